@@ -304,6 +304,7 @@ def test_lines_are_counted_with_the_blank_ones(tmp_path: Path) -> None:
     ("content", "words"),
     [
         (b"", "is empty; a log starts with a line of column names"),
+        (b"# one\n\n% two\n", "holds 2 lines of remarks and no numbers; a log starts with a line of column names"),
         (b"\n\n", "is empty"),
         (b"t,q,u\n\xff\xfe\x00", r"is not a t\w+"),
         (b"\x80\x81\x82", "is not a text file in UTF-8"),

@@ -19,7 +19,9 @@ import vpm
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGE = ROOT / "python" / "vpm"
 
-OPTIONAL = {"control", "h5py", "jinja2", "matplotlib", "nptdms", "pandas", "pyarrow", "pyulog", "rosbags"}
+OPTIONAL = {
+    *("asammdf", "control", "h5py", "jinja2", "matplotlib", "mcap", "nptdms", "pandas", "pyarrow", "pyulog", "rosbags"),
+}
 """Libraries of the extras: a plain install has none of them."""
 
 SLOW = OPTIONAL | {"rich", "scipy.signal", "scipy.stats", "typer"}

@@ -331,9 +331,16 @@ def compare(
     interpolate: Interpolate = False,
     cutoff: Cutoff = None,
     plot: Plot = None,
+    mcap: Annotated[
+        Path | None,
+        typer.Option(
+            callback=writable, help="Write measured, simulated and residual, with a layout for Foxglove beside."
+        ),
+    ] = None,
 ) -> None:
     """Say where a model and a log part: error, fit, correlation, and where the residual lives."""
     from vpm.compare import compare as compare_run
+    from vpm.compare import write_mcap
     from vpm.simulate import simulate as simulate_log
 
     machine, record = load_pair(model, log, channels, interpolate)
@@ -344,6 +351,9 @@ def compare(
         for sentence in channel.where.sentences:
             console.print(f"  {channel.channel}: {sentence}", markup=False)
     save_plot(comparison.plot, plot)
+    if mcap is not None:
+        for written in write_mcap(comparison, mcap):
+            console.print(f"{written} is written", markup=False)
 
 
 @app.command(epilog="Example:  vpm report report/diagnosis.npz --out report/")

@@ -34,7 +34,7 @@ USUAL_EVALUATIONS = 15
 PERIOD = 10.0
 
 ModelPath = Annotated[Path, typer.Argument(metavar="MODEL", help="Model file (TOML).")]
-FORMATS = "CSV, Parquet, MAT, HDF5, ROS bag, MCAP, TDMS, ULog"
+FORMATS = "CSV, Parquet, MAT, HDF5, ROS bag, MCAP, MDF, TDMS, ULog"
 Logs = Annotated[list[Path], typer.Argument(metavar="LOG...", help=f"Measured records ({FORMATS}).")]
 OneLog = Annotated[Path, typer.Argument(metavar="LOG", help=f"Measured record ({FORMATS}).")]
 Interpolate = Annotated[bool, typer.Option("--interpolate", help="Bring uneven steps and clocks to one grid.")]

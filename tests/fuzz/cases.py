@@ -9,7 +9,7 @@ from random import Random
 
 from fuzz import doors, logs, stored
 
-#: What damages something and gives it to vpm, with its share of the cases.
+#: What damages something and gives it to vpm, with its share of the cases; those of no share are asked for by name.
 DOORS: dict[str, tuple[Callable[[Random, Path], None], int]] = {
     "model": (doors.model, 36),
     "scenario": (doors.scenario, 10),
@@ -19,6 +19,8 @@ DOORS: dict[str, tuple[Callable[[Random, Path], None], int]] = {
     "channel table": (logs.channels, 6),
     "log check": (logs.checked, 1),
     "result": (stored.result, 5),
+    "recorder": (logs.recorders, 0),
+    "guarded log": (logs.guarded, 0),
 }
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import math
+import struct
 from functools import cache
 from pathlib import Path
 from random import Random
@@ -90,6 +91,34 @@ def _write_recorders(folder: Path) -> None:
         with TdmsWriter(folder / "good.tdms") as tdms:
             wave = {"wf_increment": 0.002, "wf_start_offset": 0.0}
             tdms.write_segment([ChannelObject("run", name, written[name], wave) for name in ("q", "u")])
+    if importlib.util.find_spec("pyulog"):
+        (folder / "good.ulg").write_bytes(_ulog())
+
+
+def _ulog() -> bytes:
+    """A topic of ``q`` and ``u`` (PX4 guide, "ULog file format": a message is its size, its type and its content)."""
+
+    def message(kind: str, content: bytes) -> bytes:
+        return struct.pack("<HB", len(content), ord(kind)) + content
+
+    head = b"\x55\x4c\x6f\x67\x01\x12\x35\x01" + struct.pack("<Q", 0) + message("B", bytes(40))
+    head += message("F", b"arm:uint64_t timestamp;double q;double u;") + message("A", struct.pack("<BH", 0, 0) + b"arm")
+    rows = zip(*columns().values(), strict=True)
+    return head + b"".join(message("D", struct.pack("<HQdd", 0, round(1e6 * t), q, u)) for t, q, u in rows)
+
+
+@cache
+def mdf(folder: Path) -> dict[str, bytes]:
+    """An MDF file of each version: two groups with clocks of their own, units and conversions."""
+    from asammdf import MDF, Signal
+
+    written = columns()
+    for version in ("4.10", "3.30"):
+        with MDF(version=version) as file:
+            file.append([Signal(written["q"], written["time"], name="q", unit="deg", conversion={"a": 2.0, "b": 1.0})])
+            file.append([Signal(written["u"], written["time"], name="u", conversion={"formula": "2 * X"})])
+            file.save(folder / f"mdf_{version[0]}", compression=2 if version == "4.10" else 0)
+    return {path.suffix: path.read_bytes() for path in folder.glob("mdf_*")}
 
 
 def _irregular(dice: Random) -> Any:
@@ -108,7 +137,26 @@ def table(dice: Random, folder: Path) -> None:
 
 def octets(dice: Random, folder: Path) -> None:
     """A file of any format."""
+    _damaged(dice, folder, sorted(files(folder)))
+
+
+def recorders(dice: Random, folder: Path) -> None:
+    """A TDMS or a ULog file."""
+    _damaged(dice, folder, sorted({".tdms", ".ulg"} & set(files(folder))))
+
+
+def _damaged(dice: Random, folder: Path, endings: list[str]) -> None:
     known = files(folder)
+    ending = dice.choice(endings)
+    path = folder / f"log{ending}"
+    path.write_bytes(damage.octets(known[ending], dice))
+    record = Experiment.load(path, irregular=_irregular(dice))
+    finite("record", record.time, record.data)
+
+
+def guarded(dice: Random, folder: Path) -> None:
+    """An MDF file, whose reader is a process of its own: one of these costs as much as hundreds of other cases."""
+    known = mdf(folder)
     ending = dice.choice(sorted(known))
     path = folder / f"log{ending}"
     path.write_bytes(damage.octets(known[ending], dice))

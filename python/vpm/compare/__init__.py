@@ -4,6 +4,7 @@ from vpm.compare.comparison import ChannelComparison, Comparison
 from vpm.compare.correlation import Correlation, autocorrelation, cross_correlation, effective_samples
 from vpm.compare.measure import SimulatedRun, compare
 from vpm.compare.regions import Bin, Region, Where
+from vpm.compare.written import write_mcap
 
 __all__ = [
     "Bin",
@@ -17,4 +18,5 @@ __all__ = [
     "compare",
     "cross_correlation",
     "effective_samples",
+    "write_mcap",
 ]

@@ -125,7 +125,8 @@ def _names(path: str | PathLike[str], lines: Sequence[str], told: Sequence[int])
     """Place and text of the line of names: the first that is no remark, or the last remark above the numbers."""
     first = next((place for place in told if not lines[place].startswith(REMARKS)), None)
     if first is None:
-        raise ExperimentError(f"{path} is empty; a log starts with a line of column names", path=str(path))
+        what = f"holds {len(told)} lines of remarks and no numbers" if told else "is empty"
+        raise ExperimentError(f"{path} {what}; a log starts with a line of column names", path=str(path))
     if not _is_numbers(lines[first]):
         return first, lines[first]
     above = max((place for place in told if place < first), default=None)

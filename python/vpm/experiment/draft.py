@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,11 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import ExperimentError, UnitError
+from vpm.errors import ExperimentError, UnitError, VpmError
 from vpm.experiment.grid import Source, check_finite
 from vpm.experiment.readers import open_log
 from vpm.experiment.readers.base import Log
 from vpm.experiment.table import Table
+from vpm.expression import PURE, Quantity, read_expression
 from vpm.units import parse_unit
 
 if TYPE_CHECKING:
@@ -47,73 +48,95 @@ def mapped_draft(log: Log, table: Mapping[str, ChannelEntry], model: Model | Non
     """Columns that a channel table names."""
     path = log.path
     present = _present_columns(path, table, log)
-    content = log.read(list(present.values()), present["time"])
+    columns = list(dict.fromkeys(column for found in present.values() for column in found.values()))
+    content = log.read(columns, present["time"][""])
     source = Source(str(path), content.lines, str(path))
     entry = table["time"]
     clock_factor, _ = to_si(entry.unit, "time", None, str(path), expected="s")
-    if present["time"] in content.stamps and clock_factor * entry.scale != 1.0:
+    clock = present["time"][""]
+    if clock in content.stamps and clock_factor * entry.scale != 1.0:
         raise ExperimentError(
             f'{path}: the clock "{entry.column}" holds stamps, which are read in seconds, but its entry makes '
             f'{clock_factor * entry.scale:g} s of each; write unit = "s" and no scale',
             path=str(path),
             channel="time",
         )
-    draft = Draft(source, (content.columns[present["time"]] * entry.scale + entry.offset) * clock_factor)
+    draft = Draft(source, (content.columns[clock] * entry.scale + entry.offset) * clock_factor)
     draft.shift = entry.offset * clock_factor
     draft.history += [f"Read {draft.time.size} rows of {Path(path).name}.", *content.notes]
-    draft.unused = tuple(column for column in log.header if column not in present.values())
+    draft.unused = tuple(column for column in log.header if column not in columns)
     for channel, entry in table.items():
         if channel != "time":
             _map_channel(draft, content, channel, entry, present.get(channel), model)
     return draft
 
 
-def _present_columns(path: str | PathLike[str], table: Mapping[str, ChannelEntry], log: Log) -> dict[str, str]:
-    """Column of each channel that the file has, by its name there; the others have to be optional."""
+def _present_columns(
+    path: str | PathLike[str], table: Mapping[str, ChannelEntry], log: Log
+) -> dict[str, dict[str, str]]:
+    """Columns of each channel that the file has, by their names there; channels without have to be optional."""
     if "time" not in table:
         raise ExperimentError(
             f'{path}: the channel table maps no column to "time"; add time = {{ column = "...", unit = "s" }}',
             path=str(path),
         )
+    if table["time"].value:
+        raise ExperimentError(
+            f'{path}: the channel table maps the value "{table["time"].value}" to time; map a column, with scale and '
+            "offset",
+            path=str(path),
+        )
     owners: dict[str, str] = {}
     present = {}
     for channel, entry in table.items():
-        found = log.find(entry.column)
-        column = found or entry.column
-        if column in owners:
+        found = {name: log.find(part.column) for name, part in entry.parts.items()}
+        # Values may share their columns: a difference and a sum of two are two channels.
+        column = found.get("") or entry.column
+        if column and owners.setdefault(column, channel) != channel:
             raise ExperimentError(
                 f'{path}: the column "{entry.column}" is mapped to both "{owners[column]}" and "{channel}"; '
                 "map it once",
                 path=str(path),
                 channel=channel,
             )
-        owners[column] = channel
-        if found is not None:
-            present[channel] = found
-        elif not entry.optional or channel == "time" or entry.column in log.refused:
-            raise log.missing(entry.column, channel)
+        there = {name: place for name, place in found.items() if place is not None}
+        absent = [part.column for name, part in entry.parts.items() if name not in there]
+        if not absent:
+            present[channel] = there
+        elif not entry.optional or channel == "time" or absent[0] in log.refused:
+            raise log.missing(absent[0], channel)
     return present
 
 
 def _map_channel(
-    draft: Draft, content: Table, channel: str, entry: ChannelEntry, column: str | None, model: Model | None
+    draft: Draft,
+    content: Table,
+    channel: str,
+    entry: ChannelEntry,
+    columns: Mapping[str, str] | None,
+    model: Model | None,
 ) -> None:
-    """Scale, shift and convert one column: value = (column * scale + offset) in the unit of the entry."""
+    """Scale, shift and convert one channel: (column or value * scale + offset) in the unit of the entry."""
     factor, unit = to_si(entry.unit, channel, model, draft.source.name)
     draft.units[channel] = unit
-    if column is None:
+    if columns is None:
         draft.columns[channel] = np.zeros(draft.time.size)
-        draft.history.append(f'{channel} is zero, because the file has no column "{entry.column}" and it is optional.')
+        lacking = "not all columns of the" if entry.value else "no"
+        draft.history.append(f"{channel} is zero, because the file has {lacking} {entry.told} and it is optional.")
         return
-    raw = content.columns[column]
-    own = content.clocks.get(column)
+    own = _clock(draft, content, channel, columns)
     if own is not None:
         draft.clocks[channel] = own + draft.shift
-    check_finite(
-        raw, draft.time if own is None else own, f'column "{entry.column}" ({channel})', draft.source, channel=channel
-    )
+    for name, part in entry.parts.items():
+        what = f'column "{part.column}" ({channel})'
+        check_finite(
+            content.columns[columns[name]], draft.time if own is None else own, what, draft.source, channel=channel
+        )
+    raw = _built(draft, content, channel, entry, columns) if entry.value else content.columns[columns[""]]
     draft.columns[channel] = (raw * entry.scale + entry.offset) * factor
-    words = [f'{channel} is column "{entry.column}"']
+    words = [f"{channel} is {entry.told}"]
+    if entry.value:
+        words[0] += " of " + " and ".join(f'column "{part.column}" in {part.unit}' for part in entry.columns.values())
     if entry.scale != 1.0:
         words.append(f"times {entry.scale:.9g}")
     if entry.offset != 0.0:
@@ -122,6 +145,43 @@ def _map_channel(
     draft.history.append(", ".join(words) + ".")
     if entry.delay != 0.0:
         draft.delays[channel] = entry.delay
+
+
+def _clock(draft: Draft, content: Table, channel: str, columns: Mapping[str, str]) -> Array | None:
+    """Clock of the columns of a channel, which has to be one; None where it is that of the record."""
+    first, *others = (content.clocks.get(column) for column in columns.values())
+    for own, column in zip(others, list(columns.values())[1:], strict=True):
+        if not np.array_equal(draft.time if own is None else own, draft.time if first is None else first):
+            raise ExperimentError(
+                f'{draft.source.name}: the value of "{channel}" is built from columns with clocks of their own, of '
+                f'which "{column}" is one; build it from columns of one topic or group',
+                path=draft.source.path,
+                channel=channel,
+            )
+    return first
+
+
+def _built(draft: Draft, content: Table, channel: str, entry: ChannelEntry, columns: Mapping[str, str]) -> Array:
+    """Value over several columns, in the unit of the entry."""
+    units = {name: parse_unit(part.unit) for name, part in entry.columns.items()}
+    parts = {
+        name: Quantity(content.columns[column] * units[name].factor, units[name].dimension)
+        for name, column in columns.items()
+    }
+    given = parse_unit(entry.unit)
+    try:
+        value = read_expression(entry.value)(parts)
+        if value.dimension != given.dimension:
+            kind = replace(given, dimension=value.dimension).kind
+            raise VpmError(f'"{entry.value}" is in {kind}, but its unit is {entry.unit}; correct one of them')
+        if value.dimension == PURE and given.factor != 1.0 and all(unit.factor == 1.0 for unit in units.values()):
+            # Nobody can tell whether 360 x of turns x is meant in degrees already.
+            raise VpmError(f'"{entry.value}" comes out in rad or 1, but its unit is {entry.unit}; write unit = "rad"')
+    except VpmError as error:
+        raise ExperimentError(
+            f"{draft.source.name}, channel {channel}: {error}", path=draft.source.path, channel=channel
+        ) from error
+    return np.asarray(value.values / given.factor, dtype=np.float64)
 
 
 def plain_draft(log: Log) -> Draft:

@@ -9,6 +9,8 @@ from os import PathLike
 from pathlib import Path
 
 from vpm.errors import ExperimentError
+from vpm.experiment.readers.base import reading
+from vpm.experiment.readers.lerobot import episodes_of, is_data_set
 from vpm.experiment.record import Experiment
 from vpm.files import exists
 
@@ -39,7 +41,10 @@ def shared(records: Sequence[Experiment]) -> list[Experiment]:
 
 
 def files_of(path: str | PathLike[str]) -> list[Path]:
-    """The file, or all that fit a pattern in the order of their names."""
+    """The file, all that fit a pattern in the order of their names, or the episodes of a data set of LeRobot."""
+    if is_data_set(path):
+        with reading(path):
+            return episodes_of(path)
     if not has_magic(str(path)) or exists(path):
         return [Path(path)]
     found = sorted(glob(str(path), recursive=True))  # noqa: PTH207  Path.glob refuses absolute patterns

@@ -122,10 +122,10 @@ class Experiment(Result):
         resample: float | None = None,
         name: str | None = None,
     ) -> Self:
-        """Read a log: CSV, Parquet, MATLAB, HDF5, a ROS bag or MCAP, TDMS, ULog, or what `save` wrote.
+        """Read a log: CSV, Parquet, MATLAB, HDF5, a ROS bag or MCAP, MDF, TDMS, ULog, or what `save` wrote.
 
         The ending of the name says which. Formats beside CSV and MATLAB up to 7.2 need an extra (``parquet``,
-        ``hdf5``, ``ros``, ``tdms``, ``ulog``).
+        ``hdf5``, ``ros``, ``mdf``, ``tdms``, ``ulog``).
 
         A channel table says which column is which channel: ``value = (column * scale + offset)`` in its unit, which
         becomes SI, and a channel that lags the others by ``delay`` is moved back. Without any table every column is a

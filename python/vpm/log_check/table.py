@@ -13,7 +13,7 @@ from vpm.model import ChannelEntry
 
 def line_of(channel: str, entry: ChannelEntry) -> str:
     """An entry as a line of TOML; what stands at its default is left out."""
-    parts = [f"column = {_quoted(entry.column)}", f"unit = {_quoted(entry.unit)}"]
+    parts = [*_source(entry), f"unit = {_quoted(entry.unit)}"]
     numbers = (("scale", entry.scale, 1.0), ("offset", entry.offset, 0.0), ("delay", entry.delay, 0.0))
     parts += [f"{key} = {value!r}" for key, value, default in numbers if value != default]
     parts += ["optional = true"] if entry.optional else []
@@ -33,8 +33,11 @@ def corrected_text(text: str, lines: Mapping[str, str], path: str | Path) -> str
     ModelError
         An entry does not stand on one line.
     """
+    inner = r"\{(?:[^{}\n]|\{[^{}\n]*\})*\}"  # columns of a value, and the entry of each
     for channel, line in lines.items():
-        entry = rf"""^[ \t]*["']?{re.escape(channel)}["']?[ \t]*=[ \t]*\{{[^{{}}\n]*\bcolumn\b[^{{}}\n]*\}}"""
+        entry = (
+            rf"""^[ \t]*["']?{re.escape(channel)}["']?[ \t]*=[ \t]*\{{(?=[^\n]*\bcolumns?\b)(?:[^{{}}\n]|{inner})*\}}"""
+        )
         found = list(re.finditer(entry, text, re.MULTILINE))
         if len(found) != 1:
             raise ModelError(
@@ -44,6 +47,17 @@ def corrected_text(text: str, lines: Mapping[str, str], path: str | Path) -> str
             )
         text = text[: found[0].start()] + line + text[found[0].end() :]
     return text
+
+
+def _source(entry: ChannelEntry) -> list[str]:
+    """The column, or the value and its columns."""
+    if not entry.value:
+        return [f"column = {_quoted(entry.column)}"]
+    each = (
+        f"{name} = {{ column = {_quoted(part.column)}, unit = {_quoted(part.unit)} }}"
+        for name, part in entry.columns.items()
+    )
+    return [f"value = {_quoted(entry.value)}", f"columns = {{ {', '.join(each)} }}"]
 
 
 def _quoted(text: str) -> str:

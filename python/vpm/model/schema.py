@@ -6,12 +6,13 @@ Only form is checked here. What needs more than one key to judge (references, un
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated, Literal
+from typing import Annotated, Literal, Self
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
 from vpm.catalogue import EFFECTS, Side
 from vpm.catalogue.traits import Traits
+from vpm.expression import read_expression
 from vpm.model.beam import Beam, Gauge, Line, Marker
 from vpm.model.contact import Bushing, Contact, LoadCell
 from vpm.model.controller import TYPES, Controller
@@ -128,15 +129,44 @@ def _readable(unit: str) -> str:
     return unit
 
 
-class ChannelEntry(BaseModel):
-    """Column of a log that holds one channel.
+class ColumnPart(BaseModel):
+    """Column that a value is built from; as a name alone it holds pure numbers.
 
     Attributes
     ----------
     column : str
-        Name of the column.
     unit : str
-        Unit of ``scale column + offset``.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    column: Text
+    unit: Annotated[Text, AfterValidator(_readable)] = "1"
+
+
+def _part(given: object) -> object:
+    return {"column": given} if isinstance(given, str) else given
+
+
+def _expression(text: str) -> str:
+    if text:
+        read_expression(text)
+    return text
+
+
+class ChannelEntry(BaseModel):
+    """Column of a log that holds one channel, or columns that it is built from.
+
+    Attributes
+    ----------
+    column : str
+        Name of the column; none where there is a `value`.
+    value : str
+        Expression over `columns`, worked out in SI; see `vpm.expression`.
+    columns : dict of str to ColumnPart
+        Column of each name in `value`.
+    unit : str
+        Unit of ``scale column + offset``; a `value` has to be of its kind.
     scale : float
         Factor on the numbers of the column.
     offset : float
@@ -149,12 +179,36 @@ class ChannelEntry(BaseModel):
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    column: Text
+    column: str = ""
+    value: Annotated[str, AfterValidator(_expression)] = ""
+    columns: dict[str, Annotated[ColumnPart, BeforeValidator(_part)]] = Field(default_factory=dict)
     unit: Annotated[Text, AfterValidator(_readable)]
     scale: Annotated[Number, AfterValidator(_not_zero)] = 1.0
     offset: Number = 0.0
     delay: Number = 0.0
     optional: Switch = False
+
+    @model_validator(mode="after")
+    def _is_one(self) -> Self:
+        """Check that it is a column, or a value over columns that it names all."""
+        if bool(self.column) == bool(self.value):
+            raise ValueError("needs either a column, or a value over columns; give one of them")
+        named = set(read_expression(self.value).names) if self.value else set()
+        for name in sorted(named.symmetric_difference(self.columns)):
+            if name in self.columns:
+                raise ValueError(f'has columns.{name}, which its value "{self.value}" does not name; leave it out')
+            raise ValueError(f'has the value "{self.value}", but columns has no {name}; name its column')
+        return self
+
+    @property
+    def parts(self) -> dict[str, ColumnPart]:
+        """Columns by the names that the value has for them; a column alone has the name ``""``."""
+        return self.columns or {"": ColumnPart(column=self.column, unit=self.unit)}
+
+    @property
+    def told(self) -> str:
+        """What it is read from, in words."""
+        return f'value "{self.value}"' if self.value else f'column "{self.column}"'
 
 
 class Document(Entry):

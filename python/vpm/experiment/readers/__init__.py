@@ -15,9 +15,10 @@ PARQUET = (".parquet", ".pq")
 MATLAB = (".mat",)
 HDF5 = (".h5", ".hdf5", ".hdf", ".he5")
 BAGS = (".bag", ".db3", ".mcap")
+MDF = (".mf4", ".mdf")
 TDMS = (".tdms",)
 ULOG = (".ulg",)
-ENDINGS = (".csv", ".tsv", ".txt", *PARQUET, *MATLAB, *HDF5, *BAGS, *TDMS, *ULOG)
+ENDINGS = (".csv", ".tsv", ".txt", *PARQUET, *MATLAB, *HDF5, *BAGS, *MDF, *TDMS, *ULOG)
 
 OWN = frozenset(ending[1:] for ending in ENDINGS)
 
@@ -31,7 +32,8 @@ def open_log(path: str | PathLike[str]) -> Log:
         ``.csv`` and every ending that is not named here is text; ``.parquet`` and ``.pq`` need the extra ``parquet``;
         ``.mat`` of MATLAB up to 7.2 needs none, of 7.3 the extra ``hdf5``, as do ``.h5``, ``.hdf5``, ``.hdf`` and
         ``.he5``; ``.bag`` (ROS 1), ``.db3`` and ``.mcap`` and folders with a ``metadata.yaml`` (ROS 2) need the extra
-        ``ros``; ``.tdms`` of LabVIEW the extra ``tdms``, ``.ulg`` of PX4 ``ulog``. Other packages may bring more.
+        ``ros``; ``.mf4`` and ``.mdf`` the extra ``mdf``, ``.tdms`` of LabVIEW ``tdms``, ``.ulg`` of PX4 ``ulog``;
+        folders of LeRobot, and ``FOLDER/episode_000003`` in them, ``parquet``. Other packages may bring more.
 
     Returns
     -------
@@ -53,7 +55,7 @@ def open_log(path: str | PathLike[str]) -> Log:
 def _opened(path: str | PathLike[str]) -> Log:
     file = Path(path)
     ending = file.suffix.lower()
-    if ending in (*PARQUET, *MATLAB, *HDF5, *BAGS, *TDMS, *ULOG) and not file.exists():
+    if ending in (*PARQUET, *MATLAB, *HDF5, *BAGS, *MDF, *TDMS, *ULOG) and not file.exists():
         raise ExperimentError(f"{path} does not exist; check the name and the folder", path=str(path))
     if ending in PARQUET:
         from vpm.experiment.readers.parquet import ParquetLog
@@ -67,10 +69,20 @@ def _opened(path: str | PathLike[str]) -> Log:
         from vpm.experiment.readers.hdf5 import Hdf5Log
 
         return Hdf5Log(path)
+    if ending == ".mcap":
+        from vpm.experiment.readers.mcap_json import JsonLog, is_json
+
+        if is_json(path):
+            return JsonLog(path)
     if ending in BAGS or (file / "metadata.yaml").is_file():
         from vpm.experiment.readers.ros import BagLog
 
         return BagLog(path)
+    if ending in MDF:
+        from vpm.experiment.readers.guarded import GuardedLog
+        from vpm.experiment.readers.mdf import MdfLog
+
+        return GuardedLog(path, MdfLog)
     if ending in TDMS:
         from vpm.experiment.readers.tdms import TdmsLog
 
@@ -79,11 +91,16 @@ def _opened(path: str | PathLike[str]) -> Log:
         from vpm.experiment.readers.ulog import UlogLog
 
         return UlogLog(path)
+    from vpm.experiment.readers.lerobot import EpisodeLog, is_data_set, is_episode
+
+    if is_data_set(file) or (not file.exists() and is_episode(file)):
+        return EpisodeLog(path)
     if plugin := usable("readers", OWN).get(ending[1:]):
         return _by_plugin(plugin, path)
     if file.is_dir():
         raise ExperimentError(
-            f"{path} cannot be read: it is a folder without a metadata.yaml, so no ROS 2 bag; give the path of a file",
+            f"{path} cannot be read: it is a folder without a metadata.yaml, so no ROS 2 bag, and without a "
+            "meta/info.json, so no data set of LeRobot; give the path of a file",
             path=str(path),
         )
     from vpm.experiment.readers.text import TextLog

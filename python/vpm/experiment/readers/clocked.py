@@ -5,8 +5,9 @@ from __future__ import annotations
 import logging
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from os import PathLike
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -37,8 +38,13 @@ class ClockedLog(Log):
         Names of clocks, and the group of each; they are no channels.
     remarks : tuple of str
         Sentences about the whole file, for the history of the record.
+    package, extra, kind : str
+        Library that reads such files, the extra that installs it, and what a file is called: ``"a TDMS file"``.
     """
 
+    package: ClassVar[str]
+    extra: ClassVar[str]
+    kind: ClassVar[str]
     groups: Mapping[str, str]
     sizes: Mapping[str, int]
     clocks: Mapping[str, str]
@@ -55,8 +61,9 @@ class ClockedLog(Log):
             if column == TIME or column in self.clocks:
                 raise self.error(f'{self.path}: "{column}" is a clock and no channel; map it to time only')
         base = self._base(wanted, clock)
-        times = {group: self.times(group) for group in dict.fromkeys([base, *(self.groups[c] for c in wanted)])}
-        found = {column: self.values(column) for column in wanted}
+        with self.held():
+            times = {group: self.times(group) for group in dict.fromkeys([base, *(self.groups[c] for c in wanted)])}
+            found = {column: self.values(column) for column in wanted}
         own = {column: times[self.groups[column]] for column in wanted}
         for column in wanted:
             promised, there = self.sizes[self.groups[column]], min(found[column].size, own[column].size)
@@ -77,6 +84,10 @@ class ClockedLog(Log):
             raise self.error(f'{self.path}: "{clock}" is a channel and no clock; map time to a clock: {some}')
         names = dict.fromkeys(self.groups[column] for column in wanted) or self.sizes
         return max(names, key=lambda group: self.sizes.get(group, 0))
+
+    def held(self) -> AbstractContextManager[None]:
+        """Context in which `times` and `values` are asked for; a reader may keep its file open in it."""
+        return nullcontext()
 
     @abstractmethod
     def times(self, group: str) -> Array:

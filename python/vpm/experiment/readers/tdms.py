@@ -33,6 +33,9 @@ class TdmsLog(ClockedLog):
     and ``wf_increment``, counted from the earliest ``wf_start_time``. Channels of times are seconds from their first.
     """
 
+    package, extra, kind = "nptdms", "tdms", "a TDMS file"
+    _file: TdmsFile
+
     def __init__(self, path: str | PathLike[str]) -> None:
         self.path = path
         self.refused: dict[str, str] = {}
@@ -109,8 +112,15 @@ class TdmsLog(ClockedLog):
                     f'{self.path}: the column "{column}" has {self.sizes[column]} values and the clock "{clock}" '
                     f"{self.sizes[clock]}; map channels that were sampled together, or map time to {TIME}"
                 )
-        found = {column: self.values(column) for column in columns}
+        with self.held():
+            found = {column: self.values(column) for column in columns}
         return Table(self.header, found, None, frozenset(self._stamps.intersection(columns)), notes=self.remarks)
+
+    @contextmanager
+    def held(self) -> Iterator[None]:
+        """The file open; see `ClockedLog.held`."""
+        with self._opened() as self._file:
+            yield
 
     def times(self, group: str) -> Array:
         """Times of a channel's wave form, s."""
@@ -120,8 +130,7 @@ class TdmsLog(ClockedLog):
     def values(self, column: str) -> Array:
         """Numbers of a channel; times are seconds from the first."""
         group, name = self._places[column]
-        with self._opened() as file:
-            samples = file[group][name][:]
+        samples = self._file[group][name][:]
         if column in self._stamps:
             ticks = samples.astype("datetime64[us]").astype(np.int64)
             return np.asarray((ticks - ticks[0]) * 1e-6, dtype=np.float64)

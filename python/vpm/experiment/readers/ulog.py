@@ -30,6 +30,8 @@ class UlogLog(ClockedLog):
     ``topic.timestamp``, ``topic``, or ``time``. All count from the first message of the file.
     """
 
+    package, extra, kind = "pyulog", "ulog", "a ULog file"
+
     def __init__(self, path: str | PathLike[str]) -> None:
         self.path = path
         self.units: dict[str, str] = {}
