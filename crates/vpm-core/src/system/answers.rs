@@ -178,14 +178,11 @@ impl<S: Scalar> Dynamics<S> {
     ///
     /// Checked: against the derivative of the marker's pose.
     pub fn jacobian(&mut self, q: &[S], marker: usize, jacobian: &mut [S]) {
-        let Self { model, data, loads, .. } = self;
         jacobian.fill(S::zero());
+        let Some(Pose { translation: at, .. }) = self.located(q, marker) else { return };
+        let Self { model, data, .. } = self;
         let Some(place) = model.markers().get(marker) else { return };
-        loads.fill(S::zero());
-        frames(model, data, q, loads);
-        poses(model, data);
         let (n, frames) = (model.n_coordinates(), &data.composite.frames);
-        let at = (frames[place.frame].pose * Pose::from_f64(place.pose)).translation;
         for_each_column(model, frames, &data.composite.sections, place.frame, |coordinate, column: Twist<S>| {
             let velocity = column.linear + column.angular.cross(at);
             let entries = column.angular.to_array().into_iter().chain(velocity.to_array());
@@ -193,5 +190,15 @@ impl<S: Scalar> Dynamics<S> {
                 row[coordinate] = entry;
             }
         });
+    }
+
+    /// Pose of a marker in the world at `q`, all frames being where they are then; none if there is no such marker.
+    pub(crate) fn located(&mut self, q: &[S], marker: usize) -> Option<Pose<S>> {
+        let Self { model, data, loads, .. } = self;
+        let place = model.markers().get(marker)?;
+        loads.fill(S::zero());
+        frames(model, data, q, loads);
+        poses(model, data);
+        Some(data.composite.frames[place.frame].pose * Pose::from_f64(place.pose))
     }
 }
