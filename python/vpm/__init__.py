@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from vpm.ranking import Ranking, rank
     from vpm.report import Report, report, write_report
     from vpm.scenario import Scenario, ScenarioRun
+    from vpm.shaping import Shaper, shaper
     from vpm.simplify import Ladder, simplify
     from vpm.simulate import Run, Setup, simulate
     from vpm.stepping import Simulation
@@ -76,6 +77,7 @@ __all__ = [
     "Scenario",
     "ScenarioRun",
     "Setup",
+    "Shaper",
     "Simulation",
     "Trial",
     "VpmError",
@@ -96,6 +98,7 @@ __all__ = [
     "rank",
     "realtime",
     "report",
+    "shaper",
     "simplify",
     "simulate",
     "simulate_batch",
@@ -142,6 +145,8 @@ _HOMES = {
     "write_report": "vpm.report",
     "Scenario": "vpm.scenario",
     "ScenarioRun": "vpm.scenario",
+    "Shaper": "vpm.shaping",
+    "shaper": "vpm.shaping",
     "Ladder": "vpm.simplify",
     "simplify": "vpm.simplify",
     "Run": "vpm.simulate",
