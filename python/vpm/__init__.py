@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from vpm.linear import LinearModel
     from vpm.log_check import LogCheck, check_log
     from vpm.model import Dynamics, Model
-    from vpm.observer import Noise, Observation, observe
+    from vpm.observer import Noise, Observation, Observer, observe
     from vpm.ranking import Ranking, rank
     from vpm.report import Report, report, write_report
     from vpm.scenario import Scenario, ScenarioRun
@@ -70,6 +70,7 @@ __all__ = [
     "Model",
     "Noise",
     "Observation",
+    "Observer",
     "OilFit",
     "Ranking",
     "Report",
@@ -137,6 +138,7 @@ _HOMES = {
     "Model": "vpm.model",
     "Noise": "vpm.observer",
     "Observation": "vpm.observer",
+    "Observer": "vpm.observer",
     "observe": "vpm.observer",
     "Ranking": "vpm.ranking",
     "rank": "vpm.ranking",
