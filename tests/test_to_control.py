@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,7 +25,7 @@ def machines() -> dict[str, Model]:
 def test_all_states_and_inputs_keep_their_names(name: str) -> None:
     model = machines()[name]
     linear = model.linearize()
-    system = linear.to_control()
+    system: Any = linear.to_control()
     for given, made in (
         (linear.states, system.state_labels),
         (linear.inputs, system.input_labels),
@@ -38,7 +39,8 @@ def test_all_states_and_inputs_keep_their_names(name: str) -> None:
 
 def test_sampled_systems_answer_as_held_commands_do() -> None:
     linear = machines()["beam"].linearize()
-    system, (A, B) = linear.to_control(1e-3), linear.sampled(1e-3)
+    system: Any = linear.to_control(1e-3)
+    A, B = linear.sampled(1e-3)
     assert system.dt == 1e-3
     np.testing.assert_array_equal(system.A, A)
     np.testing.assert_array_equal(system.B, B)
