@@ -38,12 +38,13 @@ if TYPE_CHECKING:
     from vpm.linear import LinearModel
     from vpm.log_check import LogCheck, check_log
     from vpm.model import Dynamics, Model
-    from vpm.observer import Noise, Observation, observe
+    from vpm.observer import Noise, Observation, Observer, observe
     from vpm.ranking import Ranking, rank
     from vpm.realtime import write_fmu
     from vpm.report import Report, report, write_report
     from vpm.robots import ExportedRobot, ImportedRobot, export_robot, import_robot
     from vpm.scenario import Scenario, ScenarioRun
+    from vpm.shaping import Shaper, shaper
     from vpm.simplify import Ladder, simplify
     from vpm.simulate import Run, Setup, simulate
     from vpm.stepping import Simulation
@@ -74,6 +75,7 @@ __all__ = [
     "Model",
     "Noise",
     "Observation",
+    "Observer",
     "OilFit",
     "Ranking",
     "Report",
@@ -81,6 +83,7 @@ __all__ = [
     "Scenario",
     "ScenarioRun",
     "Setup",
+    "Shaper",
     "Simulation",
     "Trial",
     "VpmError",
@@ -103,6 +106,7 @@ __all__ = [
     "rank",
     "realtime",
     "report",
+    "shaper",
     "simplify",
     "simulate",
     "simulate_batch",
@@ -143,6 +147,7 @@ _HOMES = {
     "Model": "vpm.model",
     "Noise": "vpm.observer",
     "Observation": "vpm.observer",
+    "Observer": "vpm.observer",
     "observe": "vpm.observer",
     "Ranking": "vpm.ranking",
     "rank": "vpm.ranking",
@@ -156,6 +161,8 @@ _HOMES = {
     "import_robot": "vpm.robots",
     "Scenario": "vpm.scenario",
     "ScenarioRun": "vpm.scenario",
+    "Shaper": "vpm.shaping",
+    "shaper": "vpm.shaping",
     "Ladder": "vpm.simplify",
     "simplify": "vpm.simplify",
     "Run": "vpm.simulate",

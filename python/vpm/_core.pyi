@@ -11,6 +11,7 @@ from vpm.errors import CoreError
 __all__ = [
     "Diverged",
     "Dynamics",
+    "Kalman",
     "Karl",
     "Leg",
     "Loop",
@@ -26,6 +27,7 @@ __all__ = [
     "narx_fit",
     "narx_select",
     "soft_flights",
+    "step_all",
     "stop_when",
 ]
 
@@ -90,6 +92,46 @@ class Dynamics:
         """Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential."""
     def jacobian(self, position: ArrayLike, marker: int) -> NDArray[np.float64]:
         """Jacobian (6, n) of a marker by number: angular velocity, then velocity of its origin, in world axes."""
+
+@final
+class Kalman:
+    """An extended Kalman filter that is fed sample by sample; m channels are measured.
+
+    Parameters
+    ----------
+    system : System
+    theta : array_like, shape (P,)
+    state : array_like, shape (n_states,)
+    channels : sequence of int
+    noise : tuple of array_like
+        As in `System.filter`.
+    time_step, substeps, integrator
+        As in `Simulation`.
+    """
+
+    def __new__(
+        cls,
+        system: System,
+        theta: ArrayLike,
+        state: ArrayLike,
+        channels: Sequence[int],
+        noise: tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike],
+        time_step: float,
+        substeps: int,
+        integrator: str,
+    ) -> Kalman: ...
+    def step(self, readings: ArrayLike, inputs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """State (nx,) corrected by the readings (m,), and innovations (m,); inputs are held to the next sample."""
+    def covariances(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Covariance of the last estimate (nx, nx) and of the last innovations (m, m)."""
+    def expected(self) -> NDArray[np.float64]:
+        """State (nx,) that is expected at the coming sample."""
+    def reset(self, state: ArrayLike, covariance: ArrayLike) -> None:
+        """Begin again in a state (nx,) of this covariance (nx, nx)."""
+    def hold_gain(self, gain: ArrayLike, covariance: ArrayLike, spread: ArrayLike) -> None:
+        """Keep a gain (nx, m) under which estimates and innovations have these covariances."""
+    def linearised(self, inputs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Transition (nx, nx) over a sample, outputs by the state (m, nx), covariance of what moves it (nx, nx)."""
 
 @final
 class Loop:
@@ -174,6 +216,18 @@ class Simulation:
         """All that it is now, with what delays and sampled drives remember."""
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to where it was when the snapshot was taken."""
+
+def step_all(
+    simulations: Sequence[Simulation], inputs: ArrayLike, samples: int
+) -> tuple[NDArray[np.float64], list[str | None]]:
+    """Hold ``inputs`` (E, n_inputs) in E simulations of one machine over so many samples.
+
+    Returns
+    -------
+    outputs : ndarray, shape (E, n_outputs)
+    failures : list of str or None
+        Why a simulation could not go on; its outputs are those of the sample before.
+    """
 
 @final
 class Snapshot:
@@ -307,6 +361,23 @@ class System:
         """Follow ``readings`` (N, m) with given ``gains`` (N, nx * m); as `simulate`, before each correction.
 
         Derivatives (N, m, k) are those of the measured outputs alone; outputs are, too, where ``alone``.
+        """
+    def answers(
+        self,
+        theta: ArrayLike,
+        question: str,
+        marker: int,
+        motions: Sequence[ArrayLike],
+        by_motion: bool = ...,
+        parameters: Sequence[int] = ...,
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Answers about N motions: positions, rates, accelerations or efforts, each (N, n).
+
+        Returns
+        -------
+        values : ndarray, shape (N, width)
+        derivatives : ndarray, shape (N, width, k)
+            By the three parts of the motion, if wanted, then by parameters, each named once.
         """
     def compile(self, theta: ArrayLike, integrator: str) -> str | None:
         """Make the machine code of steps by ``integrator``, as long runs do; or say why there is none."""

@@ -150,21 +150,41 @@ class LinearModel(Result):
             self.delays,
         )
 
-    def to_control(self) -> object:
-        """The same as ``control.StateSpace`` of python-control, with the names. Needs the extra ``control``.
+    def to_control(self, time_step: float | None = None) -> object:
+        """The same as ``control.StateSpace`` of python-control, with the names, dots being underscores.
+
+        Elastic coordinates and what drives hold are states like others. Needs the extra ``control``.
+
+        Parameters
+        ----------
+        time_step : float, optional
+            s; then in sampled time, exact for commands that are held, see `sampled`.
 
         Raises
         ------
         MissingExtraError
             python-control is not installed.
+        SimulationError
+            The time step is not positive.
         """
         try:
             import control
         except ImportError as error:
             raise MissingExtraError("control", "control") from error
-        names = {"states": list(self.states), "inputs": list(self.inputs), "outputs": list(self.outputs)}
+        names = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs}
         plain = {kind: [name.replace(".", "_") for name in labels] for kind, labels in names.items()}
-        return control.StateSpace(self.A, self.B, self.C, self.D, name=self.model_name.replace(".", "_"), **plain)
+        A, B = (self.A, self.B) if time_step is None else self.sampled(time_step)
+        sampling = () if time_step is None else (time_step,)
+        return control.StateSpace(
+            A,
+            B,
+            self.C,
+            self.D,
+            *sampling,
+            name=self.model_name.replace(".", "_"),
+            remove_useless_states=False,
+            **plain,
+        )
 
     def plot(
         self, kind: str = "poles", *, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None

@@ -17,6 +17,7 @@ from vpm.simulate import AUTOMATIC, Resolution, Run, Setup, judged
 from vpm.simulate.resolution import outermost, resolution
 
 if TYPE_CHECKING:
+    from vpm._core import Simulation as Core
     from vpm._core import Snapshot
 
 Array = NDArray[np.float64]
@@ -129,6 +130,11 @@ class Simulation:
         """
         commands = self._outputs[None, self._commanded]
         return resolution(self._model, self.state[None, :], commands, self._time_step, self._setup, 1.0)
+
+    @property
+    def core(self) -> Core:
+        """The core's simulation, for those who step many in one call."""
+        return self._core
 
     # ---- where it is -------------------------------------------------------------------------------------------------
 

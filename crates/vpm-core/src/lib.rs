@@ -6,6 +6,7 @@
 pub mod actuator;
 pub mod algebra;
 pub mod ball;
+pub mod batch;
 pub mod beam;
 pub mod body;
 pub mod bushing;

@@ -2,6 +2,8 @@
 
 use std::sync::Arc;
 
+use rayon::prelude::*;
+
 use crate::description::Description;
 use crate::error::{Diverged, Error, Result};
 use crate::integrator::Integrator;
@@ -16,6 +18,8 @@ use crate::table::Table;
 
 /// What an input stands for.
 const INPUT: &str = "actuator and logged supply";
+/// Steps that are worth a piece of their own: shorter ones cost more to hand over than to take.
+const WORTH: usize = 64;
 /// Samples that a delay may reach back.
 const LONGEST_DELAY: f64 = 1e6;
 
@@ -282,6 +286,17 @@ impl Live {
             states: Vec::new(),
         }))
     }
+}
+
+/// Holds the inputs (row by row, one row each) in simulations of the same machine over so many samples, on several threads; what became of
+/// each. A simulation does the same as by [`Live::step`], whatever the others do.
+pub fn step_all(lives: &mut [&mut Live], inputs: Table<'_>, samples: usize) -> Result<Vec<Result<()>>> {
+    let width = lives.first().map_or(0, |live| live.description.n_inputs());
+    inputs.expect("inputs", lives.len(), width)?;
+    let least = (WORTH / samples.max(1)).max(1);
+    let one =
+        |(row, live): (usize, &mut &mut Live)| (0..samples).try_for_each(|_| live.step(inputs.row(row)).map(|_| ()));
+    Ok(lives.par_iter_mut().with_min_len(least).enumerate().map(|(row, live)| one((row, live))).collect())
 }
 
 /// Samples to remember: the longest delay, the interpolation beyond it, and the sample itself.

@@ -5,6 +5,7 @@ mod answers;
 mod connections;
 mod counted;
 mod drives;
+mod engine;
 mod following;
 mod functions;
 mod guided;
@@ -23,8 +24,8 @@ mod turning;
 
 pub use connections::Connections;
 pub(crate) use counted::{Calls, Counted, Matrix};
+pub(crate) use engine::Engine;
 pub(crate) use following::Following;
-pub(crate) use functions::Function as RecordedFunction;
 pub(crate) use functions::Recorder;
 pub use functions::{Cache, Functions};
 pub use guided::{Guidance, Part};

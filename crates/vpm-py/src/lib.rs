@@ -11,6 +11,7 @@ mod flight;
 mod interrupt;
 mod linkage;
 mod narx;
+mod observing;
 mod realtime;
 mod stepping;
 mod system;
@@ -31,9 +32,11 @@ mod _core {
     #[pymodule_export]
     use crate::narx::{MaxwellNarx, Narx, NarxStepper, narx_candidates, narx_fit, narx_select};
     #[pymodule_export]
+    use crate::observing::Kalman;
+    #[pymodule_export]
     use crate::realtime::Loop;
     #[pymodule_export]
-    use crate::stepping::{Simulation, Snapshot, check_integrator};
+    use crate::stepping::{Simulation, Snapshot, check_integrator, step_all};
     #[pymodule_export]
     use crate::system::System;
 }

@@ -6,7 +6,7 @@ use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
 use vpm_core::Error;
 use vpm_core::integrator::Method;
-use vpm_core::live::Live;
+use vpm_core::live::{self, Live};
 use vpm_core::simulate::Stepping;
 
 use crate::arrays::{Numbers, Vector, matrix};
@@ -16,6 +16,7 @@ use crate::system::{System, checked};
 
 type Row<'py> = Bound<'py, PyArray1<f64>>;
 type Any<'py> = Bound<'py, PyAny>;
+type Stepped<'py> = (Bound<'py, PyArray2<f64>>, Vec<Option<String>>);
 
 /// Samples between two questions whether to stop.
 const PATIENCE: usize = 256;
@@ -188,4 +189,24 @@ impl Simulation {
     fn __repr__(&self) -> PyResult<String> {
         Ok(format!("Simulation(time={} s)", self.live()?.time()))
     }
+}
+
+/// Holds inputs (E, n_inputs) in E simulations of the same machine over so many samples: outputs (E, n_outputs) at their end, and of each
+/// simulation that could not go on why, or None.
+#[pyfunction]
+pub(crate) fn step_all<'py>(
+    py: Python<'py>,
+    simulations: Vec<Bound<'py, Simulation>>,
+    inputs: &Any<'py>,
+    samples: usize,
+) -> PyResult<Stepped<'py>> {
+    let inputs = Numbers::table("inputs", inputs)?;
+    let mut guards: Vec<_> = simulations.iter().map(|one| one.get().live()).collect::<PyResult<_>>()?;
+    let mut lives: Vec<&mut Live> = guards.iter_mut().map(|guard| &mut **guard).collect();
+    let result = py.detach(|| unbroken(|| live::step_all(&mut lives, inputs.as_table()?, samples)))?;
+    let failed = result.map_err(|error| CoreError::new_err(error.to_string()))?;
+    let mut outputs = Vec::new();
+    guards.iter().for_each(|live| outputs.extend_from_slice(live.outputs()));
+    let shape = [guards.len(), outputs.len() / guards.len().max(1)];
+    Ok((matrix(py, outputs, shape)?, failed.into_iter().map(|one| one.err().map(|error| error.to_string())).collect()))
 }

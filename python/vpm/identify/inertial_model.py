@@ -13,50 +13,12 @@ from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.feasibility import fault
 from vpm.identify.inertial_regression import InertialRegression
 from vpm.model import Model
+from vpm.model.standard import OF_FILE, PLAIN, STANDARD, UNITS, of_file
 
 Array = NDArray[np.float64]
 
-#: The ten standard parameters of a body, in this order, and their units.
-STANDARD = (
-    "mass",
-    "first_moment.x",
-    "first_moment.y",
-    "first_moment.z",
-    *(f"origin_inertia.{entry}" for entry in ("xx", "yy", "zz", "xy", "xz", "yz")),
-)
-UNITS = ("kg", *("kg m",) * 3, *("kg m^2",) * 6)
-#: The same of a model file, where inertia is about the centre of mass.
-_OF_FILE = (
-    "mass",
-    *(f"center_of_mass.{axis}" for axis in "xyz"),
-    *(f"inertia.{entry}" for entry in ("xx", "yy", "zz", "xy", "xz", "yz")),
-)
-#: A body of 1 kg with its centre of mass in the origin; some inertia, because the core moves no joint without.
-PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 #: Difference of efforts, relative to their size, below which they agree: rounding of long sums.
 AGREE = 1e-8
-
-
-def standard_parameters(mass: float, center: Array, inertia: Array) -> Array:
-    """Mass, first moment and moments of inertia about the frame's origin, (10,).
-
-    Parameters
-    ----------
-    mass : float
-    center : ndarray, shape (3,)
-    inertia : ndarray, shape (6,)
-        About the centre of mass: xx yy zz xy xz yz, entries of the matrix.
-    """
-    shift = mass * (float(center @ center) * np.eye(3) - np.outer(center, center))
-    x, y, z = 0, 1, 2
-    entries = shift[[x, y, z, x, x, y], [x, y, z, y, z, z]]
-    return np.array([mass, *(mass * center), *(inertia + entries)])
-
-
-def of_file(ten: Array) -> Array:
-    """Mass, centre of mass and moments of inertia about it, (10,), of standard parameters: a model file's numbers."""
-    center = ten[1:4] / ten[0]
-    return np.array([ten[0], *center, *(2.0 * ten[4:] - standard_parameters(float(ten[0]), center, ten[4:])[4:])])
 
 
 def repaired(model: Model, values: Mapping[str, float]) -> Model:
@@ -83,7 +45,7 @@ def repaired(model: Model, values: Mapping[str, float]) -> Model:
             raise IdentificationError(
                 f"{body}: no body has the values of this fit, {wrong}; fit with physical=True, or record more"
             )
-        changed |= {f"{body}.{end}": float(x) for end, x in zip(_OF_FILE, of_file(numbers), strict=True)}
+        changed |= {f"{body}.{end}": float(x) for end, x in zip(OF_FILE, of_file(numbers), strict=True)}
     for name in changed:
         if name not in model.parameters:
             raise IdentificationError(
@@ -109,9 +71,9 @@ class InertialModel:
 
     def __init__(self, model: Model, others: Sequence[str]) -> None:
         self.model = model
-        self.bodies = tuple(name for name in model.bodies if f"{name}.mass" in model.parameters)
+        self.bodies = model.standard_bodies
         self.others = tuple(others)
-        own = {f"{body}.{end}" for body in self.bodies for end in _OF_FILE}
+        own = {f"{body}.{end}" for body in self.bodies for end in OF_FILE}
         for name in self.others:
             if name not in model.parameters:
                 raise IdentificationError(
@@ -121,9 +83,9 @@ class InertialModel:
                 raise IdentificationError(
                     f"{name} belongs to a body, and all ten parameters of every body are sought anyway; name others"
                 )
-        self._places = [model.index(f"{body}.{end}") for body in self.bodies for end in _OF_FILE]
+        self._places = [model.index(f"{body}.{end}") for body in self.bodies for end in OF_FILE]
         self._columns = [*self._places, *(model.index(name) for name in self.others)]
-        self.names = (*(f"{body}.{end}" for body in self.bodies for end in STANDARD), *self.others)
+        self.names = (*model.standard_names, *self.others)
         self.units = (*UNITS * len(self.bodies), *(model.parameters[name].unit for name in self.others))
         self._plain = model.theta.copy()
         self._plain[self._places] = np.tile(PLAIN, len(self.bodies))
@@ -131,9 +93,8 @@ class InertialModel:
     @property
     def nominal(self) -> Array:
         """Standard parameters of the model file (p,)."""
-        theta = self.model.theta[self._places].reshape(-1, 10)
-        tens = [standard_parameters(float(row[0]), row[1:4], row[4:]) for row in theta]
-        return np.concatenate([*tens, self.model.theta[[self.model.index(name) for name in self.others]]])
+        others = [self.model.index(name) for name in self.others]
+        return np.concatenate([self.model.standard_parameters, self.model.theta[others]])
 
     def lacking(self, state: tuple[Array, Array, Array], inputs: Array, dt: float) -> tuple[Array, Array]:
         """What actuators give beyond what parts that are not sought need (N, n), and the regressor (N, n, p)."""
@@ -240,7 +201,7 @@ def inertial_regression(
 
 
 def _of_body(model: Model, name: str) -> bool:
-    return any(name == f"{body}.{end}" for body in model.bodies for end in _OF_FILE)
+    return any(name == f"{body}.{end}" for body in model.bodies for end in OF_FILE)
 
 
 def _not_negative(model: Model, name: str) -> bool:

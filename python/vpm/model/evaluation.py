@@ -1,168 +1,23 @@
-"""What a model answers about a single state: efforts, accelerations, inertia, energy, linear behaviour."""
+"""What a model answers about a single state: rest, vibrations, linear behaviour."""
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Iterator, Mapping
-from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import CoreError, ModelError, near_match
 from vpm.linear import LinearModel
-from vpm.model.components import Components
+from vpm.model.motions import Motions
 from vpm.model.settled import follow, rest
 from vpm.numbers import array_of, number_of
-
-if TYPE_CHECKING:
-    from vpm._core import Dynamics, System
-    from vpm.model.parameters import Parameter
 
 Array = NDArray[np.float64]
 
 
-class Evaluations(Components):
-    """The part of a model that asks the core about one state.
-
-    Positions, velocities and so on are arrays of one number per coordinate, in the order of ``model.coordinates``
-    (joints, then the elastic coordinates of flexible links); m or rad, per second, N or N m.
-    """
-
-    @property
-    @abstractmethod
-    def parameters(self) -> Mapping[str, Parameter]:
-        """Parameters by dotted name."""
-
-    @property
-    @abstractmethod
-    def theta(self) -> Array:
-        """Values of all parameters."""
-
-    @abstractmethod
-    def index(self, name: str) -> int:
-        """Index of a parameter."""
-
-    @property
-    @abstractmethod
-    def core(self) -> System:
-        """Compiled system."""
-
-    # ---- single evaluations ------------------------------------------------------------------------------------------
-
-    @cached_property
-    def dynamics(self) -> Dynamics:
-        """The core's evaluations with this model's parameters, all buffers prepared: the fastest way to call them.
-
-        Its methods are those of the model, without a Python function in between, and take markers by number.
-        """
-        from vpm._core import Dynamics
-
-        return Dynamics(self.core, self.theta)
-
-    def mass_matrix(self, q: ArrayLike) -> Array:
-        """Mass matrix M(q), payloads included.
-
-        Parameters
-        ----------
-        q : array_like, shape (n,)
-
-        Returns
-        -------
-        ndarray, shape (n, n)
-            kg, kg m or kg m^2; symmetric.
-
-        Raises
-        ------
-        CoreError
-            The length is wrong.
-        """
-        return self.dynamics.mass_matrix(q)
-
-    @property
-    def masses_at_zero(self) -> Array:
-        """What each coordinate moves where all are zero, shape (n,), kg or kg m^2: the diagonal of the mass matrix."""
-        return np.diag(self.mass_matrix(np.zeros(len(self.coordinates))))
-
-    def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
-        """Efforts that the actuators have to give for accelerations ``a``: ``M(q) a + h(q, v) - effects(q, v)``.
-
-        Weight, Coriolis and centrifugal efforts are in h; frictions, springs and loads of the model are carried too.
-
-        Parameters
-        ----------
-        q, v, a : array_like, shape (n,)
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            N or N m. What a flexible link's coordinates need beside zero, no actuator can give.
-
-        Raises
-        ------
-        CoreError
-            A length is wrong.
-        """
-        return self.dynamics.inverse_dynamics(q, v, a)
-
-    def forward_dynamics(self, q: ArrayLike, v: ArrayLike, effort: ArrayLike) -> Array:
-        """Accelerations that efforts of the actuators give, with all effects: the inverse of `inverse_dynamics`.
-
-        Parameters
-        ----------
-        q, v, effort : array_like, shape (n,)
-
-        Returns
-        -------
-        ndarray, shape (n,)
-            m/s^2 or rad/s^2.
-
-        Raises
-        ------
-        CoreError
-            A length is wrong.
-        """
-        return self.dynamics.forward_dynamics(q, v, effort)
-
-    def energy(self, q: ArrayLike, v: ArrayLike) -> tuple[float, float]:
-        """Kinetic and potential energy, J.
-
-        The potential is that of the bodies in gravity and of the effects, flexible links, contacts and bushings that
-        store energy.
-
-        Parameters
-        ----------
-        q, v : array_like, shape (n,)
-
-        Raises
-        ------
-        CoreError
-            A length is wrong.
-        """
-        return self.dynamics.energy(q, v)
-
-    def jacobian(self, marker: str, q: ArrayLike) -> Array:
-        """Jacobian of a marker: what the rates of the coordinates do to it.
-
-        Parameters
-        ----------
-        marker : str
-        q : array_like, shape (n,)
-
-        Returns
-        -------
-        ndarray, shape (6, n)
-            Angular velocity (rows 0 to 2) and velocity of its origin, in world axes, per unit rate of each coordinate.
-
-        Raises
-        ------
-        ModelError
-            There is no such marker.
-        CoreError
-            The length is wrong.
-        """
-        return self.dynamics.jacobian(q, self.markers.index(self._known(marker, self.markers, "marker")))
+class Evaluations(Motions):
+    """The part of a model that asks the core about rest and about one state of a simulation."""
 
     # ---- rest --------------------------------------------------------------------------------------------------------
 

@@ -3,5 +3,6 @@
 from vpm.observer.filtering import Record, filtered, measured_outputs
 from vpm.observer.noise import Noise, likely_noise
 from vpm.observer.observation import Observation, observe
+from vpm.observer.online import Observer
 
-__all__ = ["Noise", "Observation", "Record", "filtered", "likely_noise", "measured_outputs", "observe"]
+__all__ = ["Noise", "Observation", "Observer", "Record", "filtered", "likely_noise", "measured_outputs", "observe"]

@@ -62,13 +62,22 @@ class Noise(Storable):
         SimulationError
             A name is unknown, or a channel of the record has no noise.
         """
-        lacking = [name for name in record.channels if name not in self.readings]
+        return *self.placed(model, record.channels), first_deviations(model, record.first)
+
+    def placed(self, model: Model, channels: Sequence[str]) -> tuple[Array, Array, Array]:
+        """Deviations of readings of these channels, of forces and of states, as the core takes them.
+
+        Raises
+        ------
+        SimulationError
+            A name is unknown, or a channel has no noise.
+        """
+        lacking = [name for name in channels if name not in self.readings]
         if lacking:
             raise SimulationError(f'noise of readings: "{lacking[0]}" has none; state it, or leave all to the record')
-        readings = np.array([self.readings[name] for name in record.channels])
+        readings = np.array([self.readings[name] for name in channels])
         forces = _placed("forces", self.forces, model.coordinates)
-        states = _placed("states", self.states, model.state_names)
-        return readings, forces, states, first_deviations(model, record.first)
+        return readings, forces, _placed("states", self.states, model.state_names)
 
     def scaled(self, factor: float) -> Noise:
         """All of it by a factor."""

@@ -1,19 +1,16 @@
 //! Functions of a machine along a measured motion, many samples at a time, with derivatives by parameters.
 
-use std::sync::Arc;
-
 use rayon::prelude::*;
 
 use super::course::{Behind, Course, Memory};
 use super::sample_by_sample::SampleBySample;
 use crate::description::{Description, EffectEntry};
 use crate::error::{Error, Result};
-use crate::graph::{Evaluator, Lanes};
 use crate::motion::{JointMotion, position_sensors};
 use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, differentiate};
 use crate::sensor::Sensor;
-use crate::system::{Build, Dynamics, Kind, Places, RecordedFunction, Routine, code_pays};
+use crate::system::{Engine, Kind, Places};
 
 /// Samples between two questions whether to stop, and samples that a thread takes at once.
 pub(super) const PATIENCE: usize = 256;
@@ -106,10 +103,7 @@ impl<'a> Along<'a> {
         let (description, theta) = (self.record.description, self.theta);
         let (places, functions) = (description.places(), description.functions());
         if self.sensitivities.is_empty() {
-            let engine = match self.code(|| functions.function(&kind, theta)) {
-                Some(engine) => engine,
-                None => Engine::laws(description, theta, &kind)?,
-            };
+            let engine = Engine::of_values(description, theta, &kind, self.record.samples().len())?;
             return self.run(&Function { engine, places, width, entries: &[], columns: Vec::new() });
         }
         let (by, columns) = self.columns(places);
@@ -119,19 +113,8 @@ impl<'a> Along<'a> {
             let (pair, jacobian) = differentiate(&job, theta, self.sensitivities)?;
             return Ok(Numbers { values: pair.first, jacobian });
         }
-        let code = self.code(|| Ok(function.clone()));
-        let engine = code.unwrap_or_else(|| Engine::Blocks(function.blocks(theta)));
+        let engine = Engine::of_derivatives(&function, theta, self.record.samples().len());
         self.run(&Function { engine, places, width, entries: &function.entries, columns })
-    }
-
-    /// A function as machine code, if that pays and there is any.
-    fn code(&self, function: impl FnOnce() -> Result<Arc<RecordedFunction>>) -> Option<Engine> {
-        if !code_pays(self.record.samples().len()) {
-            return None;
-        }
-        let mut routine = Box::new(Routine::new(function().ok()?, self.theta));
-        routine.compile().ok()?;
-        Some(Engine::Code(routine))
     }
 
     /// The inputs by which functions are differentiated, and what they hand on.
@@ -245,46 +228,4 @@ struct Work {
     engine: Engine,
     inputs: Vec<f64>,
     outputs: Vec<f64>,
-}
-
-/// What works a function out.
-#[derive(Clone)]
-enum Engine {
-    /// The laws, for efforts or levers.
-    Laws(Box<Dynamics<f64>>, fn(&mut Dynamics<f64>, Places, &[f64], &mut [f64])),
-    /// Eight samples at once, operation by operation.
-    Blocks(Evaluator<Lanes>),
-    /// Machine code.
-    Code(Box<Routine<f64>>),
-}
-
-impl Engine {
-    fn laws(description: &Description, theta: &[f64], kind: &Kind) -> Result<Self> {
-        let dynamics: Dynamics<f64> = Build::dynamics(&description, theta)?;
-        let function = if *kind == Kind::Levers { levers } else { efforts };
-        Ok(Self::Laws(Box::new(dynamics), function))
-    }
-
-    /// Outputs of so many rows of inputs, `made` for each.
-    fn run(&mut self, places: Places, inputs: &[f64], outputs: &mut [f64], made: usize) {
-        let rows = inputs.chunks_exact(places.first_parameter()).zip(outputs.chunks_exact_mut(made.max(1)));
-        match self {
-            Self::Blocks(evaluator) => evaluator.run(inputs, outputs),
-            Self::Code(routine) => rows.for_each(|(inputs, outputs)| outputs.copy_from_slice(routine.at(inputs))),
-            Self::Laws(dynamics, function) => {
-                rows.for_each(|(inputs, outputs)| function(dynamics, places, inputs, outputs));
-            }
-        }
-    }
-}
-
-fn efforts(dynamics: &mut Dynamics<f64>, places: Places, inputs: &[f64], efforts: &mut [f64]) {
-    let (n, count) = (places.coordinates, dynamics.memories.len());
-    dynamics.memories.hold(&inputs[places.states - count..places.states]);
-    let (q, v) = inputs[..2 * n].split_at(n);
-    dynamics.inverse_dynamics(q, v, &inputs[places.accelerations()..places.accelerations() + n], efforts);
-}
-
-fn levers(dynamics: &mut Dynamics<f64>, places: Places, inputs: &[f64], levers: &mut [f64]) {
-    dynamics.levers(&inputs[..places.coordinates], levers);
 }

@@ -9,10 +9,12 @@
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
 use super::{Drive, Inputs, Plan, Run, Setting, Stepper, check_state, check_step, execute};
+use crate::description::Description;
 use crate::error::{Error, Result};
 use crate::scalar::Dual;
 use crate::sensitivity::LANES;
 use crate::sensor::Layout;
+use crate::system::Dynamics;
 use crate::table::Table;
 
 /// A number with its derivatives along some of the states.
@@ -88,8 +90,8 @@ impl Readings<'_> {
 }
 
 impl Noise<'_> {
-    fn check(&self, setting: &Setting<'_>, channels: usize) -> Result<()> {
-        let (n, states) = (setting.description.n_coordinates(), setting.description.n_states());
+    pub(super) fn check(&self, description: &Description, channels: usize) -> Result<()> {
+        let (n, states) = (description.n_coordinates(), description.n_states());
         Table::vector("noise of readings", self.readings, channels, "measured channel")?;
         Table::vector("noise of forces", self.forces, n, "coordinate")?;
         Table::vector("noise of states", self.states, states, "state")?;
@@ -126,7 +128,7 @@ pub fn filter<'a>(
 ) -> Result<Filtered> {
     let inputs = inputs.into();
     readings.check(&setting, &inputs)?;
-    noise.check(&setting, readings.channels.len())?;
+    noise.check(setting.description, readings.channels.len())?;
     check_state("initial_state", setting.description, initial_state)?;
     check_step(setting.description, setting.theta, setting.stepping, initial_state)?;
     let plan = Plan {
@@ -205,11 +207,11 @@ impl<'a> Filter<'a> {
         for row in 0..self.rows {
             self.predict(row)?;
             let innovation = DVector::from_column_slice(self.readings.table.row(row)) - &self.predicted;
-            let (gain, spread) = self.gain(row)?;
+            let (gain, spread) = gain(&self.covariance, &self.output, self.noise.readings, row)?;
             let moved = &gain * &innovation;
             self.state += &moved;
             self.stepper.correct_arriving(row, |place| Number::constant(moved[place]));
-            self.correct(&gain);
+            self.covariance = corrected(&self.covariance, &gain, &self.output, self.noise.readings);
             innovations.extend(innovation.iter());
             covariances.extend(spread.iter());
             // Row by row, where nalgebra keeps columns.
@@ -246,35 +248,9 @@ impl<'a> Filter<'a> {
         Ok(())
     }
 
-    /// `K = P H' S^-1`, and `S = H P H' + R`.
-    fn gain(&self, row: usize) -> Result<(DMatrix<f64>, DMatrix<f64>)> {
-        let shared = &self.covariance * self.output.transpose();
-        let mut spread = &self.output * &shared;
-        for (place, deviation) in self.noise.readings.iter().enumerate() {
-            spread[(place, place)] += deviation * deviation;
-        }
-        let factors: Option<Cholesky<f64, Dyn>> = spread.clone().cholesky();
-        let Some(factors) = factors else {
-            let path = format!("the covariance of the innovations at sample {row}");
-            return Err(Error::NonFinite { path, value: f64::NAN });
-        };
-        Ok((factors.solve(&shared.transpose()).transpose(), spread))
-    }
-
-    /// `P <- (1 - K H) P (1 - K H)' + K R K'`, which stays definite however it is rounded (Bucy & Joseph 1968).
-    fn correct(&mut self, gain: &DMatrix<f64>) {
-        let nx = self.state.len();
-        let left = DMatrix::identity(nx, nx) - gain * &self.output;
-        let mut weighed = gain.clone();
-        for (mut column, deviation) in weighed.column_iter_mut().zip(self.noise.readings) {
-            column *= *deviation;
-        }
-        self.covariance = &left * &self.covariance * left.transpose() + &weighed * weighed.transpose();
-    }
-
     /// State and covariance at the next sample.
     fn advance(&mut self, row: usize, setting: Setting<'_>) -> Result<()> {
-        let pushed = self.pushed();
+        let pushed = pushed(self.stepper.dynamics(), self.state.as_slice(), self.noise.forces);
         let mut next = self.state.clone();
         for first in (0..self.state.len()).step_by(LANES) {
             self.seed(first);
@@ -284,37 +260,83 @@ impl<'a> Filter<'a> {
                 take(&mut self.transition, place, first, reached);
             }
         }
-        let (n, half) = (pushed.nrows(), 0.5 * self.time_step);
-        let carried = self.transition.columns(n, n) * &pushed;
-        let mut moved = carried * half;
-        let mut rates = moved.rows_mut(n, n);
-        rates += &pushed * half;
-        self.covariance =
-            &self.transition * &self.covariance * self.transition.transpose() + &moved * moved.transpose();
-        for (place, deviation) in self.noise.states.iter().enumerate() {
-            self.covariance[(place, place)] += deviation * deviation;
-        }
+        self.covariance = &self.transition * &self.covariance * self.transition.transpose();
+        let half = 0.5 * self.time_step;
+        add_process(&mut self.covariance, &self.transition, &pushed, (half, self.noise.states));
         self.state = next;
         Ok(())
     }
+}
 
-    /// Accelerations by one deviation of the force on each coordinate: `M^-1` with columns of these lengths.
-    fn pushed(&mut self) -> DMatrix<f64> {
-        let n = self.noise.forces.len();
-        let (q, v) = self.state.as_slice()[..2 * n].split_at(n);
-        let dynamics = self.stepper.dynamics();
-        dynamics.terms(q, v);
-        dynamics.data.factorise();
-        let mut pushed = DMatrix::from_diagonal(&DVector::from_column_slice(self.noise.forces));
-        for column in pushed.as_mut_slice().chunks_exact_mut(n.max(1)) {
-            dynamics.data.solve(column);
-        }
-        pushed
+/// `K = P H' S^-1`, and `S = H P H' + R`, of readings with these deviations at a sample.
+pub(super) fn gain(
+    covariance: &DMatrix<f64>,
+    output: &DMatrix<f64>,
+    deviations: &[f64],
+    sample: usize,
+) -> Result<(DMatrix<f64>, DMatrix<f64>)> {
+    let shared = covariance * output.transpose();
+    let mut spread = output * &shared;
+    for (place, deviation) in deviations.iter().enumerate() {
+        spread[(place, place)] += deviation * deviation;
+    }
+    let factors: Option<Cholesky<f64, Dyn>> = spread.clone().cholesky();
+    let Some(factors) = factors else {
+        let path = format!("the covariance of the innovations at sample {sample}");
+        return Err(Error::NonFinite { path, value: f64::NAN });
+    };
+    Ok((factors.solve(&shared.transpose()).transpose(), spread))
+}
+
+/// `P <- (1 - K H) P (1 - K H)' + K R K'`, which stays definite however it is rounded (Bucy & Joseph 1968).
+pub(super) fn corrected(
+    covariance: &DMatrix<f64>,
+    gain: &DMatrix<f64>,
+    output: &DMatrix<f64>,
+    deviations: &[f64],
+) -> DMatrix<f64> {
+    let nx = covariance.nrows();
+    let left = DMatrix::identity(nx, nx) - gain * output;
+    let mut weighed = gain.clone();
+    for (mut column, deviation) in weighed.column_iter_mut().zip(deviations) {
+        column *= *deviation;
+    }
+    &left * covariance * left.transpose() + &weighed * weighed.transpose()
+}
+
+/// Adds to a covariance what moves the states over a sample, of which `half` is half: `pushed` accelerations under the transition, and the
+/// deviations of the states.
+pub(super) fn add_process(
+    covariance: &mut DMatrix<f64>,
+    transition: &DMatrix<f64>,
+    pushed: &DMatrix<f64>,
+    (half, states): (f64, &[f64]),
+) {
+    let n = pushed.nrows();
+    let mut moved = transition.columns(n, n) * pushed * half;
+    let mut rates = moved.rows_mut(n, n);
+    rates += pushed * half;
+    *covariance += &moved * moved.transpose();
+    for (place, deviation) in states.iter().enumerate() {
+        covariance[(place, place)] += deviation * deviation;
     }
 }
 
+/// Accelerations in a state by one deviation of the force on each coordinate: `M^-1` with columns of these lengths.
+pub(super) fn pushed(dynamics: &mut Dynamics<f64>, state: &[f64], forces: &[f64]) -> DMatrix<f64> {
+    let n = forces.len();
+    let (q, v) = state[..2 * n].split_at(n);
+    dynamics.terms(q, v);
+    dynamics.data.factorise();
+    let mut pushed = DMatrix::from_diagonal(&DVector::from_column_slice(forces));
+    for column in pushed.as_mut_slice().chunks_exact_mut(n.max(1)) {
+        dynamics.data.solve(column);
+    }
+    pushed
+}
+
 /// Takes over the derivatives of a number along the directions from `first` into a row.
-fn take(matrix: &mut DMatrix<f64>, row: usize, first: usize, number: &Number) {
+pub(super) fn take(matrix: &mut DMatrix<f64>, row: usize, first: usize, number: &Number) {
     let width = matrix.ncols();
     for (column, &slope) in (first..width).zip(&number.gradient) {
         matrix[(row, column)] = slope;

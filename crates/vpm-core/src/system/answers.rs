@@ -178,14 +178,11 @@ impl<S: Scalar> Dynamics<S> {
     ///
     /// Checked: against the derivative of the marker's pose.
     pub fn jacobian(&mut self, q: &[S], marker: usize, jacobian: &mut [S]) {
-        let Self { model, data, loads, .. } = self;
         jacobian.fill(S::zero());
+        let Some(Pose { translation: at, .. }) = self.located(q, marker) else { return };
+        let Self { model, data, .. } = self;
         let Some(place) = model.markers().get(marker) else { return };
-        loads.fill(S::zero());
-        frames(model, data, q, loads);
-        poses(model, data);
         let (n, frames) = (model.n_coordinates(), &data.composite.frames);
-        let at = (frames[place.frame].pose * Pose::from_f64(place.pose)).translation;
         for_each_column(model, frames, &data.composite.sections, place.frame, |coordinate, column: Twist<S>| {
             let velocity = column.linear + column.angular.cross(at);
             let entries = column.angular.to_array().into_iter().chain(velocity.to_array());
@@ -199,10 +196,8 @@ impl<S: Scalar> Dynamics<S> {
     ///
     /// Checked: against the markers' outputs, and in Python against the chain of textbooks.
     pub fn marker_poses(&mut self, q: &[S], values: &mut [S]) {
-        let Self { model, data, loads, .. } = self;
-        loads.fill(S::zero());
-        frames(model, data, q, loads);
-        poses(model, data);
+        self.place(q);
+        let Self { model, data, .. } = self;
         for (numbers, place) in values.chunks_exact_mut(12).zip(model.markers()) {
             let pose = data.composite.frames[place.frame].pose * Pose::from_f64(place.pose);
             numbers[..3].copy_from_slice(&pose.translation.to_array());
@@ -210,5 +205,20 @@ impl<S: Scalar> Dynamics<S> {
                 numbers.copy_from_slice(&pose.rotation.columns.map(|column| column.to_array()[row]));
             }
         }
+    }
+
+    /// Pose of a marker in the world at `q`, all frames being where they are then; none if there is no such marker.
+    pub(crate) fn located(&mut self, q: &[S], marker: usize) -> Option<Pose<S>> {
+        self.place(q);
+        let place = self.model.markers().get(marker)?;
+        Some(self.data.composite.frames[place.frame].pose * Pose::from_f64(place.pose))
+    }
+
+    /// Puts all frames where they are at `q`.
+    fn place(&mut self, q: &[S]) {
+        let Self { model, data, loads, .. } = self;
+        loads.fill(S::zero());
+        frames(model, data, q, loads);
+        poses(model, data);
     }
 }

@@ -6,7 +6,7 @@ use super::recorded::{Kind, Placed, Places};
 use crate::error::Result;
 use crate::graph::{Evaluator, Lanes, Native, Program};
 
-/// Functions that are kept of a machine: its own, fourteen kinds, and those of the last lists of parameters and of followed joints. A fit
+/// Functions that are kept of a machine: its own, some twenty kinds, and those of the last lists of parameters and of followed joints. A fit
 /// asks for up to four of each list, again and again, and takes few parameters in a list; what a search asked for and left, the next list
 /// puts out.
 const KEPT: usize = 256;

@@ -94,6 +94,16 @@ pub enum Kind {
     Required,
     /// The same as [`Kind::Required`], but without what contacts and bushings do.
     RequiredOfTree,
+    /// Accelerations under efforts, which stand in their place, with all effects.
+    Accelerations,
+    /// The mass matrix, row by row.
+    MassMatrix,
+    /// Pose of a marker in the world as a homogeneous matrix, row by row.
+    MarkerPose(u32),
+    /// Jacobian of a marker, see [`Dynamics::jacobian`].
+    MarkerJacobian(u32),
+    /// Kinetic and potential energy.
+    Energy,
     /// What the coordinates miss at rest, then the entries of its derivatives by them; the only input is the share of the weight.
     Unbalance,
     /// A function of a machine some of whose joints follow a motion, of the state of what answers to it.
@@ -251,12 +261,6 @@ fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recor
     let (n, dim) = (places.coordinates, places.states);
     let motion = (&x[..n], &x[n..dim.min(2 * n)]);
     let mut rates = zeros(dim);
-    let required = |dynamics: &mut Dynamics<Recorded>, invert: Invert| {
-        let (a, first, mut efforts) = (inputs(places.accelerations(), n), dynamics.first_memory(), zeros(n));
-        dynamics.memories.hold(&x[first..]);
-        invert(dynamics, motion.0, motion.1, &a, &mut efforts);
-        efforts
-    };
     let (values, matrix) = match kind {
         Kind::Rates => {
             dynamics.rhs(&x, &mut rates);
@@ -306,13 +310,18 @@ fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recor
             (values, Some(matrix))
         }
         Kind::Derived(kind, _) => return outputs(build, places, parameters, kind),
-        Kind::Levers => {
-            let mut levers = zeros(dynamics.layout().lines * n);
-            dynamics.levers(motion.0, &mut levers);
-            (levers, None)
+        Kind::Required
+        | Kind::RequiredOfTree
+        | Kind::Accelerations
+        | Kind::MassMatrix
+        | Kind::Levers
+        | Kind::MarkerPose(_)
+        | Kind::MarkerJacobian(_)
+        | Kind::Energy => {
+            let (third, mut numbers) = (inputs(places.accelerations(), n), zeros(kind.width(&dynamics)));
+            dynamics.answer(kind, &x, &third, &mut numbers);
+            (numbers, None)
         }
-        Kind::Required => (required(&mut dynamics, Dynamics::inverse_dynamics), None),
-        Kind::RequiredOfTree => (required(&mut dynamics, Dynamics::inverse_dynamics_of_tree), None),
         Kind::Unbalance => {
             let loads = dynamics.unbalance(&x, input(places.states, 0.0));
             (loads.clone(), Some(Matrix::by_states(loads, dim)))
@@ -325,9 +334,6 @@ fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recor
     };
     Ok(Outputs { values, matrix })
 }
-
-/// Inverse dynamics of one kind or another.
-type Invert = fn(&mut Dynamics<Recorded>, &[Recorded], &[Recorded], &[Recorded], &mut [Recorded]);
 
 impl Dynamics<Recorded> {
     /// What `sensors` show at `x` of all outputs, under commands that stand for long; writes the rates.

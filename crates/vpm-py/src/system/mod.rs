@@ -1,5 +1,6 @@
 //! The class `System`.
 
+mod batch;
 mod evaluation;
 mod observer;
 mod simulation;

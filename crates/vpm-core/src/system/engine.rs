@@ -1,0 +1,118 @@
+//! Functions of a motion worked out for many motions, one after the other or in blocks.
+
+use std::sync::Arc;
+
+use super::functions::Function;
+use super::recorded::{Kind, Places};
+use super::routine::{Routine, code_pays};
+use super::{Build, Dynamics};
+use crate::description::Description;
+use crate::error::Result;
+use crate::graph::{Evaluator, Lanes};
+use crate::scalar::Scalar;
+use crate::spatial::Pose;
+
+/// What works a function of a motion out.
+#[derive(Clone)]
+pub(crate) enum Engine {
+    /// The laws.
+    Laws(Box<Dynamics<f64>>, Kind),
+    /// Eight motions at once, operation by operation.
+    Blocks(Evaluator<Lanes>),
+    /// Machine code.
+    Code(Box<Routine<f64>>),
+}
+
+impl Engine {
+    /// A function without derivatives, for so many motions.
+    pub(crate) fn of_values(description: &Description, theta: &[f64], kind: &Kind, rows: usize) -> Result<Self> {
+        let function = || description.functions().function(kind, theta);
+        match Self::code(function, theta, rows) {
+            Some(engine) => Ok(engine),
+            None => Ok(Self::Laws(Box::new(Build::dynamics(&description, theta)?), kind.clone())),
+        }
+    }
+
+    /// A function that gives derivatives too, for so many motions.
+    pub(crate) fn of_derivatives(function: &Arc<Function>, theta: &[f64], rows: usize) -> Self {
+        let code = Self::code(|| Ok(function.clone()), theta, rows);
+        code.unwrap_or_else(|| Self::Blocks(function.blocks(theta)))
+    }
+
+    /// Machine code, if that pays and there is any.
+    fn code(function: impl FnOnce() -> Result<Arc<Function>>, theta: &[f64], rows: usize) -> Option<Self> {
+        if !code_pays(rows) {
+            return None;
+        }
+        let mut routine = Box::new(Routine::new(function().ok()?, theta));
+        routine.compile().ok()?;
+        Some(Self::Code(routine))
+    }
+
+    /// Outputs of so many rows of inputs, `made` for each.
+    pub(crate) fn run(&mut self, places: Places, inputs: &[f64], outputs: &mut [f64], made: usize) {
+        let rows = inputs.chunks_exact(places.first_parameter()).zip(outputs.chunks_exact_mut(made.max(1)));
+        match self {
+            Self::Blocks(evaluator) => evaluator.run(inputs, outputs),
+            Self::Code(routine) => rows.for_each(|(inputs, outputs)| outputs.copy_from_slice(routine.at(inputs))),
+            Self::Laws(dynamics, kind) => rows.for_each(|(inputs, outputs)| {
+                let (state, a) = (&inputs[..places.states], &inputs[places.accelerations()..]);
+                dynamics.answer(kind, state, &a[..places.coordinates], outputs);
+            }),
+        }
+    }
+}
+
+impl Kind {
+    /// How many numbers a function of a motion gives; none for other functions.
+    pub(crate) fn width<S: Scalar>(&self, dynamics: &Dynamics<S>) -> usize {
+        let n = dynamics.coordinates();
+        match self {
+            Self::Required | Self::RequiredOfTree | Self::Accelerations => n,
+            Self::MassMatrix => n * n,
+            Self::Levers => dynamics.layout().lines * n,
+            Self::MarkerPose(_) => 16,
+            Self::MarkerJacobian(_) => 6 * n,
+            Self::Energy => 2,
+            _ => 0,
+        }
+    }
+}
+
+impl<S: Scalar> Dynamics<S> {
+    /// What a function of a motion gives, of coordinates and rates, with which `state` begins and memories, with which it ends. `third`
+    /// are the accelerations, or the efforts where it is these that are given.
+    pub(crate) fn answer(&mut self, kind: &Kind, state: &[S], third: &[S], numbers: &mut [S]) {
+        let (n, first) = (self.coordinates(), state.len() - self.memories.len());
+        let (q, v) = state[..2 * n].split_at(n);
+        self.memories.hold(&state[first..]);
+        match kind {
+            Kind::Required => self.inverse_dynamics(q, v, third, numbers),
+            Kind::RequiredOfTree => self.inverse_dynamics_of_tree(q, v, third, numbers),
+            Kind::Accelerations => numbers.copy_from_slice(self.forward_dynamics(q, v, third)),
+            Kind::MassMatrix => numbers.copy_from_slice(self.mass_matrix(q)),
+            Kind::Levers => self.levers(q, numbers),
+            Kind::MarkerPose(marker) => self.marker_pose(q, *marker as usize, numbers),
+            Kind::MarkerJacobian(marker) => self.jacobian(q, *marker as usize, numbers),
+            Kind::Energy => {
+                let total = self.energy(q, v);
+                numbers.copy_from_slice(&[total.kinetic, total.potential]);
+            }
+            _ => {}
+        }
+    }
+
+    /// Pose of a marker in the world at `q`, as a homogeneous matrix, 4 x 4 row by row.
+    ///
+    /// Checked: its derivative against the Jacobian, poses of chains against closed forms.
+    pub(crate) fn marker_pose(&mut self, q: &[S], marker: usize, matrix: &mut [S]) {
+        matrix.fill(S::zero());
+        let Some(Pose { rotation, translation }) = self.located(q, marker) else { return };
+        for (column, axis) in rotation.columns.into_iter().chain([translation]).enumerate() {
+            for (row, entry) in axis.to_array().into_iter().enumerate() {
+                matrix[4 * row + column] = entry;
+            }
+        }
+        matrix[15] = S::one();
+    }
+}

@@ -1,0 +1,201 @@
+"""An observer that is fed sample by sample: state, covariance and innovations for a controller at work."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vpm.errors import DivergedError, SimulationError, near_match
+from vpm.model import Model
+from vpm.numbers import array_of
+from vpm.observer.filtering import first_deviations
+from vpm.observer.noise import Noise
+from vpm.simulate import AUTOMATIC, Setup
+
+Array = NDArray[np.float64]
+
+
+class Observer:
+    """An extended Kalman filter of a machine, as `vpm.observe` runs over a record, one sample at a time.
+
+    At each sample `step` corrects the state by what was measured and carries it to the next under inputs that are
+    held. Linear models are the exact derivatives of the integrator's steps. A steady observer keeps the gain that the
+    filter settles to about the first state.
+
+    Parameters
+    ----------
+    model : Model
+        Without delays, which remember what no state holds.
+    time_step : float
+        Time between samples, s.
+    channels : sequence of str
+        Outputs that are measured, for example ``["axis.position"]``.
+    noise : Noise
+        Deviations of readings, and of the forces and states that move for no known reason.
+    state : mapping of str to float, or array_like of shape (nx,), optional
+        First state, as ``model.state`` takes it.
+    deviations : array_like, shape (nx,), optional
+        How far off it may be; by default 0.01 of coordinates, 1 of rates, a tenth of what drives hold.
+    steady : bool
+        Keep one gain.
+    inputs : mapping of str to float, or array_like of shape (nu,), optional
+        Under which a steady observer's gain is found, as ``model.command`` takes them.
+    integrator, substeps
+        See :class:`vpm.simulate.Setup`.
+
+    Raises
+    ------
+    SimulationError, ModelError
+        A name or a number is wrong, or no steady gain exists: something that drifts is not seen.
+    CoreError
+        The machine has delays or drives in sampled time.
+
+    Examples
+    --------
+    >>> observer = Observer(model, 1e-3, ["axis.position"], Noise({"axis.position": 1e-4}, {"axis": 0.5}))
+    >>> state = observer.step([0.1], [0.0])
+    """
+
+    def __init__(
+        self,
+        model: Model,
+        time_step: float,
+        channels: Sequence[str],
+        noise: Noise,
+        *,
+        state: Mapping[str, float] | ArrayLike | None = None,
+        deviations: ArrayLike | None = None,
+        steady: bool = False,
+        inputs: Mapping[str, float] | ArrayLike | None = None,
+        integrator: str = AUTOMATIC,
+        substeps: int = 1,
+    ) -> None:
+        from vpm._core import Kalman
+
+        self.model, self.channels = model, tuple(channels)
+        if not self.channels:
+            raise SimulationError("an observer needs readings; name at least one channel")
+        for name in self.channels:
+            if name not in model.output_channels:
+                raise SimulationError(f'channels: "{name}" is unknown; {near_match(name, model.output_channels)}')
+        first = model.state(state)
+        spread = first_deviations(model, first) if deviations is None else deviations
+        self._first, self._deviations = first, array_of(spread, "the deviations of the first state", SimulationError)
+        readings, forces, states = noise.placed(model, self.channels)
+        setup = Setup(integrator, substeps)
+        try:
+            self._core = Kalman(
+                model.core,
+                model.theta,
+                first,
+                [model.output_channels.index(name) for name in self.channels],
+                (readings, forces, states, self._deviations),
+                float(time_step),
+                substeps,
+                setup.method(model),
+            )
+        except ValueError as error:
+            raise SimulationError(f"{model.name}: {error}") from error
+        self._innovation = np.zeros(len(self.channels))
+        self._estimate = first.copy()
+        if steady:
+            self._settle(np.diag(readings**2), model.command(inputs))
+
+    def step(self, measurements: ArrayLike, inputs: ArrayLike | Mapping[str, float] = ()) -> Array:
+        """State at this sample, corrected by what was measured; the inputs are held until the next.
+
+        Parameters
+        ----------
+        measurements : array_like, shape (m,)
+            In the order of `channels`; not a number where a reading did not come. A steady observer takes that one to
+            be as expected.
+        inputs : array_like of shape (nu,), or mapping of str to float
+            Commands that stand from now on; in a mapping as ``model.command`` takes them.
+
+        Returns
+        -------
+        ndarray, shape (nx,)
+            Named by ``model.state_names``.
+
+        Raises
+        ------
+        SimulationError
+            A size is wrong, or a number is infinite.
+        DivergedError
+            A state left its bounds; only `reset` leads on.
+        """
+        from vpm._core import Diverged
+
+        command = self.model.command(inputs) if isinstance(inputs, Mapping) else inputs
+        try:
+            self._estimate, self._innovation = self._core.step(np.atleast_1d(measurements), np.atleast_1d(command))
+        except Diverged as error:
+            raise DivergedError(f"{self.model.name}: {error}", run=None, time=None) from None
+        except ValueError as error:
+            raise SimulationError(f"{self.model.name}: {error}") from error
+        return self._estimate
+
+    @property
+    def state(self) -> Array:
+        """Last estimate, shape (nx,)."""
+        return self._estimate
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of the last estimate, shape (nx, nx)."""
+        return self._core.covariances()[0]
+
+    @property
+    def innovation(self) -> Array:
+        """Measurements less what was expected, shape (m,)."""
+        return self._innovation
+
+    @property
+    def innovation_covariance(self) -> Array:
+        """Covariance that the innovations should have, shape (m, m)."""
+        return self._core.covariances()[1]
+
+    @property
+    def predicted(self) -> Array:
+        """State that is expected at the coming sample, shape (nx,)."""
+        return self._core.expected()
+
+    def reset(self, state: Mapping[str, float] | ArrayLike | None = None, covariance: ArrayLike | None = None) -> None:
+        """Begin again, by default in the first state with the deviations that the observer was made with.
+
+        Parameters
+        ----------
+        state : mapping of str to float, or array_like of shape (nx,), optional
+        covariance : array_like, shape (nx, nx), optional
+        """
+        first = self._first if state is None else self.model.state(state)
+        spread = np.diag(self._deviations**2) if covariance is None else covariance
+        try:
+            self._core.reset(first, spread)
+        except ValueError as error:
+            raise SimulationError(f"{self.model.name}: {error}") from error
+        self._estimate, self._innovation = first.copy(), np.zeros(len(self.channels))
+
+    def _settle(self, readings: Array, command: Array) -> None:
+        """Keep the gain of the algebraic Riccati equation (R. Kalman, *J. Basic Engineering* 82, 1960)."""
+        from scipy.linalg import solve_discrete_are
+
+        try:
+            transition, output, process = self._core.linearised(command)
+            before = solve_discrete_are(transition.T, output.T, process, readings)
+            spread = output @ before @ output.T + readings
+            gain = np.linalg.solve(spread, output @ before).T
+            left = np.abs(np.linalg.eigvals(transition - transition @ gain @ output)).max()
+            if not left < 1.0 - 1e-9:
+                raise np.linalg.LinAlgError(f"errors die out by a factor of {left:.6g} in a sample")
+        except (ValueError, np.linalg.LinAlgError) as error:
+            raise SimulationError(
+                f"{self.model.name}: no steady gain exists about the first state ({error}); measure what drifts, give "
+                "noise to what nothing moves, or leave steady out"
+            ) from error
+        self._core.hold_gain(gain, before - gain @ spread @ gain.T, spread)
+
+    def __repr__(self) -> str:
+        return f"Observer({self.model.name!r}, channels={', '.join(self.channels)})"
