@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     )
     from vpm.linear import LinearModel
     from vpm.log_check import LogCheck, check_log
+    from vpm.many import Case, diagnose_many
     from vpm.model import Dynamics, Model
     from vpm.observer import Noise, Observation, observe
     from vpm.ranking import Ranking, rank
@@ -53,6 +54,7 @@ __all__ = [
     "EFFECTS",
     "BudgetReport",
     "Campaign",
+    "Case",
     "Climb",
     "Comparison",
     "CylinderGeometry",
@@ -86,6 +88,7 @@ __all__ = [
     "climb",
     "compare",
     "diagnose",
+    "diagnose_many",
     "identify",
     "identify_inertial",
     "identify_oil",
@@ -130,6 +133,8 @@ _HOMES = {
     "LinearModel": "vpm.linear",
     "LogCheck": "vpm.log_check",
     "check_log": "vpm.log_check",
+    "Case": "vpm.many",
+    "diagnose_many": "vpm.many",
     "Dynamics": "vpm.model",
     "Model": "vpm.model",
     "Noise": "vpm.observer",

@@ -30,9 +30,11 @@ __all__ = [
     "Scale",
     "Side",
     "SiteKind",
+    "adopt",
     "effect_type",
     "effects_for_site",
     "register",
+    "registered",
     "signature_of",
     "unregister",
     "without_law",
@@ -175,3 +177,18 @@ def unregister(name: str) -> None:
     if effect_type(name).formula is None:
         raise ModelError(f'"{name}" belongs to vpm and stays in the catalogue', where=name)
     del _ENTRIES[name]
+
+
+def registered() -> tuple[EffectType, ...]:
+    """Effects that `register` added."""
+    return tuple(effect for effect in EFFECTS.values() if effect.formula is not None)
+
+
+def adopt(effects: Collection[EffectType]) -> None:
+    """Add what another process has registered, as `register` checked it there.
+
+    Parameters
+    ----------
+    effects : collection of EffectType
+    """
+    _ENTRIES.update((effect.name, effect) for effect in effects)
