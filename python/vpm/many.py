@@ -89,12 +89,14 @@ def diagnose_many(
     names = [case.called for case in listed]
     answers: dict[int, Diagnosis | VpmError] = {}
 
+    def noted(done: Done[int]) -> None:
+        if not isinstance(done.error, KeyboardInterrupt) and done.key not in answers:
+            answers[done.key] = _answer(done, listed[done.key], asked, workers)
+
     def heard(ended: list[Done[int]]) -> None:
         for done in ended:
-            if isinstance(done.error, KeyboardInterrupt):
-                continue
-            answers[done.key] = _answer(done, listed[done.key], asked, workers)
-            if tell is not None:
+            noted(done)
+            if tell is not None and done.key in answers:
                 tell(f"{len(answers)}/{len(listed)}  {names[done.key]}: {_line(answers[done.key])}")
 
     threads = workers or (None if executor is None else 1)
@@ -102,7 +104,9 @@ def diagnose_many(
     found, interrupted = outcomes(jobs, 1 if executor is None else executor, tell, heard, names)
     if not interrupted:
         return [answers[number] for number in range(len(listed))]
-    heard([done for done in found if done is not None and done.key not in answers])
+    for done in found:
+        if done is not None:
+            noted(done)
     raise BatchInterruptedError(answers.get(number) for number in range(len(listed)))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import wraps
-from threading import Lock
+from threading import Event, Lock, Thread
 from types import TracebackType
 from typing import ParamSpec, TypeVar
 
@@ -18,7 +18,7 @@ class _OneThread:
     """Linear algebra in one thread as long as anybody is within.
 
     The limit is one of the whole process, and blocks of several threads overlap: the first one sets it, and the last
-    one that leaves takes it back.
+    one that leaves takes it back. A thread of its own does both, for a limit obeys the thread alone that has set it.
     """
 
     def __init__(self) -> None:
@@ -27,7 +27,10 @@ class _OneThread:
     def __enter__(self) -> None:
         with self._lock:
             if self._inside == 0:
-                self._limits = threadpool_limits(1, user_api="blas")
+                limited, self._over = Event(), Event()
+                self._holder = Thread(target=_hold, args=(limited, self._over), name="vpm", daemon=True)
+                self._holder.start()
+                limited.wait()
             self._inside += 1
 
     def __exit__(
@@ -36,7 +39,14 @@ class _OneThread:
         with self._lock:
             self._inside -= 1
             if self._inside == 0:
-                self._limits.restore_original_limits()
+                self._over.set()
+                self._holder.join()
+
+
+def _hold(limited: Event, over: Event) -> None:
+    with threadpool_limits(1, user_api="blas"):
+        limited.set()
+        over.wait()
 
 
 #: For ``with``; see `in_one_thread`.
