@@ -24,6 +24,9 @@ from vpm import sending, tasks
 from vpm.errors import DiagnosisError, ExecutorError
 from vpm.many import Case, diagnose_many
 from vpm.one_thread import ONE_THREAD
+from vpm.simplify.judge import Judge
+from vpm.simplify.reductions import reductions
+from vpm.simplify.trials import Trials
 from vpm.tasks import BatchInterruptedError, outcomes, processes
 
 #: A diagnosis of a fifth of a second.
@@ -164,6 +167,21 @@ def test_batches_and_fits_are_the_same_elsewhere(pool: Executor) -> None:
     for mode in ("free_run", "inverse_dynamics"):
         how: dict[str, Any] = {"mode": mode, "fitting": vpm.Fitting(starts=3, loss="huber")}
         assert vpm.identify(model, log, free, executor=pool, **how) == vpm.identify(model, log, free, **how)
+
+
+def test_reduced_models_are_fitted_the_same_elsewhere(pool: Executor) -> None:
+    full = nominal().with_effect("coulomb_friction", at="axis", coulomb=5.0).with_effect("bias_force", at="axis")
+    (log,) = simulate_axis(Truth(coulomb=4.0), 1, 1.0, 1)
+    judge = Judge(full, [log], [log], 500.0, "restarts")
+    trials = Trials(full, judge, lambda _: True, lambda _: None, 0.01, pool)
+    trials.ahead([(change,) for changes in reductions(full).values() for change in changes])
+    assert len(trials._fits) > 1
+    for begun, fitted in trials._fits.items():
+        assert fitted == judge.fitted(begun)
+        assert fitted != begun
+    taken: list[str] = []
+    ladder = vpm.simplify(full, log, rate=500.0, tolerance=0.05, executor=pool, tell=taken.append)
+    assert ladder.chosen in ladder.rungs
 
 
 def test_executorlib_takes_batches() -> None:
