@@ -1,4 +1,4 @@
-"""Time of many diagnoses by processes of this machine: one beside two, and what a task costs beside its diagnosis.
+"""Cost of many diagnoses by processes of this machine: one beside two, and what a task costs beside its diagnosis.
 
 Each is of an axis with dry friction that was simulated without vpm, read from files by the workers.
 
@@ -8,17 +8,19 @@ Each is of an axis with dry friction that was simulated without vpm, read from f
 from __future__ import annotations
 
 import argparse
-import statistics
+import os
+import resource
 import sys
 import tempfile
 import time
+from dataclasses import dataclass, fields
 from functools import partial
 from pathlib import Path
 
 import vpm
 from vpm.many import Case, diagnose_many
 from vpm.sending import packed
-from vpm.tasks import outcomes, processes
+from vpm.tasks import processes
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
 
@@ -38,26 +40,39 @@ def cases(folder: Path, count: int) -> list[Case]:
     return found
 
 
-def timed(todo: list[Case], count: int) -> float:
-    """Seconds for each diagnosis by so many processes that have begun before."""
+@dataclass(frozen=True)
+class Cost:
+    """Seconds: by the clock and of processors of the workers and of this process, and what workers take to begin."""
+
+    clock: float
+    workers: float
+    here: float
+    beginning: float
+
+
+def timed(todo: list[Case], count: int) -> Cost:
+    """What each diagnosis costs by so many processes that have begun before."""
+    first = spent()
     with processes(count) as pool:
         diagnose_many(todo[: 2 * count], executor=pool, **QUICK)
-        begin = time.perf_counter()
+    begun = spent() - first
+    with processes(count) as pool:
+        diagnose_many(todo[: 2 * count], executor=pool, **QUICK)
+        clock, here = time.perf_counter(), time.process_time()
         diagnose_many(todo, executor=pool, **QUICK)
-        return (time.perf_counter() - begin) / len(todo)
+        clock, here = time.perf_counter() - clock, time.process_time() - here
+    each = (spent() - first - 2.0 * begun) / len(todo)
+    return Cost(clock / len(todo), each, here / len(todo), (begun - 2 * count * each) / count)
 
 
-def idle(count: int) -> float:
-    """Seconds that a task takes which does nothing."""
-    with processes(1) as pool:
-        outcomes([time.time], pool)
-        begin = time.perf_counter()
-        outcomes([time.time] * count, pool)
-        return (time.perf_counter() - begin) / count
+def spent() -> float:
+    """Processor time of the processes of this one that have ended, s."""
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return used.ru_utime + used.ru_stime
 
 
 def main() -> None:
-    """Print the figures, each with the least and the most of its rounds."""
+    """Print the figures in ms, of each the least of all rounds, then the most."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--count", type=int, default=40)
     parser.add_argument("--rounds", type=int, default=3)
@@ -65,12 +80,12 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         todo = cases(Path(folder), asked.count)
         sent = len(packed(partial(vpm.diagnose, todo[0].model, *todo[0].records)))
-        rounds = [(timed(todo, 1), timed(todo, 2), idle(200)) for _ in range(asked.rounds)]
-    one, two, empty = zip(*rounds, strict=True)
-    for name, values in (("1 process", one), ("2 processes", two), ("a task that does nothing", empty)):
-        middle = 1e3 * statistics.median(values)
-        print(f"{name}: {middle:.2f} ms ({1e3 * min(values):.2f} ... {1e3 * max(values):.2f})")
-    print(f"2 processes are {statistics.median(one) / statistics.median(two):.2f} times as fast; {sent} bytes are sent")
+        rounds = [(timed(todo, 1), timed(todo, 2)) for _ in range(asked.rounds)]
+    for count, costs in zip((1, 2), zip(*rounds, strict=True), strict=True):
+        for part in fields(Cost):
+            values = [1e3 * getattr(cost, part.name) for cost in costs]
+            print(f"{count} processes, {part.name}: {min(values):.1f} ms ({max(values):.1f})")
+    print(f"{sent} bytes are sent; load of the machine {os.getloadavg()[0]:.1f}")
 
 
 if __name__ == "__main__":

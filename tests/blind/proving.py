@@ -257,16 +257,20 @@ def _beside(
     """The same by an executor; a case whose worker died again and again is answered by that."""
     batches, folder = _batches(todo), str(Path(__file__).resolve().parent.parent)
     with Tasks[list[Job] | Job](where, say, [folder]) as tasks:
+        making = 0
         try:
             while True:
                 # Cases are made a little ahead of the diagnoses, not all of them first.
-                while tasks.count < tasks.width and (batch := next(batches, None)):
+                most = max(2, tasks.width // BATCH)
+                while making < most and tasks.count < tasks.width and (batch := next(batches, None)):
+                    making += 1
                     tasks.add(batch, partial(make, batch), f"making {len(batch)} cases of {batch[0].machine}")
                 if not tasks.count:
                     return
                 for done in tasks.answered():
                     if isinstance(done.error, KeyboardInterrupt):
                         return
+                    making -= isinstance(done.key, list)
                     if isinstance(done.key, Job):
                         yield done.value if done.error is None else _lost(done.key, done.error)
                     elif done.error is not None:
