@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import pickle
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
@@ -20,7 +21,7 @@ from synthetic import Truth, nominal, simulate_axis
 from task_work import die, double, late, slow
 from two_link_arm import Arm, record
 from two_link_arm import nominal as arm
-from vpm import sending, tasks
+from vpm import demo, sending, tasks
 from vpm.errors import DiagnosisError, ExecutorError
 from vpm.many import Case, diagnose_many
 from vpm.one_thread import ONE_THREAD
@@ -295,6 +296,27 @@ def test_a_file_that_a_worker_does_not_see_is_named(tmp_path: Path) -> None:
     ending, sentence = sending.run_packed(given[0], [str(tmp_path / "none")], content, 0)
     assert ending == "refused"
     assert "sees no folder" in str(sentence)
+
+
+def test_a_file_is_read_by_the_table_that_it_was_read_with(tmp_path: Path) -> None:
+    model = vpm.Model.load(demo.MODEL)
+    log = vpm.Experiment.load(demo.VALIDATION, model=model, resample=250.0)
+    table = tmp_path / "table.toml"
+    table.write_text(
+        'time = { column = "time [s]", unit = "s" }\n"axis.position" = { column = "x [mm]", unit = "mm" }\n',
+        encoding="utf-8",
+    )
+    (tmp_path / "log.csv").write_text("time [s],x [mm]\n" + "".join(f"{n / 100},{n}\n" for n in range(99)))
+    other = vpm.Experiment.load(tmp_path / "log.csv", table)
+    for record_of, size in ((log, 30_000), (other, 4000)):
+        content = sending.packed(partial(vpm.Experiment.renamed, record_of, "again"))
+        ending, answer = sending.run_packed(sending.vpm_version(), (), content, 0)
+        assert ending == "value"
+        assert sending.unpacked(answer) == record_of.renamed("again")  # type: ignore[arg-type]
+        assert len(content) < size
+        again = pickle.loads(pickle.dumps(record_of))
+        assert again == record_of
+        assert not again.data.flags.writeable
 
 
 def test_effects_of_users_go_with_the_task() -> None:

@@ -164,7 +164,8 @@ class Experiment(Result):
 
         log, table = open_log(path), channel_table(channels, model)
         how: dict[str, Any] = {"irregular": irregular, "resample": resample, "name": name or Path(path).stem}
-        return _read_from(path, cls(*load_parts(log, table, model, **how)), {**how, "channels": table, "model": model})
+        record = cls(*load_parts(log, table, model, **how))
+        return _read_from(path, record, {**how, "channels": None if table is None else dict(table), "model": model})
 
     @cached_property
     def path(self) -> str | None:
