@@ -194,8 +194,8 @@ def test_executorlib_takes_batches() -> None:
 
 def test_a_task_that_always_dies_is_told_and_the_rest_is_kept(tmp_path: Path) -> None:
     said: list[str] = []
-    jobs = [partial(double, n) for n in range(6)]
-    jobs[2], jobs[4] = die, partial(die, tmp_path / "once")  # type: ignore[assignment, call-overload]
+    jobs: list[Callable[[], object]] = [partial(double, n) for n in range(6)]
+    jobs[2], jobs[4] = die, partial(die, tmp_path / "once")
     found, interrupted = outcomes(jobs, partial(processes, 2), said.append)
     assert not interrupted
     ends = [done for done in found if done is not None]
@@ -212,7 +212,7 @@ class Late(ThreadPoolExecutor):
         super().__init__(1)
         self.given = 0
 
-    def submit(self, *args: Any, **kwargs: Any) -> Future[Any]:  # type: ignore[override]
+    def submit(self, *args: Any, **kwargs: Any) -> Future[Any]:
         self.given += 1
         if self.given > 1:
             return super().submit(*args, **kwargs)
