@@ -21,7 +21,7 @@ from blind.proving import Job
 from shared_cases import shared_case
 from vpm.cli import app
 from vpm.errors import DiagnosisError
-from vpm.prove_command import BEGIN, END, numbers, page
+from vpm.prove_command import BEGIN, END, _maker, numbers, page
 from vpm.ranking.calibration import Calibration
 from vpm.ranking.settings import Settings
 
@@ -407,3 +407,9 @@ def test_words_that_are_no_seeds_or_pages_are_refused(tmp_path: Path) -> None:
     (tmp_path / "page.md").write_text("no place", encoding="utf-8")
     with pytest.raises(DiagnosisError, match="does not say where"):
         page(tmp_path / "page.md", "")
+
+
+def test_a_function_that_makes_no_executor_is_refused() -> None:
+    for text in ("no_module_of_this_name:make", "json:make", "json", ":make", ""):
+        with pytest.raises(DiagnosisError, match="write module:function"):
+            _maker(text)

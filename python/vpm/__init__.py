@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     )
     from vpm.linear import LinearModel
     from vpm.log_check import LogCheck, check_log
+    from vpm.many import Case, diagnose_many
     from vpm.model import Dynamics, Model
     from vpm.observer import Noise, Observation, Observer, observe
     from vpm.ranking import Ranking, rank
@@ -57,6 +58,7 @@ __all__ = [
     "EFFECTS",
     "BudgetReport",
     "Campaign",
+    "Case",
     "Climb",
     "Comparison",
     "CylinderGeometry",
@@ -94,6 +96,7 @@ __all__ = [
     "climb",
     "compare",
     "diagnose",
+    "diagnose_many",
     "export_robot",
     "identify",
     "identify_inertial",
@@ -143,6 +146,8 @@ _HOMES = {
     "LinearModel": "vpm.linear",
     "LogCheck": "vpm.log_check",
     "check_log": "vpm.log_check",
+    "Case": "vpm.many",
+    "diagnose_many": "vpm.many",
     "Dynamics": "vpm.model",
     "Model": "vpm.model",
     "Noise": "vpm.observer",

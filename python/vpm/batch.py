@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import Executor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
-from threading import Event
+from itertools import chain
+from typing import TypeVar
 
 from numpy.typing import ArrayLike
 
@@ -16,23 +17,13 @@ from vpm.errors import SimulationError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.simulate import MODES, Run, Setup, simulate
+from vpm.tasks import BatchInterruptedError, Done, Where, outcomes
 
-#: Time between two looks at Ctrl-C, s.
-PATIENCE = 0.1
+Item = TypeVar("Item")
 
-
-class BatchInterruptedError(KeyboardInterrupt):
-    """Ctrl-C while simulations ran side by side.
-
-    Attributes
-    ----------
-    outcomes : tuple of Run, VpmError or None
-        In the order of the jobs; None for those that were not finished.
-    """
-
-    def __init__(self, outcomes: Iterable[Run | VpmError | None]) -> None:
-        super().__init__("interrupted")
-        self.outcomes = tuple(outcomes)
+#: Trials that an executor gets together at most, and how many of such chunks each of its workers gets at least: a chunk
+#: sends its model and its records once, and the last ones should not keep the others waiting.
+CHUNK, EACH = 50, 4
 
 
 @dataclass(frozen=True)
@@ -63,6 +54,7 @@ def simulate_batch(
     progress: Callable[[int, int], object] | bool = False,
     setup: Setup | None = None,
     cutoff: float | None = None,
+    executor: Executor | Callable[[], Executor] | None = None,
 ) -> list[Run | VpmError]:
     """Simulate a machine many times, on threads: the core computes without the interpreter's lock.
 
@@ -79,6 +71,9 @@ def simulate_batch(
     setup : Setup, optional
     cutoff : float, optional
         As in :func:`vpm.simulate`.
+    executor : Executor or callable, optional
+        Runs the trials elsewhere, in chunks, see `vpm.tasks.Tasks`; ``workers`` then says how many it has, if it does
+        not. The runs are the same.
 
     Returns
     -------
@@ -90,6 +85,9 @@ def simulate_batch(
     ------
     SimulationError
         Mode or number of workers is impossible.
+    ExecutorError
+        The executor takes no work from the beginning. Later, trials whose worker died again and again are errors in the
+        list.
     BatchInterruptedError
         Ctrl-C, a `KeyboardInterrupt` with what was finished; all other trials stop.
     """
@@ -98,7 +96,14 @@ def simulate_batch(
     listed = [trial if isinstance(trial, Trial) else Trial(trial) for trial in trials]
     chosen = setup or Setup()
     _ = model.core  # built once, here; a model that cannot be built is no failure of a trial
-    return side_by_side([partial(_one, model, trial, mode, chosen, cutoff) for trial in listed], workers, progress)
+    one = partial(_one, model, mode, chosen, cutoff)
+    if executor is None:
+        return side_by_side([partial(one, trial) for trial in listed], workers, progress)
+    workers = getattr(executor, "_max_workers", None) if workers is None else workers
+    size = min(CHUNK, -(-len(listed) // (EACH * workers))) if workers else CHUNK
+    chunks = [listed[at : at + size] for at in range(0, len(listed), max(size, 1))]
+    with _shown(progress, len(listed)) as told:
+        return _run_all([partial(_chunk, one, chunk) for chunk in chunks], [len(c) for c in chunks], executor, told)
 
 
 def side_by_side(
@@ -130,54 +135,58 @@ def side_by_side(
     workers = (os.cpu_count() or 1) if workers is None else workers
     if workers < 1:
         raise SimulationError(f"{workers} workers can do nothing; give at least 1")
-    if progress is True:
-        with _bar(len(jobs)) as shown:
-            return _run_all(jobs, workers, shown)
-    return _run_all(jobs, workers, progress or None)
+    with _shown(progress, len(jobs)) as told:
+        return _run_all([partial(_chunk, _called, [job]) for job in jobs], [1] * len(jobs), workers, told)
 
 
 def _run_all(
-    jobs: Sequence[Callable[[], Run]], workers: int, progress: Callable[[int, int], object] | None
+    chunks: Sequence[Callable[[], list[Run | VpmError]]],
+    sizes: Sequence[int],
+    where: Where,
+    told: Callable[[int, int], object] | None,
 ) -> list[Run | VpmError]:
-    from vpm._core import stop_when
+    """Runs of all chunks; one that dies with its worker is an error for each of its trials."""
+    done = 0
 
-    stop = Event()
-    with ThreadPoolExecutor(workers, "vpm", initializer=lambda: stop_when(stop.is_set)) as pool:
-        futures = [pool.submit(_kept, job) for job in jobs]
+    def heard(ended: list[Done[int]]) -> None:
+        nonlocal done
+        done += sum(sizes[each.key] for each in ended)
+        if told is not None:
+            told(done, sum(sizes))
+
+    found, interrupted = outcomes(chunks, where, heard=heard)
+    parts = [_outcomes_of(each, size) for each, size in zip(found, sizes, strict=True)]
+    if interrupted:
+        raise BatchInterruptedError(chain(*parts))
+    return [outcome for outcome in chain(*parts) if outcome is not None]
+
+
+def _outcomes_of(done: Done[int] | None, size: int) -> list[Run | VpmError | None]:
+    if done is None:
+        return [None] * size
+    if isinstance(done.error, VpmError):
+        return [done.error] * size
+    if done.error is not None:
+        raise done.error
+    return list(done.value)
+
+
+def _chunk(one: Callable[[Item], Run], items: Sequence[Item]) -> list[Run | VpmError]:
+    """What becomes of each item, an error as a value."""
+    found: list[Run | VpmError] = []
+    for item in items:
         try:
-            _watch(futures, progress)
-        except BaseException as reason:
-            stop.set()
-            pool.shutdown(wait=False, cancel_futures=True)
-            if isinstance(reason, KeyboardInterrupt):
-                raise BatchInterruptedError(map(_finished, futures)) from reason
-            raise
-    return [future.result() for future in futures]
+            found.append(one(item))
+        except VpmError as error:
+            found.append(error)
+    return found
 
 
-def _finished(future: Future[Run | VpmError]) -> Run | VpmError | None:
-    done = future.done() and not future.cancelled() and future.exception() is None
-    return future.result() if done else None
+def _called(job: Callable[[], Run]) -> Run:
+    return job()
 
 
-def _watch(futures: Sequence[Future[Run | VpmError]], progress: Callable[[int, int], object] | None) -> None:
-    """Wait for all trials, awake enough for Ctrl-C."""
-    waiting: set[Future[Run | VpmError]] = set(futures)
-    while waiting:
-        done, waiting = wait(waiting, timeout=PATIENCE, return_when=FIRST_COMPLETED)
-        if done and progress is not None:
-            progress(len(futures) - len(waiting), len(futures))
-
-
-def _kept(job: Callable[[], Run]) -> Run | VpmError:
-    """What a job gives, an error as a value."""
-    try:
-        return job()
-    except VpmError as error:
-        return error
-
-
-def _one(model: Model, trial: Trial, mode: str, setup: Setup, cutoff: float | None) -> Run:
+def _one(model: Model, mode: str, setup: Setup, cutoff: float | None, trial: Trial) -> Run:
     machine = model.with_parameters(trial.parameters) if trial.parameters else model
     state = None if trial.initial_state is None else machine.state(trial.initial_state)
     return simulate(
@@ -194,8 +203,11 @@ def _one(model: Model, trial: Trial, mode: str, setup: Setup, cutoff: float | No
 
 
 @contextmanager
-def _bar(total: int) -> Iterator[Callable[[int, int], object]]:
-    """A progress bar on the error stream."""
+def _shown(progress: Callable[[int, int], object] | bool, total: int) -> Iterator[Callable[[int, int], object] | None]:
+    """Who is told what is done: a function, a progress bar on the error stream, or nobody."""
+    if progress is not True:
+        yield progress or None
+        return
     from rich.console import Console
     from rich.progress import Progress
 

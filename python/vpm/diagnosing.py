@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
 from functools import partial
 from itertools import chain
-from typing import Literal, TypeVar, get_args
+from typing import Literal, TypedDict, TypeVar, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,6 +36,7 @@ from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.filters import filters
 from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.moving import check_moving, check_stuck
+from vpm.discrepancy.overheard import overheard
 from vpm.discrepancy.overlooked import overlooked
 from vpm.discrepancy.provenance import own_settings, provenance
 from vpm.discrepancy.remainder import Remainder, remainder
@@ -58,6 +60,7 @@ from vpm.model import Model
 from vpm.one_thread import in_one_thread
 from vpm.ranking import Ranking, Settings, rank
 from vpm.simulate import Setup, judging_mode
+from vpm.tasks import done_by
 
 Array = NDArray[np.float64]
 
@@ -89,11 +92,24 @@ REACH = 4.0
 Tell = Callable[[str], None]
 #: Where names come from.
 Names = Literal["ranking", "search"]
+RANKING: Names = "ranking"
 Found = TypeVar("Found")
+
+
+class Asked(TypedDict, total=False):
+    """Of what `diagnose` takes, that which holds for many diagnoses."""
+
+    effects: Sequence[str] | None
+    cutoff: float | None
+    setup: Setup | None
+    limit: int | None
+    names: Names
+    check: bool
+
+
 _Records = tuple[tuple[Experiment, ...], tuple[Experiment, ...], list[str]]
 
 
-@in_one_thread
 def diagnose(
     model: Model,
     experiments: Experiment | Sequence[Experiment],
@@ -103,11 +119,12 @@ def diagnose(
     cutoff: float | None = None,
     setup: Setup | None = None,
     limit: int | None = None,
-    names: Names = "ranking",
+    names: Names = RANKING,
     check: bool = True,
     workers: int | None = None,
     tell: Tell | None = None,
     progress: Progress | None = None,
+    executor: Executor | Callable[[], Executor] | None = None,
 ) -> Diagnosis:
     """Name the physics that ``model`` is missing, with evidence on data that were not fitted.
 
@@ -147,6 +164,9 @@ def diagnose(
         exception raised there ends the diagnosis.
     progress : callable, optional
         Called after every candidate with what is being done, its name, how many are done, and how many there are.
+    executor : Executor or callable, optional
+        Does the diagnosis as one task, see `vpm.tasks.Tasks`; `vpm.diagnose_many` gives it many. ``tell`` and
+        ``progress`` hear of it when it is done, ``workers`` is one if not given.
 
     Returns
     -------
@@ -159,36 +179,94 @@ def diagnose(
         No record was given, or an effect name or the source of names is unknown.
     ExperimentError
         A channel is missing, or a log cannot be believed.
+    ExecutorError
+        The executor does not take the diagnosis, or its worker died with it again and again.
     """
-    asked_for(effects)
-    if names not in get_args(Names):
+    asked = Asked(effects=effects, cutoff=cutoff, setup=setup, limit=limit, names=names, check=check)
+    given = (as_records(experiments), as_records(validate or ()))
+    check_asked(asked, workers)
+    if executor is None:
+        diagnosis = diagnosed(model, *given, asked, workers, tell, progress)
+    else:
+        told = done_by(executor, partial(overheard, diagnosed, model, *given, asked, workers or 1), tell)
+        diagnosis = told.repeat(tell, progress)
+    return with_provenance(diagnosis, model, *given, asked, workers)
+
+
+def check_asked(asked: Asked, workers: int | None) -> None:
+    """Refuse what no diagnosis can be asked.
+
+    Raises
+    ------
+    DiagnosisError, IdentificationError
+        An effect, the source of names or the number of workers is none.
+    """
+    asked_for(asked.get("effects"))
+    if (names := asked.get("names", RANKING)) not in get_args(Names):
         raise DiagnosisError(f'names come from a "search" or a "ranking", not from "{names}"')
     worker_count(workers)
+
+
+def with_provenance(
+    diagnosis: Diagnosis,
+    model: Model,
+    experiments: Sequence[Experiment],
+    validate: Sequence[Experiment],
+    asked: Asked,
+    workers: int | None,
+) -> Diagnosis:
+    """The diagnosis with what it was made of, as this process knows it: where it was done, paths may be others.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    model, experiments, validate, asked, workers
+        As for `diagnosed`.
+    """
+    usual = {"effects": None, "cutoff": None, "limit": None, "names": RANKING, "check": True, "workers": None}
+    given = {**usual, **asked, "workers": workers}
+    settings: dict[str, tuple[object, object]] = {name: (given[name], default) for name, default in usual.items()}
+    settings |= own_settings(asked.get("setup") or Setup(), "setup")
+    return replace(diagnosis, provenance=provenance(model, experiments, validate, "vpm.diagnose", settings))
+
+
+@in_one_thread
+def diagnosed(
+    model: Model,
+    experiments: list[Experiment],
+    validate: list[Experiment],
+    asked: Asked,
+    workers: int | None = None,
+    tell: Tell | None = None,
+    progress: Progress | None = None,
+) -> Diagnosis:
+    """What `diagnose` finds, without where it comes from; a task for an executor.
+
+    Parameters
+    ----------
+    model : Model
+    experiments, validate : list of Experiment
+    asked : Asked
+    workers, tell, progress
+        As for `diagnose`.
+    """
+    effects, cutoff, limit = asked.get("effects"), asked.get("cutoff"), asked.get("limit")
+    setup = asked.get("setup") or Setup()
     records = _records(model, experiments, validate)
     if cutoff is not None:
         for record in chain(*records[:2]):
             check_cutoff(cutoff, record.rate, len(record.time))
     each = SideBySide(workers, progress)
     odd: list[str] = []
-    if check:
+    if asked.get("check", True):
         if tell is not None:
             tell("checking the channels of the logs")
-        given = [*as_records(experiments), *as_records(validate or ())]
-        found = refuse_mistakes(model, given, setup=setup, workers=workers, progress=progress)
+        found = refuse_mistakes(model, [*experiments, *validate], setup=setup, workers=workers, progress=progress)
         odd = [str(one) for one in found if one.kind in NOTED]
     most = max(LEAST_LIMIT, 2 * len(model.joints)) if limit is None else limit
-    diagnosis = _diagnosis(model, records, effects, cutoff, setup or Setup(), most, names, each, tell)
-    asked = {
-        "effects": (effects, None),
-        "cutoff": (cutoff, None),
-        "limit": (limit, None),
-        "names": (names, "ranking"),
-        "check": (check, True),
-        "workers": (workers, None),
-        **own_settings(setup or Setup(), "setup"),
-    }
-    made = provenance(model, as_records(experiments), as_records(validate or ()), "vpm.diagnose", asked)
-    return replace(diagnosis, notes=(*odd, *diagnosis.notes), provenance=made)
+    names = asked.get("names", RANKING)
+    diagnosis = _diagnosis(model, records, effects, cutoff, setup, most, names, each, tell)
+    return replace(diagnosis, notes=(*odd, *diagnosis.notes))
 
 
 def _diagnosis(
@@ -446,19 +524,16 @@ def _not_searched(effects: Sequence[str] | None, reason: str) -> list[str]:
     return [NOT_SEARCHED.format(effects=told)]
 
 
-def _records(
-    model: Model, experiments: Experiment | Sequence[Experiment], validate: Experiment | Sequence[Experiment] | None
-) -> _Records:
+def _records(model: Model, experiments: Sequence[Experiment], validate: Sequence[Experiment]) -> _Records:
     """Records to fit, records to judge on, and notes on both."""
-    training = tuple(joints_from_shafts(record, model, free=model.adjustable) for record in as_records(experiments))
+    training = tuple(joints_from_shafts(record, model, free=model.adjustable) for record in experiments)
     if not training:
         raise DiagnosisError("no record was given; pass at least one experiment")
     check_moving(model, training)
-    if validate is not None:
-        unseen = tuple(joints_from_shafts(record, model) for record in as_records(validate))
-        if unseen:
-            check_stuck(model, unseen)
-            return training, unseen, []
+    unseen = tuple(joints_from_shafts(record, model) for record in validate)
+    if unseen:
+        check_stuck(model, unseen)
+        return training, unseen, []
     pairs = [e.split(1.0 - HELD_OUT) for e in training]
     note = f"no validation record was given: the last {100 * HELD_OUT:.0f} % of each record was kept out of the fit"
     return tuple(p[0] for p in pairs), tuple(p[1] for p in pairs), [note]
@@ -505,10 +580,10 @@ def _recalibrated(model: Model, data: Data, notes: list[str], each: SideBySide) 
     if not free:
         notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
     transitions = _transitions(model, data.training)
-    data.training.workers = worker_count(each.workers)
     bounds = {**_within_reach(model, free), **transitions}
-    recalibrated, stopped = judged_anyhow(model, (*free, *transitions), data, bounds)
-    data.training.workers = 1  # candidates share the cores from here on
+    # This fit has all cores for its records; candidates share them from here on.
+    alone = replace(data, training=data.training.side_by_side(worker_count(each.workers)))
+    recalibrated, stopped = judged_anyhow(model, (*free, *transitions), alone, bounds)
     if stopped:
         notes.append(f"the recalibrated model could not simulate the unseen records: {stopped}")
     notes.extend(moved_far(model, recalibrated))

@@ -131,6 +131,23 @@ class ExcitationError(VpmError):
     """An excitation was asked for that cannot be: a band that samples do not carry, limits that allow no motion."""
 
 
+class ExecutorError(VpmError):
+    """Work cannot be given to an executor, a worker refused it, or its worker died with it again and again.
+
+    Attributes
+    ----------
+    worker : str or None
+        Host and process that refused it.
+    path : str or None
+        File that the worker cannot read as it was read here.
+    """
+
+    def __init__(self, message: str, *, worker: str | None = None, path: str | None = None) -> None:
+        super().__init__(message)
+        self.worker = worker
+        self.path = path
+
+
 class IdentificationError(VpmError):
     """The asked parameters cannot be found from the given records.
 

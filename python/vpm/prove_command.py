@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from importlib import import_module
 from pathlib import Path
 from types import ModuleType
@@ -34,6 +35,9 @@ def prove(
         list[str] | None, typer.Option(help="single, pairs, none, parameters, outside; all by default.")
     ] = None,
     workers: Annotated[int, typer.Option(help="Processes; 0 takes one for each core.")] = 0,
+    executor: Annotated[
+        str | None, typer.Option(help="Function that makes an executor, module:function, to take its workers instead.")
+    ] = None,
     limit: Annotated[float, typer.Option(help="Longest time of one diagnosis on its core, s.")] = 120.0,
     folder: Annotated[Path, typer.Option(help="Folder of a checkout that holds blind/.")] = Path("tests"),
     answers: Annotated[Path | None, typer.Option(help="Tables of the answers in this file instead.")] = None,
@@ -61,7 +65,8 @@ def prove(
         except ValueError as error:
             raise DiagnosisError(str(error)) from None
         kept = None if out is None else out.with_suffix(".partial.json")
-        found = _asked(proving, todo, (workers, limit), kept)
+        makes = None if executor is None else _maker(executor)
+        found = _asked(proving, todo, (workers, limit), kept, makes)
         if len(found) < len(todo):
             where = "" if kept is None else f"; what was answered is in {kept}, for vpm prove --answers {kept}"
             note(f"interrupted: {len(found)} of {len(todo)} cases are done{where}")
@@ -84,11 +89,31 @@ def prove(
         wrote(fitted.save(calibrate))
 
 
-def _asked(proving: ModuleType, todo: Sequence[Any], how: tuple[int, float], kept: Path | None) -> list[Any]:
+def _maker(text: str) -> Callable[[], Executor]:
+    """The function ``module:function``, whose module may stand in the working folder."""
+    module, _, name = text.partition(":")
+    if "" not in sys.path:
+        sys.path.insert(0, "")
+    try:
+        found: Callable[[], Executor] = getattr(import_module(module), name)
+    except (ImportError, AttributeError, ValueError) as error:
+        raise DiagnosisError(
+            f'there is no function "{text}" ({error}); write module:function, of a module that Python finds from here'
+        ) from None
+    return found
+
+
+def _asked(
+    proving: ModuleType,
+    todo: Sequence[Any],
+    how: tuple[int, float],
+    kept: Path | None,
+    executor: Callable[[], Executor] | None,
+) -> list[Any]:
     """Answers to cases, told and kept as they come."""
     console.print(f"{len(todo)} cases", markup=False)
     found = []
-    for answer in proving.answers(todo, *how, progressed):
+    for answer in proving.answers(todo, *how, progressed, executor):
         found.append(answer)
         if kept is not None:
             proving.save_json(found, kept)

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
 import os
 import time
 import warnings
 import zlib
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -23,7 +22,9 @@ from blind.effects import EFFECTS
 from blind.machines import MACHINES
 from blind.score import site_right
 from blind.table import failed
+from vpm.errors import ExecutorError
 from vpm.files import write_text
+from vpm.tasks import Tasks, processes
 
 KINDS = ("single", "pairs", "none", "parameters", "outside")
 #: Cases that are made together.
@@ -126,7 +127,11 @@ def _pairs(
 
 
 def answers(
-    todo: Sequence[Job], workers: int = 0, limit: float = 120.0, tell: Callable[[str], None] | None = None
+    todo: Sequence[Job],
+    workers: int = 0,
+    limit: float = 120.0,
+    tell: Callable[[str], None] | None = None,
+    executor: Executor | Callable[[], Executor] | None = None,
 ) -> Iterator[Answer]:
     """Answers in the order in which they come; Ctrl-C ends what runs and the iteration.
 
@@ -138,11 +143,14 @@ def answers(
     limit : float
         Longest time of one diagnosis on the processor [s].
     tell : callable, optional
-        Called with a line for each case.
+        Called with a line for each case, and for each task that died.
+    executor : Executor or callable, optional
+        Works in the place of processes of this machine, see `vpm.tasks.Tasks`.
     """
     count = workers or os.cpu_count() or 1
     say = tell or (lambda _: None)
-    given = _here(todo, limit) if count == 1 else _beside(todo, count, limit)
+    here = executor is None and count == 1
+    given = _here(todo, limit) if here else _beside(todo, executor or partial(processes, count), limit, say)
     for done, answer in enumerate(given, 1):
         say(f"{done}/{len(todo)}  {line(answer)}")
         yield answer
@@ -243,39 +251,43 @@ def _here(todo: Sequence[Job], limit: float) -> Iterator[Answer]:
         return
 
 
-def _beside(todo: Sequence[Job], count: int, limit: float) -> Iterator[Answer]:
-    """The same on processes of one thread each."""
-    threads = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "RAYON_NUM_THREADS")
-    before = {name: os.environ.get(name) for name in threads}
-    os.environ.update(dict.fromkeys(threads, "1"))
-    pool = ProcessPoolExecutor(count, mp_context=multiprocessing.get_context("spawn"))
-    try:
-        batches = _batches(todo)
-        making: set[Future[list[Made]]] = set()
-        asking: set[Future[Answer]] = set()
-        while True:
-            # Cases are made a little ahead of the diagnoses, not all of them first.
-            while len(making) < count and len(asking) < 2 * count and (batch := next(batches, None)):
-                making.add(pool.submit(make, batch))
-            running: list[Future[Any]] = [*making, *asking]
-            if not running:
-                return
-            wait(running, return_when=FIRST_COMPLETED)
-            for future in [f for f in making if f.done()]:
-                making.discard(future)
-                asking |= {pool.submit(ask, made, limit) for made in future.result()}
-            for answer in [f for f in asking if f.done()]:
-                asking.discard(answer)
-                yield answer.result()
-    except KeyboardInterrupt:
-        return
-    finally:
-        processes = list((pool._processes or {}).values())
-        pool.shutdown(wait=False, cancel_futures=True)
-        for process in processes:
-            process.terminate()
-        for name, value in before.items():
-            os.environ.pop(name) if value is None else os.environ.update({name: value})
+def _beside(
+    todo: Sequence[Job], where: Executor | Callable[[], Executor], limit: float, say: Callable[[str], None]
+) -> Iterator[Answer]:
+    """The same by an executor; a case whose worker died again and again is answered by that."""
+    batches, folder = _batches(todo), str(Path(__file__).resolve().parent.parent)
+    with Tasks[list[Job] | Job](where, say, [folder]) as tasks:
+        making = 0
+        try:
+            while True:
+                # Cases are made a little ahead of the diagnoses, not all of them first.
+                most = max(2, tasks.width // BATCH)
+                while making < most and tasks.count < tasks.width and (batch := next(batches, None)):
+                    making += 1
+                    tasks.add(batch, partial(make, batch), f"making {len(batch)} cases of {batch[0].machine}")
+                if not tasks.count:
+                    return
+                for done in tasks.answered():
+                    if isinstance(done.error, KeyboardInterrupt):
+                        return
+                    making -= isinstance(done.key, list)
+                    if isinstance(done.key, Job):
+                        yield done.value if done.error is None else _lost(done.key, done.error)
+                    elif done.error is not None:
+                        yield from (_lost(job, done.error) for job in done.key)
+                    else:
+                        for made in done.value:
+                            name = f"{made[0].machine}, seed {made[0].seed}: {', '.join(made[0].request)}"
+                            tasks.add(made[0], partial(ask, made, limit), name)
+        except KeyboardInterrupt:
+            return
+
+
+def _lost(job: Job, error: BaseException) -> Answer:
+    """The answer to a case that nobody could answer; a defect of the proving ground itself is raised."""
+    if not isinstance(error, ExecutorError):
+        raise error
+    return ask((job, None, (), (), 0.0, str(error)), 0.0)
 
 
 def save_json(found: Sequence[Answer], path: Path) -> None:

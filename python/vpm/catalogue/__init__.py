@@ -29,9 +29,11 @@ __all__ = [
     "Scale",
     "Side",
     "SiteKind",
+    "adopt",
     "effect_type",
     "effects_for_site",
     "register",
+    "registered",
     "repair_of",
     "signature_of",
     "unregister",
@@ -190,3 +192,18 @@ def unregister(name: str) -> None:
     if name in OWN:
         raise ModelError(f'"{name}" belongs to vpm and stays in the catalogue', where=name)
     del _CATALOGUE.entries[name]
+
+
+def registered() -> tuple[EffectType, ...]:
+    """Effects that `register` added."""
+    return tuple(effect for effect in EFFECTS.values() if effect.formula is not None)
+
+
+def adopt(effects: Collection[EffectType]) -> None:
+    """Add what another process has registered, as `register` checked it there.
+
+    Parameters
+    ----------
+    effects : collection of EffectType
+    """
+    _CATALOGUE.entries.update((effect.name, effect) for effect in effects)

@@ -6,12 +6,12 @@ import hashlib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.results import Storable
+from vpm.sending import vpm_version
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -79,7 +79,7 @@ def provenance(
     for role, records in (("fitted", fitted), ("unseen", unseen)):
         sources += [Source(role, e.name, e.path or "", _checksum(e.path, _numbers(e))) for e in records]
     told = {name: repr(value) for name, (value, default) in settings.items() if value != default}
-    return Provenance(_version(), f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC", command, tuple(sources), told)
+    return Provenance(vpm_version(), f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC", command, tuple(sources), told)
 
 
 def own_settings(given: object, name: str) -> dict[str, tuple[object, object]]:
@@ -99,10 +99,3 @@ def _checksum(path: str | None, otherwise: bytes) -> str:
 
 def _numbers(record: Experiment) -> bytes:
     return record.time.tobytes() + record.data.tobytes()
-
-
-def _version() -> str:
-    try:
-        return version("vpm-dynamics")
-    except PackageNotFoundError:
-        return "unknown"

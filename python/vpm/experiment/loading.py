@@ -45,7 +45,7 @@ def load_parts(
     name: str,
 ) -> Parts:
     """Parts of the record in a log; see `Experiment.load`."""
-    table = _channel_table(channels, model)
+    table = channel_table(channels, model)
     draft = plain_draft(log) if table is None else mapped_draft(log, table, model)
     return _finish(draft, name, irregular, resample)
 
@@ -88,10 +88,17 @@ def array_parts(
     return _finish(draft, name, irregular, resample)
 
 
-def _channel_table(
+def channel_table(
     channels: Mapping[str, ChannelEntry] | str | PathLike[str] | None, model: Model | None
 ) -> Mapping[str, ChannelEntry] | None:
-    """Entries by channel name, the clock among them under "time"; None where nobody gave a table."""
+    """Entries by channel name, the clock among them under "time"; None where nobody gave a table.
+
+    Parameters
+    ----------
+    channels : mapping of str to ChannelEntry, or path-like, optional
+    model : Model, optional
+        Its own table counts where none is given.
+    """
     if channels is None:
         return None if model is None or not model.channel_table else model.channel_table
     if isinstance(channels, str | PathLike):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Self, TypedDict, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, Literal, Self, TypedDict, TypeVar, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -158,18 +158,30 @@ class Experiment(Result):
             A unit cannot be read.
         """
         if str(path).endswith(".npz"):
-            return _read_from(path, super().load(path))
-        from vpm.experiment.loading import load_parts
+            return _read_from(path, super().load(path), {})
+        from vpm.experiment.loading import channel_table, load_parts
         from vpm.experiment.readers import open_log
 
-        called = name or Path(path).stem
-        parts = load_parts(open_log(path), channels, model, irregular=irregular, resample=resample, name=called)
-        return _read_from(path, cls(*parts))
+        log, table = open_log(path), channel_table(channels, model)
+        how: dict[str, Any] = {"irregular": irregular, "resample": resample, "name": name or Path(path).stem}
+        record = cls(*load_parts(log, table, model, **how))
+        return _read_from(path, record, {**how, "channels": None if table is None else dict(table), "model": model})
 
     @cached_property
     def path(self) -> str | None:
         """File that the record was read from; None if it came another way or was changed since."""
         return None
+
+    @cached_property
+    def reading(self) -> Mapping[str, Any] | None:
+        """What `load` was given beside the path, with which the file reads as this record; None as for `path`."""
+        return None
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        """Take what was pickled; arrays are read-only again."""
+        self.__dict__.update(state)
+        self.time.setflags(write=False)
+        self.data.setflags(write=False)
 
     @classmethod
     def from_frame(
@@ -490,7 +502,7 @@ class Experiment(Result):
         return {"time_s": self.time, **dict(zip(self.channels, self.data.T, strict=True))}
 
 
-def _read_from(path: str | PathLike[str], record: _Record) -> _Record:
+def _read_from(path: str | PathLike[str], record: _Record, how: Mapping[str, Any]) -> _Record:
     """The record, which knows its file: a path is no part of what makes two records equal."""
-    record.__dict__["path"] = str(path)
+    record.__dict__.update(path=str(path), reading=how)
     return record

@@ -129,6 +129,12 @@ class InverseDynamicsProblem(BegunAnywhere):
         same.expected = expected
         return same
 
+    def side_by_side(self, workers: int) -> InverseDynamicsProblem:
+        """The same, which works on so many records at a time."""
+        same = copy(self)
+        same.workers = workers
+        return same
+
     @property
     def integrators(self) -> tuple[str, ...]:
         """How drives with states of their own are run along each record."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -10,15 +12,17 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtri
 
-from vpm.errors import IdentificationError
+from vpm.errors import ExecutorError, IdentificationError
 from vpm.identify.estimation import blinded
 from vpm.identify.identifiability import Combination, column_lengths, unseen_combinations
 from vpm.identify.objective import AnyProblem, Objective, noise_levels
-from vpm.identify.parallel import until_interrupted, worker_count
+from vpm.identify.parallel import worker_count
 from vpm.identify.sandwich import record_groups, sandwich
 from vpm.identify.settings import Fitting
 from vpm.identify.solver import Descent, Point, descend
 from vpm.model import Model
+from vpm.sending import Parcel
+from vpm.tasks import Done, outcomes, until_interrupted
 
 Array = NDArray[np.float64]
 Progress = Callable[[int, float], None]
@@ -65,6 +69,7 @@ def fit_problem(
     tolerance: float,
     progress: Progress | None = None,
     begin: Array | None = None,
+    executor: Executor | Callable[[], Executor] | None = None,
 ) -> Found:
     """Fit free parameters, and first states if the problem has them.
 
@@ -81,6 +86,8 @@ def fit_problem(
     progress : callable, optional
     begin : ndarray, shape (p,), optional
         Parameters to begin with, in place of the starts of ``fitting``.
+    executor : Executor or callable, optional
+        Descends from the starts, see `vpm.tasks.Tasks`; threads do if not given.
 
     Raises
     ------
@@ -93,7 +100,11 @@ def fit_problem(
     # Starts are compared under weights that are the same for all; losses and noise are found from the best.
     search = Objective(model, data, free, bounds, _plain(fitting), progress) if _weighs_later(fitting) else objective
     begun = starts(model, free, search, fitting) if begin is None else [search.coordinates(begin)]
-    descents, interrupted = _search(search, begun, fitting, 1e2 * tolerance if _weighs_later(fitting) else tolerance)
+    rough = 1e2 * tolerance if _weighs_later(fitting) else tolerance
+    if executor is None or len(begun) == 1:
+        descents, interrupted = _search(search, begun, fitting, rough)
+    else:
+        descents, interrupted = _search_elsewhere(search, begun, fitting, rough, executor, progress)
     best = min(descents, key=lambda d: d.point.cost)
     if not np.isfinite(best.point.cost):
         raise IdentificationError(
@@ -132,6 +143,44 @@ def _search(
     if interrupted and not kept:
         raise KeyboardInterrupt
     return kept, interrupted
+
+
+def _search_elsewhere(
+    objective: Objective,
+    begun: Sequence[Array],
+    fitting: Fitting,
+    tolerance: float,
+    executor: Executor | Callable[[], Executor],
+    progress: Progress | None,
+) -> tuple[list[Descent], bool]:
+    """The same by an executor; a start whose worker died again and again is told, and left out."""
+    shared = Parcel.of(objective)
+
+    def heard(ended: Sequence[Done[int]]) -> None:
+        for descent, count in (done.value for done in ended if done.error is None):
+            objective.count += count
+            if progress is not None:
+                progress(objective.count, float(np.sqrt(descent.point.cost / max(1, descent.point.raw[0].size))))
+
+    jobs = [partial(_sent_descent, shared, x, fitting, tolerance) for x in begun]
+    names = [f"start {number}" for number in range(1, len(jobs) + 1)]
+    found, interrupted = outcomes(jobs, executor, heard=heard, names=names)
+    kept = [done.value[0] for done in found if done is not None and done.error is None]
+    errors = [done.error for done in found if done is not None and done.error is not None]
+    for error in errors:
+        if not kept or not isinstance(error, ExecutorError):
+            raise error
+        warnings.warn(f"{error}; the fit goes on with the other starts", RuntimeWarning, stacklevel=2)
+    if interrupted and not kept:
+        raise KeyboardInterrupt
+    return kept, interrupted
+
+
+def _sent_descent(shared: Parcel, x: Array, fitting: Fitting, tolerance: float) -> tuple[Descent, int]:
+    """A descent on a copy of the objective, and how often it was evaluated."""
+    objective: Objective = shared.open()
+    before = objective.count
+    return _descent(objective, x, fitting, tolerance), objective.count - before
 
 
 def _descent(objective: Objective, x: Array, fitting: Fitting, tolerance: float) -> Descent:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import TYPE_CHECKING, TypeVar
@@ -197,6 +198,7 @@ def identify(
     progress: Progress | None = None,
     fitting: Fitting | None = None,
     checks: Checks | None = None,
+    executor: Executor | Callable[[], Executor] | None = None,
 ) -> Fit:
     """Fit parameters of ``model`` to one or several experiments at once.
 
@@ -228,6 +230,9 @@ def identify(
         Weights, losses, priors, bounds, several starts, unknown first states, pieces.
     checks : Checks, optional
         When `Fit.warnings` says that the fit may be wrong.
+    executor : Executor or callable, optional
+        Does the fits from several starts of ``fitting``, one task each, see `vpm.tasks.Tasks`; the fit is the same.
+        ``progress`` is then called after each of them.
 
     Returns
     -------
@@ -235,6 +240,8 @@ def identify(
 
     Raises
     ------
+    ExecutorError
+        The executor takes no work, or no start could be fitted there.
     IdentificationError
         Nothing is free, a name is unknown, a channel that the mode needs is missing, or a tie has no single meaning.
     """
@@ -270,7 +277,7 @@ def identify(
     else:
         check_bounds(names, fitting)
         engine = partial(_by_engine, model, names, limits(model, names, fitting.bounds), fitting, tolerance)
-        first = engine(data, progress=progress)
+        first = engine(data, progress=progress, executor=executor)
 
         def again(_: Model, less: AnyProblem, near: _Engineered) -> _Engineered:
             return engine(less, near=near)
@@ -312,10 +319,13 @@ def _by_engine(
     data: AnyProblem,
     progress: Progress | None = None,
     near: _Engineered | None = None,
+    executor: Executor | Callable[[], Executor] | None = None,
 ) -> _Engineered:
     """A fit by the engine, from all its starts or from ``near``; of these it then knows what their fits reached."""
     begin = near.values if near else None
-    found = fit_problem(model, data, names, box, fitting, tolerance=tolerance, progress=progress, begin=begin)
+    found = fit_problem(
+        model, data, names, box, fitting, tolerance=tolerance, progress=progress, begin=begin, executor=executor
+    )
     if near:
         evaluations = near.evaluations + found.evaluations
         found = replace(found, costs=near.found.costs, agreeing=near.found.agreeing, evaluations=evaluations)

@@ -72,6 +72,10 @@ class Objective:
         self._prior_mean, self._prior_std = values[self._prior], prior[self._prior]
         self.noise: dict[str, float] = dict(fitting.noise_levels)
 
+    def __getstate__(self) -> dict[str, object]:
+        """All but who is told: that is a function of one process."""
+        return {**vars(self), "_progress": None}
+
     @property
     def priors(self) -> int:
         """Number of rows at the end of a weighted residual that stand for what is known of the parameters."""

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import ValidationError
 
-from vpm.batch import BatchInterruptedError, side_by_side
+from vpm.batch import side_by_side
 from vpm.errors import DivergedError, ScenarioError, SimulationError, VpmError, near_match
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -30,6 +30,7 @@ from vpm.scenario.panels import checked_columns, checked_panels
 from vpm.scenario.schema import Document
 from vpm.scenario.start import held_inputs, start_state
 from vpm.simulate import Run, Setup, simulate
+from vpm.tasks import BatchInterruptedError
 
 Array = NDArray[np.float64]
 

@@ -9,6 +9,7 @@ from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, Problem, estimate, gaps
 from vpm.model import Model
+from vpm.one_thread import in_one_thread
 from vpm.simplify.replacement import commanded
 from vpm.simulate import Setup, judging_mode, simulate
 
@@ -60,6 +61,7 @@ class Judge:
         """Record whose commands drive a model that is timed."""
         return self.unseen[0]
 
+    @in_one_thread
     def fitted(self, model: Model) -> Model:
         """Model with its adjustable parameters fitted to the records it learns from.
 

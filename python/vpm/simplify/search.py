@@ -10,6 +10,7 @@ best one each further change is tried while one pays.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor
 from itertools import islice, product
 
 from vpm.budget import budget
@@ -52,6 +53,7 @@ def simplify(
     mode: str | None = None,
     channels: Sequence[str] | None = None,
     tell: Callable[[str], None] | None = None,
+    executor: Executor | Callable[[], Executor] | None = None,
 ) -> Ladder:
     """Make a model simpler, place by place, as far as the tolerance allows, and find the cheapest way to step it.
 
@@ -84,6 +86,8 @@ def simplify(
         pressures, or the positions of the joints where there are none.
     tell : callable, optional
         Called with a sentence at every step.
+    executor : Executor or callable, optional
+        Fits reduced models that do not wait for each other, one task each, see `vpm.tasks.Tasks`; steps are timed here.
 
     Returns
     -------
@@ -93,6 +97,8 @@ def simplify(
     ------
     SimulationError
         A number is out of its range, the records do not suit the rate, or nothing can be simulated.
+    ExecutorError
+        The executor takes no work.
     """
     if not tolerance >= 0.0:
         raise SimulationError(f"a tolerance of {tolerance:g} is not possible; give a share of zero or more")
@@ -110,7 +116,7 @@ def simplify(
         known = {id(each): by_the_model(model, each, mode, rate, channels) for each in (*records, *unseen)}
         records, unseen = ([known[id(each)] for each in group] for group in (records, unseen))
     judge = Judge(model, records, unseen, rate, mode, channels)
-    trials = Trials(model, judge, lambda changes: bool(changes) or against == "data", say, tolerance)
+    trials = Trials(model, judge, lambda changes: bool(changes) or against == "data", say, tolerance, executor)
     sites = reductions(model, surrogates(model, judge.records, mode, rate, judge.channels))
     try:
         _weigh_terms(trials, sites)
@@ -131,8 +137,12 @@ def _descend(trials: Trials, sites: Sites) -> None:
         )
     limit = min(rung.error for rung in full) + trials.tolerance
     base = _together(trials, sites, limit)
+    singles = (_with(base, change) for changes in sites.values() for change in _coarser(changes, base))
+    trials.ahead(singles, trials.as_quick_as(base))
     alone = {site: _alone(trials, base, changes) for site, changes in sites.items()}
-    for changes in _foreseen(trials, base, {site: _paying(found) for site, found in alone.items()}, limit):
+    foreseen = _foreseen(trials, base, {site: _paying(found) for site, found in alone.items()}, limit)
+    trials.ahead(foreseen, _within(trials.rungs, limit).seconds)
+    for changes in foreseen:
         trials.attempt(changes, _within(trials.rungs, limit).seconds)
     lost = {change: added for found in alone.values() for change, (_, added) in found.items()}
     _polish(trials, sites, limit, {change for change, added in lost.items() if added > TOO_MUCH * trials.tolerance})
@@ -172,7 +182,9 @@ def _together(trials: Trials, sites: Sites, limit: float) -> Changes:
     seconds = min(rung.seconds for rung in trials.attempt(()))
     levels = [changes for (kind, _), changes in sites.items() if kind == "level"]
     together = [tuple(c for each in levels for c in each if c.name == level) for level in OFFERED]
-    for changes in sorted(filter(None, together), key=lambda changes: reduced(trials.model, changes).core.n_states):
+    coarsest = sorted(filter(None, together), key=lambda changes: reduced(trials.model, changes).core.n_states)
+    trials.ahead(coarsest)
+    for changes in coarsest:
         rung = trials.cheapest(changes, limit - (1.0 - NEGLIGIBLE) * trials.tolerance)
         if rung is not None and rung.seconds < seconds:
             best, seconds = changes, rung.seconds
@@ -258,10 +270,10 @@ def _polish(trials: Trials, sites: Sites, limit: float, hopeless: set[Reduction]
     while True:
         best = _within(trials.rungs, limit)
         base = trials.changes_of(best)
-        for changes in sites.values():
-            for change in _coarser(changes, base):
-                if change not in hopeless:
-                    trials.attempt(_with(base, change), best.seconds)
+        further = [change for changes in sites.values() for change in _coarser(changes, base) if change not in hopeless]
+        trials.ahead((_with(base, change) for change in further), best.seconds)
+        for change in further:
+            trials.attempt(_with(base, change), best.seconds)
         if not _within(trials.rungs, limit).seconds < SAVED * best.seconds:
             return
 

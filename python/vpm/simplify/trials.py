@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from vpm.budget import step_times
-from vpm.errors import SimulationError, VpmError
+from vpm.errors import ExecutorError, SimulationError, VpmError
 from vpm.model import Model
 from vpm.simplify.course import Courses
 from vpm.simplify.judge import Judge
 from vpm.simplify.ladder import Rung
 from vpm.simplify.reductions import Reduction, reduced
 from vpm.simulate import FIXED_STEP, Setup
+from vpm.tasks import outcomes
 
 #: Steps timed for each rung: as many as these seconds allow, within these numbers. A 99.9 % quantile needs the least.
 TIMED_SECONDS = 0.05
@@ -57,6 +60,8 @@ class Trials:
         Called with a sentence for each trial.
     tolerance : float
         Largest loss that is allowed.
+    executor : Executor or callable, optional
+        Does fits that `ahead` asks for, see `vpm.tasks.Tasks`.
     """
 
     def __init__(
@@ -66,9 +71,12 @@ class Trials:
         refit: Callable[[Changes], bool],
         tell: Callable[[str], None],
         tolerance: float,
+        executor: Executor | Callable[[], Executor] | None = None,
     ) -> None:
         self.model, self.judge, self.tolerance = model, judge, tolerance
-        self._refit, self.say = refit, tell
+        self._refit, self.say, self._executor = refit, tell, executor
+        #: Fits that were done elsewhere, or their errors, by the models that they began with.
+        self._fits: dict[Model, Model | VpmError] = {}
         #: Along what models are timed.
         self.courses = Courses(model, judge)
         #: Why the last way that did not work did not.
@@ -125,13 +133,53 @@ class Trials:
                     self._cut.add(key)
                     return []
                 self.say(", ".join(map(str, changes)) or "the full model")
-                self._models[key] = self.judge.fitted(self._begun(model, key)) if self._refit(changes) else model
+                self._models[key] = self._fit(self._begun(model, key)) if self._refit(changes) else model
                 self._rungs[key] = []
                 self._step(changes, glances)
             except VpmError as error:
                 self.reason = str(error)
                 self._rungs.setdefault(key, [])
         return self._rungs[key]
+
+    def ahead(self, tried: Iterable[Changes], below: float = np.inf) -> None:
+        """Let the executor fit models that are about to be tried, side by side; without one they are fitted in turn.
+
+        All end before anything is timed. A trial takes such a fit if its own would begin with the same values.
+
+        Parameters
+        ----------
+        tried : iterable of tuple of Reduction
+        below : float
+            As for `attempt`.
+        """
+        if self._executor is None:
+            return
+        begun: list[Model] = []
+        for changes in map(_in_order, tried):
+            key = frozenset(changes)
+            if key in self._rungs or not self._refit(changes):
+                continue
+            try:
+                model = reduced(self.model, changes)
+                if min(map(_period, self._glances(model).values()), default=0.0) <= min(below, self._dear()):
+                    begun.append(self._begun(model, key))
+            except VpmError:
+                continue  # the trial says why
+        found, interrupted = outcomes([partial(self.judge.fitted, model) for model in begun], self._executor, self.say)
+        if interrupted:
+            raise KeyboardInterrupt
+        for model, done in zip(begun, found, strict=True):
+            if done is None or isinstance(done.error, ExecutorError):
+                continue  # it was told, and the trial fits the model here
+            if done.error is not None and not isinstance(done.error, VpmError):
+                raise done.error
+            self._fits[model] = done.value if done.error is None else done.error
+
+    def _fit(self, begun: Model) -> Model:
+        known = self._fits.get(begun)
+        if isinstance(known, VpmError):
+            raise known
+        return self.judge.fitted(begun) if known is None else known
 
     def as_quick_as(self, changes: Changes) -> float:
         """Time of a period at a glance (s) up to which a model is no dearer than one that was tried."""
