@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +18,6 @@ from numpy.typing import NDArray
 import robot_texts as texts
 import vpm
 from command_line import vpm as run_command
-from robot_bag import write_joint_states
 from vpm.errors import MissingExtraError, ModelError
 from vpm.robots import ImportedRobot
 from written_logs import needs
@@ -522,7 +525,6 @@ def test_xacro_is_expanded_and_runs_no_code(tmp_path: Path) -> None:
 
 
 def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    import sys
 
     for library in ("mujoco", "xacro", "xacrodoc"):
         monkeypatch.setitem(sys.modules, library, None)
@@ -546,45 +548,20 @@ def test_commands(tmp_path: Path) -> None:
 
 
 ROOT = Path(__file__).resolve().parent.parent
-CHANNELS = """time = { column = "/joint_states", unit = "s" }
-"shoulder.position" = { column = "/joint_states.position[shoulder]", unit = "rad" }
-"elbow.position" = { column = "/joint_states.position[elbow]", unit = "rad" }
-"shoulder_drive.command" = { column = "/joint_states.effort[shoulder]", unit = "N m" }
-"elbow_drive.command" = { column = "/joint_states.effort[elbow]", unit = "N m" }
-"""
-COMMANDS = """vpm import arm.urdf -o arm.toml --uncertain 0.1
-vpm diagnose arm.toml bag/bag.mcap --channels channels.toml --interpolate --workers 1 --out report
-vpm export report/model.toml --urdf arm.urdf -o repaired.urdf
-"""
-
-
-def moved_by_a_controller(model: vpm.Model, step: float, count: int) -> tuple[Array, Array, Array]:
-    """Positions, velocities and efforts of the two joints that a controller swings, noise of encoders included."""
-    random, time = np.random.default_rng(1), step * np.arange(count)
-    swing = [0.7 * np.sin(2.1 * time) + 0.2 * np.sin(5.0 * time)]
-    swing += [0.9 * np.sin(3.1 * time + 0.4) + 0.2 * np.sin(7.0 * time)]
-    wanted = np.minimum(time, 1.0) * np.array(swing)
-    simulation = vpm.Simulation(model, step, substeps=2)
-    q, v, u = np.zeros((3, 2, count))
-    for k in range(count):
-        q[:, k] = [simulation[f"{joint}.position"] for joint in model.joints]
-        v[:, k] = [simulation[f"{joint}.velocity"] for joint in model.joints]
-        q[:, k] += 1e-5 * random.standard_normal(2)
-        u[:, k] = np.array([200.0, 80.0]) * (wanted[:, k] - q[:, k]) - np.array([15.0, 5.0]) * v[:, k]
-        simulation.step(u[:, k])
-    return q, v, u
+BLOCK = re.compile(r"^```(toml|text)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
 @needs("rosbags")
-def test_from_a_urdf_and_a_bag_to_a_named_effect_in_three_commands(tmp_path: Path) -> None:
+def test_the_tutorial_leads_from_a_urdf_and_a_bag_to_a_named_effect_in_three_commands(tmp_path: Path) -> None:
     """Dry friction of 1.5 N m is hidden in the elbow; only the channel table is written by hand."""
-    urdf = (ROOT / "examples" / "robots" / "arm.urdf").read_text(encoding="utf-8")
-    hidden = imported(tmp_path, urdf, "arm.urdf").model.with_effect("coulomb_friction", at="elbow", coulomb=1.5)
-    q, v, u = moved_by_a_controller(hidden, 5e-3, 900)
-    states = {joint: (q[k], v[k], u[k]) for k, joint in enumerate(hidden.joints)}
-    write_joint_states(tmp_path / "bag", 5e-3 * np.arange(900.0), states)
-    (tmp_path / "channels.toml").write_text(CHANNELS, encoding="utf-8")
-    for line in COMMANDS.splitlines():
+    page = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
+    recording, table, commands, script = (found[2] for found in BLOCK.finditer(page))
+    shutil.copytree(ROOT / "examples" / "robots", tmp_path / "examples" / "robots")
+    for line in recording.splitlines():
+        words = [sys.executable if word == "python" else word for word in line.split()]
+        subprocess.run(words, cwd=tmp_path, check=True)
+    (tmp_path / "channels.toml").write_text(table, encoding="utf-8")
+    for line in commands.splitlines():
         done = run_command(*line.split()[1:], cwd=tmp_path)
         assert done.returncode == 0, done.stdout + done.stderr
     found = vpm.Diagnosis.load(tmp_path / "report" / "diagnosis.npz")
@@ -593,3 +570,4 @@ def test_from_a_urdf_and_a_bag_to_a_named_effect_in_three_commands(tmp_path: Pat
     # The friction is in the URDF now, and what reads it finds it there.
     repaired = vpm.import_robot(tmp_path / "repaired.urdf").model
     assert repaired.parameters["elbow.friction.coulomb"].value == pytest.approx(1.5, rel=0.1)
+    assert len(script.splitlines()) <= 15

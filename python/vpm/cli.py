@@ -352,8 +352,7 @@ def compare(
             console.print(f"  {channel.channel}: {sentence}", markup=False)
     save_plot(comparison.plot, plot)
     if mcap is not None:
-        for written in write_mcap(comparison, mcap):
-            console.print(f"{written} is written", markup=False)
+        wrote(*write_mcap(comparison, mcap))
 
 
 @app.command(epilog="Example:  vpm report report/diagnosis.npz --out report/")

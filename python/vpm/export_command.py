@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from vpm.command import ModelPath, console, load_model, writable
+from vpm.manner import give, note, wrote
 
 EXAMPLES = "Example:  vpm export fit/model.toml --urdf robot.urdf -o fitted.urdf"
 
@@ -26,6 +27,7 @@ def export(
     target = exported.save(out or urdf)
     for sentence in exported.changed:
         console.print(sentence, markup=False)
-    for note in exported.notes:
-        console.print(f"note: {note}", markup=False)
-    console.print(f"wrote {target}", markup=False)
+    for told in exported.notes:
+        note(told)
+    give(changed=exported.changed)
+    wrote(target)

@@ -9,6 +9,7 @@ import typer
 
 from vpm.command import console, writable
 from vpm.errors import ModelError
+from vpm.manner import give, note, wrote
 
 EXAMPLES = (
     "Example:  vpm import robot.urdf -o model.toml --uncertain 0.1\n\n"
@@ -34,7 +35,8 @@ def import_(
     given = dict(word.split("=", 1) for word in arg or [])
     imported = import_robot(robot, uncertain=uncertain, floating=floating, xacro_args=given)
     imported.save(out)
-    for note in imported.notes:
-        console.print(f"note: {note}", markup=False)
+    for told in imported.notes:
+        note(told)
+    give(name=imported.model.name, joints=imported.model.joints, parameters=imported.model.parameter_names)
     console.print(repr(imported.model), markup=False)
-    console.print(f"wrote {out}", markup=False)
+    wrote(out)

@@ -13,14 +13,13 @@ from vpm.command import (
     Interpolate,
     ModelPath,
     console,
-    errors,
     load_model,
     load_record,
     progress,
-    warnings_told,
     writable,
 )
 from vpm.errors import VpmError
+from vpm.manner import give, note, wrote
 
 if TYPE_CHECKING:
     from vpm.experiment import Experiment
@@ -68,28 +67,28 @@ def view(
     from vpm.view import course_of, scene_of
 
     machine = load_model(model)
-    with warnings_told():
-        course = course_of(machine, _source(moved, run, machine, channels, interpolate), mode)
+    course = course_of(machine, _source(moved, run, machine, channels, interpolate), mode)
     scene = scene_of(machine, course)
-    for note in scene.notes:
-        console.print(f"note: {note}", markup=False)
+    for told in scene.notes:
+        note(told)
+    give(name=machine.name)
     if page is not None:
         from vpm.view.page import write_page
 
-        console.print(f"wrote {write_page(scene, page)}", markup=False)
+        wrote(write_page(scene, page))
     if film is not None:
         from vpm.view.film import write_film
 
         with progress() as tell:
             write_film(scene, film, speed=speed, dark=dark, progress=tell)
-        console.print(f"wrote {film}", markup=False)
+        wrote(film)
     if page is None and film is None:
         from vpm.view.live import Page, serve, show
 
         live = Page(machine, course, port=port, dark=dark)
         console.print(f"{machine.name} is at {live.address}; Ctrl-C ends it", markup=False)
         if browser and not show(live):
-            errors.print("no browser was found here; open the address in one, or write a page by --page", markup=False)
+            note("no browser was found here; open the address in one, or write a page by --page")
         serve(live)
 
 

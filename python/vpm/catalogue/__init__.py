@@ -196,7 +196,7 @@ def unregister(name: str) -> None:
 
 def registered() -> tuple[EffectType, ...]:
     """Effects that `register` added."""
-    return tuple(effect for effect in EFFECTS.values() if effect.formula is not None)
+    return tuple(effect for effect in _CATALOGUE.entries.values() if effect.formula)
 
 
 def adopt(effects: Collection[EffectType]) -> None:

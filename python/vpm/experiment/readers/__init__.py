@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from importlib import import_module
 from os import PathLike
 from pathlib import Path
 
@@ -19,6 +21,18 @@ MDF = (".mf4", ".mdf")
 TDMS = (".tdms",)
 ULOG = (".ulg",)
 ENDINGS = (".csv", ".tsv", ".txt", *PARQUET, *MATLAB, *HDF5, *BAGS, *MDF, *TDMS, *ULOG)
+
+#: Module and class, or function, that opens files of these endings.
+_READERS: Mapping[tuple[str, ...], tuple[str, str]] = {
+    PARQUET: ("parquet", "ParquetLog"),
+    MATLAB: ("mat", "open_mat"),
+    HDF5: ("hdf5", "Hdf5Log"),
+    (".mcap",): ("mcap_json", "open_mcap"),
+    BAGS: ("ros", "BagLog"),
+    MDF: ("mdf", "open_mdf"),
+    TDMS: ("tdms", "TdmsLog"),
+    ULOG: ("ulog", "UlogLog"),
+}
 
 OWN = frozenset(ending[1:] for ending in ENDINGS)
 
@@ -55,42 +69,14 @@ def open_log(path: str | PathLike[str]) -> Log:
 def _opened(path: str | PathLike[str]) -> Log:
     file = Path(path)
     ending = file.suffix.lower()
-    if ending in (*PARQUET, *MATLAB, *HDF5, *BAGS, *MDF, *TDMS, *ULOG) and not file.exists():
-        raise ExperimentError(f"{path} does not exist; check the name and the folder", path=str(path))
-    if ending in PARQUET:
-        from vpm.experiment.readers.parquet import ParquetLog
-
-        return ParquetLog(path)
-    if ending in MATLAB:
-        from vpm.experiment.readers.mat import open_mat
-
-        return open_mat(path)
-    if ending in HDF5:
-        from vpm.experiment.readers.hdf5 import Hdf5Log
-
-        return Hdf5Log(path)
-    if ending == ".mcap":
-        from vpm.experiment.readers.mcap_json import JsonLog, is_json
-
-        if is_json(path):
-            return JsonLog(path)
-    if ending in BAGS or (file / "metadata.yaml").is_file():
-        from vpm.experiment.readers.ros import BagLog
-
-        return BagLog(path)
-    if ending in MDF:
-        from vpm.experiment.readers.guarded import GuardedLog
-        from vpm.experiment.readers.mdf import MdfLog
-
-        return GuardedLog(path, MdfLog)
-    if ending in TDMS:
-        from vpm.experiment.readers.tdms import TdmsLog
-
-        return TdmsLog(path)
-    if ending in ULOG:
-        from vpm.experiment.readers.ulog import UlogLog
-
-        return UlogLog(path)
+    for endings, (module, name) in _READERS.items():
+        if ending not in endings:
+            continue
+        if not file.exists():
+            raise ExperimentError(f"{path} does not exist; check the name and the folder", path=str(path))
+        return _by(module, name, path)
+    if (file / "metadata.yaml").is_file():
+        return _by("ros", "BagLog", path)
     from vpm.experiment.readers.lerobot import EpisodeLog, is_data_set, is_episode
 
     if is_data_set(file) or (not file.exists() and is_episode(file)):
@@ -106,6 +92,12 @@ def _opened(path: str | PathLike[str]) -> Log:
     from vpm.experiment.readers.text import TextLog
 
     return TextLog(path)
+
+
+def _by(module: str, name: str, path: str | PathLike[str]) -> Log:
+    """Log by a reader of this package, imported only now."""
+    opened: Log = getattr(import_module(f"vpm.experiment.readers.{module}"), name)(path)
+    return opened
 
 
 def _by_plugin(plugin: Plugin, path: str | PathLike[str]) -> Log:

@@ -11,9 +11,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
+from vpm.experiment.readers.base import Log
 from vpm.experiment.readers.clocked import TIME, ClockedLog, broken, readable_unit
+from vpm.experiment.readers.ros import BagLog
 
 Array = NDArray[np.float64]
+
+
+def open_mcap(path: str | PathLike[str]) -> Log:
+    """Reader of a file of JSON messages, or else of messages of ROS."""
+    return JsonLog(path) if is_json(path) else BagLog(path)
 
 
 def is_json(path: str | PathLike[str]) -> bool:

@@ -15,6 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import VpmError
+from vpm.experiment.readers import guarded
+from vpm.experiment.readers.base import Log
 from vpm.experiment.readers.clocked import TIME, ClockedLog, broken, readable_unit, silent
 from vpm.expression import Quantity, read_expression
 
@@ -36,6 +38,11 @@ class _Place(NamedTuple):
 
     group: int
     channel: int
+
+
+def open_mdf(path: str | PathLike[str]) -> Log:
+    """Reader that runs in a process of its own."""
+    return guarded.GuardedLog(path, MdfLog)
 
 
 class MdfLog(ClockedLog):
