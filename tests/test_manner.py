@@ -113,7 +113,9 @@ def test_every_command_writes_one_document(name: str, folder: Path) -> None:
     files = document["files"]
     assert isinstance(files, list)
     assert all((folder / file).is_file() for file in files)
-    assert bool(files) == (name in {"simulate", "diagnose", "report", "compile"} or name.startswith("excite"))
+    assert bool(files) == (
+        name in {"simulate", "diagnose", "report", "compile", "view", "import", "export"} or name.startswith("excite")
+    )
 
 
 def test_numbers_in_the_document_are_those_of_the_result(folder: Path) -> None:
