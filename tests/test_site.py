@@ -30,11 +30,14 @@ def test_the_reference_has_every_public_function_and_class() -> None:
         assert f"      heading: vpm.{name}\n" in text
 
 
-def test_formulas_are_set_but_code_is_not() -> None:
-    pytest.importorskip("latex2mathml", reason="latex2mathml, which the site sets formulas with, is not installed")
-    formulas = import_module("formulas")
-    text = formulas.on_page_markdown("mass $M \\ddot q$ and `$HOME`\n\n$$\\tau = M a$$\n\n```sh\necho $A $B\n```\n")
+def test_formulas_are_set_but_code_is_not(tmp_path: Path) -> None:
+    pytest.importorskip("latex2mathml", reason="latex2mathml, which sets the formulas of the site, is not installed")
+    (tmp_path / "page.md").write_text(
+        'mass $M \\ddot q$ and `$HOME`\n\n$$\\tau = M a$$\n\n```python\nx["a"](b)\necho = "$A $B"\n```\n',
+        encoding="utf-8",
+    )
+    text = pages.moved(tmp_path / "page.md", {}, tmp_path)
     assert text.count("<math") == 2
     assert 'display="block"' in text
     assert "`$HOME`" in text
-    assert "echo $A $B" in text
+    assert 'x["a"](b)\necho = "$A $B"' in text

@@ -28,6 +28,9 @@ BESIDE = {
 #: Examples that draw: a folder each, with a script that takes the folder of its pictures.
 EXAMPLES = ("flexible_pendulum", "spinning_beam", "servo_cylinder", "karl", "hyq_leg", "tudor")
 
+#: Code has no links and no formulas.
+_CODE = re.compile(r"(```.*?```|`[^`\n]*`)", re.DOTALL)
+_FORMULA = re.compile(r"\$\$(?P<displayed>.+?)\$\$|\$(?P<inline>[^$\n]+?)\$", re.DOTALL)
 _LINK = re.compile(r"(\]\(|src=\"|href=\")(?!https?:|mailto:|#)([^)#\"\s]+)")
 
 
@@ -56,7 +59,21 @@ def moved(page: Path, sources: dict[Path, str], folder: Path) -> str:
             copy(goal, folder / target)
         return found[1] + target
 
-    return _LINK.sub(link, page.read_text(encoding="utf-8"))
+    parts = _CODE.split(page.read_text(encoding="utf-8"))
+    return "".join(part if number % 2 else set_formulas(_LINK.sub(link, part)) for number, part in enumerate(parts))
+
+
+def set_formulas(text: str) -> str:
+    """Formulas between dollar signs as MathML, which browsers set without a script."""
+    if not _FORMULA.search(text):
+        return text
+    from latex2mathml.converter import convert
+
+    def formula(found: re.Match[str]) -> str:
+        displayed = found["displayed"]
+        return convert(displayed.strip(), display="block") if displayed else convert(found["inline"].strip())
+
+    return _FORMULA.sub(formula, text)
 
 
 def copy(source: Path, target: Path) -> None:
