@@ -58,7 +58,7 @@ const ALONE: [(&str, &[&str]); 16] = [
     ("controller", &["error", "scalar", "effect::Domain", "actuator::Saturation"]),
 ];
 /// What puts the parts together, lowest first: each may import any part, any tree module and any before it.
-const WHOLE: [&str; 15] = [
+const WHOLE: [&str; 16] = [
     "sensitivity",
     "system",
     "description",
@@ -66,6 +66,7 @@ const WHOLE: [&str; 15] = [
     "motion",
     "simulate",
     "inverse",
+    "batch",
     "evaluate",
     "linearize",
     "c_source",
