@@ -117,6 +117,7 @@ def banded(name: str) -> Experiment:
 
 
 @needs_logs
+@pytest.mark.nightly
 def test_a_friction_damper_with_play_stays_unexplained() -> None:
     train = [banded(name) for name in ("0.5Hz_30lb_1.5in", "2Hz_30lb_0.5in")]
     unseen = [banded(name) for name in ("0.5Hz_30lb_1in", "1Hz_30lb_1in")]

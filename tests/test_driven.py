@@ -209,6 +209,7 @@ def test_one_noise_counts_once_however_many_readings_show_it() -> None:
     assert float(np.sum(weighted(apart, left) ** 2)) > 1e3 * alone
 
 
+@pytest.mark.nightly
 def test_readings_of_a_cylinder_go_with_its_joint_and_those_of_joints_alone() -> None:
     case = shared_case("servo_cylinder", "none", 1)
     model = case.model()

@@ -64,6 +64,7 @@ def test_several_experiments_in_one_fit_are_better_than_one() -> None:
     assert all_four.experiments == tuple(r.name for r in records)
 
 
+@pytest.mark.nightly
 def test_intervals_cover_the_truth() -> None:
     """Ninety-five percent intervals over forty noise seeds: binomial chance of fewer than 32 hits is below 1e-3."""
     noisy = replace(TRUTH, force_noise=3.0)

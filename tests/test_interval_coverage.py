@@ -23,6 +23,8 @@ from vpm.identify.whiteness import explained_by, heard, powers, shifted, waves
 
 BENCHES = Path(__file__).parents[1] / "benches"
 MACHINES = ("axis", "flexible_arm", "leg", "cart")
+#: The two that take longest are left to the night.
+EACH = [pytest.param(m, marks=pytest.mark.nightly) if m in {"leg", "flexible_arm"} else m for m in MACHINES]
 
 
 def loaded(name: str) -> ModuleType:
@@ -53,7 +55,7 @@ def suspects(fit: Fit) -> bool:
     return any("an effect may be missing" in sentence for sentence in fit.warnings)
 
 
-@pytest.mark.parametrize("machine", MACHINES)
+@pytest.mark.parametrize("machine", EACH)
 def test_intervals_of_a_complete_model_hold_and_nothing_is_suspected(machine: str) -> None:
     """Of some forty intervals at 95 %, a quarter misses with a chance below 1e-4, were they independent."""
     found = fits(machine, range(8), lacking=0)
@@ -62,7 +64,7 @@ def test_intervals_of_a_complete_model_hold_and_nothing_is_suspected(machine: st
     assert sum(suspects(fit) for fit, _ in found) <= 1
 
 
-@pytest.mark.parametrize("machine", MACHINES)
+@pytest.mark.parametrize("machine", EACH)
 def test_a_model_that_lacks_an_effect_is_warned_of(machine: str) -> None:
     assert sum(not fit.warnings for fit, _ in fits(machine, range(6), lacking=1)) <= 1
 

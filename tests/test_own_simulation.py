@@ -174,6 +174,7 @@ def test_a_joint_without_an_encoder_is_simulated_at_rest_where_the_balance_has_i
     assert np.std(left - own.expected) < 0.5 * np.std(left)
 
 
+@pytest.mark.nightly
 def test_nor_does_it_behind_a_motor() -> None:
     """Of twenty, fewer than 15 hold the truth with a chance of 3e-4; by the plain balance 17, 0 and 11 do."""
     fits = [identify(WITH_MOTOR, log, FREE) for log in logs(20, seed=73, motor=True)]

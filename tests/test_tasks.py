@@ -144,6 +144,7 @@ def by_dask(count: int, folder: Path) -> None:
     assert same(found, diagnose_many(todo, **QUICK))
 
 
+@pytest.mark.nightly
 def test_dask_does_without_a_worker(tmp_path: Path) -> None:
     by_dask(4, tmp_path)
 
