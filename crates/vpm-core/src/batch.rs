@@ -148,7 +148,7 @@ pub fn answer(
     let rows = motions.position.rows();
     let mut job = Job { places, motions, width, columns: inputs.len(), entries: Vec::new(), interrupt, name };
     if inputs.is_empty() {
-        return job.run(&Engine::of_values(description, theta, &kind, rows)?);
+        return job.run(&description.engine(theta, &kind, rows)?);
     }
     let derived = Kind::Derived(Box::new(kind.clone()), inputs.clone());
     let function = description.functions().function(&derived, theta)?;

@@ -37,7 +37,9 @@ use crate::model::{Model, Omissions, Parts};
 use crate::mount::{Gauge, Marker};
 use crate::scalar::Scalar;
 use crate::sensor::{Layout, Sensor};
-use crate::system::{Build, Cache, Dynamics, Functions, Kind, Machine, Memories, Placed, Places, Recorder, System};
+use crate::system::{
+    Build, Cache, Dynamics, Engine, Functions, Kind, Machine, Memories, Placed, Places, Recorder, System,
+};
 use crate::transmission::Transmission;
 
 /// The parts of a machine. Every `usize` in a law is a place in [`Description::parameters`]; all numbers are SI.
@@ -248,6 +250,15 @@ impl Description {
     /// The functions of the machine, recorded as they are asked for.
     pub(crate) fn functions(&self) -> Arc<Functions> {
         self.recorded.functions(|| Box::new(self.clone()))
+    }
+
+    /// What works a function of a motion out for so many motions, with the parameters `theta`.
+    ///
+    /// # Errors
+    /// The parts cannot be built, or a law decides by the value of a state.
+    pub(crate) fn engine(&self, theta: &[f64], kind: &Kind, motions: usize) -> Result<Engine> {
+        let function = || self.functions().function(kind, theta);
+        Engine::of_values((kind, theta, motions), function, || Build::dynamics(&self, theta))
     }
 
     /// A function of the machine as a program of operations, its parts built for the checked parameters `theta`.

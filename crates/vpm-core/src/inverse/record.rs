@@ -103,7 +103,7 @@ impl<'a> Along<'a> {
         let (description, theta) = (self.record.description, self.theta);
         let (places, functions) = (description.places(), description.functions());
         if self.sensitivities.is_empty() {
-            let engine = Engine::of_values(description, theta, &kind, self.record.samples().len())?;
+            let engine = description.engine(theta, &kind, self.record.samples().len())?;
             return self.run(&Function { engine, places, width, entries: &[], columns: Vec::new() });
         }
         let (by, columns) = self.columns(places);

@@ -2,11 +2,10 @@
 
 use std::sync::Arc;
 
+use super::Dynamics;
 use super::functions::Function;
 use super::recorded::{Kind, Places};
 use super::routine::{Routine, code_pays};
-use super::{Build, Dynamics};
-use crate::description::Description;
 use crate::error::Result;
 use crate::graph::{Evaluator, Lanes};
 use crate::scalar::Scalar;
@@ -24,12 +23,15 @@ pub(crate) enum Engine {
 }
 
 impl Engine {
-    /// A function without derivatives, for so many motions.
-    pub(crate) fn of_values(description: &Description, theta: &[f64], kind: &Kind, rows: usize) -> Result<Self> {
-        let function = || description.functions().function(kind, theta);
+    /// A function without derivatives, for so many motions: what `function` gives as machine code, or else the `laws`.
+    pub(crate) fn of_values(
+        (kind, theta, rows): (&Kind, &[f64], usize),
+        function: impl FnOnce() -> Result<Arc<Function>>,
+        laws: impl FnOnce() -> Result<Dynamics<f64>>,
+    ) -> Result<Self> {
         match Self::code(function, theta, rows) {
             Some(engine) => Ok(engine),
-            None => Ok(Self::Laws(Box::new(Build::dynamics(&description, theta)?), kind.clone())),
+            None => Ok(Self::Laws(Box::new(laws()?), kind.clone())),
         }
     }
 
