@@ -27,6 +27,7 @@ from vpm.discrepancy.standing import earned, in_order
 from vpm.identify import Gain, InverseDynamicsProblem, estimate
 
 
+@pytest.mark.nightly
 def test_a_spring_takes_the_place_of_the_constant_force_that_was_the_plainer_name() -> None:
     case = shared_case("axis_rotary", "spring", 7)
     (hidden,) = case.truth.hidden

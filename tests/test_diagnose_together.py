@@ -31,6 +31,7 @@ def test_one_effect_alone_gets_no_partner() -> None:
     assert [(effect.name, effect.site) for effect in why.effects] == [("viscous_friction", "axis")]
 
 
+@pytest.mark.nightly
 def test_a_spring_beside_a_hysteresis_is_fitted_where_the_tangent_at_its_start_does_not_lead() -> None:
     case = shared_case("axis_rotary", ("hysteresis", "joint_compliance"), 5002)
     tried = ["hysteresis", "joint_compliance"]

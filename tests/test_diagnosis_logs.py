@@ -94,6 +94,7 @@ def halves_of_a_seal(bar: int) -> tuple[Experiment, Experiment]:
     return part(slice(0, middle), "first half"), part(slice(middle, None), "second half")
 
 
+@pytest.mark.nightly
 @needs_logs
 def test_friction_that_grows_with_pressure_is_told_as_unexplained() -> None:
     first, second = zip(*(halves_of_a_seal(bar) for bar in (1, 3, 5, 7)), strict=True)

@@ -238,6 +238,7 @@ def test_what_no_model_of_oil_is_exact_to_does_not_tell_late_from_slow() -> None
     assert apart < 1.0
 
 
+@pytest.mark.nightly
 def test_readings_of_a_cylinder_are_what_a_model_of_oil_is_not_exact_to() -> None:
     case = shared_case("servo_cylinder", "none", 1)
     record = case.train[0].split(0.1)[0]

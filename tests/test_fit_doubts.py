@@ -108,9 +108,8 @@ def test_checks_that_cannot_be_meant_are_refused() -> None:
 # ---- intervals -------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(
-    "kind", [kind if kind == "coloured" else pytest.param(kind, marks=pytest.mark.nightly) for kind in KINDS]
-)
+@pytest.mark.nightly
+@pytest.mark.parametrize("kind", KINDS)
 def test_intervals_cover(kind: str) -> None:
     """Of sixty intervals at 95 %, fewer than 51 hold the truth with a chance of 1e-3."""
     assert np.all(covered(Axis(), fits(Axis(), kind, 60, seed=50)) >= 51)

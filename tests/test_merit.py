@@ -44,6 +44,7 @@ def merit() -> ModuleType:
     return module
 
 
+@pytest.mark.nightly
 @needs_record
 def test_the_flexible_arm_with_play_beats_both_baselines_on_the_other_half(merit: ModuleType, tmp_path: Path) -> None:
     first, second = merit.load(RECORD)

@@ -98,6 +98,7 @@ def some() -> list[Experiment]:
     return logs(MACHINES, seed=72)
 
 
+@pytest.mark.nightly
 def test_dry_friction_that_turns_round_biases_no_interval(some: list[Experiment]) -> None:
     """Of forty intervals at 95 %, fewer than 32 hold the truth with a chance of 1e-3."""
     fits = [identify(MODEL, log, FREE) for log in some]

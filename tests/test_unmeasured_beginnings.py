@@ -87,6 +87,7 @@ def held(fit: Fit) -> NDArray[np.bool_]:
     return np.asarray((fit.intervals[:, 0] <= EXPECTED) & (fit.intervals[:, 1] >= EXPECTED))
 
 
+@pytest.mark.nightly
 def test_a_swing_that_nobody_saw_begin_biases_no_interval() -> None:
     """Of 16 intervals at 95 %, fewer than 12 hold the truth with a chance of 1e-3."""
     fits = [identify(MODEL, log, FREE) for log in logs(16, 21, 0.4)]
@@ -107,6 +108,7 @@ def test_a_swing_far_from_the_tangent_at_rest_is_found() -> None:
     assert abs(speed) < 0.1
 
 
+@pytest.mark.nightly
 def test_settings_of_the_fit_and_ties_know_of_it_too() -> None:
     """Each record has first states of its own."""
     records = logs(2, 23, 0.4)
