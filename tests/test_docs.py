@@ -1,7 +1,8 @@
 """Every block of code in the documents is run, so that none can rot.
 
 Python blocks of one page share their names and run from top to bottom, in a folder of their own that holds a copy of
-``examples``. Blocks of TOML are read, whole models are loaded. In console blocks, lines that start with ``$ vpm`` are
+``examples``. Blocks of TOML are read, whole models are loaded; those of Rust are compiled by
+``tests/test_add_an_effect.py``. In console blocks, lines that start with ``$ vpm`` are
 run through the command line, and ``$ make`` has to name a command of the Makefile.
 """
 
@@ -20,7 +21,7 @@ from vpm.catalogue import EFFECTS
 from vpm.cli import app
 
 ROOT = Path(__file__).resolve().parent.parent
-LANGUAGES = {"console", "python", "text", "toml"}
+LANGUAGES = {"console", "python", "rust", "text", "toml"}
 FENCE = re.compile(r"^```(?P<language>\S*)[ \t]*\n(?P<code>.*?)^```[ \t]*$", re.MULTILINE | re.DOTALL)
 
 
