@@ -17,6 +17,7 @@ import pytest
 import typer
 
 import vpm
+from brick import bar_archive
 from command_line import vpm as command
 from vpm import info_command
 from vpm.cli import app
@@ -49,6 +50,7 @@ CASES: dict[str, tuple[str | Path, ...]] = {
     "view": (MODEL, "--page", "arm.html"),
     "import": (ROOT / "examples" / "robots" / "arm.urdf", "-o", "robot.toml"),
     "export": ("robot.toml", "--urdf", ROOT / "examples" / "robots" / "arm.urdf", "-o", "back.urdf"),
+    "reduce": ("bar.npz", "--modes", "2", "--out", "link.npz"),
     "demo": ("--list",),
     "excite multisine": (*BAND, "--peak", "2"),
     "excite chirp": (*BAND, "--peak", "2"),
@@ -83,6 +85,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (place / "limits.toml").write_text(LIMITS, encoding="utf-8")
     answers = json.loads((ROOT / "docs" / "proving_ground.json").read_text(encoding="utf-8"))
     (place / "answers.json").write_text(json.dumps(answers[:20]), encoding="utf-8")
+    bar_archive(place / "bar.npz")
     return place
 
 
@@ -114,7 +117,8 @@ def test_every_command_writes_one_document(name: str, folder: Path) -> None:
     assert isinstance(files, list)
     assert all((folder / file).is_file() for file in files)
     assert bool(files) == (
-        name in {"simulate", "diagnose", "report", "compile", "view", "import", "export"} or name.startswith("excite")
+        name in {"simulate", "diagnose", "report", "compile", "view", "import", "export", "reduce"}
+        or name.startswith("excite")
     )
 
 

@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from vpm.observer import Noise, Observation, Observer, observe
     from vpm.ranking import Ranking, rank
     from vpm.realtime import write_fmu
+    from vpm.reduction import Reduction, reduce
     from vpm.report import Report, report, write_report
     from vpm.robots import ExportedRobot, ImportedRobot, export_robot, import_robot
     from vpm.scenario import Scenario, ScenarioRun
@@ -80,6 +81,7 @@ __all__ = [
     "Observer",
     "OilFit",
     "Ranking",
+    "Reduction",
     "Report",
     "Run",
     "Scenario",
@@ -108,6 +110,7 @@ __all__ = [
     "observe",
     "rank",
     "realtime",
+    "reduce",
     "report",
     "shaper",
     "simplify",
@@ -157,6 +160,8 @@ _HOMES = {
     "Ranking": "vpm.ranking",
     "rank": "vpm.ranking",
     "write_fmu": "vpm.realtime",
+    "Reduction": "vpm.reduction",
+    "reduce": "vpm.reduction",
     "Report": "vpm.report",
     "report": "vpm.report",
     "write_report": "vpm.report",

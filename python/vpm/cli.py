@@ -28,6 +28,7 @@ from vpm import (
     info_command,
     prove_command,
     rank_command,
+    reduce_command,
     view_command,
 )
 from vpm.command import (
@@ -123,6 +124,7 @@ app.command(epilog=prove_command.EXAMPLES)(prove_command.prove)
 app.command(epilog=view_command.EXAMPLES)(view_command.view)
 app.command("import", epilog=import_command.EXAMPLES)(import_command.import_)
 app.command(epilog=export_command.EXAMPLES)(export_command.export)
+app.command(epilog=reduce_command.EXAMPLES)(reduce_command.reduce)
 detail_command.add_to(app)
 
 

@@ -131,6 +131,10 @@ class ExcitationError(VpmError):
     """An excitation was asked for that cannot be: a band that samples do not carry, limits that allow no motion."""
 
 
+class ReductionError(VpmError):
+    """A solid or its matrices cannot be reduced to a flexible link."""
+
+
 class ExecutorError(VpmError):
     """Work cannot be given to an executor, a worker refused it, or its worker died with it again and again.
 
@@ -198,6 +202,8 @@ class ValidityWarning(UserWarning):
         exact = (
             "use a level that is exact at any deflection: "
             f'level = "bezier(4)" in the model file, or model.at({{"{beam}": "bezier(4)"}})'
+            if not level.startswith("reduced")
+            else "cut the reduced solid into several links, each of which bends less"
         )
         what, repair = (
             (f"its level {level}", exact)

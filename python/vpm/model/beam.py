@@ -7,8 +7,9 @@ from typing import Annotated, ClassVar, Literal
 
 from pydantic import AfterValidator, Field
 
-from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Switch, Text, Vector
+from vpm.model.entry import ONE, ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Switch, Text, Vector
 from vpm.model.level import USUAL, Component, Level, parse_level
+from vpm.model.reduced import ReducedLink, link_of
 
 
 class Material(Entry):
@@ -112,7 +113,7 @@ def _different(components: tuple[Component, ...]) -> tuple[Component, ...]:
 
 
 class Beam(Entry):
-    """Flexible link, fixed to its parent at its root; the axis is z of the root frame.
+    """Flexible link, fixed to its parent at its root: a straight beam along z of the root frame, or a reduced solid.
 
     Without its `velocity_terms` no products of rates load it; without `second_order` its deflection is linear in its
     coordinates.
@@ -122,12 +123,15 @@ class Beam(Entry):
     at: Number | None = None
     translation: Vector = ORIGIN
     rotation: Vector = ORIGIN
-    length: Number
+    length: Number | None = None
     level: Annotated[Text, AfterValidator(_readable)]
     deforms: Annotated[tuple[Component, ...], Field(min_length=1), AfterValidator(_different)] = USUAL
-    material: Material
+    material: Material | None = None
     section: Section | None = None
     sections: Annotated[tuple[Section, ...], Field(min_length=1)] | None = None
+    reduced: Text | None = None
+    stiffness_factor: ParameterValue = ONE
+    mass_factor: ParameterValue = ONE
     damping: Damping = Damping()
     velocity_terms: Switch = True
     second_order: Switch = True
@@ -136,6 +140,16 @@ class Beam(Entry):
     def detail(self) -> Level:
         """Level of detail."""
         return parse_level(self.level)
+
+    @property
+    def solid(self) -> ReducedLink | None:
+        """The reduced solid that it is, if it is one."""
+        return None if self.reduced is None else link_of(self.reduced)
+
+    @property
+    def reach(self) -> float:
+        """Its last place: the length (m), or the number of interfaces of a reduced solid."""
+        return (self.length or 0.0) if self.solid is None else float(len(self.solid.interfaces))
 
 
 def sections_of(beam: Beam) -> list[tuple[tuple[str | int, ...], Section]]:

@@ -7,24 +7,56 @@ from collections.abc import Iterator, Mapping
 from itertools import pairwise
 
 from vpm.model.beam import Beam, Circle, Given, IBeam, Rectangle, Section, Tube, sections_of
+from vpm.model.entry import ONE
 from vpm.model.messages import Problem, place
 from vpm.model.parameters import Parameter
+from vpm.model.reduced import ReducedLink
 from vpm.model.schema import Document
 from vpm.model.tree import TIP_TOLERANCE
 
 #: A gauge may be this many half sizes of its section away from the axis: enough for layers on the surface, and too
 #: little for millimetres that were taken for metres.
 GAUGE_REACH = 2.0
+_EXAMPLES = {
+    "length": "length = 0.5",
+    "material": "material = { young = 206e9, poisson = 0.3, density = 7850 }",
+}
 
 
 def beam_problems(document: Document) -> Iterator[Problem]:
     """What needs no parameter values to be judged."""
     for name, beam in document.beams.items():
-        if not beam.length > 0.0:
+        if beam.solid is not None:
+            yield from _solid_problems(name, beam, beam.solid)
+            continue
+        if beam.detail.name == "reduced":
+            rest = f'is "{beam.level}", but the beam has no reduced solid; name one, reduced = "link.npz"'
+            yield Problem(place("beams", name, "level"), rest)
+        for key in ("length", "material"):
+            if getattr(beam, key) is None:
+                yield Problem(place("beams", name, key), f"is missing; add it, for example {_EXAMPLES[key]}")
+        for key in ("stiffness_factor", "mass_factor"):
+            if getattr(beam, key) != ONE:
+                yield Problem(place("beams", name, key), "is for a reduced solid; remove it, and change the material")
+        if beam.length is not None and not beam.length > 0.0:
             yield Problem(
                 place("beams", name, "length"), f"is {beam.length:g} m, but has to be above 0; correct the length"
             )
         yield from _section_problems(name, beam)
+
+
+def _solid_problems(name: str, beam: Beam, solid: ReducedLink) -> Iterator[Problem]:
+    """What a link cannot be beside a reduced solid."""
+    for key in ("length", "material", "section", "sections"):
+        if getattr(beam, key) is not None:
+            yield Problem(place("beams", name, key), "is given, but the reduced solid says it; remove one of the two")
+    level = beam.detail
+    if level.name not in {"rigid", "reduced"}:
+        rest = f'is "{level}", but a reduced solid has modes only; write "reduced({solid.squares.size})" or "rigid"'
+        yield Problem(place("beams", name, "level"), rest)
+    elif level.number > solid.squares.size:
+        rest = f'is "{level}", but the solid has {solid.squares.size} modes; take fewer, or reduce it again with more'
+        yield Problem(place("beams", name, "level"), rest)
 
 
 def _section_problems(name: str, beam: Beam) -> Iterator[Problem]:
@@ -56,10 +88,10 @@ def _order_problems(name: str, beam: Beam, sections: tuple[Section, ...]) -> Ite
     else:
         known = [at for at in places if at is not None]
         rising = all(before < after for before, after in pairwise(known))
-        whole = known[0] == 0.0 and math.isclose(known[-1], beam.length, rel_tol=TIP_TOLERANCE)
+        whole = known[0] == 0.0 and math.isclose(known[-1], beam.reach, rel_tol=TIP_TOLERANCE)
         if not (rising and whole):
             shown = ", ".join(f"{at:g}" for at in known)
-            rest = f"has the places {shown} m, but they have to rise from 0 to the length {beam.length:g} m; correct at"
+            rest = f"has the places {shown} m, but they have to rise from 0 to the length {beam.reach:g} m; correct at"
             yield Problem(where, rest)
 
 

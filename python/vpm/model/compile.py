@@ -37,6 +37,9 @@ from vpm.model.structure import (
     Structure,
 )
 
+#: Parameters of a reduced solid in the place of young, poisson and density; the core has no use for the second one.
+_FACTORS = ("stiffness_factor", "stiffness_factor", "mass_factor")
+
 
 def described(structure: str, theta: NDArray[np.float64]) -> str:
     """Description of a model for the core, as JSON text, from that of its structure and the values of its parameters.
@@ -135,14 +138,15 @@ def _inertia(body: str, index: Mapping[str, int]) -> dict[str, Any]:
 def _beam(name: str, structure: Structure, index: Mapping[str, int]) -> dict[str, Any]:
     beam = structure.document.beams[name]
     level = beam.detail
-    modes = sum(level.count(component) for component in beam.deforms)
+    modes = len(level.coordinates(beam.deforms))
+    own = ("young", "poisson", "density") if beam.solid is None else _FACTORS
     return {
         "name": name,
         **frame_json(structure.frames[name]),
-        "length": beam.length,
+        "length": beam.reach,
         "level": level.name if level.name == "rigid" else {level.name: level.number},
         "deforms": list(beam.deforms),
-        "material": {key: index[f"{name}.{key}"] for key in ("young", "poisson", "density")},
+        "material": {key: index[f"{name}.{o}"] for key, o in zip(("young", "poisson", "density"), own, strict=True)},
         "sections": [_section(name, way, section, index) for way, section in sections_of(beam)],
         "damping": {
             "stiffness": index.get(f"{name}.damping.stiffness"),
@@ -150,6 +154,7 @@ def _beam(name: str, structure: Structure, index: Mapping[str, int]) -> dict[str
             # A coarse level has fewer modes than ratios may be given for.
             "ratios": [index[f"{name}.damping.ratios.{i}"] for i in range(min(modes, len(beam.damping.ratios)))],
         },
+        **({} if beam.solid is None else {"reduced": beam.solid.content()}),
     }
 
 
@@ -160,7 +165,7 @@ def _section(beam: str, way: tuple[str | int, ...], section: Section, index: Map
 
 
 def _gauge(name: str, gauge: Gauge, structure: Structure) -> dict[str, Any]:
-    length = structure.document.beams[gauge.beam].length
+    length = structure.document.beams[gauge.beam].reach
     beam = structure.beams.index(gauge.beam)
     return {"name": name, "beam": beam, "at": min(gauge.at, length), "x": gauge.x, "y": gauge.y}
 

@@ -44,4 +44,5 @@ def _as_table(value: object) -> object:
 
 ParameterValue = Annotated[Quantity, BeforeValidator(_as_table)]
 ZERO = Quantity(value=0.0)
+ONE = Quantity(value=1.0)
 ORIGIN = (0.0, 0.0, 0.0)

@@ -108,7 +108,8 @@ class Evaluations(Motions):
             if slope > limit:
                 first = beam in self.first_order_beams
                 what = "a deflection to first order" if first else f"its level {self.levels[beam]}"
-                repair = "remove second_order = false" if first else 'use level = "bezier(4)"'
+                exact = "cut it into several links" if "reduced" in self.levels[beam] else 'use level = "bezier(4)"'
+                repair = "remove second_order = false" if first else exact
                 yield (
                     f"warning: {beam} sags by {slope:.3g} rad at rest, but {what} is right within 1 % up to "
                     f"{limit:.3g} rad only; {repair}"

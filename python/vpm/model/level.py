@@ -17,7 +17,7 @@ COMPONENTS: tuple[Component, ...] = get_args(Component)
 #: What a link deforms in unless its model says otherwise.
 USUAL: tuple[Component, ...] = ("bending_x", "bending_y", "torsion")
 
-LevelName = Literal["rigid", "lumped", "modal", "bezier", "deflection", "hermite", "strain", "elements"]
+LevelName = Literal["rigid", "lumped", "modal", "bezier", "deflection", "hermite", "strain", "elements", "reduced"]
 
 _WRITTEN = re.compile(r"\s*(?P<name>[A-Za-z_]+)\s*(?:\(\s*(?P<number>[+-]?\d+)\s*\)\s*)?")
 
@@ -40,6 +40,7 @@ FORMS: Mapping[str, _Form] = {
     "hermite": _Form("the number of cubic elements", 1, 100),
     "strain": _Form("the number of polynomials per component", 1, 12),
     "elements": _Form("the number of elements", 1, 100),
+    "reduced": _Form("the number of modes of a reduced solid", 1, 64),
 }
 LEVEL_NAMES: tuple[str, ...] = ("rigid", *FORMS)
 
@@ -50,7 +51,8 @@ class Level:
 
     Attributes
     ----------
-    name : {"rigid", "lumped", "modal", "bezier", "deflection", "hermite", "strain", "elements"}
+    name : str
+        One of `LEVEL_NAMES`.
     number : int
         Of segments, modes, elements or polynomials, or the degree of the curve; 0 for a rigid beam.
     """
@@ -88,12 +90,15 @@ class Level:
         """Names of the coordinates of a beam, in the order of the core: ``bending_x.0``.
 
         One component after the other, except for springs between rigid segments: there one segment after the other.
+        Modes of a reduced solid are of no component: ``mode.0``.
 
         Parameters
         ----------
         deforms : sequence of str
             Components, in the order of the file.
         """
+        if self.name == "reduced":
+            return tuple(f"mode.{i}" for i in range(self.number))
         if self.name == "lumped":
             return tuple(f"{component}.{i}" for i in range(self.number) for component in deforms)
         return tuple(f"{component}.{i}" for component in deforms for i in range(self.count(component)))
@@ -140,14 +145,14 @@ def _example(name: str) -> str:
 
 
 def deforms_of(beam: Mapping[str, Any]) -> tuple[str, ...]:
-    """Components in which a beam of a model file deforms.
+    """Components in which a beam of a model file deforms; none of a reduced solid, which has modes.
 
     Parameters
     ----------
     beam : mapping
         Its table.
     """
-    return tuple(beam.get("deforms", USUAL))
+    return () if "reduced" in beam else tuple(beam.get("deforms", USUAL))
 
 
 def size_of(level: str, beam: Mapping[str, Any]) -> int:

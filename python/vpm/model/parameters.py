@@ -226,13 +226,17 @@ def _rotor_slot(name: str, rotor: Quantity, structure: Structure) -> Slot:
 
 def _beam_slots(name: str, beam: Beam) -> Iterator[Slot]:
     """Material, sections, damping; the effort of a motion is linear in none of them, for they bend the beam."""
-    keys, material, damping = ("beams", name), beam.material, beam.damping
-    for key, unit, bounds in (
-        ("young", "Pa", _ABOVE_ZERO),
-        ("poisson", "1", _POISSON),
-        ("density", "kg/m^3", _ABOVE_ZERO),
-    ):
-        yield Slot(f"{name}.{key}", (*keys, "material", key), getattr(material, key), unit, bounds, "shape")
+    keys, damping = ("beams", name), beam.damping
+    if beam.material is None:  # a reduced solid
+        for key in ("stiffness_factor", "mass_factor"):
+            yield Slot(f"{name}.{key}", (*keys, key), getattr(beam, key), "1", _ABOVE_ZERO, "shape")
+    else:
+        for key, unit, bounds in (
+            ("young", "Pa", _ABOVE_ZERO),
+            ("poisson", "1", _POISSON),
+            ("density", "kg/m^3", _ABOVE_ZERO),
+        ):
+            yield Slot(f"{name}.{key}", (*keys, "material", key), getattr(beam.material, key), unit, bounds, "shape")
     for way, section in sections_of(beam):
         place_in_file = ("section",) if len(way) == 1 else ("sections", *way[1:])
         for key, quantity in section.sizes.items():

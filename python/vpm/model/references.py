@@ -93,6 +93,10 @@ def gauge_problems(document: Document) -> Iterator[Problem]:
             repair = near_match(gauge.beam, document.beams, what="it has")
             yield Problem(place("gauges", name, "beam"), f'is "{gauge.beam}", which is no beam of the model; {repair}')
             continue
+        if document.beams[gauge.beam].solid is not None:
+            rest = f'is "{gauge.beam}", a reduced solid, whose strains nobody knows; remove the gauge'
+            yield Problem(place("gauges", name, "beam"), rest)
+            continue
         yield from outside_problems(("gauges", name), gauge.at, gauge.beam, document)
         deforms = document.beams[gauge.beam].deforms
         arms = {"bending_x": gauge.y, "bending_y": gauge.x, "extension": 1.0}

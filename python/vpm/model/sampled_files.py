@@ -1,4 +1,4 @@
-"""Drives in sampled time that stand in a file of their own: their numbers take the place of the file's name.
+"""Drives in sampled time and reduced solids that stand in files of their own: the numbers take the place of the name.
 
 A model is complete in itself then: it can be saved elsewhere, and its file does not need the other one.
 """
@@ -11,7 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from vpm.errors import VpmError
+from vpm.model.beam import Beam
 from vpm.model.messages import Problem, place
+from vpm.model.reduced import EMBEDDED, embedded, link_of, read_bytes
 from vpm.model.sampled import OUTPUT, SIZES, MaxwellNarx, Narx
 from vpm.model.sampled_terms import written
 from vpm.model.schema import Document
@@ -22,7 +24,7 @@ _SLACK = 1e-9
 
 
 def with_files(document: Document, path: str | None) -> tuple[Document, list[Problem]]:
-    """Read the files that drives name, relative to the model file.
+    """Read the files that drives and flexible links name, relative to the model file.
 
     Parameters
     ----------
@@ -46,7 +48,7 @@ def with_files(document: Document, path: str | None) -> tuple[Document, list[Pro
             rest = f"is given, and {' and '.join(twice)} as well; remove the file or what it says"
             problems.append(Problem(where, rest))
             continue
-        target = Path(actuator.file) if path is None else Path(path).parent / actuator.file
+        target = _beside(actuator.file, path)
         kind = type(actuator).__name__
         try:
             result = Result.load(target)
@@ -60,7 +62,27 @@ def with_files(document: Document, path: str | None) -> tuple[Document, list[Pro
             problems.append(Problem(where, f"is wrong: {error}"))
             continue
         actuators[name] = read
-    return document.model_copy(update={"actuators": actuators}), problems
+    beams = dict(document.beams)
+    for name, beam in document.beams.items():
+        try:
+            beams[name] = _with_solid(beam, path)
+        except VpmError as error:
+            problems.append(Problem(place("beams", name, "reduced"), f"is wrong: {error}"))
+    return document.model_copy(update={"actuators": actuators, "beams": beams}), problems
+
+
+def _beside(name: str, path: str | None) -> Path:
+    return Path(name) if path is None else Path(path).parent / name
+
+
+def _with_solid(beam: Beam, path: str | None) -> Beam:
+    """A flexible link that holds the numbers of its reduced solid; any other as it is."""
+    if beam.reduced is None or beam.reduced.startswith(EMBEDDED):
+        _ = beam.solid  # damaged ones are told here
+        return beam
+    text = embedded(read_bytes(_beside(beam.reduced, path)))
+    _ = link_of(text)
+    return beam.model_copy(update={"reduced": text})
 
 
 def _narx(actuator: Narx, saved: Mapping[str, Any]) -> Narx:

@@ -246,7 +246,8 @@ class Structure:
         return owner if owner in self.joints else None
 
     def _bends(self, beam: str) -> bool:
-        return any(component.startswith("bending") for component in self.document.beams[beam].deforms)
+        link = self.document.beams[beam]
+        return link.solid is None and any(component.startswith("bending") for component in link.deforms)
 
     def _mover(self, site: str) -> str | None:
         """Last joint on the way from the world to a body or a beam."""
@@ -439,7 +440,7 @@ def _mounted(
     if parent == WORLD:
         return Frame(Mount(), placed)
     if parent in document.beams:
-        length = document.beams[parent].length
+        length = document.beams[parent].reach
         return Frame(Mount("section", beams.index(parent), length if at is None else min(at, length)), placed)
     under = frames[parent]
     return Frame(under.mount, under.pose @ placed)

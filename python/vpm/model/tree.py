@@ -88,8 +88,13 @@ def _attachment_problems(keys: tuple[str, ...], parent: str, at: float | None, d
 
 def outside_problems(keys: tuple[str, ...], at: float, beam: str, document: Document) -> Iterator[Problem]:
     """A place before the root or beyond the tip of a beam."""
-    length = document.beams[beam].length
-    if not 0.0 <= at <= length * (1.0 + TIP_TOLERANCE):
+    length, solid = document.beams[beam].reach, document.beams[beam].solid
+    if solid is not None:
+        if at not in range(len(solid.interfaces) + 1):
+            known = ", ".join(f"{number} ({name})" for number, name in enumerate(("root", *solid.interfaces)))
+            rest = f'is {at:g}, but on "{beam}", a reduced solid, it is the number of an interface: {known}; take one'
+            yield Problem(place(*keys, "at"), rest)
+    elif not 0.0 <= at <= length * (1.0 + TIP_TOLERANCE):
         yield Problem(
             place(*keys, "at"), f'is {at:g} m, but beam "{beam}" goes from 0 to {length:g} m; correct the place'
         )

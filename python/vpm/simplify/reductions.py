@@ -31,6 +31,8 @@ OFFERED = (
     "lumped(1)",
     "rigid",
 )
+#: The same of a reduced solid.
+OFFERED_SOLID = ("reduced(8)", "reduced(4)", "reduced(2)", "reduced(1)", "rigid")
 #: Component that a link needs, because its joints or loads live in it, is never held rigid: bending.
 HELD_FIRST = ("extension", "shear_x", "shear_y", "torsion")
 
@@ -160,7 +162,7 @@ def _imaginable(model: Model) -> Iterator[Reduction]:
     for name, beam in _beams(model).items():
         deforms = deforms_of(beam)
         own = size_of(beam["level"], beam)
-        for level in OFFERED:
+        for level in OFFERED_SOLID if "reduced" in beam else OFFERED:
             if size_of(level, beam) < own:
                 yield Reduction("level", level, name)
         for component in HELD_FIRST:

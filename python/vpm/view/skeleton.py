@@ -163,6 +163,9 @@ class Skeleton:
         self._draws.append(draw)
 
     def _add_beam(self, number: int, beam: Content) -> None:
+        if "reduced" in beam:
+            self._add_solid(number, beam)
+            return
         places = np.linspace(0.0, beam["length"], STATIONS)
         stations = [self.frames.add({"section": {"beam": number, "at": float(at)}}) for at in places]
         at = [section["at"] for section in beam["sections"]]
@@ -172,6 +175,19 @@ class Skeleton:
 
         def draw(pose: Pose) -> Iterator[Shape]:
             yield Tube(beam["name"], "beam", pose.origins[:, stations], np.maximum(radius, THIN * pose.size))
+
+        self._draws.append(draw)
+
+    def _add_solid(self, number: int, solid: Content) -> None:
+        """A bar from the root of a reduced solid to each of its interfaces."""
+        root, *ends = [
+            self.frames.add({"section": {"beam": number, "at": float(at)}}) for at in range(int(solid["length"]) + 1)
+        ]
+        self._lead(solid["on"], root, solid["translation"])
+
+        def draw(pose: Pose) -> Iterator[Shape]:
+            for end in ends:
+                yield Tube(solid["name"], "beam", pose.origins[:, [root, end]], np.full(2, 2.0 * THIN * pose.size))
 
         self._draws.append(draw)
 

@@ -1,6 +1,7 @@
 //! Whether a beam can exist as it is described.
 
 use super::entry::{BeamEntry, Level};
+use super::reduced::Reduced;
 use super::{Section, not_negative, positive};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
@@ -17,6 +18,7 @@ impl Level {
             Self::Hermite(n) => Some((n, 1, 100, "lie between 1 and 100 for cubic elements")),
             Self::Strain(n) => Some((n, 1, 12, "lie between 1 and 12 for Legendre coefficients of strain")),
             Self::Elements(n) => Some((n, 1, 100, "lie between 1 and 100 for elements of linear strain")),
+            Self::Reduced(n) => Some((n, 1, 64, "lie between 1 and 64 for modes of a reduced solid")),
         }
     }
 }
@@ -26,9 +28,32 @@ impl<S: Scalar> BeamEntry<S> {
     /// damping that takes energy out.
     pub fn check(&self) -> Result<()> {
         positive(&format!("{}.length", self.name), self.length)?;
-        self.check_level()?;
-        self.check_sections()?;
+        match &self.reduced {
+            Some(reduced) => self.check_reduced(reduced)?,
+            None => {
+                self.check_level()?;
+                self.check_sections()?;
+            }
+        }
         self.check_damping()
+    }
+
+    fn check_reduced(&self, reduced: &Reduced) -> Result<()> {
+        reduced.check(&self.name)?;
+        positive(&format!("{}.stiffness_factor", self.name), self.material.young)?;
+        positive(&format!("{}.mass_factor", self.name), self.material.density)?;
+        let (modes, interfaces) = (reduced.solid().squares.len(), reduced.solid().interfaces.len());
+        if self.length != interfaces as f64 {
+            return Err(self.domain("length", "be the number of interfaces beside that at the root", self.length));
+        }
+        match self.level {
+            Level::Rigid => Ok(()),
+            Level::Reduced(n) if (1..=modes).contains(&n) => Ok(()),
+            Level::Reduced(n) => {
+                Err(self.domain("level", "lie between 1 and the number of modes of the reduced solid", n as f64))
+            }
+            _ => Err(self.domain("level", "be rigid or reduced for a reduced solid", 0.0)),
+        }
     }
 
     /// An error of a number of this beam, called `{name}.{what}`.
@@ -40,12 +65,16 @@ impl<S: Scalar> BeamEntry<S> {
     pub(super) fn check_place(&self, what: &str, at: f64) -> Result<()> {
         // Places that a length was computed for may miss the tip by rounding.
         if at >= 0.0 && at <= self.length * (1.0 + 1e-12) {
-            return Ok(());
+            let between = self.reduced.is_some() && at.fract() != 0.0;
+            return if between { Err(self.domain(what, "be the number of an interface", at)) } else { Ok(()) };
         }
         Err(self.domain(what, "lie between 0 and the length of the beam", at))
     }
 
     fn check_level(&self) -> Result<()> {
+        if let Level::Reduced(n) = self.level {
+            return Err(self.domain("level", "be another one for a link without a reduced solid", n as f64));
+        }
         let Some((size, least, most, condition)) = self.level.range() else { return Ok(()) };
         if !(least..=most).contains(&size) {
             return Err(self.domain("level", condition, size as f64));

@@ -10,11 +10,12 @@ use super::fields::{Field, Fields, Interpolated, basis};
 use super::flexible::{Axis, Beam, Map};
 use super::lumped::LumpedAxis;
 use super::profile::Profile;
+use super::reduced::{Fields as ReducedFields, Reduced, ReducedAxis};
 use super::segment::{Segment, damps_locally};
 use super::strain::{PlaneAxis, SpaceAxis};
 use crate::error::Result;
 use crate::scalar::Scalar;
-use crate::spatial::SpatialInertia;
+use crate::spatial::{SpatialInertia, Vector3};
 
 /// Stations of a smooth strain beam beyond the coefficients of a component.
 const STRAIN_STATIONS: usize = 4;
@@ -65,6 +66,9 @@ impl<S: Scalar> Beam<S> {
             entry.check_place("at", mark)?;
         }
         let profile = Profile::new(entry);
+        if let Some(reduced) = &entry.reduced {
+            return Self::reduced(entry, reduced, marks, order);
+        }
         match entry.level {
             Level::Rigid => Self::segmented(entry, &profile, (&[], 1), marks),
             Level::Lumped(n) => Self::segmented(entry, &profile, (&entry.deforms, n), marks),
@@ -146,6 +150,34 @@ impl<S: Scalar> Beam<S> {
         let (damping, couplings) = (Vec::new(), Vec::new());
         let beam = Self { axis, map, inertia, heavy, marks, stiffness, damping, damped: false, couplings, segments };
         beam.damped(entry, &groups)
+    }
+
+    /// The first modes of a reduced solid: its point masses, then the interfaces that carry something.
+    fn reduced(entry: &BeamEntry<S>, reduced: &Reduced, marks: &[f64], order: Order) -> Result<Self> {
+        let n = if let Level::Reduced(n) = entry.level { n } else { 0 };
+        let (solid, quadratic) = (reduced.solid(), order == Order::Second);
+        let points: Vec<_> = solid.points.iter().map(|point| ReducedFields::new(point, n, quadratic)).collect();
+        let frame = |&at: &f64| {
+            let root = ReducedFields::still([0.0; 6], n);
+            reduced.interface(at).map_or(root, |field| ReducedFields::new(field, n, quadratic))
+        };
+        let masses = points.len();
+        let axis = ReducedAxis::new(n, points, marks.iter().map(frame).collect());
+        let point = |&mass: &f64| SpatialInertia::point_mass(entry.material.density * mass, Vector3::zero());
+        let carried = marks.iter().map(|_| SpatialInertia::zero());
+        let inertia: Vec<_> = solid.masses.iter().map(point).chain(carried).collect();
+        let mut stiffness = vec![S::zero(); n * n];
+        for (place, &square) in solid.squares[..n].iter().enumerate() {
+            stiffness[place * n + place] = entry.material.young * square;
+        }
+        let heavy = (0..inertia.len()).map(|station| station < masses).collect();
+        let marks = (masses..inertia.len()).collect();
+        let axis = Axis::Reduced(axis);
+        let segments = Segment::whole(&axis, n, inertia.len());
+        let (map, damping, couplings) = (Map::Modes(n), Vec::new(), Vec::new());
+        let beam = Self { axis, map, inertia, heavy, marks, stiffness, damping, damped: false, couplings, segments };
+        let alone: Vec<Vec<usize>> = (0..n).map(|mode| vec![mode]).collect();
+        beam.damped(entry, &alone)
     }
 
     fn damped(mut self, entry: &BeamEntry<S>, groups: &[Vec<usize>]) -> Result<Self> {

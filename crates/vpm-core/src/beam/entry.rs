@@ -4,6 +4,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value};
 
+use super::reduced::Reduced;
 use super::section::Material;
 use super::shape::Shape;
 use crate::mount::Mount;
@@ -52,6 +53,8 @@ pub enum Level {
     Strain(usize),
     /// That many elements of continuous, piecewise linear strain: exact geometry.
     Elements(usize),
+    /// That many modes of a reduced solid, displacement kinematics.
+    Reduced(usize),
 }
 
 /// The shape of the section at one place of the axis.
@@ -101,19 +104,22 @@ pub struct BeamEntry<P> {
     pub translation: [f64; 3],
     /// Axes of the root frame in the mount's frame, row by row.
     pub rotation: [f64; 9],
-    /// Length in m.
+    /// Length in m; of a reduced solid the number of its interfaces beside that at the root, and places along it are their numbers.
     pub length: f64,
     /// How finely it deforms.
     pub level: Level,
     /// The strains it may have; all others are rigid.
     pub deforms: Vec<Component>,
-    /// What it is made of.
+    /// What it is made of; of a reduced solid `young` and `density` are factors on its stiffness and its mass.
     pub material: Material<P>,
     /// One section if all are alike, otherwise several, between which sizes are interpolated linearly.
     pub sections: Vec<SectionEntry<P>>,
     /// Its damping.
     #[serde(default = "DampingEntry::default")]
     pub damping: DampingEntry<P>,
+    /// The reduced solid that takes the place of sections.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reduced: Option<Reduced>,
 }
 
 impl<P> BeamEntry<P> {
@@ -136,6 +142,7 @@ impl<P> BeamEntry<P> {
                 mass: self.damping.mass.as_ref().map(&mut *f),
                 ratios: self.damping.ratios.iter().map(&mut *f).collect(),
             },
+            reduced: self.reduced.clone(),
         }
     }
 }

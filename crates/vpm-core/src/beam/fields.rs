@@ -139,6 +139,6 @@ pub(super) fn basis(level: Level, component: Component, length: f64) -> Result<B
         (Level::Bezier(n) | Level::Deflection(n), false) => Basis::bernstein(length, n, 1),
         (Level::Modal(k), true) => Basis::bernstein(length, k + 8, 2),
         (Level::Modal(k), false) => Basis::bernstein(length, k + 8, 1),
-        (Level::Rigid | Level::Lumped(_), _) => Basis::linear(length, 1, 1),
+        (Level::Rigid | Level::Lumped(_) | Level::Reduced(_), _) => Basis::linear(length, 1, 1),
     }
 }

@@ -10,13 +10,14 @@ use super::fields::Fields;
 use super::gauge::Gauge;
 use super::lumped::LumpedAxis;
 use super::motion::Sections;
+use super::reduced::ReducedAxis;
 use super::segment::Segment;
 use super::strain::{PlaneAxis, Slices, SpaceAxis, Sums};
 use crate::error::Result;
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, SpatialInertia, Vector3};
 
-/// A straight beam along z of its root frame: a map from elastic coordinates to sections, inertia at sections, and constant
+/// A straight beam along z of its root frame, or a reduced solid: a map from elastic coordinates to sections, inertia at sections, and constant
 /// matrices of stiffness and damping.
 ///
 /// By virtual work `M = sum J^T m J` over the stations, and likewise for the velocity terms and gravity: the same sums at every level,
@@ -46,6 +47,7 @@ pub(super) enum Axis {
     Deflection(DeflectionAxis),
     Linear(LinearAxis),
     Lumped(LumpedAxis),
+    Reduced(ReducedAxis),
 }
 
 /// The map from coordinates to strains.
@@ -53,6 +55,8 @@ pub(super) enum Axis {
 pub(super) enum Map {
     Fields(Fields),
     Springs(LumpedAxis),
+    /// None: that many modes, whose strains nobody knows.
+    Modes(usize),
 }
 
 impl Axis {
@@ -61,7 +65,7 @@ impl Axis {
         match self {
             Self::Plane(axis) => axis.scratch(),
             Self::Deflection(axis) => axis.scratch(),
-            Self::Linear(_) | Self::Space(_) | Self::Lumped(_) => 0,
+            Self::Linear(_) | Self::Space(_) | Self::Lumped(_) | Self::Reduced(_) => 0,
         }
     }
 
@@ -74,6 +78,7 @@ impl Axis {
             Self::Deflection(axis) => axis.motion(q, v, out, accelerates),
             Self::Linear(axis) => axis.motion(q, v, out, accelerates),
             Self::Lumped(axis) => axis.motion(q, v, out),
+            Self::Reduced(axis) => axis.motion(q, v, out, accelerates),
         }
     }
 }
@@ -84,6 +89,7 @@ impl<S: Scalar> Beam<S> {
         match &self.map {
             Map::Fields(fields) => fields.len(),
             Map::Springs(axis) => axis.len(),
+            Map::Modes(count) => *count,
         }
     }
 
@@ -194,6 +200,7 @@ impl<S: Scalar> Beam<S> {
             Map::Springs(axis) => {
                 axis.strain_row(mu).into_iter().map(|(k, component, entry)| (k, component as usize, entry)).collect()
             }
+            Map::Modes(_) => Vec::new(),
         };
         entries.retain(|&(.., entry)| entry != 0.0);
         Gauge { entries }
@@ -210,6 +217,7 @@ impl<S: Scalar> Beam<S> {
         match &self.axis {
             Axis::Deflection(axis) => Some(axis.slope(q)),
             Axis::Linear(axis) => Some(axis.slope(q)),
+            Axis::Reduced(axis) => Some(axis.slope(q)),
             _ => None,
         }
     }
@@ -218,6 +226,15 @@ impl<S: Scalar> Beam<S> {
     /// the usual loads: a force across the tip. The error goes with the square of the slope.
     pub const fn slope_limit() -> f64 {
         0.147
+    }
+
+    /// Where the mark `i`, at the place `at`, stands in the root frame at rest.
+    pub(crate) fn at_rest(&self, i: usize, at: f64) -> Pose<f64> {
+        let place = match &self.axis {
+            Axis::Reduced(axis) => axis.place(i),
+            _ => Vector3::new(0.0, 0.0, at),
+        };
+        Pose { translation: place, ..Pose::identity() }
     }
 
     /// Mass matrix of the clamped beam at rest, row by row.

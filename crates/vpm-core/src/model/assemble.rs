@@ -9,7 +9,7 @@ use crate::joint::Joint;
 use crate::line::Line;
 use crate::mount::{Gauge, Marker, Mount, placed};
 use crate::scalar::Scalar;
-use crate::spatial::{Matrix3, Pose, SpatialInertia, Vector3};
+use crate::spatial::{Pose, SpatialInertia, Vector3};
 use crate::transmission::Transmission;
 
 /// Everything that makes up a tree, over the number type `S`.
@@ -217,11 +217,10 @@ impl<'a, S: Scalar> Assembly<'a, S> {
             Mount::Body(body) => (body + 1, Pose::identity()),
             Mount::Section { beam, at } => {
                 let elastic = &self.beams[beam];
-                let Some(first) = elastic.frame else {
-                    let along = Pose::new(Matrix3::identity(), Vector3::new(0.0, 0.0, at));
-                    return elastic.root.beyond(along);
-                };
                 let mark = self.marks[beam].iter().position(|&mark| mark == at).unwrap_or(0);
+                let Some(first) = elastic.frame else {
+                    return elastic.root.beyond(elastic.beam.at_rest(mark, at));
+                };
                 (first + elastic.beam.mark(mark), Pose::identity())
             }
         };

@@ -184,8 +184,11 @@ fn fastest(body: &Body<f64>) -> f64 {
     LIGHT / (own / inertia.mass + a * a + b * b + c * c - along * along).max(0.0).sqrt()
 }
 
-/// What a beam stores, J, whose strongest section is stretched by 1 from end to end.
+/// What a beam stores, J, whose strongest section is stretched by 1 from end to end; a reduced solid, moved as far as it is large.
 fn largest_energy(beam: &BeamEntry<f64>) -> f64 {
+    if let Some(reduced) = &beam.reduced {
+        return beam.material.young * reduced.largest_energy();
+    }
     let sections = beam.sections.iter().filter_map(|entry| Section::new(entry.shape, beam.material).ok());
     0.5 * beam.length * sections.map(|section| section.stiffness[5]).fold(0.0, f64::max)
 }

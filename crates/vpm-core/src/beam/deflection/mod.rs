@@ -35,10 +35,29 @@ pub(super) struct DeflectionAxis {
 }
 
 /// Rotation vector and displacement as functions of time: value, rate, and second rate at constant coordinate rates.
-struct Screw<S> {
-    value: [S; 6],
-    rate: [S; 6],
-    second: [S; 6],
+pub(super) struct Screw<S> {
+    pub value: [S; 6],
+    pub rate: [S; 6],
+    pub second: [S; 6],
+}
+
+impl<S: Scalar> Screw<S> {
+    /// The section with this rotation vector and place, and what rates of the two give in its axes.
+    pub fn section(&self, accelerates: bool) -> (SectionMotion<S>, Rows<S>) {
+        let Self { value, rate, second } = self;
+        let halves = |six: &[S; 6]| (Vector3::new(six[0], six[1], six[2]), Vector3::new(six[3], six[4], six[5]));
+        let ((w, p), (w_rate, p_rate), (w_second, p_second)) = (halves(value), halves(rate), halves(second));
+        let (turn, tangent) = rotation(w);
+        let turning = if accelerates { turning(w, w_rate, w_second) } else { [tangent * w_rate, Vector3::zero()] };
+        let speed = turn.transpose_mul(p_rate);
+        let change = turn.transpose_mul(p_second) - turning[0].cross(speed);
+        let motion = SectionMotion {
+            pose: Pose::new(turn, p),
+            twist: Twist::new(turning[0], speed),
+            acceleration: Twist::new(turning[1], change),
+        };
+        (motion, Rows { angular: tangent.columns, linear: turn.transpose().columns })
+    }
 }
 
 impl DeflectionAxis {
@@ -91,19 +110,8 @@ impl DeflectionAxis {
 
     fn section<S: Scalar>(&self, station: usize, screw: &Screw<S>, out: &mut Sections<S>, accelerates: bool) {
         let n = self.components.len();
-        let Screw { value, rate, second } = screw;
-        let halves = |six: &[S; 6]| (Vector3::new(six[0], six[1], six[2]), Vector3::new(six[3], six[4], six[5]));
-        let ((w, p), (w_rate, p_rate), (w_second, p_second)) = (halves(value), halves(rate), halves(second));
-        let (turn, tangent) = rotation(w);
-        let turning = if accelerates { turning(w, w_rate, w_second) } else { [tangent * w_rate, Vector3::zero()] };
-        let speed = turn.transpose_mul(p_rate);
-        let change = turn.transpose_mul(p_second) - turning[0].cross(speed);
-        out.at[station] = SectionMotion {
-            pose: Pose::new(turn, p),
-            twist: Twist::new(turning[0], speed),
-            acceleration: Twist::new(turning[1], change),
-        };
-        let rows = Rows { angular: tangent.columns, linear: turn.transpose().columns };
+        let (motion, rows) = screw.section(accelerates);
+        out.at[station] = motion;
         let columns = &mut out.columns[station * n..(station + 1) * n];
         for ((&component, column), &entries) in self.components.iter().zip(&mut *columns).zip(&self.rows[station * n..])
         {
@@ -152,7 +160,7 @@ fn first_order(component: Component, [value, slope]: [f64; 2]) -> [(usize, f64);
 }
 
 /// What a rate of each entry of rotation vector and displacement gives in the section's axes.
-struct Rows<S> {
+pub(super) struct Rows<S> {
     angular: [Vector3<S>; 3],
     linear: [Vector3<S>; 3],
 }
@@ -164,6 +172,12 @@ impl<S: Scalar> Rows<S> {
             0..3 => column.angular += self.angular[target] * factor,
             _ => column.linear += self.linear[target - 3] * factor,
         }
+    }
+
+    /// A twist whose entries are rates of rotation vector and displacement.
+    pub fn turned(&self, rates: Twist<S>) -> Twist<S> {
+        let sum = |[a, b, c]: [Vector3<S>; 3], rate: Vector3<S>| a * rate.x + b * rate.y + c * rate.z;
+        Twist::new(sum(self.angular, rates.angular), sum(self.linear, rates.linear))
     }
 }
 

@@ -8,6 +8,7 @@ mod linear;
 mod map;
 mod motion;
 mod parameters;
+mod reduced;
 mod section;
 mod strain;
 mod tree;

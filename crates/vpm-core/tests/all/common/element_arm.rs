@@ -44,6 +44,7 @@ pub fn arm(level: Level, deforms: &[Component]) -> Parts<f64> {
         material: Material { young: 210e9, poisson: 0.3, density: 7850.0 },
         sections: vec![SectionEntry { at: 0.0, shape: Shape::Rectangle { width: 0.015, height: 0.004 } }],
         damping: DampingEntry { stiffness: Some(5e-4), ..DampingEntry::default() },
+        reduced: None,
     };
     let elbow = Mount::Section { beam: 0, at: 0.44 };
     let motor = Weld {

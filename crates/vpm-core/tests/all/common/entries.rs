@@ -22,6 +22,7 @@ pub fn entry(level: Level, deforms: &[Component], length: f64, [width, height]: 
         material: STEEL,
         sections: vec![SectionEntry { at: 0.0, shape: Shape::Rectangle { width, height } }],
         damping: DampingEntry::default(),
+        reduced: None,
     }
 }
 

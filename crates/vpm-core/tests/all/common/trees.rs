@@ -82,6 +82,7 @@ pub fn beam(random: &mut Random, name: &str, on: Mount, level: Level, deforms: &
         material: Material { young: 2e9, poisson: 0.3, density: 1500.0 },
         sections: vec![SectionEntry { at: 0.0, shape: Shape::Rectangle { width: 0.03, height: 0.01 } }],
         damping: DampingEntry { stiffness: Some(1e-3), mass: Some(0.2), ratios: Vec::new() },
+        reduced: None,
     }
 }
 

@@ -63,6 +63,7 @@ pub fn machine(count: usize, change: impl FnOnce(&mut Value)) -> Description {
             material: MATERIAL,
             sections: vec![SectionEntry { at: 0.0, shape: Shape::Given(strip()) }],
             damping: DampingEntry { stiffness: Some(DAMPING), ..DampingEntry::default() },
+            reduced: None,
         });
         let [mass, inertia] = TIPS[number];
         let on = Mount::Section { beam: number, at: length };

@@ -138,6 +138,7 @@ fn propped(level: Level, stiffness: f64, gap: f64) -> Description {
         material: Material { young: 70e9, poisson: 0.3, density: 2700.0 },
         sections: vec![SectionEntry { at: 0.0, shape: Shape::Rectangle { width: 0.02, height: 0.02 } }],
         damping: DampingEntry { stiffness: Some(1e-4), mass: None, ratios: Vec::new() },
+        reduced: None,
     };
     let parts = Parts { gravity: [0.0, 0.0, -G], beams: vec![beam], ..Parts::default() };
     let tip = ("tip", Mount::Section { beam: 0, at: 0.8 }, [0.0; 3]);

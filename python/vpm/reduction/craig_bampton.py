@@ -1,0 +1,342 @@
+"""Reduction of a solid to few modes, with the integrals of its inertia and its stiffening by loads.
+
+Sources: R. R. Craig, M. C. C. Bampton, "Coupling of substructures for dynamic analyses", AIAA J. 6(7), 1968; S. R.
+Idelsohn, A. Cardona, "A reduction method for nonlinear structural dynamic analysis", Comput. Methods Appl. Mech. Eng.
+49, 1985, for static modal derivatives; O. Wallrapp, "Standardization of flexible body modeling in multibody system
+codes", Mech. Struct. Mach. 22(3), 1994.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+import scipy.linalg
+import scipy.sparse as sp
+import scipy.sparse.linalg as spla
+from numpy.typing import NDArray
+
+from vpm.errors import ReductionError
+from vpm.model.reduced import MODES, ReducedLink
+from vpm.reduction.structure import Matrix, Structure, check_structure, check_units, rigid_motions
+
+Array = NDArray[np.float64]
+
+#: Share of the largest one below which an entry of the Gram matrix is rounding.
+_RANK = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Reduction:
+    """A reduced solid, and how good it is.
+
+    Attributes
+    ----------
+    link : ReducedLink
+        What a model file names.
+    frequencies, full : ndarray
+        Frequencies of the kept modes and of the whole solid (Hz), held at its root.
+    effective_mass : ndarray
+        Share of the mass that each mode moves along x, y and z, shape (n, 3).
+    compliance : ndarray
+        Share of the exact deflection under a unit load that the kept modes show, for rotations and translations of each
+        interface, shape (m, 6).
+    mass : float
+        Mass of the solid (kg).
+    """
+
+    link: ReducedLink
+    frequencies: Array
+    full: Array
+    effective_mass: Array
+    compliance: Array
+    mass: float
+
+    @property
+    def errors(self) -> Array:
+        """Relative errors of the frequencies."""
+        return np.asarray(self.frequencies / self.full - 1.0)
+
+    def __str__(self) -> str:
+        return "\n".join(self._lines())
+
+    def _lines(self) -> Iterator[str]:
+        yield f"{self.mass:.6g} kg, {self.frequencies.size} modes of the solid held at its root"
+        yield f"{'mode':>4s} {'frequency':>12s} {'error':>9s}   {'effective mass along x, y, z':>30s}"
+        rows = zip(self.frequencies, self.errors, self.effective_mass, strict=True)
+        for number, (frequency, error, (x, y, z)) in enumerate(rows):
+            yield f"{number:4d} {frequency:9.5g} Hz {error:9.1e}   {x:10.4f}{y:10.4f}{z:10.4f}"
+        x, y, z = self.effective_mass.sum(axis=0)
+        yield f"{'sum':>4s} {'':22s}   {x:10.4f}{y:10.4f}{z:10.4f}"
+        for name, shares in zip(self.link.interfaces, self.compliance, strict=True):
+            shown = ", ".join(f"{share:.4f}" for share in shares)
+            yield f"deflection of {name} under unit moments and forces, of the exact one: {shown}"
+        if not self.link.stiffens:
+            yield (
+                "stiffening by loads and spin is left out, since matrices do not tell it: a spin that is not slow "
+                "beside the first frequency, or a load near that of buckling, needs a solid with its mesh"
+            )
+
+
+def reduce_structure(structure: Structure, modes: int = 8) -> Reduction:
+    """Reduce a solid to its slowest modes.
+
+    All constraint modes of the interfaces and as many fixed-interface modes as are asked for make the basis; of its own
+    modes, with the root held, the slowest are kept.
+
+    Parameters
+    ----------
+    structure : Structure
+    modes : int
+        How many modes to keep, 1 to 64.
+
+    Returns
+    -------
+    Reduction
+
+    Raises
+    ------
+    ReductionError
+        The matrices are those of no solid, or have fewer modes.
+    """
+    if not 1 <= modes <= MODES:
+        raise ReductionError(f"{modes} modes are asked for, but 1 to {MODES} are possible")
+    check_structure(structure)
+    solid = _Tied(structure)
+    basis = np.hstack([solid.constraint_modes(), solid.fixed_modes(modes)])
+    squares, shapes = _own_modes(solid, basis, modes)
+    check_units(structure, float(np.sqrt(squares[0]) / (2.0 * np.pi)))
+    full = solid.free_frequencies(modes)
+    fields, frames = solid.nodal(shapes), solid.frames(shapes)
+    second = _second(solid, fields, frames)
+    link = _link(structure, squares, fields, frames, second)
+    moved = rigid_motions(structure.nodes)[:, 3:]
+    effective = (fields.T @ (structure.mass @ moved)) ** 2 / structure.total_mass
+    exact = np.diag(solid.compliance())
+    kept = (frames**2 / squares).sum(axis=-1)
+    shares = kept / exact.reshape(kept.shape)
+    return Reduction(link, np.sqrt(squares) / (2.0 * np.pi), full, effective, shares, structure.total_mass)
+
+
+class _Tied:
+    """A solid whose interfaces are tied to frames: rigid ties are eliminated, averages stand as rows beside.
+
+    The unknowns are the displacements of all other nodes and the motions of rigidly tied frames.
+    """
+
+    def __init__(self, structure: Structure) -> None:
+        self.structure = structure
+        n = 3 * len(structure.nodes)
+        tied = [interface for interface in structure.interfaces if interface.tie == "rigid"]
+        held = {int(node) for interface in tied for node in interface.nodes}
+        free = np.array([node for node in range(len(structure.nodes)) if node not in held], dtype=np.intp)
+        if free.size == 0:
+            raise ReductionError("all nodes are tied rigidly to frames, so nothing can deform; name fewer nodes")
+        dofs = (3 * free[:, None] + np.arange(3)).ravel()
+        parts = [sp.csr_array((np.ones(dofs.size), (dofs, np.arange(dofs.size))), shape=(n, dofs.size))]
+        self.rows: list[Matrix] = []
+        self.arms = [
+            structure.nodes[i.nodes] - place for i, place in zip(structure.interfaces, structure.places, strict=True)
+        ]
+        size = dofs.size + 6 * len(tied)
+        for interface, arms in zip(structure.interfaces, self.arms, strict=True):
+            own = (3 * interface.nodes[:, None] + np.arange(3)).ravel()
+            motions = rigid_motions(arms)
+            if interface.tie == "rigid":
+                at = sum(part.shape[1] for part in parts)
+                rows = np.repeat(own, 6)
+                parts.append(sp.csr_array((motions.ravel(), (rows, np.tile(np.arange(6), own.size))), shape=(n, 6)))
+                self.rows.append(sp.csr_array((np.ones(6), (np.arange(6), at + np.arange(6))), shape=(6, size)))
+            else:
+                average = sp.csr_array(
+                    (np.linalg.pinv(motions).ravel(), (np.repeat(np.arange(6), own.size), np.tile(own, 6))),
+                    shape=(6, n),
+                )
+                self.rows.append(average)
+        self.tie = sp.csr_array(sp.hstack(parts))
+        self.rows = [row if row.shape[1] == size else sp.csr_array(row @ self.tie) for row in self.rows]
+        self.stiffness = sp.csr_array(self.tie.T @ structure.stiffness @ self.tie)
+        self.mass = sp.csr_array(self.tie.T @ structure.mass @ self.tie)
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return int(self.stiffness.shape[0])
+
+    @cached_property
+    def free(self) -> _Held:
+        """Held at the root alone."""
+        return _Held(self.stiffness, self.rows[:1])
+
+    @cached_property
+    def fixed(self) -> _Held:
+        """Held at all interfaces."""
+        return _Held(self.stiffness, self.rows)
+
+    def constraint_modes(self) -> Array:
+        """Deflections by a unit motion of each interface but the root, the others held."""
+        motions = 6 * len(self.rows)
+        return self.fixed.solve(np.zeros((self.size, motions - 6)), np.eye(motions)[:, 6:])
+
+    def fixed_modes(self, count: int) -> Array:
+        """Slowest modes with all interfaces held."""
+        return _slowest(self.fixed, self.mass, count)[1]
+
+    def free_frequencies(self, count: int) -> Array:
+        """Slowest frequencies with the root held (Hz)."""
+        return np.sqrt(_slowest(self.free, self.mass, count)[0]) / (2.0 * np.pi)
+
+    def compliance(self) -> Array:
+        """Motions of the interfaces but the root under unit loads on them."""
+        rows = sp.csr_array(sp.vstack(self.rows[1:]))
+        loads = rows.T.toarray()
+        return np.asarray(rows @ self.free.solve(loads, np.zeros((6, loads.shape[1]))))
+
+    def nodal(self, shapes: Array) -> Array:
+        """Displacements of all nodes, shape (3 N, n)."""
+        return np.asarray(self.tie @ shapes)
+
+    def frames(self, shapes: Array) -> Array:
+        """Motions of the interfaces but the root, shape (m, 6, n)."""
+        return np.array([row @ shapes for row in self.rows[1:]])
+
+
+class _Held:
+    """A stiffness with some motions held: solved again and again by one factorisation."""
+
+    def __init__(self, stiffness: Matrix, rows: list[Matrix]) -> None:
+        self.n = int(stiffness.shape[0])
+        held = sp.csr_array(sp.vstack(rows))
+        self.scale = float(stiffness.diagonal().mean())
+        block = sp.csc_array(sp.block_array([[stiffness, self.scale * held.T], [self.scale * held, None]]))
+        try:
+            self.factors = spla.splu(block, permc_spec="MMD_AT_PLUS_A")
+        except RuntimeError:
+            raise ReductionError(
+                "the stiffness matrix is singular with the interfaces held: parts of it hang on nothing; join them"
+            ) from None
+
+    def solve(self, loads: Array, motions: Array) -> Array:
+        """Deflections under loads (columns) at given motions of what is held."""
+        return np.asarray(self.factors.solve(np.vstack([loads, self.scale * motions]))[: self.n])
+
+    def under(self, load: Array) -> Array:
+        """Deflection under one load, what is held at rest."""
+        padded = np.zeros(self.factors.shape[0])
+        padded[: self.n] = load
+        return np.asarray(self.factors.solve(padded)[: self.n])
+
+
+def _slowest(held: _Held, mass: Matrix, count: int) -> tuple[Array, Array]:
+    """Squared angular frequencies and modes of unit modal mass, slowest first, by shift and invert (Lanczos)."""
+    if count >= held.n - 1:
+        raise ReductionError(f"{count} modes are asked for, but the solid has {held.n} displacements; take fewer modes")
+    inverse = spla.LinearOperator((held.n, held.n), matvec=held.under, dtype=np.float64)
+    start = held.under(mass @ np.ones(held.n))
+    # Of the matrix itself eigsh takes the shape alone where the inverse is given.
+    values, shapes = spla.eigsh(mass, k=count, M=mass, sigma=0.0, OPinv=inverse, v0=start)
+    order = np.argsort(values)
+    if not values.min() > 0.0:
+        raise ReductionError(
+            f"the stiffness matrix has the squared frequency {values.min():.3g} 1/s^2 with its interfaces held; it "
+            "has to be above 0, so export it without loads"
+        )
+    return values[order], shapes[:, order]
+
+
+def _own_modes(solid: _Tied, basis: Array, count: int) -> tuple[Array, Array]:
+    """Slowest modes within a basis, of unit modal mass; the largest entry of each is positive."""
+    basis = basis / np.sqrt(np.einsum("ij,ij->j", basis, solid.mass @ basis))
+    stiffness, mass = basis.T @ (solid.stiffness @ basis), basis.T @ (solid.mass @ basis)
+    values, shapes = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
+    shapes = basis @ shapes[:, :count]
+    shapes *= np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(count)])
+    return values[:count], shapes
+
+
+def _second(solid: _Tied, fields: Array, frames: Array) -> tuple[Array, Array] | None:
+    """Second derivatives by each pair of modes, of all displacements and of the frames; None where unknown.
+
+    A deflection of second order is what undoes the stress of the second-order strain: ``K gamma = -int B^T C sym(A_i^T
+    A_j)``. Its work with any load is the geometric stiffness of that load. Rigid frames turn their nodes to second
+    order.
+    """
+    structure, n = solid.structure, fields.shape[1]
+    stretching = structure.stretching
+    if stretching is None:
+        return None
+    loads, offsets, motions = [], [], []
+    for i, j in _pairs(n):
+        offset, motion = np.zeros(fields.shape[0]), np.zeros((len(frames), 6))
+        for number, (interface, arms) in enumerate(zip(structure.interfaces[1:], solid.arms[1:], strict=True)):
+            turned = _turned(frames[number, :3, i], frames[number, :3, j], arms)
+            if interface.tie == "rigid":
+                offset.reshape(-1, 3)[interface.nodes] = turned
+            else:
+                motion[number] = np.linalg.pinv(rigid_motions(arms)) @ turned.ravel()
+        loads.append(solid.tie.T @ (-stretching(fields[:, i], fields[:, j]) - structure.stiffness @ offset))
+        offsets.append(offset)
+        motions.append(motion)
+    found = solid.free.solve(np.array(loads).T, np.zeros((6, len(loads))))
+    return solid.nodal(found) + np.array(offsets).T, solid.frames(found) - np.moveaxis(np.array(motions), 0, -1)
+
+
+def _pairs(n: int) -> Iterator[tuple[int, int]]:
+    return ((i, j) for j in range(n) for i in range(j + 1))
+
+
+def _turned(one: Array, other: Array, arms: Array) -> Array:
+    """Second derivative of what a turn by both rotation vectors does to arms: ``sym(w_i x (w_j x r))``."""
+    return 0.5 * (np.cross(one, np.cross(other, arms)) + np.cross(other, np.cross(one, arms)))
+
+
+def _link(
+    structure: Structure, squares: Array, fields: Array, frames: Array, second: tuple[Array, Array] | None
+) -> ReducedLink:
+    """Point masses with the Gram matrix of the solid's fields: same mass, same inertia, same coupling in every motion.
+
+    With ``G = L L^T`` the columns of L are as good as the solid; a turn of them makes the masses equal. What is
+    quadratic goes to them by its products with all other fields.
+    """
+    nodes, n = structure.nodes - structure.places[0], squares.size
+    functions = np.hstack([np.ones((len(nodes), 1)), nodes, fields.reshape(len(nodes), 3 * n)])
+    weighted = structure.scalar_mass @ functions
+    gram = functions.T @ weighted
+    size = np.sqrt(np.diag(gram))
+    values, vectors = np.linalg.eigh(gram / np.outer(size, size))
+    if values[0] < -1e-9 * values[-1]:
+        raise ReductionError(
+            f"the mass matrix is not positive: {values[0] / values[-1]:.2g} of its size is below zero; export it again"
+        )
+    kept = values > _RANK * values[-1]
+    root, vectors = np.sqrt(values[kept]), vectors[:, kept]
+    factor = size[:, None] * vectors * root
+    turn = _levelled(factor[0])
+    weight = np.sqrt(gram[0, 0] / root.size)
+    at = (factor @ turn).T / weight
+    curved, frames_curved = np.zeros((root.size, 0, 3)), np.zeros((len(frames), 0, 6))
+    if second is not None:
+        products = weighted.T @ second[0].reshape(len(nodes), -1) / size[:, None]
+        projected = turn.T @ ((vectors / root).T @ products) / weight
+        curved = projected.reshape(root.size, 3, -1).transpose(0, 2, 1)
+        frames_curved = second[1].transpose(0, 2, 1)
+    return ReducedLink(
+        squares=squares,
+        masses=np.full(root.size, weight**2),
+        points=at[:, 1:4],
+        point_shapes=at[:, 4:].reshape(root.size, 3, n).transpose(0, 2, 1),
+        point_curved=curved,
+        interfaces=tuple(interface.name for interface in structure.interfaces[1:]),
+        places=structure.places[1:] - structure.places[0],
+        shapes=frames.transpose(0, 2, 1),
+        curved=frames_curved,
+    )
+
+
+def _levelled(row: Array) -> Array:
+    """Orthogonal matrix that makes all entries of a row equal: a reflection (Householder)."""
+    normal = row / np.linalg.norm(row) - np.full(row.size, row.size**-0.5)
+    square = normal @ normal
+    return np.eye(row.size) - (2.0 / square * np.outer(normal, normal) if square > 0.0 else 0.0)

@@ -1,0 +1,224 @@
+"""What `vpm reduce` reads: the description of a solid, or matrices with their nodes."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Annotated, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import Field, ValidationError
+
+from vpm.errors import ReductionError, VpmError
+from vpm.model.entry import Entry, Number, Switch, Text, Vector
+from vpm.model.reduced import read_bytes
+from vpm.reduction.craig_bampton import Reduction, reduce_structure
+from vpm.reduction.matrices import read_matrix, read_nodes
+from vpm.reduction.solid import box_mesh, read_mesh, solid
+from vpm.reduction.structure import Interface, Matrix, Structure, Tie
+
+Array = NDArray[np.float64]
+_Positive = Annotated[Number, Field(gt=0.0)]
+_Count = Annotated[int, Field(strict=True, ge=1, le=1000)]
+
+#: Units of matrices: SI units of force per length, mass, and length.
+UNITS = {"SI": (1.0, 1.0, 1.0), "mm-t-s": (1e3, 1e3, 1e-3), "mm-kg-ms": (1e6, 1.0, 1e-3)}
+#: How far from its plane a node may be, as a share of the size of the solid.
+_NEAR = 1e-6
+#: Share by which the mass may miss the one that is given.
+_MASS = 0.01
+
+
+class _Box(Entry):
+    size: Vector
+    elements: Annotated[tuple[_Count, ...], Field(min_length=3, max_length=3)]
+
+
+class _Solid(Entry):
+    box: _Box | None = None
+    mesh: Text | None = None
+    unit: Literal["m", "mm", "cm", "in"] = "m"
+    young: _Positive
+    poisson: Annotated[Number, Field(gt=-1.0, lt=0.5)] = 0.3
+    density: _Positive
+    mass: _Positive | None = None
+
+
+class _Matrices(Entry):
+    stiffness: Text
+    mass_matrix: Text
+    nodes: Text
+    units: Literal["SI", "mm-t-s", "mm-kg-ms"] = "SI"
+    triangle: Switch = False
+    mass: _Positive | None = None
+
+
+class _Interface(Entry):
+    plane: dict[Literal["x", "y", "z"], Number] | None = None
+    box: Annotated[tuple[Vector, ...], Field(min_length=2, max_length=2)] | None = None
+    nodes: tuple[Annotated[int, Field(strict=True)], ...] | None = None
+    tie: Tie = "rigid"
+
+
+class _File(Entry):
+    solid: _Solid | None = None
+    matrices: _Matrices | None = None
+    interfaces: dict[str, _Interface]
+
+
+_SCALES = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
+
+
+def reduce(path: str | PathLike[str], modes: int = 8) -> Reduction:
+    """Reduce a solid to a flexible link of a model file.
+
+    Parameters
+    ----------
+    path : path-like
+        TOML file of a solid or of matrices, or an ``.npz`` with ``stiffness``, ``mass``, ``nodes`` and the numbers of
+        the nodes of each interface, ``interface_root`` first (docs/reduced_links.md).
+    modes : int
+        How many of the slowest modes to keep, with the root held.
+
+    Returns
+    -------
+    Reduction
+        ``reduction.link.save("link.npz")`` writes what a model file names.
+
+    Raises
+    ------
+    ReductionError
+        The file cannot be read, or its matrices are those of no solid.
+
+    Examples
+    --------
+    >>> reduction = vpm.reduce("examples/reduced_link/bar.toml", modes=6)
+    """
+    return reduce_structure(read_structure(path), modes)
+
+
+def read_structure(path: str | PathLike[str]) -> Structure:
+    """Matrices of what a file describes.
+
+    Raises
+    ------
+    ReductionError
+        As `reduce`.
+    """
+    path = Path(path)
+    if path.suffix.lower() == ".npz":
+        return _from_archive(path)
+    try:
+        content = tomllib.loads(read_bytes(path).decode("utf-8-sig"))
+        file = _File.model_validate(content)
+    except VpmError as error:
+        raise ReductionError(str(error)) from None
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise ReductionError(f"{path} is no TOML file: {error}; describe a [solid] or [matrices]") from None
+    except ValidationError as error:
+        first = error.errors(include_url=False)[0]
+        where = ".".join(map(str, first["loc"])) or "the file"
+        raise ReductionError(
+            f"{path}: {where} is wrong: {first['msg'].lower()}; docs/reduced_links.md lists the keys"
+        ) from None
+    if file.solid is not None and file.matrices is None:
+        structure, given = _of_solid(file, file.solid, path)
+    elif file.matrices is not None and file.solid is None:
+        structure, given = _of_matrices(file, file.matrices, path)
+    else:
+        raise ReductionError(f"{path} needs one of the tables [solid] and [matrices]; add one, or remove one")
+    if given is not None and abs(structure.total_mass / given - 1.0) > _MASS:
+        raise ReductionError(
+            f"{path}: the solid weighs {structure.total_mass:.5g} kg, but mass is {given:.5g} kg, so "
+            f"{structure.total_mass / given:.3g} times that; check density and units"
+        )
+    return structure
+
+
+def _of_solid(file: _File, entry: _Solid, path: Path) -> tuple[Structure, float | None]:
+    if (entry.box is None) == (entry.mesh is None):
+        raise ReductionError(f"{path}: solid needs one of box and mesh; add one, or remove one")
+    if entry.box is not None:
+        if not min(entry.box.size) > 0.0:
+            raise ReductionError(f"{path}: solid.box.size is {entry.box.size}, but has to be above 0; correct it")
+        mesh = box_mesh(entry.box.size, entry.box.elements)
+    else:
+        mesh = read_mesh(path.parent / str(entry.mesh), _SCALES[entry.unit])
+    material = {"young": entry.young, "poisson": entry.poisson, "density": entry.density}
+    return solid(mesh, lambda nodes: _interfaces(file, nodes, path), **material), entry.mass
+
+
+def _of_matrices(file: _File, entry: _Matrices, path: Path) -> tuple[Structure, float | None]:
+    folder, (stiffness, mass, length) = path.parent, UNITS[entry.units]
+    nodes = read_nodes(folder / entry.nodes) * length
+    matrices = [read_matrix(folder / name, triangle=entry.triangle) for name in (entry.stiffness, entry.mass_matrix)]
+    return Structure(matrices[0] * stiffness, matrices[1] * mass, nodes, _interfaces(file, nodes, path)), entry.mass
+
+
+def _interfaces(file: _File, nodes: Array, path: Path) -> tuple[Interface, ...]:
+    found = []
+    for name, entry in file.interfaces.items():
+        ways = [way for way in (entry.plane, entry.box, entry.nodes) if way is not None]
+        if len(ways) != 1:
+            raise ReductionError(
+                f"{path}: interfaces.{name} needs one of plane, box and nodes; add one, or remove others"
+            )
+        found.append(Interface(name, _chosen(entry, nodes), entry.tie))
+    return tuple(found)
+
+
+def _chosen(entry: _Interface, nodes: Array) -> NDArray[np.intp]:
+    if entry.nodes is not None:
+        return np.array(sorted(set(entry.nodes)), dtype=np.intp)
+    near = _NEAR * float(np.linalg.norm(np.ptp(nodes, axis=0)))
+    inside = np.ones(len(nodes), dtype=bool)
+    if entry.plane is not None:
+        for axis, at in entry.plane.items():
+            inside &= np.abs(nodes[:, "xyz".index(axis)] - at) <= near
+    if entry.box is not None:
+        low, high = np.sort(np.array(entry.box), axis=0)
+        inside &= ((nodes >= low - near) & (nodes <= high + near)).all(axis=1)
+    return np.flatnonzero(inside)
+
+
+def _from_archive(path: Path) -> Structure:
+    """Everything in one ``.npz``; sparse matrices as ``stiffness_data``, ``_indices`` and ``_indptr`` (CSR)."""
+    import scipy.sparse as sp
+
+    def matrix(stored: Mapping[str, Matrix], name: str) -> Matrix:
+        if name in stored:
+            return sp.csr_array(np.asarray(stored[name], dtype=np.float64))
+        parts = tuple(stored[f"{name}_{part}"] for part in ("data", "indices", "indptr"))
+        size = parts[2].size - 1
+        built = sp.csr_array(parts, shape=(size, size), dtype=np.float64)
+        built.check_format(full_check=True)
+        return built
+
+    try:
+        _ = read_bytes(path)
+        with np.load(path, allow_pickle=False) as stored:
+            nodes = np.asarray(stored["nodes"], dtype=np.float64)
+            if nodes.ndim != 2 or nodes.shape[1] != 3:
+                raise ReductionError(
+                    f"{path}: nodes has the shape {nodes.shape}, but x, y and z of each node are needed"
+                )
+            names = [name for name in stored if name.startswith("interface_")]
+            interfaces = tuple(
+                Interface(name.removeprefix("interface_"), np.unique(np.asarray(stored[name]).astype(np.intp)))
+                for name in names
+            )
+            return Structure(matrix(stored, "stiffness"), matrix(stored, "mass"), nodes, interfaces)
+    except ReductionError:
+        raise
+    except KeyError as error:
+        missing = str(error.args[0]).split()[0]
+        raise ReductionError(
+            f"{path} has no {missing}; write stiffness, mass, nodes, interface_root and interface_tip"
+        ) from None
+    except Exception as error:  # damaged archives  # noqa: BLE001
+        raise ReductionError(
+            f"{path} cannot be read ({str(error)[:80] or type(error).__name__}); write it again"
+        ) from None

@@ -1,0 +1,219 @@
+"""A solid of finite elements as matrices, and what has to hold for them before they are reduced."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any, Literal
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from vpm.errors import ReductionError
+
+Array = NDArray[np.float64]
+#: Sparse arrays of scipy, whose types say more than is needed here.
+Matrix = Any
+Tie = Literal["rigid", "averaged"]
+
+#: Share by which matrices may miss what has to hold exactly: sums of many numbers, written with few digits.
+ROUNDING = 1e-6
+#: Fastest and slowest waves in solids, m/s, with room: beryllium has 1.3e4, soft rubber some tens.
+FASTEST, SLOWEST = 2e4, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Interface:
+    """Nodes of a solid that are tied to a frame.
+
+    Attributes
+    ----------
+    name : str
+    nodes : ndarray of int
+    tie : {"rigid", "averaged"}
+        Rigid: the nodes move with the frame (RBE2). Averaged: the frame moves as the nodes do on average, which
+        stiffens nothing (RBE3).
+    """
+
+    name: str
+    nodes: NDArray[np.intp]
+    tie: Tie = "rigid"
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """Matrices of a solid with three displacements per node; number ``3 node + axis``, SI.
+
+    Attributes
+    ----------
+    stiffness, mass : sparse matrix
+    nodes : ndarray
+        Places, shape (N, 3).
+    interfaces : tuple of Interface
+        That of the root comes first.
+    stretching : callable, optional
+        For two displacement fields, the nodal forces of the stress of their Green-Lagrange strain, ``sym(A_i^T A_j)``
+        with the gradients A; without it nothing of second order is known of the solid.
+    """
+
+    stiffness: Matrix
+    mass: Matrix
+    nodes: Array
+    interfaces: tuple[Interface, ...]
+    stretching: Callable[[Array, Array], Array] | None = field(default=None, repr=False)
+
+    @cached_property
+    def scalar_mass(self) -> Matrix:
+        """Mass matrix of one displacement component."""
+        return sp.csr_array((self._block(0, 0) + self._block(1, 1) + self._block(2, 2)) / 3.0)
+
+    @property
+    def total_mass(self) -> float:
+        """Mass (kg)."""
+        return float(self.scalar_mass.sum())
+
+    @cached_property
+    def centre(self) -> Array:
+        """Centre of mass (m)."""
+        ones = np.ones(len(self.nodes))
+        return np.asarray(ones @ (self.scalar_mass @ self.nodes) / self.total_mass)
+
+    @cached_property
+    def places(self) -> Array:
+        """Places of the frames of the interfaces (m): the middle of their nodes."""
+        return np.array([self.nodes[interface.nodes].mean(axis=0) for interface in self.interfaces])
+
+    def _block(self, row: int, column: int) -> Matrix:
+        return sp.csr_array(self.mass[row::3, column::3])
+
+
+def rigid_motions(places: Array) -> Array:
+    """Displacements of points by a small rigid motion, shape (3 N, 6): rotation vector, then translation."""
+    motions = np.zeros((len(places), 3, 6))
+    x, y, z = places.T
+    motions[:, 0, 1], motions[:, 0, 2] = z, -y
+    motions[:, 1, 0], motions[:, 1, 2] = -z, x
+    motions[:, 2, 0], motions[:, 2, 1] = y, -x
+    motions[:, :, 3:] = np.eye(3)
+    return motions.reshape(-1, 6)
+
+
+def check_structure(structure: Structure) -> None:
+    """Refuse matrices that are those of no solid.
+
+    Raises
+    ------
+    ReductionError
+        One sentence: what is wrong, by how much, and the repair.
+    """
+    n = 3 * len(structure.nodes)
+    for what in ("stiffness", "mass"):
+        matrix: Matrix = getattr(structure, what)
+        if matrix.shape != (n, n):
+            raise ReductionError(
+                f"the {what} matrix has {matrix.shape[0]} rows and {matrix.shape[1]} columns, but "
+                f"{len(structure.nodes)} nodes with 3 displacements each need {n}; give the "
+                "nodes of the matrix, without rotations"
+            )
+        if not np.isfinite(matrix.data).all():
+            raise ReductionError(f"the {what} matrix has numbers that are not finite; export it again")
+        size = abs(matrix).max()
+        skew = abs(matrix - matrix.T).max()
+        if skew > ROUNDING * size:
+            raise ReductionError(
+                f"the {what} matrix is not symmetric: two entries differ by {skew:.3g}, its largest is {size:.3g}; "
+                "export both triangles, or say that it is one with triangle = true"
+            )
+        least = matrix.diagonal().min()
+        if least < 0.0 or (what == "stiffness" and least == 0.0):
+            number = int(matrix.diagonal().argmin())
+            raise ReductionError(
+                f"the {what} matrix has {least:.3g} on its diagonal, at node {number // 3}, {'xyz'[number % 3]}; "
+                "it is not that of a free solid, so export it without constraints"
+            )
+    _check_mass(structure)
+    _check_interfaces(structure)
+    _check_rigid(structure)
+
+
+def _check_mass(structure: Structure) -> None:
+    """The mass is the same in all directions, and none couples two of them."""
+    scalar = structure.scalar_mass
+    size = abs(scalar).max()
+    worst = max(
+        (abs(structure._block(i, j) - (scalar if i == j else 0.0 * scalar)).max(), i, j)  # noqa: SLF001
+        for i in range(3)
+        for j in range(3)
+    )
+    if worst[0] > ROUNDING * size:
+        raise ReductionError(
+            f"the mass matrix couples {'xyz'[worst[1]]} with {'xyz'[worst[2]]} by {worst[0] / size:.2g} of "
+            "its largest entry, but mass is the same in all directions and couples none; check the order of the "
+            "displacements: x, y and z node by node"
+        )
+    if not structure.total_mass > 0.0:
+        raise ReductionError(f"the mass matrix sums up to {structure.total_mass:.3g} kg; it has to be above 0")
+
+
+def _check_interfaces(structure: Structure) -> None:
+    if len(structure.interfaces) < 2:
+        raise ReductionError("the solid needs two interfaces, root and another one; name the nodes of both")
+    taken: dict[int, str] = {}
+    for interface in structure.interfaces:
+        nodes, what = interface.nodes, f'interface "{interface.name}"'
+        if nodes.size == 0:
+            raise ReductionError(f"{what} has no nodes; check its places against the mesh, in m")
+        if nodes.min() < 0 or nodes.max() >= len(structure.nodes):
+            wrong = nodes.max() if nodes.min() >= 0 else nodes.min()
+            raise ReductionError(
+                f"{what} has the node {wrong}, but the nodes are numbered 0 to {len(structure.nodes) - 1}; correct it"
+            )
+        spread = np.linalg.svd(structure.nodes[nodes] - structure.nodes[nodes].mean(axis=0), compute_uv=False)
+        if spread.size < 2 or spread[1] <= ROUNDING * spread[0] or spread[0] == 0.0:
+            raise ReductionError(
+                f"{what} has {nodes.size} nodes on one line, which hold no rotation about it; name nodes of a face"
+            )
+        for node in nodes:
+            if (other := taken.setdefault(int(node), interface.name)) != interface.name:
+                raise ReductionError(
+                    f'node {node} is part of the interfaces "{other}" and "{interface.name}"; keep one'
+                )
+
+
+def _check_rigid(structure: Structure) -> None:
+    """The six rigid motions cost no energy."""
+    motions = rigid_motions(structure.nodes - structure.centre)
+    names = (
+        "rotation about x",
+        "rotation about y",
+        "rotation about z",
+        "shift along x",
+        "shift along y",
+        "shift along z",
+    )
+    forces = structure.stiffness @ motions
+    largest = abs(structure.stiffness) @ abs(motions)
+    shares = np.linalg.norm(forces, axis=0) / np.linalg.norm(largest, axis=0)
+    worst = int(shares.argmax())
+    if shares[worst] > ROUNDING:
+        raise ReductionError(
+            f"the stiffness matrix resists the {names[worst]} by {shares[worst]:.2g} of its size, but a free solid "
+            "resists no rigid motion; export it without supports, and check places and order of the nodes"
+        )
+
+
+def check_units(structure: Structure, slowest: float) -> None:
+    """Refuse frequencies that no solid of this size has.
+
+    A wave that runs along the solid in a quarter of its slowest period is slower than sound in it; bending waves of
+    slender solids are slower by its slenderness.
+    """
+    size = float(np.linalg.norm(np.ptp(structure.nodes, axis=0)))
+    speed = 4.0 * slowest * size
+    if not SLOWEST * 1e-3 < speed < FASTEST:
+        raise ReductionError(
+            f"the slowest frequency {slowest:.4g} Hz of a solid {size:.4g} m large means waves of {speed:.3g} m/s, "
+            'which no material carries; check the units, for example units = "mm-t-s" for N, mm and tonnes'
+        )
