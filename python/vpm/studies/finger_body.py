@@ -135,8 +135,8 @@ def _growing(begin: float, end: float, first: float) -> Array:
 
 
 def _penalty(material: Material, length: float) -> float:
-    """Contact stiffness of the order of the body's own; rounds of augmented Lagrange do the rest."""
-    return 30.0 * material.young / length
+    """Contact stiffness well above the body's own, E over a length; rounds of augmented Lagrange do the rest."""
+    return 300.0 * material.young / length
 
 
 def hertz(way: float | Array, radius: float, young: float) -> tuple[Array, Array]:

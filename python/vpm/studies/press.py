@@ -16,12 +16,12 @@ Array = NDArray[np.float64]
 
 #: Newton steps, halvings of a step, halvings of a load step, rounds of contact.
 STEPS, HALVINGS, CUTS, ROUNDS = 30, 6, 6, 12
-#: Balance that counts as reached, of the largest force inside; overlap that counts as none, of the way pressed.
+#: Balance that counts as reached, of a force of the body's size; overlap that counts as none, of the way pressed.
 BALANCE, OVERLAP = 1e-9, 1e-4
 
 
 class _StuckError(Exception):
-    """Newton's method found no balance."""
+    """Newton's method found no balance, or rounds of contact left an overlap."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Pressed:
     contact_radius : float
         m.
     overlap : float
-        Largest overlap, m.
+        Mean overlap, weighed by the pressure, m.
     state : State
     newton : int
         Newton steps that it took.
@@ -129,13 +129,20 @@ def _settled(body: SoftBody, state: State, obstacle: Obstacle, way: float, augme
         state, steps = _newton(body, state, obstacle)
         total += steps
         if not augmented or _overlap(body, state, obstacle) < OVERLAP * way:
-            break
+            return state, total
         state.multiplier = body.touch(state, obstacle)
-    return state, total
+    raise _StuckError
 
 
 def _overlap(body: SoftBody, state: State, obstacle: Obstacle) -> float:
-    return float(max(0.0, -np.min(body.gap(state, obstacle)[0])))
+    """Mean overlap, weighed by the pressure that acts through it, m: what contact takes of the work, by the force.
+
+    Its largest value says less: a curve of the second order has not enough freedom for every point of the element in
+    which the contact ends.
+    """
+    pressure, gap = body.touch(state, obstacle), body.gap(state, obstacle)[0]
+    weight = pressure * np.asarray(body.skin.global_coordinates()[0]) * body.skin.dx
+    return float(np.sum(weight * np.maximum(0.0, -gap)) / max(np.sum(weight), np.finfo(float).tiny))
 
 
 def _newton(body: SoftBody, state: State, obstacle: Obstacle) -> tuple[State, int]:

@@ -119,7 +119,7 @@ class SoftBody:
         radius = self.basis.global_coordinates()[0]
         parts = []
         for (shape,) in self.basis.basis:
-            g, v = shape.grad, shape.value
+            g, v = np.asarray(shape.grad), np.asarray(shape)
             parts.append(np.stack([g[0, 0], g[0, 1], g[1, 0], g[1, 1], v[0] / radius]))
         return np.stack(parts)
 
@@ -181,7 +181,7 @@ class SoftBody:
         force = _gathered(np.einsum("aikq,ikq->ak", self._shape, stress), self.basis)
         force += self._push(state, obstacle)
         swell = (volume.value - 1.0 - self.compliance * p) * self._measure
-        shapes = np.stack([np.asarray(shape.value) for (shape,) in self.inner.basis])
+        shapes = np.stack([np.asarray(shape) for (shape,) in self.inner.basis])
         kept = self.merge.T @ _gathered(np.einsum("akq,kq->ak", shapes, swell), self.inner)
         return np.concatenate([force, kept]), (energy, volume, p)
 
@@ -189,7 +189,7 @@ class SoftBody:
         """Derivative of the residual, sparse and symmetric."""
         energy, volume, p = known
         stiffness = (energy.hessian + p * volume.hessian) * self._measure
-        shapes = np.stack([np.asarray(shape.value) for (shape,) in self.inner.basis])
+        shapes = np.stack([np.asarray(shape) for (shape,) in self.inner.basis])
         half = np.einsum("ijkq,bjkq->bikq", stiffness, self._shape)
         K = _spread(np.einsum("aikq,bikq->abk", self._shape, half, optimize=True), self.basis, self.basis)
         swell = np.einsum("aikq,ikq->akq", self._shape, volume.gradient * self._measure)
@@ -202,7 +202,7 @@ class SoftBody:
     def _slopes(self, state: State, obstacle: Obstacle) -> tuple[Array, Array, Array]:
         """Derivatives of the gap by the displacements of an element, shapes' radial values, and the measure."""
         radius = self.gap(state, obstacle)[1]
-        values = np.stack([np.asarray(shape.value) for (shape,) in self.skin.basis])
+        values = np.stack([np.asarray(shape) for (shape,) in self.skin.basis])
         ring = 2.0 * np.pi * np.asarray(self.skin.global_coordinates()[0]) * self.skin.dx
         return values[:, 1] - obstacle.curvature * radius * values[:, 0], values[:, 0], ring
 
