@@ -47,6 +47,7 @@ CASES: dict[str, tuple[str | Path, ...]] = {
     "budget": (MODEL, "--steps", "2000", "--latency", "0"),
     "compile": (MODEL, "--c", "c"),
     "linkage": (ROOT / "examples" / "karl" / "karl.toml",),
+    "study": ("carton", "--mesh", "1"),
     "view": (MODEL, "--page", "arm.html"),
     "import": (ROOT / "examples" / "robots" / "arm.urdf", "-o", "robot.toml"),
     "export": ("robot.toml", "--urdf", ROOT / "examples" / "robots" / "arm.urdf", "-o", "back.urdf"),

@@ -29,6 +29,7 @@ from vpm import (
     prove_command,
     rank_command,
     reduce_command,
+    study_command,
     view_command,
 )
 from vpm.command import (
@@ -121,6 +122,7 @@ app.command(epilog=identify_command.EXAMPLES)(identify_command.identify)
 app.command(epilog=diagnose_command.EXAMPLES)(diagnose_command.diagnose)
 app.command(epilog=rank_command.EXAMPLES)(rank_command.rank)
 app.command(epilog=prove_command.EXAMPLES)(prove_command.prove)
+app.command(epilog=study_command.EXAMPLES)(study_command.study)
 app.command(epilog=view_command.EXAMPLES)(view_command.view)
 app.command("import", epilog=import_command.EXAMPLES)(import_command.import_)
 app.command(epilog=export_command.EXAMPLES)(export_command.export)

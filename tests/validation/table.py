@@ -18,6 +18,7 @@ from validation import (
     maxwell_narx,
     motions,
     oil,
+    studies,
     tudor,
 )
 from validation.row import Row, row
@@ -45,6 +46,8 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
     "TUDOR at rest": tudor.static,
     "TUDOR in motion": tudor.dynamic,
     "TUDOR, the published table": tudor.published,
+    "A carton and a fingertip": studies.printed,
+    "A panel that bends, a curved bar and a ball on a layer": studies.solved,
     "Parameters of the examples from noisy logs": identification.recovered,
 }
 

@@ -1,0 +1,220 @@
+"""Newton's method with line search, rounds of augmented Lagrange and load steps for a soft body on an obstacle."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import VpmError
+from vpm.studies.jet import Jet
+from vpm.studies.soft import Obstacle, SoftBody, State
+
+Array = NDArray[np.float64]
+
+#: Newton steps, halvings of a step, halvings of a load step, rounds of contact.
+STEPS, HALVINGS, CUTS, ROUNDS = 30, 6, 6, 12
+#: Balance that counts as reached, of a force of the body's size; overlap that counts as none, of the way pressed.
+BALANCE, OVERLAP = 1e-9, 1e-4
+
+
+class _StuckError(Exception):
+    """Newton's method found no balance, or rounds of contact left an overlap."""
+
+
+@dataclass(frozen=True)
+class Pressed:
+    """A body pressed so far.
+
+    Attributes
+    ----------
+    indentation : float
+        Way of the obstacle since it touched, m.
+    force : float
+        N.
+    energy : float
+        Elastic, J.
+    radius, pressure : ndarray
+        Radius now (m) and true pressure (Pa) at the points of the skin, from the axis outwards.
+    contact_radius : float
+        m.
+    overlap : float
+        Mean overlap, weighed by the pressure, m.
+    state : State
+    newton : int
+        Newton steps that it took.
+    """
+
+    indentation: float
+    force: float
+    energy: float
+    radius: Array
+    pressure: Array
+    contact_radius: float
+    overlap: float
+    state: State
+    newton: int
+
+    @property
+    def area(self) -> float:
+        """Area of contact, m^2."""
+        return float(np.pi * self.contact_radius**2)
+
+
+def press(
+    body: SoftBody,
+    ways: Iterable[float],
+    *,
+    start: float,
+    curvature: float = 0.0,
+    augmented: bool = True,
+    after: Pressed | None = None,
+) -> list[Pressed]:
+    """Raise an obstacle against a body, one load step after the other.
+
+    Parameters
+    ----------
+    body : SoftBody
+    ways : iterable of float
+        Indentations in growing order, m.
+    start : float
+        Height of the obstacle where it touches, m.
+    curvature : float
+        Of the obstacle, see `Obstacle`.
+    augmented : bool
+        False for the penalty alone, which lets the body overlap.
+    after : Pressed, optional
+        Where to go on.
+
+    Raises
+    ------
+    VpmError
+        No balance is found, not even by small steps.
+    """
+    state, reached = (after.state, after.indentation) if after else (body.rest(), 0.0)
+    results = []
+    for way in ways:
+        state, steps = _advance(body, state, reached, way, start, curvature, augmented)
+        reached = way
+        results.append(_seen(body, state, way, Obstacle(start + way, curvature), steps))
+    return results
+
+
+def _advance(
+    body: SoftBody, state: State, reached: float, way: float, start: float, curvature: float, augmented: bool
+) -> tuple[State, int]:
+    """From one indentation to the next, in halves where need be."""
+    step, smallest, total = way - reached, (way - reached) / 2**CUTS, 0
+    while reached < way * (1.0 - 1e-12):
+        goal = min(reached + step, way)
+        try:
+            state, steps = _settled(body, state.copy(), Obstacle(start + goal, curvature), goal, augmented)
+            reached, total = goal, total + steps
+        except _StuckError as error:
+            step /= 2.0
+            if step < smallest:
+                raise VpmError(
+                    f"no balance was found beyond an indentation of {1e3 * reached:.4g} mm (asked {1e3 * way:.4g} mm), "
+                    "not even in small steps; press less deep, take a finer mesh or a stiffer material"
+                ) from error
+    return state, total
+
+
+def _settled(body: SoftBody, state: State, obstacle: Obstacle, way: float, augmented: bool) -> tuple[State, int]:
+    """Balance on an obstacle, with contact pressures that leave no overlap."""
+    total = 0
+    for _ in range(ROUNDS):
+        state, steps = _newton(body, state, obstacle)
+        total += steps
+        if not augmented or _overlap(body, state, obstacle) < OVERLAP * way:
+            return state, total
+        state.multiplier = body.touch(state, obstacle)
+    raise _StuckError
+
+
+def _overlap(body: SoftBody, state: State, obstacle: Obstacle) -> float:
+    """Mean overlap, weighed by the pressure that acts through it, m: what contact takes of the work, by the force.
+
+    Its largest value says less: a curve of the second order has not enough freedom for every point of the element in
+    which the contact ends.
+    """
+    pressure, gap = body.touch(state, obstacle), body.gap(state, obstacle)[0]
+    weight = pressure * np.asarray(body.skin.global_coordinates()[0]) * body.skin.dx
+    return float(np.sum(weight * np.maximum(0.0, -gap)) / max(np.sum(weight), np.finfo(float).tiny))
+
+
+def _newton(body: SoftBody, state: State, obstacle: Obstacle) -> tuple[State, int]:
+    from scipy.sparse.linalg import spsolve
+
+    count = body.basis.N
+    free = np.setdiff1d(np.arange(count + state.pressure.size), body.fixed)
+    residual, known = body.residual(state, obstacle)
+    scale = _scale(body)
+    for step in range(STEPS):
+        if _size(residual[free], scale) < BALANCE:
+            return state, step
+        matrix = body.tangent(state, obstacle, known)[free][:, free]
+        change = np.zeros(residual.size)
+        change[free] = spsolve(matrix.tocsc(), -residual[free])
+        state, residual, known = _searched(body, state, obstacle, change, _size(residual[free], scale), free)
+    raise _StuckError
+
+
+def _scale(body: SoftBody) -> tuple[int, float, float]:
+    """Number of displacements; force and volume to which those out of balance are compared."""
+    shear = max(material.shear for material in body.materials)
+    extent = float(np.ptp(body.mesh.doflocs, axis=1).max())
+    return body.basis.N - body.fixed.size, shear * extent**2, extent**3
+
+
+def _size(residual: Array, scale: tuple[int, float, float]) -> float:
+    count, force, volume = scale
+    return float(np.hypot(np.linalg.norm(residual[:count]) / force, np.linalg.norm(residual[count:]) / volume))
+
+
+def _searched(
+    body: SoftBody, state: State, obstacle: Obstacle, change: Array, before: float, free: NDArray[np.int64]
+) -> tuple[State, Array, tuple[Jet, Jet, Array]]:
+    """The longest of halved steps that lessens what is out of balance; contact may let it grow a little."""
+    count, share = body.basis.N, 1.0
+    for _ in range(HALVINGS):
+        trial = State(
+            state.displacement + share * change[:count], state.pressure + share * change[count:], state.multiplier
+        )
+        with np.errstate(all="ignore"):
+            residual, known = body.residual(trial, obstacle)
+            after = _size(residual[free], _scale(body))
+            upright = bool(np.all(known[1].value > 0.0))
+        if np.isfinite(after) and upright and after < 2.0 * before:
+            return trial, residual, known
+        share /= 2.0
+    raise _StuckError
+
+
+def _seen(body: SoftBody, state: State, way: float, obstacle: Obstacle, steps: int) -> Pressed:
+    """What a balance shows; true pressures from those of the undeformed surface by the areas of rings."""
+    nominal = body.touch(state, obstacle)
+    rest = np.asarray(body.skin.global_coordinates()[0])
+    now = body.gap(state, obstacle)[1]
+    order = np.argsort(rest, axis=None)
+    r0, r1, t = (np.ravel(each)[order] for each in (rest, now, nominal))
+    pressure = t * _stretch(body, state, r0, order)
+    touching = t > 0.0
+    edge = float(r1[touching].max()) if touching.any() else 0.0
+    after = r1[~touching & (r1 > edge)]
+    contact = 0.5 * (edge + float(after.min())) if edge and after.size else edge
+    force, energy = body.force(state, obstacle), body.energy(state)
+    return Pressed(way, force, energy, r1, pressure, contact, _overlap(body, state, obstacle), state, steps)
+
+
+def _stretch(body: SoftBody, state: State, rest: Array, order: NDArray[np.int64]) -> Array:
+    """Undeformed area of the skin by the area of its shadow on the plate, at each point."""
+    field = body.skin.interpolate(state.displacement)
+    normal = np.asarray(body.skin.normals)
+    along = np.stack([-normal[1], normal[0]])
+    grow = along[0] + np.einsum("jkq,jkq->kq", np.asarray(field.grad)[0], along)
+    now = np.ravel(np.asarray(body.skin.global_coordinates())[0] + np.asarray(field)[0])[order]
+    shadow = np.abs(np.ravel(grow)[order])
+    return np.asarray(rest / np.maximum(now * shadow, 1e-12 * np.max(rest)))

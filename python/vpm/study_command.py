@@ -1,0 +1,31 @@
+"""Command line of the studies: ``vpm study``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from vpm.command import console, fillable
+from vpm.manner import give, wrote
+
+EXAMPLES = "Example:  vpm study carton\n\nExample:  vpm study fingertip --mesh 1 --out fingertip"
+
+
+def study(
+    name: Annotated[str, typer.Argument(metavar="STUDY", help="knee, fingertip or carton.")],
+    out: Annotated[
+        Path | None, typer.Option(callback=fillable, help="Folder for study.json, report.html and the pictures.")
+    ] = None,
+    mesh: Annotated[int, typer.Option(help="Fineness of the finest mesh; 0 for the usual one.")] = 0,
+) -> None:
+    """Run a study on solids and soft bodies, and show its figures beside the printed ones (extra fem)."""
+    from vpm.studies import run_study
+
+    found = run_study(name, mesh)
+    give(study=found.to_dict())
+    for line in str(found).splitlines():
+        console.print(line, markup=False)
+    if out is not None:
+        wrote(*found.save(out))
