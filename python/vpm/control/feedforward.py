@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vpm.control.rest import along, derivatives, loaded
+from vpm.control.rest import along, course, loaded
 from vpm.control.splitting import between, solve, split
 from vpm.control.target import TargetMotion
 from vpm.control.task import Task, task_of
@@ -30,6 +30,8 @@ METHODS = ("rigid", "quasi_static", "inertial", "inversion")
 LEFT = 1e-6
 #: Errors of the outputs die out over so many samples.
 SAMPLES = 10
+#: Points in a motion that show how it accelerates.
+RESOLVED = 200
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -231,8 +233,7 @@ def _inverted(
     zeros = _internal(ends[0], stiffness, len(task.outputs))
     lead, trail = _lengths(zeros, _internal(ends[1], stiffness, len(task.outputs)), motion, actuation)
     times = _times(motion, step, (lead, trail))
-    near = loaded(task, times, motion.at(times)[0], _held(way, inside, times))
-    guess = np.concatenate([near, derivatives(times, near)[0]], axis=1)
+    guess = np.concatenate(_loaded(task, motion, times, _held(way, inside, times))[:2], axis=1)
     guess[[0, -1]] = still
     states = solve(rates, times, guess, (ends[0], ends[1]))
     _check_lead(task, states, still[0], (lead, _needed(zeros.real[zeros.real > 0.0])))
@@ -240,8 +241,8 @@ def _inverted(
     middle, between_states = between(times, states, slopes)
     held = task.follow(motion, middle, between_states, stiffness).inputs
     last = task.follow(motion, times[-1:], states[-1:], stiffness).inputs
-    course = (states[:, :n], states[:, n:], slopes[:, n:])
-    return _plan(task, motion, "inversion", times, np.concatenate([held, last]), course, zeros)
+    found = (states[:, :n], states[:, n:], slopes[:, n:])
+    return _plan(task, motion, "inversion", times, np.concatenate([held, last]), found, zeros)
 
 
 def _algebraic(
@@ -249,17 +250,26 @@ def _algebraic(
 ) -> FlexibleFeedforward:
     """Poses by balance under loads of the motion before: none for the first two methods."""
     times, stiff = _times(motion, step, actuation), order == 0
-    wanted = motion.at(times)[0]
-    q = along(task, wanted, near, stiff=stiff)
-    if METHODS[order] == "inertial":
-        q = loaded(task, times, wanted, q)
-    course = (q, *derivatives(times, q))
-    efforts = np.asarray(task.model.inverse_dynamics(*course))
+    q = along(task, motion.at(times)[0], near, stiff=stiff)
+    found = _loaded(task, motion, times, q) if METHODS[order] == "inertial" else course(times, q, times)
+    q, efforts = found[0], np.asarray(task.model.inverse_dynamics(*found))
     moving = np.arange(len(task.model.joints) if stiff else q.shape[1])
     inverse = np.linalg.pinv(task.levers(q)[:, moving])
     u = np.einsum("kmn,kn->km", inverse, efforts[:, moving])
     held = np.concatenate([0.5 * (u[1:] + u[:-1]), u[-1:]])
-    return _plan(task, motion, METHODS[order], times, held, course, np.zeros(0, dtype=np.complex128))
+    return _plan(task, motion, METHODS[order], times, held, found, np.zeros(0, dtype=np.complex128))
+
+
+def _loaded(task: Task, motion: TargetMotion, times: Array, q: Array) -> tuple[Array, Array, Array]:
+    """Positions, velocities and accelerations with the loads of inertia, from poses under gravity.
+
+    They are sought at times so far apart that four derivatives leave little of rounding.
+    """
+    span = float(times[-1] - times[0]) / motion.duration
+    count = min(len(times), round(span * max(RESOLVED, 4 * (len(motion.breaks) - 1))) + 1)
+    coarse = np.linspace(times[0], times[-1], count)
+    found = loaded(task, coarse, motion.at(coarse)[0], course(times, q, coarse)[0])
+    return course(coarse, found, times)
 
 
 def _plan(
@@ -268,7 +278,7 @@ def _plan(
     method: str,
     times: Array,
     inputs: Array,
-    course: tuple[Array, Array, Array],
+    found: tuple[Array, Array, Array],
     zeros: NDArray[np.complex128],
 ) -> FlexibleFeedforward:
     model = task.model
@@ -285,9 +295,9 @@ def _plan(
         strains,
         commands,
         motion.at(times)[0],
-        task.values(course[0]),
-        *course,
-        _strains(model, course[0], strains),
+        task.values(found[0]),
+        *found,
+        _strains(model, found[0], strains),
         zeros,
     )
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,6 +16,8 @@ Array = NDArray[np.float64]
 CLOSE, STEPS = 1e-11, 60
 #: Longest step, rad or m: farther away no linear model of an arm holds.
 LONGEST = 0.3
+#: Share of a motion that no further term of a series is worth: each one makes more of rounding.
+ENOUGH = 1e-6
 
 
 def poses(
@@ -93,30 +97,33 @@ def loaded(task: Task, times: Array, wanted: Array, q: Array) -> Array:
     """Poses (N, n) under gravity and the inertial forces of their own motion, from those under gravity.
 
     Each round takes the loads of the motion before, which adds two derivatives of the target. Such a series converges
-    at first where the target is slow beside the internal motions, and diverges in the end; it ends where its terms
-    have been smallest.
+    at first where the target is slow beside the internal motions, and diverges in the end: it ends where its terms
+    have been smallest, or are small.
     """
-    size = np.inf
+    size, small = np.inf, ENOUGH * float(np.ptp(q, axis=0).max())
     while True:
-        v, a = derivatives(times, q)
+        _, v, a = course(times, q, times)
         try:
             better, _ = poses(task, wanted, q, (v, a))
         except SimulationError:
             return q
         change = float(np.abs(better - q).max())
-        if not change < 0.5 * size:
+        if not small < change < 0.5 * size:
             return q
         q, size = better, change
-        if size < 10.0 * CLOSE:
-            return q
 
 
-def derivatives(times: Array, q: Array) -> tuple[Array, Array]:
-    """Velocities and accelerations of sampled coordinates (N, n), by splines of degree 5."""
+def course(times: Array, q: Array, at: Array) -> tuple[Array, Array, Array]:
+    """Positions, velocities and accelerations at other times of coordinates (N, n) that go from rest to rest.
+
+    They are those of splines of degree 5, which are at rest at both ends.
+    """
     from scipy.interpolate import make_interp_spline
 
-    spline = make_interp_spline(times, q, k=5)
-    return np.asarray(spline(times, 1)), np.asarray(spline(times, 2))
+    still = np.zeros(q.shape[1])
+    ends: Any = ([(1, still), (2, still)],) * 2  # the stubs of SciPy know single conditions only
+    spline = make_interp_spline(times, q, k=5, bc_type=ends)
+    return np.asarray(spline(at)), np.asarray(spline(at, 1)), np.asarray(spline(at, 2))
 
 
 def _solved(both: Array, right: Array) -> Array:

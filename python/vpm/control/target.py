@@ -94,13 +94,13 @@ class TargetMotion:
         _check_finite(table)
         if not (np.isfinite(grid).all() and (np.diff(grid) > 0.0).all()):
             raise SimulationError("the times of a target have to ascend; sort them, and leave out what stands twice")
-        still = [(order, np.zeros(table.shape[1])) for order in (1, 2)]
-        ends: Any = (still, still)  # the stubs of SciPy know single conditions only, and no splines of several columns
-        spline: Any = make_interp_spline(grid - grid[0], table, k=DEGREE, bc_type=ends)
-        pieces = PPoly.from_spline(spline)
-        inside = np.flatnonzero(np.diff(pieces.x) > 0.0)
-        breaks = np.append(pieces.x[inside], pieces.x[-1])
-        return cls(float(grid[-1] - grid[0]), np.asarray(pieces.c[:, inside]), np.asarray(breaks))
+        ends: Any = ([(1, 0.0), (2, 0.0)],) * 2  # the stubs of SciPy know single conditions only
+        splines: list[Any] = [make_interp_spline(grid - grid[0], column, k=DEGREE, bc_type=ends) for column in table.T]
+        pieces = [PPoly.from_spline(spline) for spline in splines]
+        knots = pieces[0].x
+        inside = np.flatnonzero(np.diff(knots) > 0.0)
+        coefficients = np.stack([piece.c[:, inside] for piece in pieces], axis=-1)
+        return cls(float(grid[-1] - grid[0]), coefficients, np.append(knots[inside], knots[-1]))
 
     @classmethod
     def from_log(cls, experiment: Experiment, channels: Sequence[str]) -> TargetMotion:
