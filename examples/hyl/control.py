@@ -2,8 +2,8 @@
 
 python examples/hyl/control.py [FOLDER] [--seeds 5]
 
-Bearings of 1e6 N/m, pins and housings included, carry the simulated leg. It has what no controller's model has: cylinders
-that lag by 2 ms and rub, and in the rows below what they name.
+Bearings of 3e6 N/m, pins and housings included, carry the simulated leg. Its cylinders lag by 2 ms and rub, which no
+model of a controller knows; rows of the table name what else is hidden.
 """
 
 from __future__ import annotations
@@ -23,9 +23,9 @@ from matplotlib import pyplot as plt
 Array = NDArray[np.float64]
 
 HERE = Path(__file__).resolve().parent
-STEP, MOVE, REST = 1e-3, 0.25, 0.4
+STEP, MOVE, REST = 1e-3, 0.35, 0.4
 #: Heights of the hip (m) between which it squats, radial stiffness of the bearings (N/m), lengths of the legs (m).
-HIGH, LOW, BEARING, UPPER, LOWER = 0.56, 0.47, 1e6, 0.350, 0.341
+HIGH, LOW, BEARING, UPPER, LOWER = 0.56, 0.47, 3e6, 0.350, 0.341
 DRIVES, JOINTS = ("hip_drive", "knee_drive"), ("hip_rotation", "knee_rotation")
 MEASURED = ("slider.position", *(f"{joint}.position" for joint in JOINTS))
 #: Noise of the encoders (m, rad), and gains of the leg's joint controllers (N m/rad, N m s/rad).
@@ -86,7 +86,7 @@ def play(machine: vpm.Model, controller: Impedance | vpm.FlexibleController, pla
     generator, state = np.random.default_rng(0), np.zeros(machine.core.n_states)
     own = plan.position[0]
     state[: len(own)] = own
-    sim, height = vpm.Simulation(machine, STEP, state=state, substeps=10), np.empty(len(plan.time))
+    sim, height = vpm.Simulation(machine, STEP, state=state), np.empty(len(plan.time))
     for place in range(len(height)):
         seen = np.array([sim[name] for name in MEASURED])
         height[place] = seen[0]

@@ -203,12 +203,9 @@ def main(folder: Path, seeds: int) -> None:
         print(f"worst of {seeds} seeds: better than rigid by {factors[0]:.1f} (error), {factors[1]:.1f} (vibration)")
     own = laboratory.controllers()["flexible, LQR"]
     times = own.step_times(5000, thread_time) if isinstance(own, vpm.FlexibleController) else np.zeros(1)
-    quantiles = ", ".join(
-        f"{name} {1e6 * np.quantile(times, q):.0f} us" for name, q in (("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999))
-    )
-    print(
-        f"a step of observer, feedback and feed-forward: {quantiles}; {100 * np.quantile(times, 0.999) / STEP:.1f} % of 1 ms at p99.9"
-    )
+    quantiles = {name: float(np.quantile(times, q)) for name, q in (("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999))}
+    told = ", ".join(f"{name} {1e6 * value:.0f} us" for name, value in quantiles.items())
+    print(f"a step of observer, feedback and feed-forward: {told}; {100 * quantiles['p99.9'] / STEP:.1f} % of 1 ms")
     _draw(drawn, folder / "control.png")
     print(f"wrote {folder / 'control.png'}")
 

@@ -219,13 +219,17 @@ def _reached(linear: LinearModel, A: Array, B: Array, names: Sequence[str], comp
     """Refuse a motion that does not die out by itself and that B does not reach.
 
     Test of Popov, Belevitch and Hautus: the rank of ``[A - z, B]`` at each eigenvalue (T. Kailath, "Linear Systems",
-    1980, section 2.4).
+    1980, section 2.4), with states in units in which none is large beside the others.
     """
-    scale = np.abs(B).max() or 1.0
-    for value in np.linalg.eigvals(A):
+    from scipy.linalg import matrix_balance
+
+    balanced, units = matrix_balance(A, permute=False)
+    reached = np.linalg.solve(units, B)
+    reached /= np.maximum(np.abs(reached).max(axis=0), 1e-300)
+    for value in np.linalg.eigvals(balanced):
         if np.abs(value) < 1.0 - 1e-9:
             continue
-        left, sizes, _ = np.linalg.svd(np.hstack([A - value * np.eye(len(A)), B / scale]))
+        left, sizes, _ = np.linalg.svd(np.hstack([balanced - value * np.eye(len(A)), reached]))
         if sizes[-1] < NOTHING * sizes[0]:
             name = names[int(np.argmax(np.abs(left[:, -1])))]
             raise SimulationError(f"{linear.model_name}: what moves in {name} does not die out and {complaint}")
