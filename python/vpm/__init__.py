@@ -20,6 +20,14 @@ if TYPE_CHECKING:
     from vpm.catalogue import EFFECTS
     from vpm.climb import Climb, climb
     from vpm.compare import Comparison, compare
+    from vpm.control import (
+        FlexibleController,
+        FlexibleFeedforward,
+        StateFeedback,
+        TargetMotion,
+        flexible_feedforward,
+        state_feedback,
+    )
     from vpm.diagnosing import diagnose
     from vpm.discrepancy import Diagnosis
     from vpm.errors import VpmError
@@ -69,6 +77,8 @@ __all__ = [
     "ExportedRobot",
     "Fit",
     "Fitting",
+    "FlexibleController",
+    "FlexibleFeedforward",
     "ImportedRobot",
     "InertialFit",
     "InertialRegression",
@@ -89,6 +99,8 @@ __all__ = [
     "Setup",
     "Shaper",
     "Simulation",
+    "StateFeedback",
+    "TargetMotion",
     "Trial",
     "VpmError",
     "Weighing",
@@ -100,6 +112,7 @@ __all__ = [
     "diagnose",
     "diagnose_many",
     "export_robot",
+    "flexible_feedforward",
     "identify",
     "identify_inertial",
     "identify_oil",
@@ -116,6 +129,7 @@ __all__ = [
     "simplify",
     "simulate",
     "simulate_batch",
+    "state_feedback",
     "view",
     "weigh",
     "write_fmu",
@@ -132,6 +146,12 @@ _HOMES = {
     "climb": "vpm.climb",
     "Comparison": "vpm.compare",
     "compare": "vpm.compare",
+    "FlexibleController": "vpm.control",
+    "FlexibleFeedforward": "vpm.control",
+    "StateFeedback": "vpm.control",
+    "TargetMotion": "vpm.control",
+    "flexible_feedforward": "vpm.control",
+    "state_feedback": "vpm.control",
     "diagnose": "vpm.diagnosing",
     "Diagnosis": "vpm.discrepancy",
     "VpmError": "vpm.errors",

@@ -71,6 +71,9 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "vpm.compare.comparison": ("ChannelComparison", "Comparison"),
     "vpm.compare.correlation": ("Correlation",),
     "vpm.compare.regions": ("Bin", "Region", "Where"),
+    "vpm.control.feedback": ("StateFeedback",),
+    "vpm.control.feedforward": ("FlexibleFeedforward",),
+    "vpm.control.schedule": ("Schedule",),
     "vpm.discrepancy.diagnosis": (
         "AcceptedEffect",
         "Ambiguity",

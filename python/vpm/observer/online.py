@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,6 +16,16 @@ from vpm.observer.noise import Noise
 from vpm.simulate import AUTOMATIC, Setup
 
 Array = NDArray[np.float64]
+
+
+class SteadyGain(NamedTuple):
+    """A gain that stays, with what it leaves unknown."""
+
+    #: Correction of the state by the innovations (nx, m).
+    gain: Array
+    #: Covariance of the corrected state (nx, nx), and of the innovations (m, m).
+    covariance: Array
+    spread: Array
 
 
 class Observer:
@@ -98,10 +109,11 @@ class Observer:
             )
         except ValueError as error:
             raise SimulationError(f"{model.name}: {error}") from error
+        self._readings = readings
         self._innovation = np.zeros(len(self.channels))
         self._estimate = first.copy()
         if steady:
-            self._settle(np.diag(readings**2), model.command(inputs))
+            self.keep(self.settled(first, model.command(inputs)))
 
     def step(self, measurements: ArrayLike, inputs: ArrayLike | Mapping[str, float] = ()) -> Array:
         """State at this sample, corrected by what was measured; the inputs are held until the next.
@@ -178,15 +190,25 @@ class Observer:
             raise SimulationError(f"{self.model.name}: {error}") from error
         self._estimate, self._innovation = first.copy(), np.zeros(len(self.channels))
 
-    def _settle(self, readings: Array, command: Array) -> None:
-        """Keep the gain of the algebraic Riccati equation (R. Kalman, *J. Basic Engineering* 82, 1960)."""
+    def settled(self, state: Mapping[str, float] | ArrayLike, inputs: Mapping[str, float] | ArrayLike) -> SteadyGain:
+        """The gain that the filter settles to near a state under standing inputs; the observer begins again there.
+
+        Law: the algebraic Riccati equation (R. Kalman, *J. Basic Engineering* 82, 1960).
+
+        Raises
+        ------
+        SimulationError
+            No steady gain exists: something that drifts is not seen.
+        """
         from scipy.linalg import solve_discrete_are
 
+        self.reset(state)
+        readings = np.diag(self._readings**2)
         try:
-            transition, output, process = self._core.linearised(command)
+            transition, output, process = self._core.linearised(self.model.command(inputs))
             before = solve_discrete_are(transition.T, output.T, process, readings)
             spread = output @ before @ output.T + readings
-            gain = np.linalg.solve(spread, output @ before).T
+            gain: Array = np.linalg.solve(spread, output @ before).astype(np.float64).T
             left = np.abs(np.linalg.eigvals(transition - transition @ gain @ output)).max()
             if not left < 1.0 - 1e-9:
                 raise np.linalg.LinAlgError(f"errors die out by a factor of {left:.6g} in a sample")
@@ -195,7 +217,12 @@ class Observer:
                 f"{self.model.name}: no steady gain exists about the first state ({error}); measure what drifts, give "
                 "noise to what nothing moves, or leave steady out"
             ) from error
-        self._core.hold_gain(gain, before - gain @ spread @ gain.T, spread)
+        left_over: Array = (before - gain @ spread @ gain.T).astype(np.float64)
+        return SteadyGain(gain, left_over, spread.astype(np.float64))
+
+    def keep(self, steady: SteadyGain) -> None:
+        """Correct by this gain from now on, until another is kept."""
+        self._core.hold_gain(*steady)
 
     def __repr__(self) -> str:
         return f"Observer({self.model.name!r}, channels={', '.join(self.channels)})"

@@ -1,0 +1,383 @@
+"""Commands by which chosen outputs of a flexible machine follow a target, with all that the machine does meanwhile."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vpm.control.rest import along, course, loaded
+from vpm.control.splitting import between, solve, split
+from vpm.control.target import TargetMotion
+from vpm.control.task import Task, task_of
+from vpm.errors import SimulationError, near_match
+from vpm.model import Model
+from vpm.numbers import array_of
+from vpm.results import Result
+from vpm.simulate import Setup
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+#: From the cheapest to the exact one.
+METHODS = ("rigid", "quasi_static", "inertial", "inversion")
+#: What is left of internal motions where the feed-forward begins and ends, as a share of the motion.
+LEFT = 1e-6
+#: Errors of the outputs die out over so many samples.
+SAMPLES = 10
+#: Points in a motion that show how it accelerates.
+RESOLVED = 200
+
+
+@dataclass(frozen=True, repr=False, eq=False)
+class FlexibleFeedforward(Result):
+    """Commands and references of a motion, from rest to rest.
+
+    Attributes
+    ----------
+    model_name, method : str
+    time : ndarray, shape (N,)
+        s; the target moves from zero to its duration, what comes before is the pre-actuation.
+    inputs, outputs, coordinates, strains : tuple of str
+    commands : ndarray, shape (N, nu)
+        Of all inputs of the model, each for the sample that begins there, SI; what is not at work has its usual value.
+    target, reached : ndarray, shape (N, m)
+        What the outputs should do, and what they do.
+    position, velocity, acceleration : ndarray, shape (N, n)
+        References of joints and elastic coordinates.
+    strain : ndarray, shape (N, gauges)
+    zeros : ndarray, shape (internal motions,)
+        Poles of the internal motions at the start (1/s); those to the right make the feed-forward begin early.
+    """
+
+    model_name: str
+    method: str
+    time: Array
+    inputs: tuple[str, ...]
+    outputs: tuple[str, ...]
+    coordinates: tuple[str, ...]
+    strains: tuple[str, ...]
+    commands: Array
+    target: Array
+    reached: Array
+    position: Array
+    velocity: Array
+    acceleration: Array
+    strain: Array
+    zeros: NDArray[np.complex128]
+
+    @property
+    def time_step(self) -> float:
+        """Time between samples, s."""
+        return float(self.time[1] - self.time[0])
+
+    @property
+    def pre_actuation(self) -> float:
+        """How long before the target the machine is moved, s."""
+        return abs(float(self.time[0]))
+
+    @property
+    def state(self) -> Array:
+        """Reference of the state (N, nx), named by ``model.state_names``."""
+        return np.concatenate([self.position, self.velocity], axis=1)
+
+    def _headline(self) -> Mapping[str, object]:
+        return {
+            "model": self.model_name,
+            "method": self.method,
+            "outputs": ", ".join(self.outputs),
+            "seconds": float(np.ptp(self.time)),
+            "pre_actuation": self.pre_actuation,
+        }
+
+    def _frame_columns(self) -> Mapping[str, object]:
+        columns: dict[str, object] = {"time_s": self.time}
+        columns |= {f"{name}.command": self.commands[:, place] for place, name in enumerate(self.inputs)}
+        columns |= {f"{name}.target": self.target[:, place] for place, name in enumerate(self.outputs)}
+        columns |= {f"{name}.position": self.position[:, place] for place, name in enumerate(self.coordinates)}
+        return columns | {name: self.strain[:, place] for place, name in enumerate(self.strains)}
+
+    def plot(self) -> Figure:
+        """Outputs, commands, joints and strains over time. Needs the extra ``plot``."""
+        from vpm.plot import plot_channels
+
+        kinds = (
+            ("", self.outputs, self.reached),
+            (".command", self.inputs, self.commands),
+            ("", self.strains, self.strain),
+        )
+        names = [f"{name}{end}" for end, own, _ in kinds for name in own]
+        table = np.hstack([values for _, _, values in kinds])
+        return plot_channels(self.time, table, names, [""] * len(names), title=f"{self.model_name}, {self.method}")
+
+
+def flexible_feedforward(
+    model: Model,
+    motion: TargetMotion,
+    output: str | Sequence[str] | None = None,
+    *,
+    start: Mapping[str, float] | ArrayLike | None = None,
+    inputs: Sequence[str] | None = None,
+    time_step: float = 1e-3,
+    method: str = "inversion",
+    pre_actuation: float | None = None,
+    post_actuation: float | None = None,
+    limits: Mapping[str, float] | None = None,
+) -> FlexibleFeedforward:
+    """Commands by which outputs of a flexible machine follow a target exactly, computed ahead of the motion.
+
+    ``"inversion"`` solves the internal elastic motions as a boundary value problem: what dies out is followed from the
+    start, what grows is followed back from the end, so that tips that move the wrong way first begin early. The
+    cheaper ones take links as straight (``"rigid"``), bent as by gravity (``"quasi_static"``), or as by gravity and
+    the inertial forces of that motion (``"inertial"``).
+
+    Parameters
+    ----------
+    model : Model
+        With drives that deliver at once; delays are left to the feedback.
+    motion : TargetMotion
+    output : str or sequence of str, optional
+        A marker, whose three coordinates are meant, or names such as ``"tip.x"`` and ``"joint_1.position"``, as many
+        as inputs; by default the joints.
+    start : mapping of str to float, or array_like of shape (joints,), optional
+        Joints near the first pose, which decide between elbow up and down; by default zero.
+    inputs : sequence of str, optional
+        Actuators at work; by default all.
+    time_step : float
+        s.
+    method : {"inversion", "inertial", "quasi_static", "rigid"}
+    pre_actuation, post_actuation : float, optional
+        s; by default as long as internal motions need to die out, the latter at most as long as the motion.
+    limits : mapping of str to float, optional
+        Largest absolute values, SI, of inputs ``"motor_2"`` and of joints, ``"joint_2.position"`` or
+        ``"joint_2.velocity"``.
+
+    Returns
+    -------
+    FlexibleFeedforward
+
+    Raises
+    ------
+    SimulationError
+        A name is unknown, the target is out of reach, the pre-actuation is too short, a limit is not kept, or outputs
+        cannot be prescribed by these inputs.
+
+    Examples
+    --------
+    >>> move = TargetMotion.rest_to_rest([0.5, 0.0, 0.9], [0.6, 0.3, 0.8], 0.8)
+    >>> plan = flexible_feedforward(arm, move, "tip", start={"joint_2": 0.6, "joint_3": -1.0})
+    >>> plan.commands, plan.strain
+    """
+    task = task_of(model, output, inputs)
+    if motion.width != len(task.outputs):
+        raise SimulationError(
+            f"the target has {motion.width} columns, the outputs are {', '.join(task.outputs)}; give one for each"
+        )
+    if method not in METHODS:
+        raise SimulationError(f"there is no method '{method}'; choose {', '.join(METHODS)}")
+    if not (np.isfinite(time_step) and 0.0 < time_step <= motion.duration / 20.0):
+        raise SimulationError(
+            f"samples of {time_step} s do not resolve a motion of {motion.duration:.4g} s; give at most a twentieth"
+        )
+    near = _start(model, start)
+    if method == "inversion":
+        found = _inverted(task, motion, near, time_step, (pre_actuation, post_actuation))
+    else:
+        ends = (pre_actuation or 0.0, post_actuation or 0.0)
+        found = _algebraic(task, motion, near, time_step, ends, METHODS.index(method))
+    _keep(found, limits or {})
+    return found
+
+
+def _start(model: Model, start: Mapping[str, float] | ArrayLike | None) -> Array:
+    """Coordinates near the first pose: joints as given, links as gravity bends them there."""
+    joints: Array = np.zeros(len(model.joints))
+    if isinstance(start, Mapping):
+        for name, value in start.items():
+            if name not in model.joints:
+                raise SimulationError(f'start: "{name}" is no joint; {near_match(name, model.joints)}')
+            joints[model.joints.index(name)] = value
+    elif start is not None:
+        given = array_of(start, "the start", SimulationError)
+        if given.shape != joints.shape:
+            raise SimulationError(
+                f"the start has shape {given.shape}, but {model.name} has {len(joints)} joints; give a number for each"
+            )
+        joints = given
+    if not np.isfinite(joints).all():
+        raise SimulationError("the start is not finite; give a number for each joint that it names")
+    return np.asarray(model.equilibrium(joints)[0])
+
+
+def _inverted(
+    task: Task, motion: TargetMotion, near: Array, step: float, actuation: tuple[float | None, float | None]
+) -> FlexibleFeedforward:
+    n, stiffness = len(near), 1.0 / (SAMPLES * step)
+    inside = _times(motion, step, (0.0, 0.0))
+    way = along(task, motion.at(inside)[0], near)
+
+    def rates(times: Array, states: Array) -> tuple[Array, Array]:
+        answer = task.follow(motion, times, states, stiffness)
+        by_state = np.zeros((len(times), 2 * n, 2 * n))
+        by_state[:, :n, n:], by_state[:, n:] = np.eye(n), answer.acceleration_by_state
+        return np.concatenate([states[:, n:], answer.acceleration], axis=1), by_state
+
+    still = np.zeros((2, 2 * n))
+    still[:, :n] = way[0], way[-1]
+    ends = rates(np.array([-1.0, motion.duration + 1.0]), still)[1]
+    zeros = _internal(ends[0], stiffness, len(task.outputs))
+    lead, trail = _lengths(zeros, _internal(ends[1], stiffness, len(task.outputs)), motion, actuation)
+    times = _times(motion, step, (lead, trail))
+    guess = np.concatenate(_loaded(task, motion, times, _held(way, inside, times))[:2], axis=1)
+    guess[[0, -1]] = still
+    states = solve(rates, times, guess, (ends[0], ends[1]))
+    _check_lead(task, states, still[0], (lead, _needed(zeros.real[zeros.real > 0.0])))
+    slopes = rates(times, states)[0]
+    middle, between_states = between(times, states, slopes)
+    held = task.follow(motion, middle, between_states, stiffness).inputs
+    last = task.follow(motion, times[-1:], states[-1:], stiffness).inputs
+    found = (states[:, :n], states[:, n:], slopes[:, n:])
+    return _plan(task, motion, "inversion", times, np.concatenate([held, last]), found, zeros)
+
+
+def _algebraic(
+    task: Task, motion: TargetMotion, near: Array, step: float, actuation: tuple[float, float], order: int
+) -> FlexibleFeedforward:
+    """Poses by balance under loads of the motion before: none for the first two methods."""
+    times, stiff = _times(motion, step, actuation), order == 0
+    q = along(task, motion.at(times)[0], near, stiff=stiff)
+    found = _loaded(task, motion, times, q) if METHODS[order] == "inertial" else course(times, q, times)
+    q, efforts = found[0], np.asarray(task.model.inverse_dynamics(*found))
+    moving = np.arange(len(task.model.joints) if stiff else q.shape[1])
+    inverse = np.linalg.pinv(task.levers(q)[:, moving])
+    u = np.einsum("kmn,kn->km", inverse, efforts[:, moving])
+    held = np.concatenate([0.5 * (u[1:] + u[:-1]), u[-1:]])
+    return _plan(task, motion, METHODS[order], times, held, found, np.zeros(0, dtype=np.complex128))
+
+
+def _loaded(task: Task, motion: TargetMotion, times: Array, q: Array) -> tuple[Array, Array, Array]:
+    """Positions, velocities and accelerations with the loads of inertia, from poses under gravity.
+
+    They are sought at times so far apart that four derivatives leave little of rounding.
+    """
+    span = float(times[-1] - times[0]) / motion.duration
+    count = min(len(times), round(span * max(RESOLVED, 4 * (len(motion.breaks) - 1))) + 1)
+    coarse = np.linspace(times[0], times[-1], count)
+    found = loaded(task, coarse, motion.at(coarse)[0], course(times, q, coarse)[0])
+    return course(coarse, found, times)
+
+
+def _plan(
+    task: Task,
+    motion: TargetMotion,
+    method: str,
+    times: Array,
+    inputs: Array,
+    found: tuple[Array, Array, Array],
+    zeros: NDArray[np.complex128],
+) -> FlexibleFeedforward:
+    model = task.model
+    commands = np.tile(model.command(), (len(times), 1))
+    commands[:, task.columns] = inputs
+    strains = tuple(name for name in model.output_channels if name.endswith(".strain"))
+    return FlexibleFeedforward(
+        model.name,
+        method,
+        times,
+        model.inputs,
+        task.outputs,
+        model.coordinates,
+        strains,
+        commands,
+        motion.at(times)[0],
+        task.values(found[0]),
+        *found,
+        _strains(model, found[0], strains),
+        zeros,
+    )
+
+
+def _strains(model: Model, q: Array, names: tuple[str, ...]) -> Array:
+    """What gauges show at the poses (N, gauges)."""
+    if not names:
+        return np.zeros((len(q), 0))
+    from vpm._core import Simulation
+
+    places = [model.output_channels.index(name) for name in names]
+    states = np.concatenate([q, np.zeros_like(q)], axis=1)
+    shown = Simulation(model.core, model.theta, states[0], 1e-3, 1, Setup().method(model))
+    rows = np.empty((len(q), len(places)))
+    for row, state in zip(rows, states, strict=True):
+        shown.reset(state)
+        row[:] = shown.outputs[places]
+    return rows
+
+
+def _times(motion: TargetMotion, step: float, actuation: tuple[float, float]) -> Array:
+    before, after = (int(np.ceil(length / step - 1e-9)) for length in (actuation[0], motion.duration + actuation[1]))
+    return np.arange(-before, after + 1) * float(step)
+
+
+def _held(way: Array, inside: Array, times: Array) -> Array:
+    return np.column_stack([np.interp(times, inside, column) for column in way.T])
+
+
+def _internal(matrix: Array, stiffness: float, outputs: int) -> NDArray[np.complex128]:
+    """Poles of the internal motions: those of the following machine but for two of each output."""
+    poles = split(matrix).poles.astype(np.complex128)
+    far = np.argsort(np.abs(poles + stiffness))
+    return np.asarray(poles[np.sort(far[2 * outputs :])])
+
+
+def _lengths(
+    first: NDArray[np.complex128],
+    last: NDArray[np.complex128],
+    motion: TargetMotion,
+    given: tuple[float | None, float | None],
+) -> tuple[float, float]:
+    for name, value in zip(("pre", "post"), given, strict=True):
+        if value is not None and not (np.isfinite(value) and value >= 0.0):
+            raise SimulationError(f"a {name}-actuation of {value} s is not possible; give a time that is not negative")
+    lead = _needed(first.real[first.real > 0.0]) if given[0] is None else given[0]
+    trail = min(_needed(-last.real[last.real < 0.0]), motion.duration) if given[1] is None else given[1]
+    return lead, trail
+
+
+def _needed(rates: Array) -> float:
+    """How long the slowest of these rates (1/s) takes to leave little, s."""
+    return float(-np.log(LEFT) / rates.min()) if rates.size else 0.0
+
+
+def _check_lead(task: Task, states: Array, rest: Array, times: tuple[float, float]) -> None:
+    n = len(task.model.coordinates)
+    moved = np.abs(states[:, :n] - rest[:n]).max(axis=0)
+    jump = np.abs(states[0, :n] - rest[:n])
+    share = float((jump / np.maximum(moved, 1e-300))[moved > 1e-9].max(initial=0.0))
+    if share > 1e3 * LEFT:
+        place = int(np.argmax(np.where(moved > 1e-9, jump / np.maximum(moved, 1e-300), 0.0)))
+        raise SimulationError(
+            f"{task.model.name}: with a pre-actuation of {times[0]:.3g} s {task.model.coordinates[place]} would have "
+            f"to begin at {100 * share:.2g} % of its motion, as internal motions grow by themselves; "
+            f"give at least {times[1]:.3g} s"
+        )
+
+
+def _keep(found: FlexibleFeedforward, limits: Mapping[str, float]) -> None:
+    tables = {name: found.commands[:, place] for place, name in enumerate(found.inputs)}
+    for place, name in enumerate(found.coordinates):
+        tables |= {f"{name}.position": found.position[:, place], f"{name}.velocity": found.velocity[:, place]}
+    for name, limit in limits.items():
+        if name not in tables:
+            raise SimulationError(f'limits: "{name}" is unknown; {near_match(name, tuple(tables))}')
+        largest = float(np.abs(tables[name]).max())
+        if largest > limit:
+            at = float(found.time[np.argmax(np.abs(tables[name]))])
+            raise SimulationError(
+                f"the motion takes {name} to {largest:.4g} at {at:.4g} s, beyond its limit of {limit:.4g}; "
+                "take more time, or a shorter way"
+            )
