@@ -182,7 +182,7 @@ def test_a_singular_configuration_is_named_where_a_run_comes_to_it(parallelogram
     with pytest.raises(
         CoreError, match=r"closed loops .`wrist`. come into a singular configuration .only 1 of their 2"
     ):
-        run(parallelogram, x, 101, 1e-4)
+        run(parallelogram, x, 301, 1e-4)
 
 
 # ---- refusals -------------------------------------------------------------------------------------------------------
@@ -192,7 +192,7 @@ def test_what_cannot_close_says_how_far(parallelogram: Model) -> None:
     content = parallelogram.to_dict()
     content["loops"]["wrist"]["a"]["point"] = [1.5, 0.0, 0.0]
     long = Model.from_dict(content)
-    with pytest.raises(ModelError, match=r"do not close: loop wrist stays open by 0\.4 m"):
+    with pytest.raises(ModelError, match=r"do not close: loop wrist stays open by 0\.4\d* m"):
         long.state()
     with pytest.raises(ModelError, match=r"left_crank = 0.3, elbow = 2 held: loop wrist stays open"):
         parallelogram.state({"left_crank.position": 0.3, "elbow.position": 2.0})
@@ -288,7 +288,7 @@ def test_a_model_with_loops_is_written_and_read(parallelogram: Model) -> None:
 
 def test_karl_agrees_with_its_linkage() -> None:
     model, karl = load("karl"), linkages.load(EXAMPLES / "karl" / "karl.toml")
-    for strokes in ((0.20, 0.18), (0.22, 0.2), (0.24, 0.3)):
+    for strokes in ((0.20, 0.18), (0.22, 0.2), (0.24, 0.22)):
         q = model.loops.assembled({"stroke1": strokes[0], "stroke2": strokes[1]})
         poses = karl.direct(strokes)
         angles = q[[model.coordinates.index(name) for name in ("q1", "q2")]]
@@ -304,29 +304,24 @@ def test_karl_agrees_with_its_linkage() -> None:
         assert torques == pytest.approx(expected, rel=1e-10)
 
 
-def test_karl_loses_control_at_the_published_strokes() -> None:
-    """The eight singular strokes of D'Imperio 2016, section 2.4.1, as printed with four digits."""
-    model = load("karl")
-    published = {"stroke1": (0.2534, -0.2797, 0.1720, -0.1983), "stroke2": (0.3848, 0.2481, 0.5026, 0.1302)}
-    other = {"stroke1": {"stroke2": 0.18}, "stroke2": {"stroke1": 0.2}}
-    q = model.loops.assembled({"stroke1": 0.2, "stroke2": 0.18})
-    for stroke, swing, expected in (
-        ("stroke1", "swing1", published["stroke1"]),
-        ("stroke2", "swing2", published["stroke2"]),
-    ):
-        found = set()
-        for turn in np.linspace(0.0, 2.0 * np.pi, 7)[:-1]:
-            guess = dict(zip(model.coordinates, q.tolist(), strict=True))
-            guess[swing] += turn
-            guess = {name: value for name, value in guess.items() if name not in other[stroke]}
-            try:
-                places = model.loops.singularities(stroke, other[stroke], guess)
-            except ModelError:
-                continue
-            found |= {round(place.value, 9) for place in places}
-        for value in expected:
-            assert min(abs(value - place) for place in found) < 6e-5, (stroke, found)
-        assert all(min(abs(value - place) for value in expected) < 6e-5 for place in found)
+@pytest.mark.parametrize(
+    ("stroke", "held", "guess", "published"),
+    [
+        ("stroke1", {"stroke2": 0.18}, {}, (0.2534, 0.1720)),
+        ("stroke1", {"stroke2": 0.18}, {"stroke1": -0.24, "swing1": -0.5}, (-0.2797, -0.1983)),
+        ("stroke2", {"stroke1": 0.2}, {}, (0.2481, 0.1302)),
+        ("stroke2", {"stroke1": 0.2}, {"stroke2": 0.45, "swing2": 3.1}, (0.3848, 0.5026)),
+    ],
+)
+def test_karl_loses_control_at_the_published_strokes(
+    stroke: str, held: dict[str, float], guess: dict[str, float], published: tuple[float, ...]
+) -> None:
+    """The eight singular strokes of D'Imperio 2016, section 2.4.1: as printed, and those of the closed form."""
+    found = [place.value for place in load("karl").loops.singularities(stroke, held, guess)]
+    assert sorted(found) == pytest.approx(sorted(published), abs=6e-5)
+    linkage = linkages.load(EXAMPLES / "karl" / "karl.toml").singularities()
+    exact = np.asarray(linkage.strokes)
+    assert all(np.abs(exact - value).min() < 1e-10 for value in found)
 
 
 def test_the_leg_agrees_with_its_three_derivations() -> None:
@@ -392,6 +387,10 @@ def random_machine(seed: int) -> Model:
     def vector(size: float) -> list[float]:
         return [float(x) for x in size * random.normal(size=3)]
 
+    def unit() -> list[float]:
+        way = random.normal(size=3)
+        return [float(x) for x in way / np.linalg.norm(way)]
+
     content: dict[str, Any] = {"name": "random", "gravity": vector(5.0), "bodies": {}, "joints": {}}
     last = {"a": "world", "b": "world"}
     for chain, count in (("a", 5), ("b", 4)):
@@ -409,7 +408,7 @@ def random_machine(seed: int) -> Model:
                 "child": name,
                 "translation": vector(0.2),
                 "rotation": vector(1.0),
-                "axis": vector(1.0),
+                "axis": unit(),
             }
             last[chain] = name
     closed = {
@@ -507,14 +506,31 @@ def test_a_flexible_rod_in_a_slider_crank() -> None:
     # Away from the chord, downward in the world as z is up and the crank turns it down first.
     away = -(chord[0] * middle[1] - chord[1] * middle[0]) / np.linalg.norm(chord, axis=0)
     expected = floating_rod(t, w)
-    assert np.abs(expected).max() > 3e-4
+    assert np.abs(expected).max() > 2.5e-4
     assert away == pytest.approx(expected, abs=0.03 * np.abs(expected).max())
+
+
+def test_a_flexible_rod_sags_and_vibrates_between_its_pins() -> None:
+    """At a dead centre nothing moves the slider: the rod is a beam on two pins, in closed form."""
+    content = load("slider_crank").to_dict() | {"gravity": [0.0, 0.0, -G]}
+    model = Model.from_dict(content)
+    load_per_length, rigidity, L = 7850.0 * math.pi * 0.003**2, 206e9 * math.pi * 0.003**4 / 4.0, 0.4
+    q, efforts = model.loops.rest({"crank": 0.0})
+    sag = 5.0 * load_per_length * G * L**4 / (384.0 * rigidity)
+    assert -model.forward_kinematics("middle", q)[2, 3] == pytest.approx(sag, rel=2e-3)
+    # Half of the rod hangs on the crank, 0.1 m out, and the pin.
+    assert efforts["crank"] == pytest.approx(-(0.5 * load_per_length * L + 1e-3) * G * 0.1, rel=1e-3)
+    linear = model.linearize({"crank.position": 0.0})
+    assert "rod.bending_y.0.position" in linear.states
+    expected = (math.pi / L) ** 2 * math.sqrt(rigidity / load_per_length) / (2.0 * math.pi)
+    assert np.abs(linear.frequencies() / expected - 1.0).min() < 2e-3
 
 
 def test_a_fit_along_a_log_finds_a_parameter(parallelogram: Model) -> None:
     t = 2e-3 * np.arange(1001)
-    command = 1.5 * np.sin(7.0 * t) + np.sin(2.3 * t)
-    x = parallelogram.state({"left_crank.position": 1.2})
+    # At rest for a while, so that the log tells the first velocity exactly.
+    command = np.where(t < 0.3, 0.0, 1.5 * np.sin(7.0 * (t - 0.3)) + np.sin(2.3 * (t - 0.3)))
+    x = parallelogram.state({"left_crank.position": 0.5 * math.pi})
     outputs, _, _ = run(parallelogram, x, 1001, 2e-3, inputs=command[:, None])
     log = Experiment.from_arrays(
         t,

@@ -11,7 +11,7 @@ use crate::mount::Marker;
 pub enum Closure {
     /// The origins coincide.
     Spherical,
-    /// The origins coincide, and so do the z axes.
+    /// The origins coincide, and so do the z axes of the joint.
     Revolute,
     /// The frames coincide.
     Rigid,
@@ -32,6 +32,13 @@ pub struct LoopEntry {
     pub a: BushingEnd,
     /// Frame B.
     pub b: BushingEnd,
+    /// Axes of the joint in A and in B, row by row.
+    #[serde(default = "upright")]
+    pub axes: [f64; 9],
+}
+
+fn upright() -> [f64; 9] {
+    [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0]
 }
 
 impl Closure {

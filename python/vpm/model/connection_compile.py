@@ -80,12 +80,12 @@ def loop_json(name: str, loop: Loop, structure: Structure) -> dict[str, Any]:
     """A closed loop; the core turns a revolute one about the z axes of its frames."""
     axis = unit(loop.axis or (0.0, 0.0, 1.0))
     columns = (*plane(axis), axis)
-    turn = Pose(rotation=tuple(column[row] for row in range(3) for column in columns))
+    axes = [column[row] for row in range(3) for column in columns]
 
     def end(entry: BushingEnd) -> dict[str, Any]:
-        return frame_json(structure.mounted(entry.parent, entry.at, pose(entry.point, entry.rotation) @ turn))
+        return frame_json(structure.mounted(entry.parent, entry.at, pose(entry.point, entry.rotation)))
 
-    return {"name": name, "joint": loop.type, "a": end(loop.a), "b": end(loop.b)}
+    return {"name": name, "joint": loop.type, "a": end(loop.a), "b": end(loop.b), "axes": axes}
 
 
 def cell_json(name: str, cell: LoadCell, structure: Structure) -> dict[str, Any]:

@@ -161,7 +161,7 @@ class Path:
             return np.asarray(away)
 
         before, after = apart(at), apart(q)
-        length = float(np.linalg.norm(after - before))
+        length = float(np.linalg.norm(q - at))  # where an angle leaps by a whole turn, what is apart does not
         near = float(np.linalg.norm(before)) < 2.0 * length and float(np.linalg.norm(after)) < 2.0 * length
         return near and float(before @ (after - before)) < 0.0 <= float(after @ (after - before))
 

@@ -38,9 +38,8 @@ impl Description {
         if self.drop_velocity_terms || self.omissions != Omissions::default() {
             return Err(ConnectionError::LoopWithoutTerms { closure: first.name.clone() }.into());
         }
-        let joints: Vec<_> = self.loops.iter().map(|closure| (closure.name.as_str(), closure.joint)).collect();
-        let ends = model.attachments().len() - 2 * joints.len();
-        Loops::new(model, &joints, &model.attachments()[ends..]).map(Some)
+        let ends = model.attachments().len() - 2 * self.loops.len();
+        Loops::new(model, &self.loops, &model.attachments()[ends..]).map(Some)
     }
 
     /// Whether a state (coordinates and rates first) leaves all loops closed.

@@ -2,13 +2,14 @@
 
 use super::connections::End;
 use crate::algebra::Cholesky;
-use crate::closure::Closure;
+use crate::closure::{Closure, LoopEntry};
 use crate::data::{Composite, Data, FrameSlot};
 use crate::dynamics::{flexible, for_each_column, frames, poses, take_off};
 use crate::error::{ConnectionError, Result};
 use crate::model::{Model, Place};
+use crate::mount::placed;
 use crate::scalar::Scalar;
-use crate::spatial::{Pose, Vector3, Wrench};
+use crate::spatial::{Matrix3, Pose, Vector3, Wrench};
 
 /// The square of the sine of the angle between an equation and all before it below which it says nothing that they do not say:
 /// steps lead off the closure by less than that angle, and there an equation that is redundant on the closure is not quite.
@@ -68,6 +69,8 @@ struct Placed<S> {
     joint: Closure,
     a: End<S>,
     b: End<S>,
+    /// Axes of the joint in both ends.
+    turn: Matrix3<S>,
     /// Its first equation.
     first: usize,
 }
@@ -99,19 +102,23 @@ impl<S: Scalar> Moved<S> {
 }
 
 impl<S: Scalar> Loops<S> {
-    /// On their ends in `model`, two for each of the named `joints`.
-    pub(crate) fn new(model: &Model<S>, joints: &[(&str, Closure)], ends: &[Place]) -> Result<Self> {
+    /// On their ends in `model`, two for each of the `entries`.
+    ///
+    /// # Errors
+    /// [`ConnectionError`] for a loop both of whose ends move as one piece, or whose axes are none.
+    pub(crate) fn new(model: &Model<S>, entries: &[LoopEntry], ends: &[Place]) -> Result<Self> {
         let (n, mut rows) = (model.n_coordinates(), 0);
-        let place = |(&(name, joint), ends): (&(&str, Closure), &[Place])| {
+        let place = |(entry, ends): (&LoopEntry, &[Place])| {
             let [a, b] = [0, 1].map(|k| End { frame: ends[k].frame, pose: Pose::from_f64(ends[k].pose) });
             if a.frame == b.frame {
-                return Err(ConnectionError::LoopOnOnePiece { closure: name.to_owned() }.into());
+                return Err(ConnectionError::LoopOnOnePiece { closure: entry.name.clone() }.into());
             }
-            let first = rows;
+            let turn = Pose::from_f64(placed(&format!("{}.axes", entry.name), [0.0; 3], entry.axes)?).rotation;
+            let (joint, first) = (entry.joint, rows);
             rows += joint.equations();
-            Ok(Placed { joint, a, b, first })
+            Ok(Placed { joint, a, b, turn, first })
         };
-        let placed = joints.iter().zip(ends.chunks_exact(2)).map(place).collect::<Result<Vec<_>>>()?;
+        let placed = entries.iter().zip(ends.chunks_exact(2)).map(place).collect::<Result<Vec<_>>>()?;
         let zeros = |count: usize| vec![S::zero(); count];
         Ok(Self {
             placed,
@@ -146,15 +153,16 @@ impl<S: Scalar> Loops<S> {
         let (n, Composite { frames, sections, .. }) = (model.n_coordinates(), &data.composite);
         jacobian.fill(S::zero());
         sizes.fill(S::zero());
-        for &mut Placed { joint, ref a, ref b, first } in placed {
+        for &mut Placed { joint, ref a, ref b, turn, first } in placed {
             let [from, to] = [a, b].map(|end| Moved::new(frames, end));
             let across = to.pose.translation - from.pose.translation;
             gap[first..first + 3].copy_from_slice(&across.to_array());
             drift[first..first + 3].copy_from_slice(&(to.acceleration - from.acceleration).to_array());
             let pairs = joint.perpendicular();
+            let [axes, others] = [&from, &to].map(|end| (end.pose.rotation * turn).columns);
             let mut normals = [Vector3::zero(); 3];
             for (place, &(own, other)) in pairs.iter().enumerate() {
-                let (x, y) = (from.pose.rotation.columns[own], to.pose.rotation.columns[other]);
+                let (x, y) = (axes[own], others[other]);
                 let (swing, sway) = (from.spin.cross(x), to.spin.cross(y));
                 let rate = sway.cross(x) + y.cross(swing);
                 normals[place] = y.cross(x);
@@ -303,14 +311,17 @@ impl<S: Scalar> Loops<S> {
     }
 
     /// Frame and wrench, about its origin and in its axes, of what a loop does to the body of A and to that of B, in the last evaluation.
-    fn wrenches(&self, slots: &[FrameSlot<S>], Placed { joint, a, b, first }: &Placed<S>) -> [(usize, Wrench<S>); 2] {
+    fn wrenches(
+        &self,
+        slots: &[FrameSlot<S>],
+        Placed { joint, a, b, turn, first }: &Placed<S>,
+    ) -> [(usize, Wrench<S>); 2] {
         let forces = &self.forces[*first..first + joint.equations()];
-        let [from, to] = [a, b].map(|end| slots[end.frame].pose * end.pose);
+        let [axes, others] = [a, b].map(|end| ((slots[end.frame].pose * end.pose).rotation * *turn).columns);
         let force = Vector3::new(forces[0], forces[1], forces[2]);
         let moments = joint.perpendicular().iter().zip(&forces[3..]);
-        let moment = moments.fold(Vector3::zero(), |sum, (&(own, other), &force)| {
-            sum + to.rotation.columns[other].cross(from.rotation.columns[own]) * force
-        });
+        let moment =
+            moments.fold(Vector3::zero(), |sum, (&(own, other), &force)| sum + others[other].cross(axes[own]) * force);
         [(a, -1.0), (b, 1.0)].map(|(end, sign)| {
             let axes = slots[end.frame].pose.rotation;
             let [moment, force] = [moment, force].map(|vector| axes.transpose_mul(vector * S::from_f64(sign)));
