@@ -598,6 +598,10 @@ class System:
 
         A negative one is the rate of growth of a beam that buckles.
         """
+    def loops(
+        self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+        """Gap (m,) of the closed loops, its derivative (m, n), drift ``J' v`` (m,), and 1.0 where independent (m,)."""
     def slopes(self, theta: ArrayLike, states: ArrayLike) -> NDArray[np.float64]:
         """Largest slope (N, n_beams) in rad of each beam; not a number where the kinematics are exact."""
     @property

@@ -14,6 +14,7 @@ from vpm.errors import ExperimentError
 from vpm.experiment import Experiment, Motion, joints_from_shafts, motion
 from vpm.model import Model
 from vpm.model.commanded import commanded_states
+from vpm.model.loop_states import measured
 from vpm.model.settled import follow, rest
 
 Array = NDArray[np.float64]
@@ -91,9 +92,16 @@ def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
             position, velocity = _fit_start(experiment, f"{name}.position")
             state[joint] = (position - offset[joint]) / gain[joint]
             state[coordinates + joint] = velocity / gain[joint]
+    if model.loops:
+        seen = [name for name in model.joints if f"{name}.position" in experiment]
+        moving = slice(coordinates, 2 * coordinates)
+        state[:coordinates], state[moving] = measured(model, state[:coordinates], state[moving], seen)
     if model.added_joints:
         state[:joints] = _settled(model, theta, state[:joints], experiment.dt)
-    if coordinates > joints:
+    if coordinates > joints and model.loops:
+        valued = model.with_parameters(dict(zip(model.parameter_names, theta.tolist(), strict=True)))
+        state[:coordinates] = valued.equilibrium(state[:joints])[0]
+    elif coordinates > joints:
         state[:coordinates] = model.core.equilibrium(theta, state[:joints])[0]
     internal = _internal(model, experiment, theta, state[:coordinates], 0)
     for place, name in enumerate(model.internal_names):

@@ -27,6 +27,7 @@ use crate::ball::Ball;
 use crate::beam::BeamEntry;
 use crate::body::{Body, PointMass, Weld};
 use crate::bushing::BushingEntry;
+use crate::closure::LoopEntry;
 use crate::contact::ContactEntry;
 use crate::data::Data;
 use crate::dynamics::check_regular;
@@ -105,6 +106,9 @@ pub struct Description {
     /// Joints of three angles.
     #[serde(default)]
     pub balls: Vec<Ball>,
+    /// Closed loops.
+    #[serde(default)]
+    pub loops: Vec<LoopEntry>,
     /// Number of elastic coordinates of each beam, known once the beams are built.
     #[serde(skip)]
     elastic: Vec<usize>,
@@ -126,6 +130,7 @@ impl Description {
         let model = description.model(&description.parameters)?;
         description.elastic = (0..model.n_beams()).filter_map(|k| model.beam(k)).map(|(beam, _)| beam.len()).collect();
         description.connections(&description.parameters, &model)?;
+        description.closures(&model)?;
         controllers::check_rigid(&description)?;
         check_regular(&model, &mut Data::new(&model))?;
         Ok(description)
@@ -209,6 +214,7 @@ impl Description {
             bushings: self.bushings.len(),
             load_cells: self.load_cells.len(),
             balls: self.balls.len(),
+            loops: self.loops.len(),
         }
     }
 
@@ -322,6 +328,7 @@ impl Description {
             markers: self.markers.clone(),
             gauges: self.gauges.clone(),
             attachments: self.attachments(),
+            closed: !self.loops.is_empty(),
             drop_velocity_terms: self.drop_velocity_terms,
             omissions: self.omissions.clone(),
         };
@@ -348,8 +355,8 @@ impl Build for &Description {
         let actuators = self.actuators_of(theta);
         let supplies = self.supplies.iter().map(|supply| supply.map(&mut |&index| theta[index])).collect();
         let model = self.model(theta)?;
-        let connections = self.connections(theta, &model)?;
-        let machine = Dynamics::new(model, effects, actuators, supplies).connected(connections);
+        let (connections, loops) = (self.connections(theta, &model)?, self.closures(&model)?);
+        let machine = Dynamics::new(model, effects, actuators, supplies).connected(connections).closed_by(loops);
         Ok(machine.remembering(self.memories_of(theta)).with_balls(self.balls.clone()))
     }
 

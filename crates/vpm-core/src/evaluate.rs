@@ -4,7 +4,7 @@ use crate::ball::check_angles;
 use crate::description::Description;
 use crate::error::{Error, Result};
 use crate::statics::Statics;
-use crate::system::{Build, Dynamics};
+use crate::system::{Build, Dynamics, LoopState};
 use crate::table::Table;
 
 /// Accelerations of all coordinates under `effort` (N or N m) on the joints, with all effects.
@@ -121,6 +121,12 @@ pub fn marker_poses(description: &Description, theta: &[f64], positions: Table<'
         dynamics.marker_poses(&positions.numbers()[k * positions.columns()..][..positions.columns()], row);
     }
     Ok(values)
+}
+
+/// Where the closed loops of a machine are at `position` and `velocity` of all coordinates.
+pub fn loops(description: &Description, theta: &[f64], position: &[f64], velocity: &[f64]) -> Result<LoopState<f64>> {
+    let mut dynamics = prepare(description, theta, [("position", position), ("velocity", velocity)])?;
+    Ok(dynamics.loops_at(position, velocity))
 }
 
 fn held(description: &Description, theta: &[f64], position: &[f64]) -> Result<Statics> {

@@ -57,6 +57,10 @@ pub fn inverse_dynamics(
     sensitivities: &[usize],
     interrupt: Interrupt<'_>,
 ) -> Result<Efforts> {
+    description.refuse_loops(
+        "the balance of efforts along a log",
+        "compare simulated motion instead, or ask model.loops.efforts",
+    )?;
     if let Some((beam, _)) = description.beams.iter().zip(description.elastic()).find(|(_, len)| **len > 0) {
         return Err(Error::Flexible { beam: beam.name.clone() });
     }
@@ -122,6 +126,10 @@ pub fn required(
     sensitivities: &[usize],
     interrupt: Interrupt<'_>,
 ) -> Result<(Vec<f64>, Vec<f64>)> {
+    description.refuse_loops(
+        "the balance of efforts along a log",
+        "compare simulated motion instead, or ask model.loops.efforts",
+    )?;
     if let Some((beam, _)) = description.beams.iter().zip(description.elastic()).find(|(_, len)| **len > 0) {
         return Err(Error::Flexible { beam: beam.name.clone() });
     }

@@ -11,6 +11,7 @@ pub mod beam;
 pub mod body;
 pub mod bushing;
 pub mod c_source;
+pub mod closure;
 pub mod compiled;
 pub mod contact;
 pub mod controller;

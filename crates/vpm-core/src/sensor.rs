@@ -130,6 +130,14 @@ pub enum Channel {
         /// Which number.
         quantity: BallQuantity,
     },
+    /// Wrench of a closed loop on the body of A, in the axes of A.
+    Loop {
+        /// Number of the loop.
+        #[serde(rename = "loop")]
+        closure: usize,
+        /// Which component.
+        component: Component,
+    },
     /// Reaction wrench at a joint, on the child, in its axes.
     LoadCell {
         /// Number of the load cell.
@@ -224,7 +232,7 @@ pub enum Component {
 /// In this order: position, velocity, acceleration, effort of each joint; command, force of each actuator; length, rate, force of each
 /// line; strain of each gauge; x, y, z, rx, ry, rz of each marker; spool, pressure a, pressure b, flow a, flow b of each hydraulic drive;
 /// current of each motor; pressure, flow of each supply; depth, normal force, fx, fy, fz of each contact; mx, my, mz, fx, fy, fz of each
-/// bushing and of each load cell; qw, qx, qy, qz, wx, wy, wz of each ball joint.
+/// bushing and of each load cell; qw, qx, qy, qz, wx, wy, wz of each ball joint; mx, my, mz, fx, fy, fz of each closed loop.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Layout {
     /// Joints.
@@ -251,6 +259,8 @@ pub struct Layout {
     pub load_cells: usize,
     /// Ball joints.
     pub balls: usize,
+    /// Closed loops.
+    pub loops: usize,
 }
 
 impl Layout {
@@ -309,19 +319,24 @@ impl Layout {
         self.load_cells() + 6 * self.load_cells
     }
 
+    /// Where the outputs of the closed loops begin.
+    pub fn loops(self) -> usize {
+        self.balls() + 7 * self.balls
+    }
+
     /// Whether the state alone decides an output, see [`crate::system::Dynamics::observe_motion`]; not said of contacts and bushings.
     pub(crate) fn is_of_motion(self, column: usize) -> bool {
         match column {
             _ if column < self.actuators() => column % 4 < 2,
             _ if column < self.lines() => false,
             _ if column < self.gauges() => (column - self.lines()) % 3 < 2,
-            _ => column < self.hydraulics() || column >= self.balls(),
+            _ => column < self.hydraulics() || (self.balls()..self.loops()).contains(&column),
         }
     }
 
     /// Number of all outputs.
     pub fn count(self) -> usize {
-        self.balls() + 7 * self.balls
+        self.loops() + 6 * self.loops
     }
 }
 
@@ -351,6 +366,7 @@ impl Channel {
             Self::Contact { contact, quantity } => layout.contacts() + 5 * contact + quantity as usize,
             Self::Bushing { bushing, component } => layout.bushings() + 6 * bushing + component as usize,
             Self::Ball { ball, quantity } => layout.balls() + 7 * ball + quantity as usize,
+            Self::Loop { closure, component } => layout.loops() + 6 * closure + component as usize,
             Self::LoadCell { load_cell, component } => layout.load_cells() + 6 * load_cell + component as usize,
         }
     }

@@ -184,7 +184,7 @@ pub(crate) fn check_state(name: &str, description: &Description, state: &[f64]) 
         description.n_states(),
         "state of the model: positions, velocities, states of drives and supplies",
     )?;
-    Ok(())
+    description.check_closed(state)
 }
 
 struct Simulation<'a> {
@@ -286,7 +286,27 @@ pub(crate) fn troubled<S: Scalar>(stepper: &Stepper<'_, S>, trouble: Trouble, ro
 
 /// Which joint, what happened to it and what helps.
 pub(crate) fn trouble_in_words(description: &Description, trouble: Trouble) -> (String, String, &'static str) {
-    let (Trouble::Singular(number, angle) | Trouble::Leap(number, angle)) = trouble;
+    let (number, angle) = match trouble {
+        Trouble::Singular(number, angle) | Trouble::Leap(number, angle) => (number, angle),
+        Trouble::Open(gap) => {
+            let event = format!("cannot be closed again after a step, {gap:.3e} (m or a cosine) is left");
+            return (
+                loops_in_words(description),
+                event,
+                "use more substeps, or start away from where the loops cannot close",
+            );
+        }
+        Trouble::Dependent(usual, now) => {
+            let event = format!(
+                "come into a singular configuration (only {now} of their {usual} independent equations are independent there)"
+            );
+            return (
+                loops_in_words(description),
+                event,
+                "keep the motion away from it; model.loops.singularities finds such places",
+            );
+        }
+    };
     let ball = &description.balls[number];
     let (what, degrees) = (format!("joint `{}`", ball.name), angle.to_degrees());
     if let Trouble::Leap(..) = trouble {
@@ -301,6 +321,11 @@ pub(crate) fn trouble_in_words(description: &Description, trouble: Trouble) -> (
         event,
         "turn the frame of the joint so that this angle stays away from 90 degrees, or take off what needs its angles",
     )
+}
+
+fn loops_in_words(description: &Description) -> String {
+    let names: Vec<_> = description.loops.iter().map(|closure| format!("`{}`", closure.name)).collect();
+    format!("the closed loops ({})", names.join(", "))
 }
 
 /// What went astray at sample `row` of a piece that begins at `start`; `tables` are the outputs and states of its samples until then.

@@ -9,6 +9,7 @@ mod engine;
 mod following;
 mod functions;
 mod guided;
+mod loops;
 mod memory;
 mod observe;
 mod ode;
@@ -29,6 +30,8 @@ pub(crate) use following::Following;
 pub(crate) use functions::Recorder;
 pub use functions::{Cache, Functions};
 pub use guided::{Guidance, Part};
+pub use loops::LoopState;
+pub(crate) use loops::Loops;
 pub use memory::Memories;
 pub use ode::System;
 pub(crate) use recorded::Recording;
@@ -91,6 +94,8 @@ pub struct Dynamics<S> {
     loads: Vec<S>,
     /// Contacts, bushings and load cells.
     pub(crate) connections: Connections<S>,
+    /// Closed loops, if there are any.
+    pub(crate) loops: Option<Box<Loops<S>>>,
     /// Effects that remember.
     pub(crate) memories: Memories<S>,
     /// Joints of three angles.
@@ -124,6 +129,7 @@ impl<S: Scalar> Dynamics<S> {
             stretches: actuators.iter().any(|actuator| matches!(actuator.on, Target::Line(line) if line < n_lines)),
             loads: zeros(model.n_coordinates()),
             connections: Connections::default(),
+            loops: None,
             memories: Memories::new(Vec::new()),
             balls: Vec::new(),
             model,
@@ -137,6 +143,12 @@ impl<S: Scalar> Dynamics<S> {
     #[must_use]
     pub fn connected(self, connections: Connections<S>) -> Self {
         Self { connections, ..self }
+    }
+
+    /// With closed loops.
+    #[must_use]
+    pub(crate) fn closed_by(self, loops: Option<Loops<S>>) -> Self {
+        Self { loops: loops.map(Box::new), ..self }
     }
 
     /// With joints of three angles.
@@ -201,6 +213,25 @@ impl<S: Scalar> Dynamics<S> {
         flexible::terms(&self.model, &mut self.data, q, v);
     }
 
+    /// Brings coordinates and rates, which lead `x`, to where all loops are closed, see [`Loops::close`].
+    pub(crate) fn close(&mut self, x: &mut [S]) -> [S; 2] {
+        let n = self.coordinates();
+        let (q, v) = x[..2 * n].split_at_mut(n);
+        let Self { model, data, loops, .. } = self;
+        loops.as_mut().map_or([S::zero(); 2], |loops| loops.close(model, data, q, v))
+    }
+
+    /// Where the closed loops are at (q, v).
+    pub fn loops_at(&mut self, q: &[S], v: &[S]) -> LoopState<S> {
+        let Self { model, data, loops, .. } = self;
+        let Some(loops) = loops else { return LoopState::default() };
+        frames(model, data, q, v);
+        poses(model, data);
+        loops.place(model, data);
+        loops.choose(q.len());
+        loops.state()
+    }
+
     /// Resistance of each effect at (q, v), under the efforts of the actuators in the last state evaluated.
     fn write_resistances(&self, q: &[S], v: &[S], resistances: &mut [S]) {
         for ((seat, effect), resistance) in self.effects.iter().zip(resistances) {
@@ -217,7 +248,7 @@ impl<S: Scalar> Dynamics<S> {
 
     /// Whether beams are all that is stiff in it.
     fn is_stiff_by_beams_alone(&self) -> bool {
-        self.model.n_elastic() > 0 && self.ideal && self.connections.is_free()
+        self.model.n_elastic() > 0 && self.ideal && self.connections.is_free() && self.loops.is_none()
     }
 
     /// dx/dt at x.
@@ -255,11 +286,11 @@ impl<S: Scalar> Dynamics<S> {
     #[inline]
     fn locate(&mut self, q: &[S], v: &[S]) {
         let (full, pulls) = (self.has_mass_matrix(), self.stretches || !self.connections.is_free());
-        let Self { model, data, .. } = self;
+        let Self { model, data, connections, loops, .. } = self;
         shafts(model, data, q, v);
         if full {
             flexible::terms(model, data, q, v);
-            if !self.connections.is_free() {
+            if !connections.is_free() || loops.is_some() {
                 poses(model, data);
             }
         } else if pulls {
@@ -286,7 +317,7 @@ impl<S: Scalar> Dynamics<S> {
         ),
         on_beams: &[S],
     ) {
-        let Self { model, data, loads, tensions, connections, .. } = self;
+        let Self { model, data, loads, tensions, connections, loops, .. } = self;
         let (of_joints, elastic) = loads.split_at_mut(model.n_joints());
         of_joints.copy_from_slice(&self.efforts);
         elastic.fill(S::zero());
@@ -306,6 +337,9 @@ impl<S: Scalar> Dynamics<S> {
             articulated(model, data, q, v, loads);
         } else {
             flexible::solve(model, data, q, v, loads);
+            if let Some(loops) = loops {
+                loops.constrain(model, data);
+            }
         }
     }
 }

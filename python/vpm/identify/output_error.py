@@ -86,7 +86,12 @@ class OutputErrorProblem(BegunAnywhere):
         return self._left(np.concatenate(residuals)), self._left(np.concatenate(jacobians))
 
     def open_states(self, model: Model) -> tuple[Array, int]:
-        """All states where whole records are simulated, as large as they get; see :class:`BegunAnywhere`."""
+        """All states where whole records are simulated, as large as they get; see :class:`BegunAnywhere`.
+
+        Of machines with closed loops none: first states next to one another would leave their loops open.
+        """
+        if model.loops:
+            return np.zeros(len(model.state_names)), len(self.experiments)
         spread = np.zeros(len(model.state_names))
         for record, experiment in enumerate(self.experiments if self.mode in WHOLE else ()):
             states = self._simulated(model, experiment, model.theta, [], None, record).states

@@ -18,6 +18,7 @@ from vpm.model.connection_compile import (
     connection_channel,
     contact_json,
     frame_json,
+    loop_json,
     mount_json,
 )
 from vpm.model.controller import ComputedTorque, Controller
@@ -86,6 +87,8 @@ def structure_text(checked: Checked) -> str:
     }
     if document.transmissions:  # older programs know no such key
         content["transmissions"] = [_transmission(name, structure, index) for name in document.transmissions]
+    if document.loops:
+        content["loops"] = [loop_json(name, entry, structure) for name, entry in document.loops.items()]
     if structure.balls:
         content["balls"] = [{"name": name, "angles": list(map(list, of))} for name, of in structure.balls.items()]
     if not document.velocity_terms:

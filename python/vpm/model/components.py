@@ -9,6 +9,7 @@ from types import MappingProxyType
 from vpm.catalogue import JointKind
 from vpm.errors import ModelError
 from vpm.model.checked import Checked
+from vpm.model.contact import Loop
 from vpm.model.drive_components import DriveComponents
 from vpm.model.drives import acted_on
 from vpm.model.schema import ChannelEntry
@@ -139,14 +140,15 @@ class Components(DriveComponents):
     def is_linearly_stiff(self) -> bool:
         """Whether it has flexible links, and nothing beside them that is stiff in ways of its own.
 
-        Stiff in ways of their own are contacts, bushings, ends of ways, backlash, and drives that rub or are other than
-        ideal and sampled ones.
+        Stiff in ways of their own are contacts, bushings, loops, ends of ways, backlash, and drives that rub or are
+        other than ideal and sampled ones.
         """
         document = self._checked.document
         hits = any(effect.traits.impacts for effect in document.effects)
         elastic = any(level != "rigid" for level in self.levels.values())
         direct = all(entry.type in DIRECT and not self._rubs(name) for name, entry in document.actuators.items())
-        return elastic and direct and not document.contacts and not document.bushings and not hits
+        free = not document.contacts and not document.bushings and not document.loops
+        return elastic and direct and free and not hits
 
     @property
     def first_order_beams(self) -> frozenset[str]:
@@ -173,6 +175,11 @@ class Components(DriveComponents):
     def bushings(self) -> tuple[str, ...]:
         """Elastic connections of two frames."""
         return tuple(self._checked.document.bushings)
+
+    @property
+    def loop_entries(self) -> Mapping[str, Loop]:
+        """Closed loops as the model file has them."""
+        return self._checked.document.loops
 
     @property
     def load_cells(self) -> tuple[str, ...]:
@@ -252,7 +259,8 @@ class Components(DriveComponents):
         current; per supply pressure, flow; per contact depth, normal_force and the force fx, fy, fz in world axes; per
         bushing the wrench mx, my, mz, fx, fy, fz on A in its axes; per load cell the reaction mx, my, mz, fx, fy, fz on
         the child in its axes; per spherical or free joint the unit quaternion qw, qx, qy, qz of the child in the frame
-        of the joint, and its angular velocity wx, wy, wz in its own axes.
+        of the joint, and its angular velocity wx, wy, wz in its own axes; per closed loop the wrench mx, my, mz, fx,
+        fy, fz on the body of A in the axes of A.
         """
         return self._checked.structure.outputs
 

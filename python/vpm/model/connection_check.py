@@ -1,4 +1,4 @@
-"""What contacts, bushings and load cells name, and what may not be together."""
+"""What contacts, bushings, load cells and loops name, and what may not be together."""
 
 from __future__ import annotations
 
@@ -8,7 +8,8 @@ import numpy as np
 
 from vpm.errors import UnitError, near_match
 from vpm.model.connection_parameters import stiffness_unit
-from vpm.model.contact import DIRECTIONS, Bushing, BushingEnd, Contact, entries, entry_name
+from vpm.model.contact import DIRECTIONS, Bushing, BushingEnd, Contact, Loop, entries, entry_name
+from vpm.model.controller import ComputedTorque
 from vpm.model.entry import Quantity
 from vpm.model.messages import Problem, place
 from vpm.model.parameters import Parameter
@@ -22,7 +23,7 @@ _SLACK = 1e-9
 
 
 def connection_problems(document: Document, structure: Structure) -> Iterator[Problem]:
-    """Contacts that cannot touch, bushings that cannot deform, load cells at nothing."""
+    """Contacts that cannot touch, bushings that cannot deform, load cells at nothing, loops that close none."""
     for name, contact in document.contacts.items():
         yield from _contact_problems(name, contact, structure)
     for name, bushing in document.bushings.items():
@@ -30,8 +31,34 @@ def connection_problems(document: Document, structure: Structure) -> Iterator[Pr
         if ends[0] == ends[1]:
             rest = f"has both ends on {_said(bushing.a)}, so it never deforms; put one end on another body or beam"
             yield Problem(place("bushings", name), rest)
+    for name, loop in document.loops.items():
+        yield from _loop_problems(name, loop, document, structure)
     for name, cell in document.load_cells.items():
         yield from _cell_problems(name, cell.joint, document, structure)
+
+
+def _loop_problems(name: str, loop: Loop, document: Document, structure: Structure) -> Iterator[Problem]:
+    if (
+        structure.mounted(loop.a.parent, loop.a.at, Pose()).mount
+        == structure.mounted(loop.b.parent, loop.b.at, Pose()).mount
+    ):
+        rest = f"has both ends on {_said(loop.a)}, so it closes nothing; put one end on another body or beam"
+        yield Problem(place("loops", name), rest)
+    if loop.type == "revolute" and not any(loop.axis or ()):
+        rest = "is missing or [0, 0, 0]; give the direction about which the ends turn, such as [0, 1, 0]"
+        yield Problem(place("loops", name, "axis"), rest)
+    if loop.type != "revolute" and loop.axis is not None:
+        yield Problem(place("loops", name, "axis"), f'belongs to type = "revolute", but this is {loop.type}; remove it')
+    for joint in loop.start:
+        if joint not in structure.joints:
+            repair = near_match(joint, structure.joints, what="it has")
+            yield Problem(place("loops", name, "start", joint), f"is no joint of one coordinate; {repair}")
+    for controller, law in document.controllers.items():
+        if isinstance(law, ComputedTorque):
+            rest = f"closes a loop, but controller {controller} inverts the open tree; use another type, such as pd"
+            yield Problem(place("loops", name), rest)
+    if not document.velocity_terms:
+        yield Problem(place("loops", name), "cannot stay closed without velocity_terms; put them back, or remove it")
 
 
 def _contact_problems(name: str, contact: Contact, structure: Structure) -> Iterator[Problem]:

@@ -1,11 +1,12 @@
-"""Contacts, bushings and load cells in the words of the core."""
+"""Contacts, bushings, load cells and closed loops in the words of the core."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-from vpm.model.contact import DIRECTIONS, Bushing, BushingEnd, Contact, LoadCell, entry_name
+from vpm.model.contact import DIRECTIONS, Bushing, BushingEnd, Contact, LoadCell, Loop, entry_name
+from vpm.model.expand import plane, unit
 from vpm.model.pose import Pose, pose
 from vpm.model.structure import CONTACT_UNITS, WRENCH_UNITS, Frame, Mount, Structure
 
@@ -75,6 +76,18 @@ def bushing_json(name: str, bushing: Bushing, structure: Structure, index: Mappi
     }
 
 
+def loop_json(name: str, loop: Loop, structure: Structure) -> dict[str, Any]:
+    """A closed loop; the core turns a revolute one about the z axes of its frames."""
+    axis = unit(loop.axis or (0.0, 0.0, 1.0))
+    columns = (*plane(axis), axis)
+    axes = [column[row] for row in range(3) for column in columns]
+
+    def end(entry: BushingEnd) -> dict[str, Any]:
+        return frame_json(structure.mounted(entry.parent, entry.at, pose(entry.point, entry.rotation)))
+
+    return {"name": name, "joint": loop.type, "a": end(loop.a), "b": end(loop.b), "axes": axes}
+
+
 def cell_json(name: str, cell: LoadCell, structure: Structure) -> dict[str, Any]:
     """A load cell; at a joint of several coordinates the last one carries the child."""
     if cell.joint in structure.joints:
@@ -84,11 +97,11 @@ def cell_json(name: str, cell: LoadCell, structure: Structure) -> dict[str, Any]
 
 
 def connection_channel(owner: str, kind: str, structure: Structure) -> dict[str, Any] | None:
-    """Channel of a contact, a bushing or a load cell; None for those of others."""
+    """Channel of a contact, a bushing, a load cell or a loop; None for those of others."""
     document = structure.document
     if owner in document.contacts and kind in CONTACT_UNITS:
         return {"kind": "contact", "contact": list(document.contacts).index(owner), "quantity": kind}
-    for what, names in (("bushing", document.bushings), ("load_cell", document.load_cells)):
+    for what, names in (("bushing", document.bushings), ("load_cell", document.load_cells), ("loop", document.loops)):
         if owner in names and kind in WRENCH_UNITS:
             return {"kind": what, what: list(names).index(owner), "component": kind}
     return None

@@ -1,9 +1,9 @@
-"""Form of the tables of contacts, bushings and load cells."""
+"""Form of the tables of contacts, bushings, load cells and closed loops."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Annotated
+from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, Discriminator, Field, Tag
 
@@ -126,7 +126,20 @@ class LoadCell(Entry):
     joint: Text
 
 
-#: Tables inside of contacts and bushings, by their key.
+class Loop(Entry):
+    """Joint between frames A and B that closes a loop; `axis` is in the axes of both.
+
+    `start` holds positions of joints (m, rad) from which the loops are closed: it chooses among assemblies.
+    """
+
+    type: Literal["revolute", "spherical", "rigid"]
+    a: BushingEnd
+    b: BushingEnd
+    axis: Vector | None = None
+    start: dict[str, Number] = Field(default_factory=dict)
+
+
+#: Tables inside of contacts, bushings and loops, by their key.
 NESTED: Mapping[str, type[BaseModel]] = {
     "plane": Plane,
     "friction": ContactFriction,
@@ -145,6 +158,9 @@ EXAMPLES: Mapping[str, str] = {
     "contacts.dynamic_velocity": 'dynamic_velocity = { value = 1, unit = "m/s" }',
     "bushings.a": 'a = { parent = "lower", point = [0.0, 0.0, 0.0] }',
     "bushings.b": 'b = { parent = "upper", point = [0.0, 0.0, -0.35] }',
+    "loops.type": 'type = "revolute"',
+    "loops.a": 'a = { parent = "crank", point = [0.1, 0.0, 0.0] }',
+    "loops.b": 'b = { parent = "rod", point = [0.3, 0.0, 0.0] }',
     "bushings.stiffness": "stiffness = [1e4, 0.0, 1e4, 1e7, 1e7, 1e7]",
 }
 

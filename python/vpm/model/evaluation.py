@@ -9,6 +9,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import CoreError, ModelError, near_match
 from vpm.linear import LinearModel
+from vpm.model.loop_rest import resting
+from vpm.model.loop_states import close, reduced
+from vpm.model.loops import Loops
 from vpm.model.motions import Motions
 from vpm.model.settled import follow, rest
 from vpm.numbers import array_of, number_of
@@ -19,6 +22,11 @@ Array = NDArray[np.float64]
 class Evaluations(Motions):
     """The part of a model that asks the core about rest and about one state of a simulation."""
 
+    @property
+    def loops(self) -> Loops:
+        """Closed loops: assemblies, independent coordinates, efforts, rest, singular configurations."""
+        return Loops(self)
+
     # ---- rest --------------------------------------------------------------------------------------------------------
 
     def equilibrium(self, q: ArrayLike) -> tuple[Array, Array]:
@@ -27,7 +35,7 @@ class Evaluations(Motions):
         Parameters
         ----------
         q : array_like, shape (joints,)
-            Positions of the joints.
+            Positions of the joints. With closed loops those of `Loops.independent` are held, the others follow.
 
         Returns
         -------
@@ -41,6 +49,8 @@ class Evaluations(Motions):
         CoreError
             The length is wrong, or there is no rest: what the links carry buckles them.
         """
+        if self.loops:
+            return resting(self, q)
         return self.core.equilibrium(self.theta, q)
 
     def natural_frequencies(self, q: ArrayLike) -> Array:
@@ -60,7 +70,14 @@ class Evaluations(Motions):
         ------
         CoreError
             As `equilibrium`.
+        ModelError
+            The machine has closed loops.
         """
+        if self.loops:
+            raise ModelError(
+                f"{self.name} has closed loops, which joints that are locked do not leave free; ask linearize for its "
+                "frequencies"
+            )
         return self.core.natural_frequencies(self.theta, q)
 
     @property
@@ -123,7 +140,8 @@ class Evaluations(Motions):
         Parameters
         ----------
         values : mapping of str to float, or array_like of shape (nx,), optional
-            By name as in ``model.state_names``, ``{"axis.position": 0.1}``; what is not named is zero, and drives
+            By name as in ``model.state_names``, ``{"axis.position": 0.1}``; what is not named is zero, or closes the
+            loops with what is named, and drives
             and supplies of which nothing is named are as after a long rest without commands at these positions.
 
         Returns
@@ -137,6 +155,8 @@ class Evaluations(Motions):
         """
         filled = self._filled(values, self.state_names, "state")
         if values is None or isinstance(values, Mapping):
+            if self.loops:
+                close(self, filled, values or {})
             self._keep_named(filled, rest(self, self.theta, filled[: len(self.coordinates)]), values or {})
         return filled
 
@@ -184,6 +204,8 @@ class Evaluations(Motions):
     ) -> LinearModel:
         """Linear model of small deviations from a state, by exact derivatives.
 
+        Of a machine with closed loops its states are positions and velocities of independent coordinates.
+
         Parameters
         ----------
         state : mapping of str to float, or array_like of shape (nx,), optional
@@ -207,16 +229,20 @@ class Evaluations(Motions):
         command = self.command(inputs)
         place = self._settled(state, command)
         A, B, C, D = self.core.linearize(self.theta, place, command)
+        names, units = self.state_names, tuple(self._state_units())
+        if self.loops:
+            kept, (A, B, C) = reduced(self, place, (A, B, C))
+            names, units, place = tuple(names[k] for k in kept), tuple(units[k] for k in kept), place[kept]
         return LinearModel(
             self.name,
             A,
             B,
             C,
             D,
-            self.state_names,
+            names,
             self.input_channels,
             self.output_channels,
-            tuple(self._state_units()),
+            units,
             tuple(self.channel_unit(name) for name in self.input_channels),
             tuple(self.channel_unit(name) for name in self.output_channels),
             place,

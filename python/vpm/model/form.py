@@ -187,7 +187,7 @@ def _known_keys(keys: tuple[str | int, ...], tag: str | None = None) -> tuple[st
     if keys[0] in {"actuators", "supplies"} and len(keys) > 3:
         inside_of = tables_inside(str(keys[0]), tag)
         return keys_of(inside_of.get(str(keys[-2]), Quantity))
-    if keys[0] in {"contacts", "bushings"} and len(keys) > 3:
+    if keys[0] in {"contacts", "bushings", "loops"} and len(keys) > 3:
         return keys_of(CONNECTION_TABLES.get(str(keys[-2]), Quantity))
     if len(keys) == 3 and keys[0] in SECTIONS:
         return keys_of(*SECTIONS[str(keys[0])])

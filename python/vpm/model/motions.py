@@ -125,6 +125,8 @@ class Motions(Components):
         """Efforts that the actuators have to give for accelerations ``a``: ``M(q) a + h(q, v) - effects(q, v)``.
 
         Weight, Coriolis and centrifugal efforts are in h; frictions, springs and loads of the model are carried too.
+        Of a machine with closed loops they are those on all coordinates of the open tree; `Loops.efforts` puts them on
+        the driven joints.
 
         Parameters
         ----------

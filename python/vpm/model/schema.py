@@ -14,7 +14,7 @@ from vpm.catalogue import EFFECTS, Side
 from vpm.catalogue.traits import Traits
 from vpm.expression import read_expression
 from vpm.model.beam import Beam, Gauge, Line, Marker
-from vpm.model.contact import Bushing, Contact, LoadCell
+from vpm.model.contact import Bushing, Contact, LoadCell, Loop
 from vpm.model.controller import TYPES, Controller
 from vpm.model.drives import ACTUATOR_TYPES, Actuator
 from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Switch, Text, Vector
@@ -231,6 +231,7 @@ class Document(Entry):
     contacts: dict[str, Contact] = Field(default_factory=dict)
     bushings: dict[str, Bushing] = Field(default_factory=dict)
     load_cells: dict[str, LoadCell] = Field(default_factory=dict)
+    loops: dict[str, Loop] = Field(default_factory=dict)
     effects: tuple[EffectEntry, ...] = ()
     channels: dict[str, ChannelEntry] | None = None
 
@@ -251,6 +252,7 @@ SECTIONS: Mapping[str, tuple[type[BaseModel], ...]] = {
     "contacts": (Contact,),
     "bushings": (Bushing,),
     "load_cells": (LoadCell,),
+    "loops": (Loop,),
     "channels": (ChannelEntry,),
 }
 

@@ -299,6 +299,7 @@ class Structure:
             (tuple(document.bushings), tuple(WRENCH_UNITS)),
             (tuple(document.load_cells), tuple(WRENCH_UNITS)),
             (tuple(self.balls), tuple(BALL_UNITS)),
+            (tuple(document.loops), tuple(WRENCH_UNITS)),
         ]
         return tuple(f"{owner}.{channel}" for owners, channels in groups for owner in owners for channel in channels)
 

@@ -70,6 +70,9 @@ def _attachments(document: Document) -> Iterator[tuple[tuple[str, ...], str, flo
     for name, bushing in document.bushings.items():
         yield ("bushings", name, "a"), bushing.a.parent, bushing.a.at
         yield ("bushings", name, "b"), bushing.b.parent, bushing.b.at
+    for name, loop in document.loops.items():
+        yield ("loops", name, "a"), loop.a.parent, loop.a.at
+        yield ("loops", name, "b"), loop.b.parent, loop.b.at
 
 
 def _attachment_problems(keys: tuple[str, ...], parent: str, at: float | None, document: Document) -> Iterator[Problem]:

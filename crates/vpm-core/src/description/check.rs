@@ -217,6 +217,7 @@ pub(super) fn channel(what: &str, channel: Channel, description: &Description) -
         Channel::Contact { contact, .. } => within(what, "contact", contact, description.contacts.len()),
         Channel::Bushing { bushing, .. } => within(what, "bushing", bushing, description.bushings.len()),
         Channel::Ball { ball, .. } => within(what, "ball joint", ball, description.balls.len()),
+        Channel::Loop { closure, .. } => within(what, "loop", closure, description.loops.len()),
         Channel::LoadCell { load_cell, .. } => within(what, "load cell", load_cell, description.load_cells.len()),
     }
 }

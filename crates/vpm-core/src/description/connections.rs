@@ -3,12 +3,16 @@
 use serde::Deserialize;
 
 use super::Description;
+use crate::closure::LoopEntry;
 use crate::effect::Domain;
-use crate::error::Result;
-use crate::model::Model;
+use crate::error::{ConnectionError, Result};
+use crate::model::{Model, Omissions};
 use crate::mount::Marker;
 use crate::scalar::Scalar;
-use crate::system::Connections;
+use crate::system::{Build, Connections, Dynamics, LoopState, Loops};
+
+/// How far (m, m/s, or as the cosine of an angle) a state may leave loops open: what numbers in files are rounded to.
+const TORN: f64 = 1e-6;
 
 /// A reading of the reaction wrench at a joint: what the parent's side exerts on the child at the joint's origin, in the child's axes.
 #[derive(Clone, Debug, PartialEq, Eq, Deserialize)]
@@ -21,10 +25,56 @@ pub struct LoadCell {
 }
 
 impl Description {
-    /// The frames that contacts and bushings act on: points of the contacts, then A and B of each bushing.
+    /// The frames that contacts, bushings and loops act on: points of the contacts, then A and B of each bushing and of each loop.
     pub(super) fn attachments(&self) -> Vec<Marker> {
         let points = self.contacts.iter().map(|contact| contact.marker());
-        points.chain(self.bushings.iter().flat_map(|bushing| bushing.markers())).collect()
+        let bushings = self.bushings.iter().flat_map(|bushing| bushing.markers());
+        points.chain(bushings).chain(self.loops.iter().flat_map(|closure| closure.markers())).collect()
+    }
+
+    /// The closed loops, on the frames of `model`.
+    pub(super) fn closures<S: Scalar>(&self, model: &Model<S>) -> Result<Option<Loops<S>>> {
+        let Some(first) = self.loops.first() else { return Ok(None) };
+        if self.drop_velocity_terms || self.omissions != Omissions::default() {
+            return Err(ConnectionError::LoopWithoutTerms { closure: first.name.clone() }.into());
+        }
+        let ends = model.attachments().len() - 2 * self.loops.len();
+        Loops::new(model, &self.loops, &model.attachments()[ends..]).map(Some)
+    }
+
+    /// Whether a state (coordinates and rates first) leaves all loops closed.
+    pub(crate) fn check_closed(&self, state: &[f64]) -> Result<()> {
+        if self.loops.is_empty() || state.iter().any(|number| !number.is_finite()) {
+            return Ok(());
+        }
+        let mut dynamics: Dynamics<f64> = Build::dynamics(&self, &self.parameters)?;
+        let (q, v) = state[..2 * self.n_coordinates()].split_at(self.n_coordinates());
+        let LoopState { gap, jacobian, .. } = dynamics.loops_at(q, v);
+        let mut rates = jacobian.chunks_exact(q.len().max(1)).map(|row| -> (f64, f64) {
+            let entries = row.iter().zip(v).map(|(entry, v)| entry * v);
+            entries.fold((0.0, 0.0), |(sum, size), entry| (sum + entry, size + entry.abs()))
+        });
+        let mut gaps = gap.into_iter();
+        for closure in &self.loops {
+            let count = closure.joint.equations();
+            let gap = gaps.by_ref().take(count).fold(0.0, |most: f64, gap| most.max(gap.abs()));
+            let torn = rates.by_ref().take(count).find(|(rate, size)| rate.abs() > TORN * size.max(1.0));
+            if gap > TORN {
+                return Err(ConnectionError::LoopOpen { closure: closure.name.clone(), gap }.into());
+            }
+            if let Some((rate, _)) = torn {
+                return Err(ConnectionError::LoopTorn { closure: closure.name.clone(), rate: rate.abs() }.into());
+            }
+        }
+        Ok(())
+    }
+
+    /// Complains about closed loops where `what` is asked for, which is not known of them.
+    pub(crate) fn refuse_loops(&self, what: &'static str, repair: &'static str) -> Result<()> {
+        let refused = |closure: &LoopEntry| {
+            Err(ConnectionError::LoopRefused { closure: closure.name.clone(), what, repair }.into())
+        };
+        self.loops.first().map_or(Ok(()), refused)
     }
 
     /// Contacts, bushings and load cells with the parameters `theta`, on the frames of `model`.

@@ -33,6 +33,55 @@ pub enum ConnectionError {
         /// Name of the bushing.
         bushing: String,
     },
+    /// A loop that is none.
+    #[error(
+        "loop `{closure}` has both ends on what moves as one piece, so it closes nothing; put one end on another body or beam"
+    )]
+    LoopOnOnePiece {
+        /// Name of the loop.
+        closure: String,
+    },
+    /// A loop in a model that leaves out what keeps it closed.
+    #[error(
+        "loop `{closure}` cannot stay closed in a model that leaves out velocity terms or couplings; put velocity_terms and \
+         inertia_coupling back, or remove the loop"
+    )]
+    LoopWithoutTerms {
+        /// Name of the loop.
+        closure: String,
+    },
+    /// A state in which loops are open.
+    #[error(
+        "the state leaves loop `{closure}` open by {gap:.4e} (m, or the cosine of an angle that has to be a right one); close the loops first, \
+         as model.state and model.assembled do"
+    )]
+    LoopOpen {
+        /// Name of the loop.
+        closure: String,
+        /// Largest gap.
+        gap: f64,
+    },
+    /// A state whose rates tear loops.
+    #[error(
+        "the velocities of the state tear loop `{closure}` apart at {rate:.4e} m/s or rad/s; give those of the independent joints to \
+         model.state, which finds the others"
+    )]
+    LoopTorn {
+        /// Name of the loop.
+        closure: String,
+        /// How fast.
+        rate: f64,
+    },
+    /// Something that is not known of machines with closed loops.
+    #[error("the machine has closed loops (`{closure}`), of which {what} is not known; {repair}")]
+    LoopRefused {
+        /// Name of the loop.
+        closure: String,
+        /// What was asked for.
+        what: &'static str,
+        /// What to do instead.
+        repair: &'static str,
+    },
     /// A stiffness without potential.
     #[error(
         "bushing `{bushing}` has the stiffness {above} in row {row}, column {column}, but {below} in row {column}, column {row}; \

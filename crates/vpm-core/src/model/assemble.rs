@@ -35,6 +35,8 @@ pub struct Parts<S> {
     pub gauges: Vec<Gauge>,
     /// Frames that contacts and bushings act on.
     pub attachments: Vec<Marker>,
+    /// Whether loops close on some of these, which takes the mass matrix.
+    pub closed: bool,
     /// Whether products of rates are left out of the dynamics.
     pub drop_velocity_terms: bool,
     /// What else is left out, part by part.

@@ -65,10 +65,11 @@ impl<S: Scalar> Assembly<'_, S> {
         let summed = self.slices(&order, &links, &products);
         let shafts: Vec<_> = self.parts.transmissions.iter().map(|shaft| shaft_of(shaft, &mut links)).collect();
         let massive = lines.iter().any(Wire::is_massive) || shafts.iter().any(|shaft| shaft.inertia.is_some());
-        let segmented = couples && uniform && !massive;
+        let closed = self.parts.closed;
+        let segmented = couples && uniform && !massive && !closed;
         let cut = self.beams.iter().any(|elastic| elastic.beam.segments().len() > 1);
         let rigid = n_coordinates == n_joints && self.beams.iter().all(|elastic| elastic.frame.is_none());
-        let recursive = sorted && rigid && couples && !massive;
+        let recursive = sorted && rigid && couples && !massive && !closed;
         Ok(Model {
             gravity: Vector3::from(self.parts.gravity),
             order,

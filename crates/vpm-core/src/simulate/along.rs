@@ -1,6 +1,7 @@
 //! Drives along a given motion: what motors and cylinders do to their commands while the joints move as they were seen to.
 
 use super::guide::{Drives, Guide};
+use super::prescribed::PRESCRIBED;
 use super::{Run, Setting, check_starts};
 use crate::error::{Error, Result};
 use crate::motion::JointMotion;
@@ -42,6 +43,7 @@ pub fn drives_along(
     if let Some((beam, _)) = description.beams.iter().zip(description.elastic()).find(|(_, len)| **len > 0) {
         return Err(Error::Flexible { beam: beam.name.clone() });
     }
+    description.refuse_loops(PRESCRIBED, "simulate it freely or with its controllers")?;
     motion.expect(joints)?;
     inputs.expect("inputs", rows, description.n_inputs())?;
     let states = description.n_states() - 2 * joints;

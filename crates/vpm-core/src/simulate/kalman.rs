@@ -7,7 +7,7 @@ use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
 
-use super::observer::{Noise, add_process, corrected, gain, take};
+use super::observer::{Noise, OBSERVED, add_process, corrected, gain, take};
 use super::{Bounds, Stepping, check_state, check_step, halted, output_name, repair, trouble_in_words};
 use crate::description::Description;
 use crate::error::{Diverged, Error, Result};
@@ -88,6 +88,7 @@ impl Kalman {
     ) -> Result<Self> {
         description
             .refuse_sampled("no observer can correct it", "use an ideal drive that is given the measured effort")?;
+        description.refuse_loops(OBSERVED, "compare free runs instead")?;
         check_state("state", &description, state)?;
         noise.check(&description, channels.len())?;
         let count = description.n_outputs();

@@ -111,6 +111,9 @@ impl Noise<'_> {
     }
 }
 
+/// What closed loops take away.
+pub(super) const OBSERVED: &str = "an observer, which would correct states one by one";
+
 /// The innovations of an extended Kalman filter on `readings` from `initial_state`, with its gains; a mere table of inputs is held.
 ///
 /// Its linear models are the exact derivatives of the steps that the integrator takes. A force that is held for a sample moves the machine by
@@ -127,6 +130,7 @@ pub fn filter<'a>(
     noise: Noise<'a>,
 ) -> Result<Filtered> {
     let inputs = inputs.into();
+    setting.description.refuse_loops(OBSERVED, "compare free runs instead")?;
     readings.check(&setting, &inputs)?;
     noise.check(setting.description, readings.channels.len())?;
     check_state("initial_state", setting.description, initial_state)?;
@@ -153,6 +157,7 @@ pub fn observe<'a>(
     gains: Gains<'a>,
 ) -> Result<Run> {
     let inputs = inputs.into();
+    setting.description.refuse_loops(OBSERVED, "compare free runs instead")?;
     gains.readings.check(&setting, &inputs)?;
     let (rows, entries) = (inputs.table.rows(), setting.description.n_states() * gains.readings.channels.len());
     gains.gains.expect("gains", rows, entries)?;

@@ -7,6 +7,9 @@ use crate::error::{Error, Result};
 use crate::motion::{JointMotion, StrainRates};
 use crate::table::Table;
 
+/// What closed loops take away.
+pub(super) const PRESCRIBED: &str = "a run in which some of its joints follow a log";
+
 /// Joints follow `motion`, readings of the model's position sensors, but for `passive` ones, whose columns mean nothing; these and the
 /// beams move freely.
 ///
@@ -33,6 +36,7 @@ pub fn observed(
     strains: Option<StrainRates<'_>>,
     departure: &[f64],
 ) -> Result<Run> {
+    setting.description.refuse_loops(PRESCRIBED, "simulate it freely or with its controllers")?;
     let (rows, joints) = (motion.position.rows(), setting.description.n_joints());
     motion.expect(joints)?;
     if let Some(StrainRates { rate, gain }) = strains {

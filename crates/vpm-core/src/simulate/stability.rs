@@ -18,7 +18,13 @@ use crate::system::System;
 /// are open add later is left to the run.
 pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Stepping, state: &[f64]) -> Result<()> {
     if stepping.method == Method::Additive {
+        description
+            .refuse_loops("the split step of the integrator additive", "use rosenbrock, or linearly_implicit")?;
         return check_additive(description, theta, stepping, state);
+    }
+    if stepping.method == Method::SemiImplicit && description.n_elastic() > 0 {
+        let what = "the stiffness of flexible links that the integrator semi_implicit takes implicitly";
+        description.refuse_loops(what, "use linearly_implicit, or rosenbrock")?;
     }
     if description.actuators.iter().all(|actuator| actuator.is_direct()) {
         return check_structure(description, theta, stepping, state, &[]);

@@ -25,6 +25,7 @@ impl<S: Scalar> Dynamics<S> {
             bushings: self.connections.bushings.len(),
             load_cells: self.connections.cells.len(),
             balls: self.balls.len(),
+            loops: self.loops.as_ref().map_or(0, |loops| loops.len()),
         }
     }
 
@@ -43,7 +44,7 @@ impl<S: Scalar> Dynamics<S> {
     /// The outputs that the state alone decides: positions and velocities, lines, strains, markers.
     pub fn observe_motion(&mut self, x: &[S], outputs: &mut [S]) {
         let (n, layout) = (self.coordinates(), self.layout());
-        self.observe_balls(&x[..n], &x[n..2 * n], &mut outputs[layout.balls()..]);
+        self.observe_balls(&x[..n], &x[n..2 * n], &mut outputs[layout.balls()..layout.loops()]);
         if layout.lines + layout.gauges + layout.markers > 0 || !self.connections.is_free() {
             let (q, v) = x[..2 * n].split_at(n);
             let Self { model, data, .. } = self;
@@ -95,10 +96,13 @@ impl<S: Scalar> Dynamics<S> {
             return;
         }
         let first = self.layout().load_cells();
-        let Self { model, data, connections, tensions, .. } = self;
+        let Self { model, data, connections, tensions, loops, .. } = self;
         let mut extra = std::mem::take(&mut connections.extra);
         reactions(model, data, motion, &mut extra, tensions, |data| {
             connections.take_off(data, ContactFriction::resistance);
+            if let Some(loops) = loops {
+                loops.take_off(data);
+            }
         });
         connections.extra = extra;
         for (channels, &joint) in outputs[first..].chunks_exact_mut(6).zip(&connections.cells) {
@@ -122,6 +126,9 @@ impl<S: Scalar> Dynamics<S> {
         }
         for (channels, &tension) in outputs[layout.lines()..].chunks_exact_mut(3).zip(&self.tensions) {
             channels[2] = tension;
+        }
+        if let Some(loops) = &self.loops {
+            loops.observe(&self.data, &mut outputs[layout.loops()..]);
         }
         let shown = &self.shown;
         for (channels, values) in

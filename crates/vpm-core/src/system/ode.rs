@@ -16,6 +16,8 @@ use crate::scalar::Scalar;
 
 /// The largest code of a whole step, in operations. Each takes some 3 us to compile; larger steps gain little.
 const MOST_OF_STEP: usize = 3_000;
+/// A gap (m, or the cosine of an angle that has to be a right one) at which a loop counts as torn.
+const OPEN: f64 = 1e-9;
 /// By how much a whole step is larger than the matrix that it asks for, at least: in plain numbers, and with derivatives.
 const LARGER: [usize; 2] = [2, 6];
 
@@ -45,6 +47,12 @@ pub struct System<S> {
     seen: Kind,
     /// Ball joints.
     turning: Turning<S>,
+    /// Coordinates and rates with closed loops, the gap that is left, and how many equations count.
+    closed: Vec<S>,
+    /// How many equations counted at first.
+    independent: usize,
+    /// What became of the loops.
+    torn: Option<Trouble>,
 }
 
 impl<S: Scalar> System<S> {
@@ -67,6 +75,9 @@ impl<S: Scalar> System<S> {
             whole: false,
             seen: Kind::Sample,
             turning: Turning::new(std::iter::empty()),
+            closed: vec![S::zero(); if dynamics.loops.is_some() { 2 * dynamics.coordinates() + 2 } else { 0 }],
+            independent: 0,
+            torn: None,
             dynamics,
         };
         if !Self::is_plain() {
@@ -90,6 +101,34 @@ impl<S: Scalar> System<S> {
     /// Takes over a state as users know it: brings it into the coordinates in which the machine goes on.
     pub(crate) fn enter(&mut self, x: &mut [S]) {
         self.turn(|turning, n, hold| turning.enter(x, n, hold));
+        if self.dynamics.loops.is_some() {
+            (self.torn, self.independent) = (None, usize::MAX);
+            self.independent = self.close(x);
+        }
+    }
+
+    /// Brings the state to where all loops are closed; returns how many of their equations count.
+    fn close(&mut self, x: &mut [S]) -> usize {
+        self.ready = false;
+        let moving = self.closed.len() - 2;
+        if let Some(routine) = self.routines.get(&Kind::Closed) {
+            self.closed.copy_from_slice(routine.at(x));
+        } else if let (Some(x), Some(closed)) = (S::plain(x), S::plain_mut(&mut self.closed)) {
+            closed[..moving].copy_from_slice(&x[..moving]);
+            let found = self.dynamics.close(closed);
+            closed[moving..].copy_from_slice(&found);
+        } else {
+            self.routines.copy(&Kind::Closed, x, &[], &mut self.closed);
+        }
+        x[..moving].copy_from_slice(&self.closed[..moving]);
+        let [gap, count] = [0, 1].map(|place| self.closed[moving + place].re());
+        let count = count.round() as usize;
+        if self.independent != usize::MAX && count < self.independent {
+            self.torn.get_or_insert(Trouble::Dependent(self.independent, count));
+        } else if gap > OPEN {
+            self.torn.get_or_insert(Trouble::Open(gap));
+        }
+        count
     }
 
     /// Writes the state `x` as users know it into `shown`.
@@ -106,7 +145,7 @@ impl<S: Scalar> System<S> {
     /// What became of the coordinates of a ball joint since the last [`System::enter`], if they failed.
     #[inline]
     pub(crate) fn trouble(&self) -> Option<Trouble> {
-        self.turning.trouble()
+        self.torn.or(self.turning.trouble())
     }
 
     /// Does something with the ball joints, which may hold other orientations after it.
@@ -133,11 +172,16 @@ impl<S: Scalar> System<S> {
     /// # Errors
     /// [`crate::error::Error::Unrecorded`] where a law decides by the value of a state.
     pub fn make_for(&mut self, method: Method) -> Result<()> {
-        let kinds = [Some(self.seen.clone()), kind_of(method)].into_iter().flatten();
+        let kinds = [Some(self.seen.clone()), kind_of(method), self.closing()].into_iter().flatten();
         for kind in kinds.filter(|kind| !self.is_direct(kind)).collect::<Vec<_>>() {
             self.routines.make(&kind)?;
         }
         Ok(())
+    }
+
+    /// The function by which steps end that have loops to close.
+    fn closing(&self) -> Option<Kind> {
+        self.dynamics.loops.is_some().then_some(Kind::Closed)
     }
 
     /// Whether a function is worked out by the laws themselves.
@@ -155,12 +199,13 @@ impl<S: Scalar> System<S> {
         self.ready = false;
         if !Self::is_plain() {
             // What has no code goes on operation by operation.
-            let kinds = [Some(Kind::Rates), Some(self.seen.clone()), kind_of(method)].into_iter().flatten();
+            let kinds = [Some(Kind::Rates), Some(self.seen.clone()), kind_of(method), self.closing()];
+            let kinds = kinds.into_iter().flatten();
             return kinds.map(|kind| self.routines.compile(&kind)).fold(Ok(()), std::result::Result::and);
         }
         // An additive step begins with the rates of the sample before it, if that has any.
         let rates = Some(Kind::Rates).filter(|_| method != Method::Additive || self.seen != Kind::Sample);
-        let needed: Vec<Kind> = rates.into_iter().chain([self.seen.clone()]).collect();
+        let needed: Vec<Kind> = rates.into_iter().chain([self.seen.clone()]).chain(self.closing()).collect();
         self.routines.compile_all(&needed)?;
         // A matrix alone that has no code is worked out as before.
         let kind = kind_of(method).filter(|kind| *kind != Kind::Elasticity);
@@ -174,8 +219,8 @@ impl<S: Scalar> System<S> {
     pub(crate) fn compile_steps(&mut self, method: Method) -> std::result::Result<(), String> {
         if method == Method::LinearlyImplicit && self.dynamics.is_well_scaled() && self.has_small_steps() {
             let made = self.routines.compile_within(&Kind::Step, MOST_OF_STEP);
-            let seen = self.seen.clone();
-            if made.and_then(|()| self.routines.compile(&seen)).is_ok() {
+            let mut needed = [Some(self.seen.clone()), self.closing()].into_iter().flatten();
+            if made.and_then(|()| needed.try_for_each(|kind| self.routines.compile(&kind))).is_ok() {
                 (self.ready, self.whole) = (false, true);
                 return Ok(());
             }
@@ -399,6 +444,9 @@ impl<S: Scalar> Ode<S> for System<S> {
     }
 
     fn arrive(&mut self, x: &mut [S], step: Option<f64>) {
+        if self.dynamics.loops.is_some() && !self.turning.is_resting() {
+            self.close(x);
+        }
         self.turn(|turning, n, hold| turning.arrive(x, n, step, hold));
     }
 

@@ -88,6 +88,8 @@ pub enum Kind {
     Additive,
     /// The state after a linearly implicit step, then whether it is exact: one, or zero where the elimination would have to exchange rows.
     Step,
+    /// Coordinates and rates brought to where all loops are closed, then the largest gap that is left and how many equations count.
+    Closed,
     /// Lever arms of all lines, line by line.
     Levers,
     /// Efforts that the accelerations need, those of the effects taken off.
@@ -302,6 +304,12 @@ fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recor
             dynamics.data.factorise();
             stiff::elasticity(&dynamics, &mut block, 2 * n, &mut column);
             (rates, Some(Matrix::Entries(block, 2 * n)))
+        }
+        Kind::Closed => {
+            let mut state = x[..2 * n].to_vec();
+            let found = dynamics.close(&mut state);
+            state.extend(found);
+            (state, None)
         }
         Kind::Additive => (dynamics.additive(&x, places), None),
         Kind::Step => (step::linearly_implicit(&mut dynamics, places), None),

@@ -13,6 +13,10 @@ pub(crate) enum Trouble {
     Singular(usize, f64),
     /// A step turned this joint by this angle (rad), too far for the coordinates of a step.
     Leap(usize, f64),
+    /// Loops could not be closed again: the gap that is left (m).
+    Open(f64),
+    /// Equations of the loops that became dependent: how many were independent at first, and how many are.
+    Dependent(usize, usize),
 }
 
 /// The ball joints of a machine.
@@ -74,6 +78,11 @@ impl<S: Scalar> Turning<S> {
     /// Stays at the orientations where it is from now on, however steps move the coordinates.
     pub(super) fn rest(&mut self) {
         self.rests = true;
+    }
+
+    /// Whether it stays where it is.
+    pub(super) fn is_resting(&self) -> bool {
+        self.rests
     }
 
     pub(super) fn trouble(&self) -> Option<Trouble> {

@@ -25,7 +25,7 @@ const TREE: [&str; 17] = [
     "linkage",
 ];
 /// Parts that stand alone, each a rig of its own, and all that they may import besides themselves.
-const ALONE: [(&str, &[&str]); 16] = [
+const ALONE: [(&str, &[&str]); 17] = [
     ("error", &[]),
     ("scalar", &[]),
     ("table", &["error"]),
@@ -53,6 +53,7 @@ const ALONE: [(&str, &[&str]); 16] = [
     ),
     ("contact", &["error", "scalar", "spatial", "mount", "effect::Domain"]),
     ("bushing", &["error", "scalar", "spatial", "mount", "effect::Domain"]),
+    ("closure", &["mount", "bushing::BushingEnd"]),
     ("ball", &["error", "scalar", "spatial"]),
     ("sensor", &["error", "scalar", "delay", "effect::Domain"]),
     ("controller", &["error", "scalar", "effect::Domain", "actuator::Saturation"]),

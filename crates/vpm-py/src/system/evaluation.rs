@@ -211,6 +211,24 @@ impl System {
         Ok(PyArray1::from_vec(py, result))
     }
 
+    /// Of the closed loops at a position and a velocity: what they miss (m,), its derivative (m, n), `J' v` (m,), and 1.0 for each equation that
+    /// is independent of the others (m,).
+    fn loops<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+        velocity: &Any<'py>,
+    ) -> PyResult<(Row<'py>, Table<'py>, Row<'py>, Row<'py>)> {
+        let theta = Numbers::vector("theta", theta)?;
+        let (q, v) = (Numbers::vector("position", position)?, Numbers::vector("velocity", velocity)?);
+        let found = unbroken(|| evaluate::loops(self.description(), theta.values(), q.values(), v.values()))?;
+        let found = self.checked(py, found)?;
+        let jacobian = matrix(py, found.jacobian, [found.gap.len(), self.description().n_coordinates()])?;
+        let [gap, drift, chosen] = [found.gap, found.drift, found.chosen].map(|row| PyArray1::from_vec(py, row));
+        Ok((gap, jacobian, drift, chosen))
+    }
+
     /// Largest slope in rad of each beam in each of many states (N, n_beams); not a number where the kinematics are exact.
     fn slopes<'py>(&self, py: Python<'py>, theta: &Any<'py>, states: &Any<'py>) -> PyResult<Table<'py>> {
         let (theta, states) = (Numbers::vector("theta", theta)?, Numbers::table("states", states)?);
