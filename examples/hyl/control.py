@@ -31,7 +31,10 @@ MEASURED = ("slider.position", *(f"{joint}.position" for joint in JOINTS))
 #: Noise of the encoders (m, rad), and gains of the leg's joint controllers (N m/rad, N m s/rad).
 NOISE, PROPORTIONAL, DERIVATIVE = 2e-5, 300.0, 6.0
 #: Values of which nobody knows more than 10 %.
-UNCERTAIN = ("carriage.mass", "upper_leg.mass", "lower_leg.mass", "foot.stiffness")
+UNCERTAIN = (
+    *("carriage.mass", "upper_leg.mass", "lower_leg.mass"),
+    *("upper_leg.center_of_mass.x", "lower_leg.center_of_mass.x", "foot.stiffness"),
+)
 
 
 def leg(file: str) -> vpm.Model:

@@ -14,8 +14,9 @@ from vpm.control.splitting import between, solve, split
 from vpm.control.target import TargetMotion
 from vpm.control.task import Task, task_of
 from vpm.errors import SimulationError, near_match
+from vpm.experiment import Experiment
 from vpm.model import Model
-from vpm.numbers import array_of
+from vpm.numbers import array_of, number_of
 from vpm.results import Result
 from vpm.simulate import Setup
 
@@ -32,6 +33,8 @@ LEFT = 1e-6
 SAMPLES = 10
 #: Points in a motion that show how it accelerates.
 RESOLVED = 200
+#: Samples that are solved at once: what they need of memory grows with them.
+MOST = 50_000
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -85,6 +88,43 @@ class FlexibleFeedforward(Result):
     def state(self) -> Array:
         """Reference of the state (N, nx), named by ``model.state_names``."""
         return np.concatenate([self.position, self.velocity], axis=1)
+
+    def to_experiment(self, model: Model) -> Experiment:
+        """The feed-forward as a log, for `vpm.simulate`, files and `vpm simulate`.
+
+        Parameters
+        ----------
+        model : Model
+            That plays it. Where a controller of the model commands an actuator by the position of a joint, the log has
+            the joint's reference, and the feed-forward as a disturbance of the command; elsewhere commands.
+
+        Returns
+        -------
+        Experiment
+            Its time begins at zero, with the pre-actuation.
+
+        Raises
+        ------
+        SimulationError
+            The model lacks a joint or an actuator.
+        """
+        values: dict[str, Array] = {}
+        for place, name in enumerate(self.inputs):
+            if name not in model.inputs:
+                raise SimulationError(f'{model.name} has no input "{name}"; {near_match(name, model.inputs)}')
+            measured = model.held_channels.get(name)
+            if measured is None:
+                values[f"{name}.command"] = self.commands[:, place]
+                continue
+            joint = measured.removesuffix(".position")
+            if joint not in self.coordinates:
+                raise SimulationError(
+                    f"the controller of {name} follows {measured}, for which a feed-forward has no reference; "
+                    "play it with a model without that controller"
+                )
+            values[f"{name}.reference"] = self.position[:, self.coordinates.index(joint)]
+            values[f"{name}.disturbance"] = self.commands[:, place]
+        return Experiment.from_arrays(self.time - self.time[0], values, model=model, name=f"{self.method} feed-forward")
 
     def _headline(self) -> Mapping[str, object]:
         return {
@@ -201,7 +241,7 @@ def _start(model: Model, start: Mapping[str, float] | ArrayLike | None) -> Array
         for name, value in start.items():
             if name not in model.joints:
                 raise SimulationError(f'start: "{name}" is no joint; {near_match(name, model.joints)}')
-            joints[model.joints.index(name)] = value
+            joints[model.joints.index(name)] = number_of(value, f"start: {name}", SimulationError)
     elif start is not None:
         given = array_of(start, "the start", SimulationError)
         if given.shape != joints.shape:
@@ -319,8 +359,14 @@ def _strains(model: Model, q: Array, names: tuple[str, ...]) -> Array:
 
 
 def _times(motion: TargetMotion, step: float, actuation: tuple[float, float]) -> Array:
-    before, after = (int(np.ceil(length / step - 1e-9)) for length in (actuation[0], motion.duration + actuation[1]))
-    return np.arange(-before, after + 1) * float(step)
+    lengths = actuation[0], motion.duration + actuation[1]
+    if sum(lengths) > MOST * step:
+        raise SimulationError(
+            f"a motion of {sum(lengths):.4g} s with what goes before and after has more than {MOST} samples of "
+            f"{step:g} s; give a longer time step, or a shorter motion or actuation"
+        )
+    before, after = (int(np.ceil(length / step - 1e-9)) for length in lengths)
+    return np.asarray(step * np.arange(-before, after + 1), dtype=np.float64)
 
 
 def _held(way: Array, inside: Array, times: Array) -> Array:
@@ -374,6 +420,8 @@ def _keep(found: FlexibleFeedforward, limits: Mapping[str, float]) -> None:
     for name, limit in limits.items():
         if name not in tables:
             raise SimulationError(f'limits: "{name}" is unknown; {near_match(name, tuple(tables))}')
+        if not limit > 0.0:
+            raise SimulationError(f'limits: "{name}" is {limit:g}; give a positive number')
         largest = float(np.abs(tables[name]).max())
         if largest > limit:
             at = float(found.time[np.argmax(np.abs(tables[name]))])
