@@ -28,7 +28,7 @@ from validation.machines import arm  # noqa: E402
 
 ELEMENTS = (2, 5, 10, 20, 40)
 STEP, SAMPLES = 1e-3, 1000
-INTEGRATORS = ("additive", "linearly_implicit")
+INTEGRATORS = ("additive", "crank_nicolson", "linearly_implicit")
 TUDOR = ROOT / "examples" / "tudor" / "tudor.toml"
 #: Elements per link of TUDOR.
 FINE = 20
@@ -84,10 +84,10 @@ def arm_table(repeats: int) -> str:
         if find_spec("exudyn"):
             peer[count] = exudyn(count)
     columns = {**found, **({"Exudyn": peer} if peer else {})}
-    head = ("elements per link", *(f"{name}, us" for name in columns), "Exudyn / additive")
+    head = ("elements per link", *(f"{name}, us" for name in columns), "Exudyn / crank_nicolson")
     rows = []
     for count in ELEMENTS:
-        ratio = f"{peer[count] / found['additive'][count]:.1f}" if peer else "not installed"
+        ratio = f"{peer[count] / found['crank_nicolson'][count]:.1f}" if peer else "not installed"
         rows.append((str(count), *(f"{times[count]:.1f}" for times in columns.values()), ratio))
     rows.append(("growth from 10 to 40", *(f"n^{growth(times, 10, 40):.2f}" for times in columns.values()), ""))
     return markdown.table(head, rows)

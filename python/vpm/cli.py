@@ -232,8 +232,8 @@ def simulate(
     integrator: Annotated[
         str | None,
         typer.Option(
-            help="auto, linearly_implicit, additive, rosenbrock, rk4, semi_implicit, guarded or adaptive; by default "
-            "auto, or what the scenario says."
+            help="auto, linearly_implicit, additive, crank_nicolson, rosenbrock, rk4, semi_implicit, guarded or "
+            "adaptive; by default auto, or what the scenario says."
         ),
     ] = None,
     hold: Annotated[

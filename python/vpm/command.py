@@ -55,7 +55,8 @@ Mode = Annotated[
 Integrator = Annotated[
     str,
     typer.Option(
-        help="auto, linearly_implicit, additive, rosenbrock, rk4, semi_implicit, guarded, adaptive, adaptive(1e-8)."
+        help="auto, linearly_implicit, additive, crank_nicolson, rosenbrock, rk4, semi_implicit, guarded, adaptive, "
+        "adaptive(1e-8)."
     ),
 ]
 Hold = Annotated[

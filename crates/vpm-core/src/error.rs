@@ -246,8 +246,8 @@ pub enum Error {
     },
     /// No integrator has this name.
     #[error(
-        "there is no integrator `{name}`; use semi_implicit, rk4, linearly_implicit, rosenbrock, additive, guarded, adaptive or, with a \
-         tolerance, adaptive(1e-8)"
+        "there is no integrator `{name}`; use semi_implicit, rk4, linearly_implicit, rosenbrock, additive, crank_nicolson, \
+         guarded, adaptive or, with a tolerance, adaptive(1e-8)"
     )]
     Integrator {
         /// The name asked for.

@@ -133,6 +133,8 @@ pub(crate) struct Elastic<S> {
     pub(crate) heavy: Vec<bool>,
     /// Its stations that are nothing but slices of a beam that bends in one plane, where these can be summed up.
     pub(crate) slices: Option<Slices<S>>,
+    /// The same of each of its segments, or none.
+    pub(crate) segment_slices: Vec<Slices<S>>,
 }
 
 /// The shaft of a transmission.

@@ -12,7 +12,7 @@ use super::lumped::LumpedAxis;
 use super::profile::Profile;
 use super::reduced::{Fields as ReducedFields, Reduced, ReducedAxis};
 use super::segment::{Segment, damps_locally};
-use super::strain::{PlaneAxis, SpaceAxis};
+use super::strain::{PlaneAxis, Rule, SpaceAxis};
 use crate::error::Result;
 use crate::scalar::Scalar;
 use crate::spatial::{SpatialInertia, Vector3};
@@ -100,7 +100,10 @@ impl<S: Scalar> Beam<S> {
             Order::First => Axis::Linear(LinearAxis::new(&fields, &at)),
             Order::Second if !integrated(entry.level) => Axis::Deflection(DeflectionAxis::new(&fields, &at)),
             Order::Second => {
-                PlaneAxis::new(&fields, &at).map_or_else(|| Axis::Space(SpaceAxis::new(&fields, &at)), Axis::Plane)
+                let elements = matches!(entry.level, Level::Elements(_));
+                let rule = if elements { Rule::Elements } else { Rule::Sections };
+                PlaneAxis::new(&fields, &at, rule)
+                    .map_or_else(|| Axis::Space(SpaceAxis::new(&fields, &at)), Axis::Plane)
             }
         };
         let inertia = places.iter().map(|place| profile.slice(place.at, place.weight)).collect::<Result<_>>()?;

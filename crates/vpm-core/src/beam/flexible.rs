@@ -160,8 +160,17 @@ impl<S: Scalar> Beam<S> {
     /// Where anything else can sit there are none: at the marks.
     pub(crate) fn slices(&self, root: &Pose<f64>, spatial: bool) -> Option<Slices<S>> {
         let Axis::Plane(axis) = &self.axis else { return None };
-        let is_slice = |station: usize| self.heavy[station] && !self.marks.contains(&station);
-        Some(axis.slices(&self.inertia, is_slice, (root, spatial)))
+        Some(axis.slices(&self.inertia, |station| self.is_slice(station), (root, spatial)))
+    }
+
+    /// The same of each of its segments, on their begins.
+    pub(crate) fn segment_slices(&self, spatial: bool) -> Option<Vec<Slices<S>>> {
+        let of = |segment: &Segment| segment.slices(&self.inertia, |station| self.is_slice(station), spatial);
+        self.segments.iter().map(of).collect()
+    }
+
+    fn is_slice(&self, station: usize) -> bool {
+        self.heavy[station] && !self.marks.contains(&station)
     }
 
     /// Its parts, root to tip, in which some of its coordinates act alone.

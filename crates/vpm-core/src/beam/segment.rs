@@ -10,9 +10,10 @@ use super::fields::{Field, Fields, Interpolated};
 use super::flexible::Axis;
 use super::lumped::LumpedAxis;
 use super::motion::Sections;
-use super::strain::{PlaneAxis, SpaceAxis};
+use super::strain::{PlaneAxis, Rule, Slices, SpaceAxis, Sums};
 use crate::error::Result;
 use crate::scalar::Scalar;
+use crate::spatial::{Pose, SpatialInertia};
 
 /// A part of a beam whose sections move, relative to where it begins, by some of the beam's coordinates alone.
 ///
@@ -51,7 +52,7 @@ impl Segment {
         let segment = |(number, cut): (usize, Cut)| {
             // The functions of the first node, component by component, then those of the second.
             let fields = Fields::new(Interpolated::Strain, nodal(deforms, cut.size)?);
-            let axis = PlaneAxis::new(&fields, &cut.places)
+            let axis = PlaneAxis::new(&fields, &cut.places, Rule::Elements)
                 .map_or_else(|| Axis::Space(SpaceAxis::new(&fields, &cut.places)), Axis::Plane);
             let at = |node: usize| (0..each).map(move |component| component * (count + 1) + node);
             let coordinates = at(number).chain(at(number + 1)).collect();
@@ -88,6 +89,35 @@ impl Segment {
     #[inline]
     pub(crate) fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>, accelerates: bool) {
         self.axis.sweep(q, v, out, accelerates);
+    }
+
+    /// Its slices on its begin, if it bends in one plane: those stations of a beam with these `inertias` that `is_slice` names.
+    pub(super) fn slices<S: Scalar>(
+        &self,
+        inertias: &[SpatialInertia<S>],
+        is_slice: impl Fn(usize) -> bool,
+        spatial: bool,
+    ) -> Option<Slices<S>> {
+        let Axis::Plane(axis) = &self.axis else { return None };
+        let Range { start, end } = self.stations;
+        let mut own = inertias[start..end].to_vec();
+        own.resize(self.sections, SpatialInertia::zero());
+        let is_own = |section: usize| start + section < end && is_slice(start + section);
+        Some(axis.slices(&own, is_own, (&Pose::identity(), spatial)))
+    }
+
+    /// As [`Segment::motion`], but of slices only sums, for a begin that turns with `turn` about the axis of bending.
+    #[inline]
+    pub(crate) fn gather<S: Scalar>(
+        &self,
+        motion: (&[S], &[S]),
+        turn: S,
+        sums: (&Slices<S>, &mut Sums<S>),
+        out: &mut Sections<S>,
+    ) {
+        if let Axis::Plane(axis) = &self.axis {
+            axis.gather(motion, turn, sums, out);
+        }
     }
 }
 

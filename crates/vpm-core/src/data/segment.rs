@@ -1,6 +1,6 @@
 //! Buffers of the articulated bodies along beams.
 
-use crate::beam::{Sections, Segment};
+use crate::beam::{Sections, Segment, Slices, Sums};
 use crate::model::{Elastic, Model};
 use crate::scalar::Scalar;
 use crate::spatial::{ArticulatedInertia, Twist, Wrench};
@@ -10,6 +10,8 @@ use crate::spatial::{ArticulatedInertia, Twist, Wrench};
 pub(crate) struct SegmentSlot<S> {
     /// Its sections relative to its begin.
     pub(crate) sections: Sections<S>,
+    /// Sums over its slices, where there are any.
+    pub(crate) sums: Sums<S>,
     /// Its coordinates c and their rates.
     pub(crate) coordinates: Vec<S>,
     pub(crate) rates: Vec<S>,
@@ -36,11 +38,12 @@ pub(crate) struct SegmentSlot<S> {
 }
 
 impl<S: Scalar> SegmentSlot<S> {
-    fn new(segment: &Segment) -> Self {
+    fn new(segment: &Segment, slices: Option<&Slices<S>>) -> Self {
         let zeros = |count: usize| vec![S::zero(); count];
         let n = segment.len();
         Self {
             sections: segment.buffers(),
+            sums: slices.map_or_else(Sums::default, Slices::sums),
             coordinates: zeros(n),
             rates: zeros(n),
             velocity: Twist::zero(),
@@ -60,7 +63,10 @@ impl<S: Scalar> SegmentSlot<S> {
 /// Buffers for the segments of all beams that bend.
 pub(super) fn segments<S: Scalar>(model: &Model<S>) -> Vec<Vec<SegmentSlot<S>>> {
     let of = |elastic: &Elastic<S>| match elastic.frame {
-        Some(_) if model.is_segmented() => elastic.beam.segments().iter().map(SegmentSlot::new).collect(),
+        Some(_) if model.is_segmented() => {
+            let segments = elastic.beam.segments().iter().enumerate();
+            segments.map(|(k, segment)| SegmentSlot::new(segment, elastic.segment_slices.get(k))).collect()
+        }
         _ => Vec::new(),
     };
     model.beams().iter().map(of).collect()

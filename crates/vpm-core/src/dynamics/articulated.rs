@@ -93,13 +93,14 @@ fn along<S: Scalar>(
     (carrier, keeps): (Twist<S>, bool),
 ) {
     let mut velocity = Pose::from_f64(elastic.root.pose).inverse_twist(carrier);
-    for (segment, slot) in elastic.beam.segments().iter().zip(slots) {
+    for (number, (segment, slot)) in elastic.beam.segments().iter().zip(slots).enumerate() {
         for (place, &coordinate) in segment.coordinates.iter().enumerate() {
             (slot.coordinates[place], slot.rates[place]) = (q[coordinate], v[coordinate]);
         }
         slot.velocity = velocity;
         let own = segment.stations.clone();
-        velocity = begin(segment, slot, &mut stations[own.clone()], &elastic.inertias[own], keeps);
+        let heavy = (&elastic.inertias[own.clone()], elastic.segment_slices.get(number));
+        velocity = begin(segment, slot, &mut stations[own], heavy, keeps);
     }
 }
 

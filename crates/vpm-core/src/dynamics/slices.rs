@@ -24,10 +24,6 @@ pub(super) fn hand_on<S: Scalar>(slices: &Slices<S>, sums: &Sums<S>, carrier: &m
 }
 
 /// Adds what the slices of a beam do to its coordinates, and what of their wrench on its root is not that of a rigid body.
-///
-/// Law: `bias_i = p_i . a + l_i A + sum m J_i . r' - w_z^2 s_xx - w_x^2 s_zz + w_x w_z s_xz`. There `p_i = sum m J_i`,
-/// `l_i = sum m r x J_i`, and a is the acceleration of the root's point. What turns about the axis of bending is in r'; s are the sums
-/// of [`crate::beam::Sums`] for roots that move in space.
 pub(super) fn add<S: Scalar>(
     (elastic, slices): (&Elastic<S>, &Slices<S>),
     number: usize,
@@ -37,9 +33,35 @@ pub(super) fn add<S: Scalar>(
 ) {
     let Composite { frames, sums, columns, bias, .. } = data;
     let (n, len, first, sums) = (bias.len(), elastic.beam.len(), elastic.coordinate, &sums[number]);
-    let (frame, zero) = (Pose::<S>::from_f64(slices.frame), S::zero());
+    let frame = Pose::<S>::from_f64(slices.frame);
     let FrameSlot { velocity, acceleration, .. } = frames[elastic.root.frame];
-    let (velocity, acceleration) = (frame.inverse_twist(velocity), frame.inverse_twist(acceleration));
+    let motion = (frame.inverse_twist(velocity), frame.inverse_twist(acceleration));
+    let wrench = weigh((slices, sums), motion, &v[first..], |i, coupling, effort| {
+        bias[first + i] += effort;
+        columns[first + i] += frame.wrench(coupling);
+        for j in 0..=i {
+            *entry(mass, n, first + i, first + j) += sums.block[i * len + j] + slices.block[i * len + j];
+        }
+    });
+    if elastic.root.frame != 0 {
+        frames[elastic.root.frame].wrench += frame.wrench(wrench);
+    }
+}
+
+/// Tells `own` of each coordinate the wrench on the root per unit of its acceleration and what the slices do to it at a root of that
+/// velocity and acceleration, and returns what of their wrench on the root is not that of a rigid body; all in the axes of the slices.
+///
+/// Law: `bias_i = p_i . a + l_i A + sum m J_i . r' - w_z^2 s_xx - w_x^2 s_zz + w_x w_z s_xz`. There `p_i = sum m J_i`,
+/// `l_i = sum m r x J_i`, and a is the acceleration of the root's point. What turns about the axis of bending is in r'; s are the sums
+/// of [`crate::beam::Sums`] for roots that move in space.
+#[inline]
+pub(super) fn weigh<S: Scalar>(
+    (slices, sums): (&Slices<S>, &Sums<S>),
+    (velocity, acceleration): (Twist<S>, Twist<S>),
+    v: &[S],
+    mut own: impl FnMut(usize, Wrench<S>, S),
+) -> Wrench<S> {
+    let zero = S::zero();
     let [x, y, z] = velocity.angular.to_array();
     let point = (acceleration.linear + velocity.angular.cross(velocity.linear)).to_array();
     // Rates of the momentum and of the moments of second order, for roots that move in space.
@@ -47,24 +69,16 @@ pub(super) fn add<S: Scalar>(
     for (i, (column, &turning)) in sums.columns.iter().zip(&slices.turning).enumerate() {
         let [across, along] = column.momentum;
         let angular = column.angular + turning;
-        let own = &mut bias[first + i];
-        *own += across * point[0] + along * point[2] + angular * acceleration.angular.y + column.effort;
-        columns[first + i] +=
-            frame.wrench(Wrench::new(Vector3::new(zero, angular, zero), Vector3::new(across, zero, along)));
-        for j in 0..=i {
-            *entry(mass, n, first + i, first + j) += sums.block[i * len + j] + slices.block[i * len + j];
-        }
+        let mut effort = across * point[0] + along * point[2] + angular * acceleration.angular.y + column.effort;
         if slices.spatial {
             let [xx, zz, xz] = column.spread;
-            *own += x * z * xz - z * z * xx - x * x * zz;
-            let rate = v[first + i];
+            effort += x * z * xz - z * z * xx - x * x * zz;
+            let rate = v[i];
             (slide[0], slide[1]) = (slide[0] + across * rate, slide[1] + along * rate);
             (0..3).for_each(|k| spread[k] += column.spread[k] * rate);
             spin += angular * rate;
         }
-    }
-    if elastic.root.frame == 0 {
-        return;
+        own(i, Wrench::new(Vector3::new(zero, angular, zero), Vector3::new(across, zero, along)), effort);
     }
     // The rigid body's share has `w x (w x r)` already, which r' has too about the axis of bending.
     let square = y * y;
@@ -77,5 +91,5 @@ pub(super) fn add<S: Scalar>(
         moment.x = x * zz * 2.0 - z * (xz + spin);
         moment.z = z * xx * 2.0 - x * (xz - spin);
     }
-    frames[elastic.root.frame].wrench += frame.wrench(Wrench::new(moment, force));
+    Wrench::new(moment, force)
 }

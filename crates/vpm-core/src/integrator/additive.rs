@@ -1,6 +1,6 @@
 //! An additive Runge-Kutta method for machines whose stiff forces are linear.
 
-use super::lu::Lu;
+use super::split::Split;
 use crate::ode::Ode;
 use crate::scalar::Scalar;
 
@@ -64,35 +64,21 @@ const IMPLICIT: [[f64; STAGES]; STAGES] = [
 /// Law (ARK4(3)6L\[2\]SA, used semi-implicitly): six stages `k_i = F(x + h sum a^E_ij k_j, x + h sum a^I_ij k_j)` with `F(x, x) = f(x)`,
 /// of which stage i itself enters the second argument alone, by a quarter of the step, and `x+ = x + h sum b_i k_i`. Both tables have
 /// the same weights b and places, so that the order is 4 whichever argument stands where.
-/// Of a system that tells of its constant [`Ode::elasticity`] alone, `[A, B] = [-M^-1 K, -M^-1 D]`, the accelerations follow from
-/// `(1 - r B - r^2 A) a = a_E + A (q_I + r v_I - q_E) + B (v_I - v_E)`, r a quarter of the step and a_E those of the first argument.
 /// Source: Kennedy & Carpenter 2003, Appl. Numer. Math. 44, for the tables; Boscarino, Filbet & Russo 2016, J. Sci. Comput. 68, for
 /// the semi-implicit use. Where a fast component follows a slow motion the order may fall to 2, that of the stages.
 /// Checked: order 4 on flexible arms with friction and lagging drives, both ways of solving against each other, the stability function
 /// of the implicit table, steps far above the explicit limit.
 #[derive(Clone, Debug)]
 pub struct Additive<S> {
-    explicit: Vec<S>,
-    implicit: Vec<S>,
+    split: Split<S>,
     /// Rates of the stages, one stage after the other.
     slopes: Vec<S>,
-    /// `[-M^-1 K, -M^-1 D]`, one row per coordinate, of systems that solve nothing by themselves.
-    elastic: Vec<S>,
-    lu: Lu<S>,
 }
 
 impl<S: Scalar> Additive<S> {
     /// Buffers for systems of `dim` states.
     pub fn new(dim: usize) -> Self {
-        // There are coordinates for half of the states at most.
-        let most = dim / 2;
-        Self {
-            explicit: vec![S::zero(); dim],
-            implicit: vec![S::zero(); dim],
-            slopes: vec![S::zero(); STAGES * dim],
-            elastic: vec![S::zero(); 2 * most * most],
-            lu: Lu::new(most),
-        }
+        Self { split: Split::new(dim), slopes: vec![S::zero(); STAGES * dim] }
     }
 
     /// Moves `x` on by `step` (s).
@@ -101,48 +87,15 @@ impl<S: Scalar> Additive<S> {
         ode.additive_rates(x, x, 0.0, &mut self.slopes[..dim]);
         for stage in 1..STAGES {
             let known = &self.slopes[..stage * dim];
-            ahead(&mut self.explicit, x, known, &EXPLICIT[stage], step);
-            ahead(&mut self.implicit, x, known, &IMPLICIT[stage], step);
-            let rates = &mut self.slopes[stage * dim..(stage + 1) * dim];
-            if !ode.additive_rates(&self.explicit, &self.implicit, GAMMA * step, rates) {
-                self.relax(ode, stage, GAMMA * step);
-            }
+            ahead(&mut self.split.explicit, x, known, &EXPLICIT[stage], step);
+            ahead(&mut self.split.implicit, x, known, &IMPLICIT[stage], step);
+            self.split.rates(ode, GAMMA * step, &mut self.slopes[stage * dim..(stage + 1) * dim]);
         }
         let slopes = self.slopes.chunks_exact(dim.max(1));
         for (slope, &weight) in slopes.zip(&IMPLICIT[STAGES - 1]) {
             x.iter_mut().zip(slope).for_each(|(state, &slope)| *state += slope * (weight * step));
         }
     }
-
-    /// Takes the elasticity that the system tells of implicitly in the explicit rates of a stage.
-    fn relax(&mut self, ode: &mut impl Ode<S>, stage: usize, reach: f64) {
-        let (n, dim) = (ode.coordinates(), self.explicit.len());
-        if n == 0 || !ode.elasticity(&self.explicit, &mut self.elastic[..2 * n * n]) {
-            return;
-        }
-        self.lu.resize(n);
-        let ([q_e, v_e], [q_i, v_i]) = (halves(&self.explicit, n), halves(&self.implicit, n));
-        let (coordinates, rates) = self.slopes[stage * dim..][..2 * n].split_at_mut(n);
-        for (i, row) in self.elastic[..2 * n * n].chunks_exact(2 * n).enumerate() {
-            let (stiff, damped) = row.split_at(n);
-            let matrix = &mut self.lu.matrix()[i * n..(i + 1) * n];
-            for (j, (entry, (&stiff, &damped))) in matrix.iter_mut().zip(stiff.iter().zip(damped)).enumerate() {
-                rates[i] += stiff * (q_i[j] + v_i[j] * reach - q_e[j]) + damped * (v_i[j] - v_e[j]);
-                *entry = -(stiff * reach + damped) * reach;
-            }
-            matrix[i] = matrix[i] + 1.0;
-        }
-        self.lu.factorise();
-        self.lu.solve(rates);
-        for ((coordinate, &rate), &acceleration) in coordinates.iter_mut().zip(v_i).zip(&*rates) {
-            *coordinate = rate + acceleration * reach;
-        }
-    }
-}
-
-/// Coordinates and their rates.
-fn halves<S>(x: &[S], n: usize) -> [&[S]; 2] {
-    [&x[..n], &x[n..2 * n]]
 }
 
 /// Puts `place` a step of `step` (s) along the weighted `slopes` from `x`.

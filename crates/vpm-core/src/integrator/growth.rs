@@ -39,6 +39,7 @@ pub fn check_rates(method: Method, step: f64, system: &Rates<'_>) -> Result<()> 
 }
 
 /// As [`check_rates`], for any method of fixed steps; `derivative` is that of the state after a step (s) by the state before, row by row.
+/// Of a method of several steps it is that of the last states, newest first, by those before.
 ///
 /// Checked: against the stability functions of the methods.
 pub fn check_steps(
@@ -48,10 +49,12 @@ pub fn check_steps(
     mut derivative: impl FnMut(f64) -> Vec<f64>,
 ) -> Result<()> {
     let (scaled, sizes) = (Scaled::new(system), system.sizes);
-    let size = |i: usize, j: usize| sizes[j] / sizes[i];
+    let dim = sizes.len();
+    let size = |i: usize, j: usize| sizes[j % dim] / sizes[i % dim];
     let turn = |step: f64| {
         let entries = derivative(step);
-        DMatrix::from_fn(sizes.len(), sizes.len(), |i, j| entries[i * sizes.len() + j] * size(i, j))
+        let whole = entries.len().isqrt();
+        DMatrix::from_fn(whole, whole, |i, j| entries[i * whole + j] * size(i, j))
     };
     judge(method, step, system, scaled.stepped(step, turn)?)
 }
@@ -131,7 +134,7 @@ impl Scaled {
         }
         let matrix = turn(high);
         let finite = matrix.iter().all(|entry| entry.is_finite());
-        let place = if finite { self.largest_part(&matrix, factor) } else { 0 };
+        let place = if finite { self.largest_part(&matrix, factor) % self.matrix.nrows() } else { 0 };
         // What grows is the fastest of its modes, or one much like it.
         let frequency = own.iter().map(|value| value.norm()).fold(0.0, f64::max);
         Ok(Some(Worst { place, frequency, limit: low }))

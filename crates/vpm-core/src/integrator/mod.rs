@@ -15,6 +15,7 @@ macro_rules! for_size {
 
 mod adaptive;
 mod additive;
+mod crank_nicolson;
 pub mod growth;
 mod linearly_implicit;
 mod lu;
@@ -24,11 +25,13 @@ pub mod resolution;
 mod rk4;
 mod rosenbrock;
 mod semi_implicit;
+mod split;
 pub mod stability;
 mod stage;
 
 pub use adaptive::{Adaptive, Halt, MOST_STEPS, Steps, Stuck};
 pub use additive::Additive;
+pub use crank_nicolson::CrankNicolson;
 pub use linearly_implicit::LinearlyImplicit;
 pub use lu::Lu;
 pub use rk4::Rk4;
@@ -68,6 +71,8 @@ pub enum Method {
     Rosenbrock,
     /// Additive Runge-Kutta, order 4: L-stable for linear stiffness, damping and friction, explicit in all else.
     Additive,
+    /// The same split in two steps of order 2 with one evaluation each, A-stable.
+    CrankNicolson,
     /// The Rosenbrock method of order 4 with steps of controlled error, as many as it takes.
     Adaptive {
         /// Error of a step relative to each state and its scale.
@@ -79,15 +84,16 @@ pub enum Method {
 
 impl Method {
     /// Those of fixed steps.
-    pub const FIXED: [Self; 5] =
-        [Self::SemiImplicit, Self::Rk4, Self::LinearlyImplicit, Self::Rosenbrock, Self::Additive];
+    pub const FIXED: [Self; 6] =
+        [Self::SemiImplicit, Self::Rk4, Self::LinearlyImplicit, Self::Rosenbrock, Self::Additive, Self::CrankNicolson];
     /// All of them.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::SemiImplicit,
         Self::Rk4,
         Self::LinearlyImplicit,
         Self::Rosenbrock,
         Self::Additive,
+        Self::CrankNicolson,
         Self::Adaptive { tolerance: TOLERANCE },
         Self::Guarded,
     ];
@@ -96,12 +102,17 @@ impl Method {
     /// operation by operation.
     pub fn evaluations(self) -> usize {
         match self {
-            Self::SemiImplicit => 1,
+            Self::SemiImplicit | Self::CrankNicolson => 1,
             Self::LinearlyImplicit => 2,
             Self::Rk4 => 4,
             Self::Additive => 6,
             Self::Rosenbrock | Self::Adaptive { .. } | Self::Guarded => 6 + 10,
         }
+    }
+
+    /// Whether it takes what is stiff implicitly by [`Ode::additive_rates`], and all else explicitly.
+    pub fn is_additive(self) -> bool {
+        matches!(self, Self::Additive | Self::CrankNicolson)
     }
 
     /// Its name in options, without a tolerance.
@@ -112,6 +123,7 @@ impl Method {
             Self::LinearlyImplicit => "linearly_implicit",
             Self::Rosenbrock => "rosenbrock",
             Self::Additive => "additive",
+            Self::CrankNicolson => "crank_nicolson",
             Self::Adaptive { .. } => "adaptive",
             Self::Guarded => "guarded",
         }
@@ -160,6 +172,7 @@ enum Scheme<S> {
     LinearlyImplicit(LinearlyImplicit<S>),
     Rosenbrock(Rosenbrock<S>),
     Additive(Additive<S>),
+    CrankNicolson(CrankNicolson<S>),
     Adaptive(Adaptive<S>),
 }
 
@@ -172,6 +185,7 @@ impl<S: Scalar> Integrator<S> {
             Method::LinearlyImplicit => Scheme::LinearlyImplicit(LinearlyImplicit::new(dim)),
             Method::Rosenbrock => Scheme::Rosenbrock(Rosenbrock::new(dim)),
             Method::Additive => Scheme::Additive(Additive::new(dim)),
+            Method::CrankNicolson => Scheme::CrankNicolson(CrankNicolson::new(dim)),
             Method::Adaptive { tolerance } => Scheme::Adaptive(Adaptive::unchecked(tolerance, dim)),
             Method::Guarded => Scheme::Adaptive(Adaptive::guarded(dim)),
         };
@@ -191,6 +205,7 @@ impl<S: Scalar> Integrator<S> {
             }
             Scheme::Rosenbrock(method) => method.step(ode, x, step),
             Scheme::Additive(method) => method.step(ode, x, step),
+            Scheme::CrankNicolson(method) => method.step(ode, x, step),
             Scheme::Adaptive(method) => {
                 if let Err(Halt::Stuck(stuck)) = method.advance(ode, x, step, &|| false) {
                     x[stuck.state] = S::from_f64(f64::NAN);
@@ -224,10 +239,26 @@ impl<S: Scalar> Integrator<S> {
         Ok(())
     }
 
-    /// Forgets what earlier steps have told about the length of the next.
+    /// Takes note that a step of that length (s) has led from `start` to `x`, for methods that remember it.
+    pub(crate) fn follow(&mut self, start: &[S], x: &[S], step: f64) {
+        if let Scheme::CrankNicolson(method) = &mut self.scheme {
+            method.follow(start, x, step);
+        }
+    }
+
+    /// Takes note that a state counts anew from `value`, without a jump of what it stands for.
+    pub(crate) fn recount(&mut self, state: usize, value: S) {
+        if let Scheme::CrankNicolson(method) = &mut self.scheme {
+            method.recount(state, value);
+        }
+    }
+
+    /// Forgets what earlier steps have told about the next.
     pub fn reset(&mut self) {
-        if let Scheme::Adaptive(method) = &mut self.scheme {
-            method.reset();
+        match &mut self.scheme {
+            Scheme::Adaptive(method) => method.reset(),
+            Scheme::CrankNicolson(method) => method.reset(),
+            _ => (),
         }
     }
 }

@@ -5,7 +5,7 @@
 use nalgebra::{Complex, DMatrix};
 
 use super::stability::eigenvalues;
-use super::{Integrator, Method};
+use super::{Integrator, Method, crank_nicolson};
 use crate::error::Result;
 use crate::ode::Ode;
 
@@ -142,6 +142,9 @@ impl Steps {
 
     /// What one step of `reach` radians multiplies an oscillator of that damping ratio with.
     fn turn(&self, reach: f64, ratio: f64) -> Complex<f64> {
+        if self.method == Method::CrankNicolson {
+            return crank_nicolson::growth(Complex::new(-ratio, (1.0 - ratio * ratio).max(0.0).sqrt()) * reach);
+        }
         let [[a, c], [b, d]] = self.columns(1.0, 2.0 * ratio, reach);
         let (half, product) = (0.5 * (a + d), a * d - b * c);
         let square = half * half - product;
@@ -153,6 +156,9 @@ impl Steps {
 
     /// By how much one step of `reach` time constants makes a decay grow.
     fn decay(&self, reach: f64) -> f64 {
+        if self.method == Method::CrankNicolson {
+            return crank_nicolson::growth(Complex::from(-reach)).norm();
+        }
         let [[a, c], [b, d]] = self.columns(0.0, 1.0, reach);
         // The other factor is that of the place, which is 1.
         (a * d - b * c).abs()
@@ -185,12 +191,12 @@ pub enum Taken {
 /// Law: `v' = -turn (tanh(v) - load)` in steps of 1, v over the width in which friction turns around, from speeds that friction takes ten
 /// steps to stop, under loads up to 7/8 of the friction. The method itself makes the steps. What does not stay within 1 of `atanh(load)`,
 /// where friction holds the load, creeps or chatters, by a share of what friction brakes in a step.
-/// Steps of controlled error follow friction: they always do, and so does [`Method::Additive`] where it takes it implicitly. Guarded steps
+/// Steps of controlled error follow friction: they always do, and so do additive methods where they take it implicitly. Guarded steps
 /// are those of the Rosenbrock method, for they let such errors pass.
 /// Checked: runs of a slider with each method.
 pub fn sticks(method: Method, turn: f64, taken: Taken) -> bool {
     let followed = match method {
-        Method::Additive => taken == Taken::Implicitly,
+        Method::Additive | Method::CrankNicolson => taken == Taken::Implicitly,
         _ => matches!(method, Method::Adaptive { .. }),
     };
     if turn <= 1.0 || followed {
@@ -208,10 +214,10 @@ pub fn sticks(method: Method, turn: f64, taken: Taken) -> bool {
 ///
 /// Law: as [`sticks`], with `v' = -stiffness z - damping z'` and `z' = v - |v| z` (Dahl), v over the way that it bends in a step: friction that
 /// has stopped a joint stores no more than what moves it by the root of the stiffness. What stays faster is driven by the steps.
-/// [`Method::Additive`] takes such friction where it leads to, and errors that grow so fast are seen by all steps that look at them.
+/// Additive methods take such friction where it leads to, and errors that grow so fast are seen by all steps that look at them.
 /// Checked: runs of a slider with each method.
 pub fn bends(method: Method, [stiffness, damping]: [f64; 2]) -> bool {
-    if stiffness <= 0.0 || matches!(method, Method::Additive | Method::Adaptive { .. } | Method::Guarded) {
+    if stiffness <= 0.0 || matches!(method, Method::Adaptive { .. } | Method::Guarded) || method.is_additive() {
         return true;
     }
     rests::<3>(method, &mut Bristles { stiffness, damping }, stiffness, stiffness.sqrt())

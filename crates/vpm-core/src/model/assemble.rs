@@ -195,6 +195,7 @@ impl<'a, S: Scalar> Assembly<'a, S> {
                 inertias: Vec::new(),
                 heavy: Vec::new(),
                 slices: None,
+                segment_slices: Vec::new(),
             });
         }
         let (inertias, heavy) = (vec![SpatialInertia::zero(); frame], vec![false; frame]);

@@ -105,6 +105,7 @@ impl<S: Scalar> Assembly<'_, S> {
             let own = first..first + elastic.beam.stations();
             if products[own.clone()].iter().all(|each| *each == Products::Kept) {
                 elastic.slices = elastic.beam.slices(&elastic.root.pose, spatial);
+                elastic.segment_slices = elastic.beam.segment_slices(spatial).unwrap_or_default();
             }
             if let Some(slices) = &elastic.slices {
                 own.enumerate().for_each(|(station, frame)| summed[frame] = slices.has(station));

@@ -152,7 +152,7 @@ pub(crate) fn repair(method: Method) -> &'static str {
         Method::LinearlyImplicit | Method::Rosenbrock | Method::Guarded => {
             "use more substeps or the integrator adaptive, or check signs and units of parameters and commands"
         }
-        Method::Rk4 | Method::SemiImplicit | Method::Additive => {
+        Method::Rk4 | Method::SemiImplicit | Method::Additive | Method::CrankNicolson => {
             "use more substeps or the integrator linearly_implicit, or check signs and units of parameters and commands"
         }
         Method::Adaptive { .. } => "check signs and units of parameters and commands",
@@ -167,7 +167,7 @@ pub(super) fn repair_along(method: Method, drives: bool) -> &'static str {
         Method::LinearlyImplicit | Method::Rosenbrock | Method::Guarded => {
             "use more substeps or the integrator adaptive, and check units and jumps of the motion"
         }
-        Method::Rk4 | Method::SemiImplicit | Method::Additive => {
+        Method::Rk4 | Method::SemiImplicit | Method::Additive | Method::CrankNicolson => {
             "use more substeps or the integrator linearly_implicit, and check units and jumps of the motion"
         }
     }

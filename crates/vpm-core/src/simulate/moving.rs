@@ -52,6 +52,7 @@ impl<S: Scalar> Courses<S> {
         let mut state = std::mem::take(&mut self.state);
         state[..x.len()].copy_from_slice(x);
         state[x.len()] = S::zero();
+        integrator.recount(x.len(), S::zero());
         let duration = self.interval;
         let end = integrator.advance(&mut Moving { system, courses: self }, &mut state, (duration, pieces), ask);
         x.copy_from_slice(&state[..x.len()]);

@@ -6,7 +6,6 @@ use super::names::site;
 use super::{Stepping, check_state};
 use crate::description::{Description, EffectEntry};
 use crate::error::Result;
-use crate::integrator::Method;
 use crate::integrator::resolution::{Resolution, Steps, Taken, bends, sticks};
 use crate::ode::Ode;
 use crate::system::System;
@@ -49,7 +48,7 @@ pub fn resolution(
     system.without_dry_friction(&state, &mut jacobian);
     system.scales(&mut sizes);
     let (method, step) = (stepping.method, stepping.step());
-    let implicit = method == Method::Additive || description.n_elastic() > 0;
+    let implicit = method.is_additive() || description.n_elastic() > 0;
     Resolution::new(&jacobian, &sizes, Steps { method, step, duration, implicit })
 }
 

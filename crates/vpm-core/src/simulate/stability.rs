@@ -17,9 +17,9 @@ use crate::system::System;
 /// Judged with the drives where they stand in that state; what friction, end stops, opening valves and contacts that
 /// are open add later is left to the run.
 pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Stepping, state: &[f64]) -> Result<()> {
-    if stepping.method == Method::Additive {
-        description
-            .refuse_loops("the split step of the integrator additive", "use rosenbrock, or linearly_implicit")?;
+    if stepping.method.is_additive() {
+        let what = "the split step of the integrators additive and crank_nicolson";
+        description.refuse_loops(what, "use rosenbrock, or linearly_implicit")?;
         return check_additive(description, theta, stepping, state);
     }
     if stepping.method == Method::SemiImplicit && description.n_elastic() > 0 {
@@ -45,7 +45,7 @@ pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Ste
     check_rates(stepping.method, stepping.step(), &rates)
 }
 
-/// As [`check_step`] for additive steps, by the derivative of the step itself: contacts, bushings and drives are explicit in them.
+/// As [`check_step`] for additive methods, by the derivative of the step itself: contacts, bushings and drives are explicit in them.
 fn check_additive(description: &Description, theta: &[f64], stepping: Stepping, state: &[f64]) -> Result<()> {
     let direct = description.actuators.iter().all(|actuator| actuator.is_direct());
     let free = description.contacts.is_empty() && description.bushings.is_empty();
@@ -62,17 +62,24 @@ fn check_additive(description: &Description, theta: &[f64], stepping: Stepping, 
     system.jacobian(&state, &mut jacobian);
     system.scales(&mut sizes);
     let mut integrator = Integrator::new(stepping.method, dim);
+    let states = if stepping.method == Method::CrankNicolson { 2 } else { 1 };
     let derivative = |step: f64| {
-        let mut matrix = vec![0.0; dim * dim];
-        for first in (0..dim).step_by(LANES) {
+        let whole = states * dim;
+        let mut matrix = vec![0.0; whole * whole];
+        for first in (0..whole).step_by(LANES) {
             // A column before `first` wraps around to a lane that does not exist, which gives a constant.
             let seed = |(column, &value): (usize, &f64)| Dual::variable(value, column.wrapping_sub(first));
-            let mut x: Vec<_> = state.iter().enumerate().map(seed).collect();
-            integrator.step(&mut duals, &mut x, step);
-            for (row, x) in matrix.chunks_exact_mut(dim).zip(&x) {
+            let mut all: Vec<_> = state.iter().cycle().take(whole).enumerate().map(seed).collect();
+            let (x, before) = all.split_at_mut(dim);
+            integrator.reset();
+            integrator.follow(before, x, step);
+            integrator.step(&mut duals, x, step);
+            for (row, x) in matrix.chunks_exact_mut(whole).zip(x) {
                 row[first..].iter_mut().zip(&x.gradient).for_each(|(entry, &slope)| *entry = slope);
             }
         }
+        // The state before is then the one where the step began.
+        (dim..whole).for_each(|row| matrix[row * whole + row - dim] = 1.0);
         matrix
     };
     let names: Vec<String> = (0..dim).map(|place| state_name(description, place)).collect();

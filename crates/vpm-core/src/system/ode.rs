@@ -204,7 +204,7 @@ impl<S: Scalar> System<S> {
             return kinds.map(|kind| self.routines.compile(&kind)).fold(Ok(()), std::result::Result::and);
         }
         // An additive step begins with the rates of the sample before it, if that has any.
-        let rates = Some(Kind::Rates).filter(|_| method != Method::Additive || self.seen != Kind::Sample);
+        let rates = Some(Kind::Rates).filter(|_| !method.is_additive() || self.seen != Kind::Sample);
         let needed: Vec<Kind> = rates.into_iter().chain([self.seen.clone()]).chain(self.closing()).collect();
         self.routines.compile_all(&needed)?;
         // A matrix alone that has no code is worked out as before.

@@ -431,7 +431,7 @@ pub(crate) fn kind_of(method: Method) -> Option<Kind> {
     match method {
         Method::Rk4 => None,
         Method::SemiImplicit => Some(Kind::Elasticity),
-        Method::Additive => Some(Kind::Additive),
+        Method::Additive | Method::CrankNicolson => Some(Kind::Additive),
         Method::LinearlyImplicit => Some(Kind::Prepared),
         Method::Rosenbrock | Method::Adaptive { .. } | Method::Guarded => Some(Kind::Linearised),
     }

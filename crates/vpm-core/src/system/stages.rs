@@ -157,7 +157,7 @@ impl System<f64> {
     pub(crate) fn rates_seconds(&mut self, method: Method, x: &[f64]) -> f64 {
         let mut rates = vec![0.0; self.dim()];
         match method {
-            Method::Additive => seconds(|| {
+            _ if method.is_additive() => seconds(|| {
                 self.additive_rates(black_box(x), x, REACH, &mut rates);
             }),
             _ => seconds(|| self.rhs(black_box(x), &mut rates)),

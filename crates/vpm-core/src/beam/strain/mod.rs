@@ -23,7 +23,7 @@ pub use beam::{Field, StrainBeam};
 pub(super) use exponential::rotation;
 pub use exponential::{exponential, tangent};
 pub use motion::{Drive, TreeMotion};
-pub(super) use plane::PlaneAxis;
+pub(super) use plane::{PlaneAxis, Rule};
 pub(super) use space::SpaceAxis;
 pub use statics::TipLoad;
 pub(crate) use sums::{Slices, Sums};

@@ -1,5 +1,7 @@
 //! The axis of a beam that bends in one plane and cannot stretch or shear: the exact map in closed form but for one quadrature.
 
+use std::ops::Range;
+
 use super::angles::Angles;
 use super::sums::{Passing, Slices, Sums};
 use crate::beam::entry::Component;
@@ -9,11 +11,24 @@ use crate::beam::quadrature::composite;
 use crate::scalar::Scalar;
 use crate::spatial::{Matrix3, Pose, SpatialInertia, Twist, Vector3};
 
-/// Gauss points between neighbouring sections: exact to the sixth order of the angle that the beam bends between them.
+/// Gauss points of a rule: exact to the sixth order of the angle that the beam bends over its interval.
 const POINTS: usize = 3;
 
 /// Share of a coordinate's largest turn below which its turn at a point is rounding.
 const ROUNDING: f64 = 4e-15;
+
+/// Over which intervals places along an axis are integrated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::beam) enum Rule {
+    /// From section to section, whatever lies between them.
+    Sections,
+    /// Over one element after the other, each of which bends little: up to a section inside by the polynomial through the tangents at the
+    /// points of the rule and at both ends, which over the whole element is the rule itself.
+    Elements,
+}
+
+/// Share of an element below which two places are one.
+const SAME: f64 = 1e-12;
 
 /// An axis whose slope angle is linear in the coordinates, `alpha(mu) = int_0^mu Phi q`.
 ///
@@ -24,45 +39,52 @@ pub(in crate::beam) struct PlaneAxis {
     /// Whether it bends about y, deflecting along x; otherwise about x, along y.
     about_y: bool,
     n: usize,
-    /// Weight of each point in m; a section instead of a point has none.
-    weights: Vec<Option<f64>>,
-    /// Derivative of the angle at each point by the coordinates.
+    /// Derivative of the angle at each point by the coordinates, then at each section that is none of them.
     rows: Vec<f64>,
+    points: usize,
     angles: Angles,
+    sections: Vec<Section>,
+    /// Points, section by section: what lies between it and the section before.
+    terms: Vec<usize>,
+    /// Of each of these its weight in m, then that times the derivatives of its angle by the coordinates.
+    weights: Vec<f64>,
+}
+
+#[derive(Clone, Debug)]
+struct Section {
+    /// Number of its row.
+    row: usize,
+    terms: Range<usize>,
 }
 
 impl PlaneAxis {
     /// An axis with sections at `places`, if the fields are one curvature and nothing else.
-    pub fn new(fields: &Fields, places: &[f64]) -> Option<Self> {
+    pub fn new(fields: &Fields, places: &[f64], rule: Rule) -> Option<Self> {
         let [field] = &fields.list[..] else { return None };
         if !field.component.bends() {
             return None;
         }
+        let mut grid = Grid { fields, points: Vec::new(), rows: Vec::new() };
+        let (sections, terms) = match rule {
+            Rule::Sections => grid.between(places),
+            Rule::Elements => grid.over(places),
+        };
+        let points: Vec<_> = grid.points.iter().copied().enumerate().collect();
         let mut axis = Self {
             about_y: field.component == Component::BendingY,
             n: fields.len(),
-            weights: Vec::new(),
-            rows: Vec::new(),
+            rows: grid.rows,
+            points: points.len(),
             angles: Angles::default(),
+            sections,
+            terms: terms.iter().map(|&(point, _)| point).collect(),
+            weights: Vec::new(),
         };
-        let mut points = Vec::new();
-        let (mut begin, mut angle) = (0.0, vec![0.0; axis.n]);
-        for &place in places {
-            let inside = fields.breaks().into_iter().filter(|&at| at > begin && at < place);
-            for end in inside.chain(std::iter::once(place)).collect::<Vec<_>>() {
-                let reach = |to: f64| turned(fields, &angle, begin, to);
-                for point in composite(POINTS, &[begin, end]) {
-                    points.push((axis.weights.len(), point.place));
-                    axis.weights.push(Some(point.weight));
-                    axis.rows.extend(reach(point.place));
-                }
-                angle = reach(end);
-                begin = end;
-            }
-            axis.weights.push(None);
-            axis.rows.extend(&angle);
-        }
         axis.drop_rounding();
+        for (point, weight) in terms {
+            axis.weights.push(weight);
+            axis.weights.extend(axis.rows[point * axis.n..(point + 1) * axis.n].iter().map(|entry| entry * weight));
+        }
         axis.angles = Angles::new(&points, field.basis.length(), &axis.rows, axis.n);
         Some(axis)
     }
@@ -80,7 +102,7 @@ impl PlaneAxis {
 
     /// Numbers of partial sums that a motion needs.
     pub fn scratch(&self) -> usize {
-        2 * self.n + 2 * self.weights.len()
+        2 * self.n + 4 * self.points
     }
 
     /// Poses, twists, columns and accelerations of all sections.
@@ -107,8 +129,7 @@ impl PlaneAxis {
         is_slice: impl Fn(usize) -> bool,
         (root, spatial): (&Pose<f64>, bool),
     ) -> Slices<S> {
-        let rows = self.rows.chunks_exact(self.n).zip(&self.weights);
-        let rows: Vec<_> = rows.filter(|(_, weight)| weight.is_none()).map(|(row, _)| row).collect();
+        let rows: Vec<_> = self.sections.iter().map(|section| self.row(section.row)).collect();
         let across = self.vector([1.0, 0.0]);
         let axes = Matrix3::from_columns(across, self.axis(), Vector3::new(0.0, 0.0, 1.0));
         let frame = *root * Pose::new(axes, Vector3::zero());
@@ -124,53 +145,71 @@ impl PlaneAxis {
     ///
     /// With `turn` the rate of the root about the axis of bending, `change` is the acceleration in axes that do not turn. There the tangent
     /// turns with `turn + alpha'`, so that it is `-int_0^mu t (turn + alpha')^2 dmu`.
-    fn run<S: Scalar>(
+    fn run<S: Scalar>(&self, motion: (&[S], &[S]), out: &mut Sections<S>, sums: Option<(S, &Slices<S>, &mut Sums<S>)>) {
+        // The two coordinates of an element: loops are written out.
+        if self.n == 2 { self.pass::<S, 2>(motion, out, sums) } else { self.pass::<S, 0>(motion, out, sums) }
+    }
+
+    /// The same for N coordinates, or with 0 for any number.
+    fn pass<S: Scalar, const N: usize>(
         &self,
         (q, v): (&[S], &[S]),
         out: &mut Sections<S>,
         mut sums: Option<(S, &Slices<S>, &mut Sums<S>)>,
     ) {
-        let (n, mut station) = (self.n, 0);
-        let zero = S::zero();
+        let (n, zero) = (if N == 0 { self.n } else { N }, S::zero());
+        let (q, v) = (&q[..n], &v[..n]);
         let turn = sums.as_ref().map_or(zero, |(turn, ..)| *turn);
         // Across and along the root's axis: place, and acceleration at zero coordinate accelerations.
         let (mut place, mut change) = ([zero; 2], [zero; 2]);
         let mut scratch = std::mem::take(&mut out.scratch);
         let (running, rest) = scratch.split_at_mut(2 * n);
-        let (angles, rates) = rest.split_at_mut(self.weights.len());
+        let (tangents, rest) = rest.split_at_mut(2 * self.points);
+        let (angles, rates) = rest.split_at_mut(self.points);
         running.fill(zero);
         self.angles.evaluate(&self.rows, q, zero, angles);
         self.angles.evaluate(&self.rows, v, turn, rates);
-        let points = self.weights.iter().zip(self.rows.chunks_exact(n)).zip(angles.iter().zip(&*rates));
-        for ((weight, row), (angle, &rate)) in points {
-            let Some(weight) = *weight else {
-                if let Some((_, slices, sums)) = &mut sums
-                    && let Some(slice) = &slices.each[station]
-                {
-                    let passing = Passing { row, place, change, columns: running };
-                    sums.add(slice, &passing);
-                    if slices.spatial {
-                        sums.add_in_space(slice, &passing, dot(row, q, zero).sin_cos());
-                    }
-                } else {
-                    let (sin, cos) = dot(row, q, zero).sin_cos();
-                    let rates = (dot(row, v, zero), turn);
-                    self.section(row, (sin, cos, rates), (place, change, &*running), v, (station, &mut *out));
+        for ((tangent, angle), rate) in tangents.chunks_exact_mut(2).zip(&*angles).zip(&mut *rates) {
+            (tangent[0], tangent[1]) = angle.sin_cos();
+            *rate = *rate * *rate;
+        }
+        let mut weights = self.weights.chunks_exact(1 + n);
+        for (station, section) in self.sections.iter().enumerate() {
+            for (&point, weights) in self.terms[section.terms.clone()].iter().zip(&mut weights) {
+                let (sin, cos, square) = (tangents[2 * point], tangents[2 * point + 1], rates[point]);
+                let (across, along) = (sin * weights[0], cos * weights[0]);
+                (place[0], place[1]) = (place[0] + across, place[1] + along);
+                (change[0], change[1]) = (change[0] - across * square, change[1] - along * square);
+                for (sums, &weight) in running[..2 * n].chunks_exact_mut(2).zip(&weights[1..1 + n]) {
+                    sums[0] += cos * weight;
+                    sums[1] -= sin * weight;
                 }
-                station += 1;
-                continue;
+            }
+            let row = &self.row(section.row)[..n];
+            let tangent = || match tangents.get(2 * section.row..2 * section.row + 2) {
+                Some(known) => (known[0], known[1]),
+                None => dot(row, q, zero).sin_cos(),
             };
-            let (sin, cos) = angle.sin_cos();
-            let (sin, cos) = (sin * weight, cos * weight);
-            let square = rate * rate;
-            (place[0], place[1]) = (place[0] + sin, place[1] + cos);
-            (change[0], change[1]) = (change[0] - sin * square, change[1] - cos * square);
-            for (sums, &entry) in running.chunks_exact_mut(2).zip(row) {
-                sums[0] += cos * entry;
-                sums[1] -= sin * entry;
+            if let Some((_, slices, sums)) = &mut sums
+                && let Some(slice) = &slices.each[station]
+            {
+                let passing = Passing { row, place, change, columns: &running[..2 * n] };
+                sums.add::<N>(slice, &passing);
+                if slices.spatial {
+                    sums.add_in_space(slice, &passing, tangent());
+                }
+            } else {
+                let ((sin, cos), rates) = (tangent(), (dot(row, v, zero), turn));
+                self.section(row, (sin, cos, rates), (place, change, &*running), v, (station, &mut *out));
             }
         }
         out.scratch = scratch;
+    }
+
+    /// Derivatives of the angle at a point or section by the coordinates.
+    #[inline]
+    fn row(&self, number: usize) -> &[f64] {
+        &self.rows[number * self.n..(number + 1) * self.n]
     }
 
     /// Writes one section from the sums up to it.
@@ -223,6 +262,92 @@ impl PlaneAxis {
             Matrix3::from_columns(x, Vector3::new(zero, cos, sin), Vector3::new(zero, -sin, cos))
         }
     }
+}
+
+/// The points of an axis while they are laid out.
+struct Grid<'a> {
+    fields: &'a Fields,
+    points: Vec<f64>,
+    rows: Vec<f64>,
+}
+
+impl Grid<'_> {
+    /// A rule between neighbouring sections and all breaks between them.
+    fn between(&mut self, places: &[f64]) -> (Vec<Section>, Vec<(usize, f64)>) {
+        let (mut begin, mut angle) = (0.0, vec![0.0; self.fields.len()]);
+        let (mut ends, mut terms, mut own) = (Vec::new(), Vec::new(), Vec::<f64>::new());
+        for &place in places {
+            let inside = self.fields.breaks().into_iter().filter(|&at| at > begin && at < place);
+            for end in inside.chain(std::iter::once(place)).collect::<Vec<_>>() {
+                for point in composite(POINTS, &[begin, end]) {
+                    terms.push((self.points.len(), point.weight));
+                    self.points.push(point.place);
+                    self.rows.extend(turned(self.fields, &angle, begin, point.place));
+                }
+                angle = turned(self.fields, &angle, begin, end);
+                begin = end;
+            }
+            own.extend(&angle);
+            ends.push(terms.len());
+        }
+        self.rows.extend(own);
+        let starts = std::iter::once(0).chain(ends.iter().copied());
+        let rows = self.points.len()..;
+        let sections =
+            rows.zip(starts.zip(&ends)).map(|(row, (start, &end))| Section { row, terms: start..end }).collect();
+        (sections, terms)
+    }
+
+    /// A rule over each element, with points at its ends besides.
+    fn over(&mut self, places: &[f64]) -> (Vec<Section>, Vec<(usize, f64)>) {
+        let (breaks, last) = (self.fields.breaks(), places.last().copied().unwrap_or(0.0));
+        let (mut angle, mut sections, mut terms) = (vec![0.0; self.fields.len()], Vec::new(), Vec::new());
+        let (mut apart, mut first) = (Vec::new(), 0);
+        self.points.push(0.0);
+        self.rows.extend(&angle);
+        let mut left = places.iter().copied().peekable();
+        for piece in breaks.windows(2).take_while(|piece| piece[0] < last) {
+            let (begin, end, root) = (piece[0], piece[1], self.points.len() - 1);
+            for place in composite(POINTS, piece).into_iter().map(|point| point.place).chain([end]) {
+                self.points.push(place);
+                self.rows.extend(turned(self.fields, &angle, begin, place));
+            }
+            let (nodes, mut from) = (self.points[root..].to_vec(), begin);
+            let mut go = |to: f64, terms: &mut Vec<(usize, f64)>| {
+                let weights = (0..nodes.len()).map(|node| (root + node, integral(&nodes, node, from, to)));
+                terms.extend(weights.filter(|(_, weight)| weight.abs() > ROUNDING * (end - begin)));
+                from = to;
+            };
+            let near = |place: f64, other: f64| (place - other).abs() <= SAME * (end - begin);
+            while let Some(place) = left.next_if(|&place| place < end || near(place, end)) {
+                go(place, &mut terms);
+                let node = nodes.iter().position(|&node| near(node, place));
+                let row = node.map(|node| root + node).ok_or_else(|| turned(self.fields, &angle, begin, place));
+                apart.push(row);
+                sections.push(first..terms.len());
+                first = terms.len();
+            }
+            go(end, &mut terms);
+            angle = turned(self.fields, &angle, begin, end);
+        }
+        let mut number = self.points.len();
+        let rows = apart.into_iter().map(|row| {
+            row.unwrap_or_else(|own| {
+                self.rows.extend(own);
+                number += 1;
+                number - 1
+            })
+        });
+        let sections = rows.zip(sections).map(|(row, terms)| Section { row, terms }).collect();
+        (sections, terms)
+    }
+}
+
+/// The integral from `from` to `to` of the polynomial that is 1 at this of the `nodes` and 0 at the others.
+fn integral(nodes: &[f64], node: usize, from: f64, to: f64) -> f64 {
+    let others = || nodes.iter().enumerate().filter(|&(other, _)| other != node).map(|(_, at)| at);
+    let value = |x: f64| others().map(|at| (x - at) / (nodes[node] - at)).product::<f64>();
+    composite(POINTS, &[from, to]).into_iter().map(|point| point.weight * value(point.place)).sum()
 }
 
 /// The derivative of the angle at `to` by the coordinates, from that at `begin`.

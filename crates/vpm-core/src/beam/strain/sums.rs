@@ -159,24 +159,26 @@ impl<S: Scalar> Sums<S> {
         self.block.fill(zero);
     }
 
-    /// Adds a slice to what does not depend on how the root moves.
-    pub(super) fn add(&mut self, slice: &Slice<S>, at: &Passing<'_, S>) {
-        let n = self.columns.len();
+    /// Adds a slice to what does not depend on how the root moves, for N coordinates or with 0 for any number.
+    #[inline]
+    pub(super) fn add<const N: usize>(&mut self, slice: &Slice<S>, at: &Passing<'_, S>) {
+        let n = if N == 0 { self.columns.len() } else { N };
         let (m, [x, z], [across, along]) = (slice.mass, at.place, at.change);
         let (mx, mz) = (x * m, z * m);
         (self.first[0], self.first[1]) = (self.first[0] + mx, self.first[1] + mz);
         (self.second[0], self.second[1]) = (self.second[0] + mx * x, self.second[1] + mz * z);
         (self.force[0], self.force[1]) = (self.force[0] + across * m, self.force[1] + along * m);
         self.moment += mz * across - mx * along;
-        for ((column, heavy), own) in self.columns.iter_mut().zip(&mut self.heavy).zip(at.columns.chunks_exact(2)) {
+        let (columns, heavy, own) = (&mut self.columns[..n], &mut self.heavy[..n], &at.columns[..2 * n]);
+        for ((column, heavy), own) in columns.iter_mut().zip(&mut *heavy).zip(own.chunks_exact(2)) {
             *heavy = [own[0] * m, own[1] * m];
             let Column { momentum, angular, effort, .. } = column;
             (momentum[0], momentum[1]) = (momentum[0] + heavy[0], momentum[1] + heavy[1]);
             *angular += mz * own[0] - mx * own[1];
             *effort += heavy[0] * across + heavy[1] * along;
         }
-        for (i, (own, row)) in at.columns.chunks_exact(2).zip(self.block.chunks_exact_mut(n)).enumerate() {
-            for (sum, heavy) in row[..=i].iter_mut().zip(&self.heavy) {
+        for (i, (own, row)) in own.chunks_exact(2).zip(self.block[..n * n].chunks_exact_mut(n)).enumerate() {
+            for (sum, heavy) in row[..=i].iter_mut().zip(&*heavy) {
                 *sum += heavy[0] * own[0] + heavy[1] * own[1];
             }
         }

@@ -1,6 +1,7 @@
 //! One segment of a beam on its way through an articulated tree.
 
-use crate::beam::{Beam, Segment};
+use super::super::slices;
+use crate::beam::{Beam, Segment, Slices};
 use crate::data::{AbaSlot, SegmentSlot};
 use crate::scalar::Scalar;
 use crate::spatial::{ArticulatedInertia, Pose, SpatialInertia, Twist, Wrench};
@@ -13,18 +14,27 @@ pub(super) fn begin<S: Scalar>(
     segment: &Segment,
     slot: &mut SegmentSlot<S>,
     stations: &mut [AbaSlot<S>],
-    inertias: &[SpatialInertia<S>],
+    (inertias, slices): (&[SpatialInertia<S>], Option<&Slices<S>>),
     keeps: bool,
 ) -> Twist<S> {
-    let SegmentSlot { sections, coordinates, rates, columns, matrix, efforts, .. } = slot;
-    segment.motion(coordinates, rates, sections, keeps);
-    columns.fill(Wrench::zero());
-    matrix.fill(S::zero());
-    efforts.fill(S::zero());
-    let (mut composite, mut total) = (SpatialInertia::zero(), Wrench::zero());
+    let (mut composite, mut total) = match slices {
+        Some(slices) => sum_up(segment, slot, slices),
+        None => {
+            let SegmentSlot { sections, coordinates, rates, columns, matrix, efforts, .. } = slot;
+            segment.motion(coordinates, rates, sections, keeps);
+            columns.fill(Wrench::zero());
+            matrix.fill(S::zero());
+            efforts.fill(S::zero());
+            (SpatialInertia::zero(), Wrench::zero())
+        }
+    };
+    let SegmentSlot { sections, columns, matrix, efforts, .. } = slot;
     let (mut velocity, mut drift) = (slot.velocity, Twist::zero());
     let n = segment.len();
     for (number, section) in sections.at.iter().enumerate() {
+        if slices.is_some_and(|slices| slices.has(number)) {
+            continue;
+        }
         if keeps {
             velocity = section.pose.inverse_twist(slot.velocity) + section.twist;
             drift = velocity.cross(section.twist) + section.acceleration;
@@ -43,6 +53,26 @@ pub(super) fn begin<S: Scalar>(
     }
     (slot.inertia, slot.wrench, slot.drift) = (composite.into(), total, drift);
     velocity
+}
+
+/// The inertia of the slices of a segment and the wrench on them where its begin does not accelerate; what is felt of the coordinates goes
+/// to the slot.
+fn sum_up<S: Scalar>(
+    segment: &Segment,
+    slot: &mut SegmentSlot<S>,
+    slices: &Slices<S>,
+) -> (SpatialInertia<S>, Wrench<S>) {
+    let SegmentSlot { sections, sums, coordinates, rates, columns, matrix, efforts, velocity, .. } = slot;
+    segment.gather((coordinates, rates), slices::turn(slices, *velocity), (slices, sums), sections);
+    let frame = Pose::<S>::from_f64(slices.frame);
+    let (inertia, own) = (slices.inertia(sums), frame.inverse_twist(*velocity));
+    let extra = slices::weigh((slices, sums), (own, Twist::zero()), rates, |i, coupling, effort| {
+        (columns[i], efforts[i]) = (frame.wrench(coupling), effort);
+    });
+    for (entry, (&sum, &constant)) in matrix.iter_mut().zip(sums.block.iter().zip(&slices.block)) {
+        *entry = sum + constant;
+    }
+    (frame.inertia(inertia), frame.wrench(own.cross_wrench(inertia.apply(own)) + extra))
 }
 
 /// Adds the inertia of one section to what is felt of the coordinates.
