@@ -1,19 +1,16 @@
-"""What drives with states of their own answer along a measured motion: what shows of them, and the effort on joints."""
+"""Drives with states of their own on a measured motion: where they begin, what shows of them, and their efforts."""
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment, Motion
-from vpm.identify.drive_memory import DriveMemory
-from vpm.identify.drives_apart import drives_of
 from vpm.initial import measured_states
 from vpm.model import Model
 from vpm.simulate import AUTOMATIC, Setup
@@ -35,103 +32,17 @@ def picked(model: Model, outputs: Array, jacobian: Array, rows: slice, channels:
     return seen, derivative
 
 
-def together(
+def shown_and_efforts(
     model: Model,
     theta: Array,
-    m: Motion,
-    experiment: Experiment,
-    wanted: tuple[Sequence[int], Sequence[str]],
-    memory: DriveMemory,
-) -> tuple[Array, Array]:
-    """Channels and efforts of drives on joints (n, k), filtered, and their derivative: of the machine as a whole."""
-    columns, channels = wanted
-    internal = first_drives(model, theta, m, experiment)
-    effects = tuple(effect.key for effect in model.effects)
-    key = (memory.commands, model.structure, effects, theta.tobytes(), internal.tobytes(), tuple(channels))
-    work = partial(_answered, model, theta, m, experiment, channels, internal, memory.integrator)
-    return memory.recall(key, [model.parameter_names[column] for column in columns], work)
-
-
-def apart(
-    model: Model,
-    theta: Array,
-    m: Motion,
-    experiment: Experiment,
-    wanted: tuple[Sequence[int], Sequence[str]],
-    memory: DriveMemory,
-    origin: Array | None = None,
-) -> tuple[Array, Array]:
-    """The same of drives that do not feel each other, one after the other, or from their tangents at ``origin``."""
-    columns, channels = wanted
-    start = theta if origin is None else origin
-    internal = first_drives(model, start, m, experiment)
-    parts = []
-    for drives in drives_of(model):
-        alone, mine, first = drives.model, start[drives.places], internal[drives.states]
-        moving = {int(drives.places[place]) for place in drives.own}
-        felt = [place for place, column in enumerate(columns) if column in moving]
-        asked = [columns[place] for place in felt]
-        moved = [column for column in sorted(moving) if theta[column] != start[column]]
-        shown = [place for place, channel in enumerate(channels) if channel.rpartition(".")[0] in alone.actuators]
-        read, pushed = [channels[place] for place in shown], replace(m, inputs=m.inputs[:, drives.inputs])
-        key = (memory.commands, alone.structure, tuple(read), mine[drives.own].tobytes(), first.tobytes())
-        work = partial(_answered, alone, mine, pushed, experiment, read, first, memory.integrator)
-        names = [model.parameter_names[column] for column in dict.fromkeys([*asked, *moved])]
-        outputs, slopes = memory.recall(key, names, work)
-        steps = (theta - start)[[model.index(name) for name in names]]
-        parts.append((outputs + slopes @ steps, slopes[:, :, : len(asked)], shown, felt))
-    total = np.zeros((len(parts[0][0]), len(channels) + len(model.joints)))
-    derivative = np.zeros((*total.shape, len(columns)))
-    for outputs, slopes, shown, felt in parts:
-        places = [*shown, *range(len(channels), total.shape[1])]
-        total[:, places] += outputs
-        derivative[np.ix_(range(len(total)), places, felt)] += slopes
-    return total, derivative
-
-
-def needed(model: Model, theta: Array, m: Motion, columns: Sequence[int], memory: DriveMemory) -> tuple[Array, Array]:
-    """Effort that a motion needs at the joints (n, joints), filtered, and its derivative by ``columns``."""
-    structure, places = _carried(model)
-    moving = frozenset(places.tolist())
-    felt = [place for place, column in enumerate(columns) if column in moving]
-
-    def work(missing: Sequence[str]) -> tuple[Array, Array]:
-        asked = [model.index(name) for name in missing]
-        required, slopes = model.core.required(theta, m.position, m.velocity, m.acceleration, m.dt, asked)
-        return required, slopes
-
-    names = [model.parameter_names[columns[place]] for place in felt]
-    efforts, slopes = memory.recall((structure, theta[places].tobytes()), names, work)
-    derivative = np.zeros((*efforts.shape, len(columns)))
-    derivative[:, :, felt] = slopes
-    return efforts, derivative
-
-
-@lru_cache(maxsize=256)
-def _carried(model: Model) -> tuple[str, NDArray[np.int64]]:
-    """All that the effort of a motion may depend on: a text, and parameters. Nothing of cylinders and supplies does."""
-    silent = {name for name in model.actuators if model.actuator_type(name) == "hydraulic"}
-    silent |= {*model.supplies, *model.controllers}
-    document = model.to_dict()
-    document["actuators"] = {name: entry for name, entry in document["actuators"].items() if name not in silent}
-    document["effects"] = [entry for entry in document.get("effects", ()) if entry["at"] not in silent]
-    text = json.dumps({key: entry for key, entry in document.items() if key not in {"supplies", "controllers"}})
-    owners = [name.partition(".")[0] for name in model.parameter_names]
-    return text, np.array([place for place, owner in enumerate(owners) if owner not in silent], dtype=np.int64)
-
-
-def _answered(
-    model: Model,
-    theta: Array,
+    columns: Sequence[int],
     m: Motion,
     experiment: Experiment,
     channels: Sequence[str],
     internal: Array,
     integrator: str,
-    names: Sequence[str],
 ) -> tuple[Array, Array]:
-    """Channels, then efforts of drives on joints (N, k), and their derivative by the named parameters."""
-    columns = [model.index(name) for name in names]
+    """Channels, then efforts of drives on joints (N, k), and their derivative (N, k, columns)."""
     run = partial(driven, model, theta, m, experiment, internal=internal, integrator=integrator)
     every = int(SLOPE_STEP / m.dt + 1e-6) if integrator != AUTOMATIC else 1
     if not columns or every < 2:
