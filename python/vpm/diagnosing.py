@@ -53,7 +53,7 @@ from vpm.errors import DiagnosisError, DivergedError, VpmError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
 from vpm.experiment.signal import check_cutoff
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gaps
-from vpm.identify.fit import fit_of
+from vpm.identify.fitted import fit_of
 from vpm.identify.parallel import worker_count
 from vpm.log_check import refuse_mistakes
 from vpm.model import Model
