@@ -88,11 +88,12 @@ def check_along(model: Model, joints: Sequence[str]) -> None:
             )
     if not has_hidden(model, joints):
         return
+    apart = drives_of(model, tuple(joints)) is not None
     hidden = [name for name in model.beams if model.levels[name] != "rigid"]
     hidden += [name for name in model.joints if name not in joints]
     for name in model.actuators:
         kind, line = model.actuator_type(name), model.line_of_actuator(name)
-        if line is not None or not model.follows_command(name):
+        if line is not None or not (apart or model.follows_command(name)):
             rest = f"acts on the line {line}" if line is not None else "has friction of its own"
             what = f"has type {kind}" if kind != "ideal" else rest
             raise SimulationError(
@@ -157,7 +158,7 @@ def respond(
         How the record is followed, and what was answered to it before. With it, all is given as it is compared:
         filtered, and only at the samples that the filter retains.
     origin : ndarray, shape (P,), optional
-        How links bend and what drives do is taken from the tangent at these values, not worked out at ``theta``.
+        How links bend or what drives do is taken from the tangent at these values, not worked out at ``theta``.
 
     Raises
     ------
@@ -196,20 +197,23 @@ class Asked:
 
 def _responded(ask: Asked, channels: Sequence[str]) -> Response:
     """The sum of what the motion needs, of what the drives deliver, and of what shows of either."""
-    own, hidden = has_own_drives(ask.model), has_hidden(ask.model, ask.m.joints)
+    model, own, hidden = ask.model, has_own_drives(ask.model), has_hidden(ask.model, ask.m.joints)
     if not own and not hidden:
         return _rigid(ask, channels)
-    needs = _bent(ask, () if own else channels) if hidden else _carried(ask)
-    drives = _driven(ask, channels) if own else _delivered(ask)
-    width, (values, slopes) = len(channels), drives if own else needs
+    if own and hidden:
+        ask = replace(ask, origin=None)  # where drives and what they swing come together there is no tangent
+    # What is no channel of a drive shows in a run of drives, as long as no link bends.
+    of_drives = [c for c in channels if own and (not bends(model) or shows_drives_alone(model, [c]))]
+    others = [c for c in channels if c not in of_drives]
+    needs = _bent(ask, others) if hidden else _carried(ask)
+    drives = _driven(ask, of_drives) if own else _delivered(ask)
+    order = [[*of_drives, *others].index(c) for c in channels]
+    ours, theirs = slice(len(of_drives)), slice(len(others))
+    seen = np.concatenate([drives[0][:, ours], needs[0][:, theirs]], axis=1)[:, order]
+    slopes = np.concatenate([drives[1][:, ours], needs[1][:, theirs]], axis=1)[:, order]
     joints = [-place for place in range(len(ask.m.joints), 0, -1)]
-    return Response(
-        needs[0][:, joints],
-        drives[0][:, joints],
-        needs[1][:, joints] - drives[1][:, joints],
-        values[:, :width],
-        slopes[:, :width],
-    )
+    balance = needs[1][:, joints] - drives[1][:, joints]
+    return Response(needs[0][:, joints], drives[0][:, joints], balance, seen, slopes)
 
 
 def _rigid(ask: Asked, channels: Sequence[str]) -> Response:

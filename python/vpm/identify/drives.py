@@ -9,7 +9,6 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import SimulationError
 from vpm.experiment import Experiment, Motion
 from vpm.initial import measured_states
 from vpm.model import Model
@@ -80,11 +79,6 @@ def first_drives(model: Model, theta: Array, m: Motion, experiment: Experiment) 
 
     From there on: what nobody knows of the first state has the filter's settling to die away.
     """
-    if model.core.n_elastic:
-        raise SimulationError(
-            f"no effort can be balanced along a motion of {model.name}, whose links bend while its drives have states "
-            "of their own; make the links rigid with model.at('rigid')"
-        )
     given = None if model.added_joints else m
     state = measured_states(model, experiment, theta, np.zeros(1, dtype=np.int64), m.cutoff, given)[0]
     return np.asarray(state[2 * len(model.joints) :])

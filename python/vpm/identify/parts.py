@@ -35,7 +35,8 @@ class Part:
     felt : ndarray of bool
         Which of them change its answer.
     inputs, states : ndarray of int
-        Its inputs, and its states of drives and supplies, among those of the whole machine.
+        Its inputs, and its states of drives and supplies, among those of the whole machine, or of the bare one of
+        `Drives`.
     """
 
     model: Model
@@ -69,7 +70,7 @@ class Drives:
     Attributes
     ----------
     bare : Part
-        The machine without what nobody measured.
+        The machine with rigid links, without joints that effects have split off.
     parts : tuple of Part
     """
 
@@ -98,7 +99,7 @@ def carried(model: Model) -> Part:
 
 
 def drives_of(model: Model, joints: tuple[str, ...]) -> Drives | None:
-    """Split a machine with rigid links into what its drives do on the measured ``joints``.
+    """Split a machine into what its drives do on the measured ``joints``, which they feel alone.
 
     The motor side of a joint that effects have split keeps the measured motion and the drives: these answer as in the
     machine without such effects. None where that has other joints.
@@ -109,8 +110,9 @@ def drives_of(model: Model, joints: tuple[str, ...]) -> Drives | None:
         bare = candidate if len(candidate.joints) < len(bare.joints) else bare
     if tuple(bare.joints) != joints:
         return None
+    bare = bare.at("rigid") if bare.beams else bare
     parts = tuple(_drives(bare, model, group) for group in _groups(bare))
-    return Drives(_part(model, bare, set(bare.parameter_names)), parts)
+    return Drives(_part(model, bare, set(bare.parameter_names), bare), parts)
 
 
 def moves_drives(model: Model, name: str) -> bool:
@@ -193,23 +195,25 @@ def _drives(model: Model, machine: Model, group: Sequence[str]) -> Part:
     effects = [entry for entry in content.get("effects", ()) if entry["at"] in sites]
     content["effects"] = [entry for entry in effects if EFFECTS[entry["type"]].site != "joint"]
     alone = Model.from_dict(content)
-    alone = alone.at("rigid") if alone.beams else alone
-    return _part(machine, alone, {name for name in alone.parameter_names if moves_drives(alone, name)})
+    return _part(machine, alone, {name for name in alone.parameter_names if moves_drives(alone, name)}, model)
 
 
 def _owner(name: str) -> str:
     return name.partition(".")[0]
 
 
-def _part(model: Model, alone: Model, felt: Collection[str]) -> Part:
-    """A machine for a part of ``model``, whose answer changes with the parameters ``felt`` alone."""
-    names = alone.parameter_names
+def _part(model: Model, alone: Model, felt: Collection[str], within: Model | None = None) -> Part:
+    """A machine for a part of ``model``, whose answer changes with the parameters ``felt`` alone.
+
+    Its inputs and states are those of a machine ``within`` that, if it is another one.
+    """
+    names, within = alone.parameter_names, within or model
     return Part(
         alone,
         _places(names, model.parameter_names),
         np.array([name in felt for name in names], dtype=np.bool_),
-        _places(alone.inputs, model.inputs),
-        _places(alone.internal_names, model.internal_names),
+        _places(alone.inputs, within.inputs),
+        _places(alone.internal_names, within.internal_names),
     )
 
 
