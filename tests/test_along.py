@@ -175,9 +175,9 @@ def test_an_elastic_link_balances_and_a_rigid_one_does_not() -> None:
     assert shares["rigid"] > 3.0 * shares["strain(4)"]
 
 
-def test_what_cannot_be_balanced_is_refused() -> None:
-    """A drive with states of its own on a link that bends."""
-    content = arm().to_dict()
+def geared(level: str = "strain(4)", **more: object) -> vpm.Model:
+    """The arm with a winding, whose current follows its voltage and the motion, and a gauge at the root."""
+    content = arm(level).to_dict()
     content["actuators"]["motor"] = {
         "type": "dc_motor",
         "joint": "shoulder",
@@ -188,11 +188,53 @@ def test_what_cannot_be_balanced_is_refused() -> None:
         "gear_ratio": 10.0,
         "efficiency": 0.9,
     }
-    model = vpm.Model.from_dict(content)
+    content["gauges"] = {"root": {"beam": "link", "at": 0.05, "x": 0.0, "y": 1e-3}}
+    return vpm.Model.from_dict({**content, **more})
+
+
+def test_a_drive_with_states_of_its_own_balances_a_link_that_bends() -> None:
+    """The motor feels the joint alone: current, strain and effort are those of a simulation of both."""
+    model, time = geared(), np.arange(2000) * DT
+    voltage = 0.8 * np.sin(2 * np.pi * 1.1 * time) + 0.6 * np.sin(2 * np.pi * 4.3 * time)
+    given = vpm.Experiment.from_arrays(time, {"motor.command": voltage}, units={"motor.command": "V"})
+    run = vpm.simulate(model, given, substeps=2)
+    channels = ("shoulder.position", "motor.current", "root.strain")
+    record = vpm.Experiment.from_arrays(
+        time, {"motor.command": voltage, **{channel: run[channel] for channel in channels}}, model=model
+    )
+    shares = {}
+    for level in ("strain(4)", "rigid"):
+        one = geared(level)
+        problem = InverseDynamicsProblem(one, [record], cutoff=40.0)
+        assert set(problem.shown) == {"motor.current", "root.strain"}
+        left = gaps(problem, problem.evaluate(one, one.theta)[0])
+        shares[level] = {channel: share for channel, (_, share, _) in left.items()}
+    bent = shares["strain(4)"]
+    assert bent["motor.current"] < 0.01
+    assert bent["root.strain"] < 1e-3
+    assert bent["shoulder.effort"] < 0.03 < 0.3 * shares["rigid"]["shoulder.effort"]
+    problem, names = InverseDynamicsProblem(model, [record], cutoff=40.0), ("motor.resistance", "link.young")
+    _, slopes = problem.evaluate(model, model.theta, [model.index(name) for name in names])
+    for name, slope in zip(names, slopes.T, strict=True):
+        sides = []
+        for factor in (1.0 + 1e-4, 1.0 - 1e-4):
+            moved = model.with_parameters({name: factor * model.parameters[name].value})
+            sides.append(problem.evaluate(moved, moved.theta)[0])
+        exact = (sides[0] - sides[1]) / (2e-4 * model.parameters[name].value)
+        assert np.abs(slope - exact).max() < 2e-3 * np.abs(exact).max(), name
+
+
+def test_what_cannot_be_balanced_is_refused() -> None:
+    """A drive with states of its own beside a joint that nobody measured and no effect has split off."""
+    content = geared().to_dict()
+    tail = {"mass": 0.1, "inertia": [1e-4, 1e-4, 1e-4, 0.0, 0.0, 0.0]}
+    swings = {"type": "revolute", "parent": "hub", "child": "tail", "axis": [0.0, 0.0, 1.0]}
+    bodies, joints = {**content["bodies"], "tail": tail}, {**content["joints"], "loose": swings}
+    model = geared(bodies=bodies, joints=joints)
     time = np.arange(500) * DT
     data = {"motor.command": np.sin(time), "shoulder.position": np.sin(3 * time)}
     record = vpm.Experiment.from_arrays(time, data, units={"motor.command": "V", "shoulder.position": "rad"})
-    with pytest.raises(SimulationError, match="leaves link free while the actuator motor has type dc_motor"):
+    with pytest.raises(SimulationError, match="leaves link, loose free while the actuator motor has type dc_motor"):
         InverseDynamicsProblem(model, [record])
 
 

@@ -16,7 +16,7 @@ from hopper import HOPPER
 from second_suite.cases import make_case
 from sledge import MASS, SLEDGE, swung
 from synthetic import Truth, nominal, simulate_axis
-from vpm import diagnosing
+from vpm import naming
 from vpm.diagnosing import diagnose
 from vpm.discrepancy import by_ranking
 from vpm.discrepancy.by_ranking import why_not_ranked
@@ -69,7 +69,7 @@ def records() -> list[Experiment]:
 
 @pytest.fixture
 def named(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> vpm.Diagnosis:
-    monkeypatch.setattr(diagnosing, "rank", lambda *_, **__: two())
+    monkeypatch.setattr(naming, "rank", lambda *_, **__: two())
     return diagnose(nominal(), records[0], records[1], names="ranking", workers=1)
 
 
@@ -140,7 +140,7 @@ def test_a_ranking_learns_from_the_training_records_alone(
         seen.append([record.name for record in (*given, *unseen)])
         return ranking()
 
-    monkeypatch.setattr(diagnosing, "rank", asked)
+    monkeypatch.setattr(naming, "rank", asked)
     diagnose(nominal(), records[0], records[1], limit=3, names="ranking", workers=1)
     assert seen == [[records[0].name, records[1].name]]
 
@@ -152,7 +152,7 @@ def test_names_that_leave_more_of_unseen_records_are_no_explanation(
     told = {"axis.position": seen_by_observer(1.0, after), "tip.position": seen_by_observer(0.0, 0.0)}
     seen = replace(two(), gaps=told)
     assert seen.left == {"axis": after**2}
-    monkeypatch.setattr(diagnosing, "rank", lambda *_, **__: seen)
+    monkeypatch.setattr(naming, "rank", lambda *_, **__: seen)
     assert diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict == word
 
 
@@ -164,7 +164,7 @@ def test_names_that_explain_unseen_records_stand_whatever_the_balance_leaves(
     words = []
     for left in (float("nan"), 0.1):
         seen = replace(small, gaps={"axis.position": seen_by_observer(1.0, left**0.5)})
-        monkeypatch.setattr(diagnosing, "rank", lambda *_, seen=seen, **__: seen)
+        monkeypatch.setattr(naming, "rank", lambda *_, seen=seen, **__: seen)
         words.append(diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict)
     assert words == ["unexplained", "effect_found"]
 
@@ -177,7 +177,7 @@ def test_names_that_leave_more_of_an_effort_than_it_is_explain_nothing(
     for mass in (1.0, 1e4):
         heavy = ranking(tried("rotor_inertia", {"axis.rotor.inertia": mass}, 0.9, evidence=900.0, probability=0.99))
         seen = replace(heavy, gaps={"axis.position": seen_by_observer(1.0, 0.1)})
-        monkeypatch.setattr(diagnosing, "rank", lambda *_, seen=seen, **__: seen)
+        monkeypatch.setattr(naming, "rank", lambda *_, seen=seen, **__: seen)
         monkeypatch.setattr(by_ranking, "judged_anyhow", unmoved)
         words.append(diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict)
     assert words == ["effect_found", "unexplained"]
@@ -187,7 +187,7 @@ def test_ctrl_c_in_the_ranking_gives_what_is_known(monkeypatch: pytest.MonkeyPat
     def stopped(*_: object, **__: object) -> Ranking:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr(diagnosing, "rank", stopped)
+    monkeypatch.setattr(naming, "rank", stopped)
     stated = vpm.Setup(hold="first_order")
     why = diagnose(nominal(), records[0], records[1], names="ranking", setup=stated, workers=1)
     assert why.interrupted
@@ -200,7 +200,7 @@ def test_where_a_ranking_fails_a_search_names(monkeypatch: pytest.MonkeyPatch, r
     def failed(*_: object, **__: object) -> Ranking:
         raise VpmError("the axis runs away from the records")
 
-    monkeypatch.setattr(diagnosing, "rank", failed)
+    monkeypatch.setattr(naming, "rank", failed)
     # Without a restriction to effects, which a ranking is told of in its own words.
     why = diagnose(nominal(), records[0], records[1], limit=1, names="ranking", workers=1)
     assert [e.name for e in why.effects] == ["coulomb_friction"]
@@ -218,7 +218,7 @@ def test_a_name_that_no_balance_can_carry_is_told(monkeypatch: pytest.MonkeyPatc
         name: warm.parameters[name].value for name in warm.effect("warming_friction", "lift").parameter_names.values()
     }
     one = replace(tried("warming_friction", values, 0.9, evidence=900.0, probability=0.99), site="lift")
-    monkeypatch.setattr(diagnosing, "rank", lambda *_, **__: Ranking((one,), ((one,),), warm, model))
+    monkeypatch.setattr(naming, "rank", lambda *_, **__: Ranking((one,), ((one,),), warm, model))
     why = diagnose(model, case.train, case.holdout, names="ranking", workers=1)
     (told,) = [note for note in why.notes if note.startswith("the ranking names warming_friction at lift")]
     assert "no balance of effort can be computed" in told
@@ -233,7 +233,7 @@ def test_machines_that_a_ranking_does_not_cover_say_why() -> None:
 
 
 def test_a_refit_that_simulates_worse_is_not_kept(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
-    monkeypatch.setattr(diagnosing, "rank", lambda *_, **__: two())
+    monkeypatch.setattr(naming, "rank", lambda *_, **__: two())
     never = replace(by_ranking.SETTINGS, worse=-np.inf, sure=-np.inf)
     monkeypatch.setattr(by_ranking, "SETTINGS", never)
     why = diagnose(nominal(), records[0], records[1], names="ranking", workers=1)
@@ -251,12 +251,12 @@ def test_effects_that_no_search_tries_are_asked_of_a_ranking(
         asked.append(effects)
         return ranking()
 
-    monkeypatch.setattr(diagnosing, "rank", rank)
+    monkeypatch.setattr(naming, "rank", rank)
     diagnose(nominal(), records[0], records[1], effects=["quadratic_drag"], workers=1)
     assert asked == [["quadratic_drag"]]
     with pytest.raises(DiagnosisError, match=r'does not try quadratic_drag, .*: names="search" was asked for; ask'):
         diagnose(nominal(), records[0], records[1], effects=["quadratic_drag"], names="search", workers=1)
-    monkeypatch.setattr(diagnosing, "why_not_ranked", lambda *_: "links bend")
+    monkeypatch.setattr(naming, "why_not_ranked", lambda *_: "links bend")
     with pytest.raises(DiagnosisError, match=r"does not try quadratic_drag, .*: links bend; ask for"):
         diagnose(nominal(), records[0], records[1], effects=["quadratic_drag"], workers=1)
     why = diagnose(

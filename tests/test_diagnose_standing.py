@@ -89,7 +89,7 @@ def test_a_rival_earns_its_additional_numbers_where_they_were_fitted(left: float
 
 def test_a_search_goes_on_beside_what_took_the_place_of_an_effect(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beside the true name a second effect stands clear; the name that went out does not come back."""
-    diagnose = import_module("vpm.diagnosing")
+    naming = import_module("vpm.naming")
     model, free, data = balances(shared_case("axis_linear", ("spring", "viscous_friction"), 3))
     start, each = judge(model, free, data, {}), SideBySide(1)
     spring = search(start, data, ["spring"], 6, print, each)
@@ -101,11 +101,11 @@ def test_a_search_goes_on_beside_what_took_the_place_of_an_effect(monkeypatch: p
     )
     plain = replace(exchanged, accepted=spring.accepted)
     monkeypatch.setattr(
-        diagnose,
+        naming,
         "replaced",
         lambda found, known, _: (exchanged if found is plain else found, known),
     )
-    found, known = diagnose._settled(plain, data, ["bias_force", "spring", "viscous_friction"], 6, print, each)
+    found, known = naming._settled(plain, data, ["bias_force", "spring", "viscous_friction"], 6, print, each)
     assert {entry.key for entry in found.accepted} == {("spring", "axis"), ("viscous_friction", "axis")}
     assert {(one.effect, one.site) for one in known} == {entry.key for entry in found.accepted}
     assert ("bias_force", "axis") not in {(c.name, c.site) for c in found.ranking}

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 from two_link_arm import Arm, nominal, record
-from vpm.diagnosing import Names, diagnose
+from vpm.diagnosing import diagnose
 from vpm.discrepancy import Diagnosis
+from vpm.naming import Names
 
 
 def of(arm: Arm, names: Names = "ranking") -> Diagnosis:

@@ -243,7 +243,7 @@ def test_noise_beside_which_the_model_runs_away_leaves_the_fit(monkeypatch: pyte
         raise SimulationError("the position leaves its bounds")
 
     log = logs(1, 3)[0]
-    monkeypatch.setattr(import_module("vpm.identify.fit"), "noisy", away)
+    monkeypatch.setattr(import_module("vpm.identify.onward"), "noisy", away)
     fit = identify(MODEL, log, free=FREE)
     assert asked
     assert np.all(np.abs(fit.values - EXPECTED) <= 5.0 * fit.std)

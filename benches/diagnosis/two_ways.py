@@ -27,7 +27,7 @@ from blind.answer import Answer  # noqa: E402
 from blind.proving import KINDS, Job, ask, jobs, line, make, save_json  # noqa: E402
 from blind.score import rate  # noqa: E402
 from markdown import table  # noqa: E402
-from vpm import diagnosing  # noqa: E402
+from vpm import naming  # noqa: E402
 from vpm.prove_command import numbers  # noqa: E402
 
 MACHINES = ("flexible_arm", "servo_cylinder", "hydraulic_leg")
@@ -43,7 +43,7 @@ def answers(todo: Sequence[Job], limit: float, ways: Sequence[str]) -> Iterator[
         for made in make(list(batch)):
             found = []
             for way in ways:
-                with patch.object(diagnosing, "why_not_ranked", lambda *_, why=WAYS[way]: why):
+                with patch.object(naming, "why_not_ranked", lambda *_, why=WAYS[way]: why):
                     found.append(ask(made, limit))
             yield found
 

@@ -30,8 +30,10 @@ from vpm.errors import IdentificationError, near_match
 from vpm.manner import give, wrote
 
 if TYPE_CHECKING:
-    from vpm.identify import Fit
+    from vpm.experiment import Experiment
+    from vpm.identify import Fit, Fitting
     from vpm.model import Model
+    from vpm.simulate import Setup
 
 EXAMPLES = (
     "Example:  vpm identify examples/emps/model.toml log.csv --free carriage.mass --free axis.friction.viscous\n\n"
@@ -94,11 +96,8 @@ def identify(
     plot: Plot = None,
 ) -> None:
     """Fit parameters to one or several logs. Ctrl-C ends a fit and keeps the best until then."""
-    from vpm.discrepancy.moving import check_stuck
-    from vpm.identify import Fitting, judged_on
-    from vpm.identify import identify as fit_logs
-    from vpm.identify.words import intervals, names, numbers, ranges, told, told_intervals, told_unseen
-    from vpm.log_check import refuse_mistakes
+    from vpm.identify import Fitting
+    from vpm.identify.words import numbers, ranges
     from vpm.simulate import Setup
 
     settings = Fitting(
@@ -125,39 +124,90 @@ def identify(
     unseen = [load_record(path, machine, channels, interpolate) for path in validate or []]
     setup = Setup(integrator, substeps, horizon, settling, hold)
     if check:
-        check_stuck(machine, [*records, *unseen])
-        refuse_mistakes(machine, [*records, *unseen], setup=setup, workers=workers or None)
+        _refuse(machine, [*records, *unseen], setup, workers)
+    fit = _fitted(
+        machine, records, _without(machine, free, fix), mode, cutoff, setup, tie, settings if asked else None, starts
+    )
+    lines = _told(fit, machine, unseen, cutoff)
+    lines += _more(fit, records, profile or [], replicates, seed, cutoff)
+    save_plot(fit.plot, plot)
+    if out is not None:
+        _write(fit, out, lines)
+
+
+def _refuse(machine: Model, records: list[Experiment], setup: Setup, workers: int) -> None:
+    """Refuse logs with a mistake, or in which nothing moves."""
+    from vpm.discrepancy.moving import check_stuck
+    from vpm.log_check import refuse_mistakes
+
+    check_stuck(machine, records)
+    refuse_mistakes(machine, records, setup=setup, workers=workers or None)
+
+
+def _fitted(
+    machine: Model,
+    records: list[Experiment],
+    free: list[str] | None,
+    mode: str,
+    cutoff: float | None,
+    setup: Setup,
+    tie: list[str] | None,
+    settings: Fitting | None,
+    starts: int,
+) -> Fit:
+    """The fit, with its progress on the screen."""
+    from vpm.identify import identify as fit_logs
+    from vpm.identify.words import names
+
+    ties = names(tie, "--tie", "FOLLOWER=LEADER")
     with fitting(starts) as tell:
-        fit = fit_logs(
+        return fit_logs(
             machine,
             records,
-            _without(machine, free, fix),
+            free,
             mode=mode,
             cutoff=cutoff,
             setup=setup,
-            ties=names(tie, "--tie", "FOLLOWER=LEADER"),
+            ties=ties,
             progress=tell,
-            fitting=settings if asked else None,
+            fitting=settings,
         )
+
+
+def _told(fit: Fit, machine: Model, unseen: list[Experiment], cutoff: float | None) -> list[str]:
+    """Print what was found, and what it leaves of unseen records."""
+    from vpm.identify import judged_on
+    from vpm.identify.words import told, told_unseen
+
     give(fit=fit)
     lines = told(fit)
     if unseen:
         judged = judged_on(fit, machine, unseen, cutoff=cutoff)
         give(unseen=dict(zip(("before", "after"), judged, strict=True)))
         lines += told_unseen(judged)
-    for line in lines:  # at once: intervals may take long, and Ctrl-C then still leaves the values
-        console.print(f"  {line}", markup=False)
+    _print(lines)  # at once: intervals may take long, and Ctrl-C then still leaves the values
+    return lines
+
+
+def _more(
+    fit: Fit, records: list[Experiment], profile: list[str], replicates: int, seed: int, cutoff: float | None
+) -> list[str]:
+    """Print intervals by profile and bootstrap, as far as they are asked for."""
+    from vpm.identify.words import intervals, told_intervals
+
     try:
-        found = intervals(fit, records, profile or [], replicates, seed, cutoff)
+        found = intervals(fit, records, profile, replicates, seed, cutoff)
         give(intervals=found)
-        more = told_intervals(found)
+        lines = told_intervals(found)
     except KeyboardInterrupt:
-        more = ["stopped by Ctrl-C: no intervals by profile or bootstrap"]
-    for line in more:
+        lines = ["stopped by Ctrl-C: no intervals by profile or bootstrap"]
+    _print(lines)
+    return lines
+
+
+def _print(lines: list[str]) -> None:
+    for line in lines:
         console.print(f"  {line}", markup=False)
-    save_plot(fit.plot, plot)
-    if out is not None:
-        _write(fit, out, lines + more)
 
 
 def _without(model: Model, free: list[str] | None, fixed: list[str] | None) -> list[str] | None:

@@ -98,7 +98,7 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "vpm.experiment.campaign": ("Campaign",),
     "vpm.experiment.motion": ("Motion",),
     "vpm.experiment.record": ("Experiment",),
-    "vpm.identify.fit": ("Fit",),
+    "vpm.identify.fitted": ("Fit",),
     "vpm.identify.identifiability": ("Combination",),
     "vpm.identify.inertial_fit": ("InertialFit",),
     "vpm.identify.inertial_regression": ("InertialRegression",),

@@ -18,8 +18,8 @@ from vpm.experiment import Experiment, Motion, noise_std
 from vpm.experiment.signal import RETAINED_BAND as _BAND
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import has_own_drives, respond
-from vpm.identify.drive_memory import DriveMemory
-from vpm.identify.drives_apart import moves_drives
+from vpm.identify.answers import Following
+from vpm.identify.parts import moves_drives
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -167,8 +167,8 @@ def with_noise(model: Model, experiment: Experiment, generator: np.random.Genera
 
 
 def _shown(model: Model, problem: InverseDynamicsProblem, record: int, whole: Motion) -> Array:
-    memory = DriveMemory(problem.motions[record].parallel, problem.integrators[record])
-    return respond(model, model.theta, whole, problem.experiments[record], (), problem.shown, memory).seen
+    known = Following(problem.motions[record].parallel, problem.integrators[record])
+    return respond(model, model.theta, whole, problem.experiments[record], (), problem.shown, known).seen
 
 
 def _powers(values: Array) -> Array:

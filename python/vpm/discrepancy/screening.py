@@ -93,15 +93,12 @@ def prepare(base: Baseline, data: InverseDynamicsProblem, listed: Sequence[Candi
     """Work out together what links do under all candidates that move them and do nothing at their start.
 
     They all share one motion there, and its derivatives by many parameters take little longer than by one. Shapes of
-    what has no size have no influence. The baseline comes back with its regressor at its own values. In later rounds,
-    where what bends has hardly changed, the derivatives of the first do.
+    what has no size have no influence. The baseline comes back with its regressor at its own values.
     """
     if not bends(base.model) or not has_tangent(base.model, data):
         return base
     pool = [c for c in listed if c.neutral and len(c.starts) == 1 and c.effect.site not in {"joint", "actuator"}]
     models = [base.model.with_effect(c.effect.name, at=c.site, **c.starts[0]) for c in pool]
-    if data.share_again(base.model, models):
-        return base
     whole = base.model
     for c in pool:
         whole = whole.with_effect(c.effect.name, at=c.site, **c.starts[0])

@@ -19,7 +19,7 @@ from vpm.discrepancy.first_step import linear_step
 from vpm.discrepancy.formula import TRANSITION_SHARES
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import has_hidden
-from vpm.identify.drive_answers import driven, first_drives
+from vpm.identify.drives import driven, first_drives
 from vpm.identify.statistics import NORMAL_95
 from vpm.model import Model
 

@@ -14,7 +14,7 @@ import numpy as np
 from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import has_hidden, has_own_drives
-from vpm.identify.drives_apart import moves_drives
+from vpm.identify.parts import moves_drives
 from vpm.model import Model
 
 

@@ -77,7 +77,7 @@ def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str],
     """Why a model with one effect more could not be built, or balanced along the ``measured`` joints, or "".
 
     A motion with joints that nobody measures is integrated, and there no effect carries its memory along; but it does
-    on the motor side of a joint that is split where that is measured, see `vpm.identify.reuse.parts_of`, and where all
+    on the motor side of a joint that is split where that is measured, see `vpm.identify.parts.bending`, and where all
     is ``simulated``.
     """
     remembering = [f"{entry.type.title} at {entry.at}" for entry in model.effects if entry.type.memory]

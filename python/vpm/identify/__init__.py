@@ -3,7 +3,8 @@
 from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.comparison import FIT_MODES, problem
 from vpm.identify.estimation import Estimate, Worth, estimate
-from vpm.identify.fit import Fit, identify
+from vpm.identify.fit import identify
+from vpm.identify.fitted import Fit
 from vpm.identify.identifiability import Combination, unseen_combinations
 from vpm.identify.inertial import identify_inertial
 from vpm.identify.inertial_fit import InertialFit

@@ -10,19 +10,18 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache, partial
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import CoreError, DivergedError, SimulationError
 from vpm.experiment import Experiment, Motion
-from vpm.identify.drive_answers import apart, driven, first_drives, needed, picked, together
-from vpm.identify.drive_memory import DriveMemory, Filter
-from vpm.identify.hidden_motion import with_hidden
-from vpm.identify.reuse import Kept
+from vpm.identify.answers import Following, Pair
+from vpm.identify.drives import first_drives, picked, shown_and_efforts
+from vpm.identify.parts import Bending, Drives, Part, bending, carried, drives_of, whole
 from vpm.initial import whole_motion
-from vpm.model import Model, Shape
+from vpm.model import Model
 from vpm.simulate import Setup, copied_channels
 
 Array = NDArray[np.float64]
@@ -89,11 +88,12 @@ def check_along(model: Model, joints: Sequence[str]) -> None:
             )
     if not has_hidden(model, joints):
         return
+    apart = drives_of(model, tuple(joints)) is not None
     hidden = [name for name in model.beams if model.levels[name] != "rigid"]
     hidden += [name for name in model.joints if name not in joints]
     for name in model.actuators:
         kind, line = model.actuator_type(name), model.line_of_actuator(name)
-        if line is not None or not model.follows_command(name):
+        if line is not None or not (apart or model.follows_command(name)):
             rest = f"acts on the line {line}" if line is not None else "has friction of its own"
             what = f"has type {kind}" if kind != "ideal" else rest
             raise SimulationError(
@@ -137,8 +137,7 @@ def respond(
     experiment: Experiment,
     columns: Sequence[int],
     channels: Sequence[str],
-    memory: DriveMemory | None = None,
-    kept: Kept | None = None,
+    known: Following | None = None,
     origin: Array | None = None,
 ) -> Response:
     """Let a machine answer to a measured motion and to its commands.
@@ -154,14 +153,12 @@ def respond(
     columns : sequence of int
         Parameters to differentiate by.
     channels : sequence of str
-        Outputs to give, see `shown_channels`; the same in all calls with one ``kept``.
-    memory : DriveMemory, optional
-        Of what drives answered before to this motion. With it, all is given as it is compared: filtered, and only at
-        the samples that the filter retains.
-    kept : Kept, optional
-        Remembers how links bend along this record.
+        Outputs to give, see `shown_channels`; the same in all calls with one ``known``.
+    known : Following, optional
+        How the record is followed, and what was answered to it before. With it, all is given as it is compared:
+        filtered, and only at the samples that the filter retains.
     origin : ndarray, shape (P,), optional
-        How links bend and what drives do is taken from the tangent at these values, not worked out at ``theta``.
+        How links bend or what drives do is taken from the tangent at these values, not worked out at ``theta``.
 
     Raises
     ------
@@ -170,24 +167,11 @@ def respond(
     """
     from vpm._core import Diverged
 
-    near = kept or Kept()
+    asked = Asked(
+        model, theta, m, experiment, tuple(columns), known or Following(lambda values: values[m.kept]), origin
+    )
     try:
-        if has_own_drives(model) and not has_hidden(model, m.joints):
-            remembered = memory or DriveMemory(lambda values: values[m.kept])
-            return _with_drives(model, theta, m, experiment, (columns, channels), remembered, origin)
-        if has_own_drives(model):
-            bare = _unsplit(Shape(model), m.joints)
-            if bare is not None and shows_drives_alone(model, channels):
-                remembered = memory or DriveMemory(lambda values: values[m.kept])
-                return _with_known_drives(model, bare, theta, m, experiment, (columns, channels), (remembered, near))
-            answer = _with_both(model, theta, m, experiment, (columns, channels), near)
-        elif has_hidden(model, m.joints):
-            remembered = memory or DriveMemory(lambda values: values[m.kept])
-            swing = partial(_swung, m=m, known=near)
-            return Response(*with_hidden(model, theta, m, (columns, channels), (remembered, near, origin), swing))
-        else:
-            answer = _rigid(model, theta, m, columns, channels)
-        return answer if memory is None else _filtered(answer, memory.keep)
+        return _responded(asked, channels)
     except Diverged as error:
         time = float(m.time[0]) + len(error.outputs) * m.dt
         raise DivergedError(f"{experiment.name}: {error}", time=time) from None
@@ -198,26 +182,114 @@ def respond(
         raise DivergedError(f"{experiment.name}: {error}", time=float(m.time[m.kept][0])) from None
 
 
-def _filtered(answer: Response, keep: Filter) -> Response:
-    """The same at the samples that are compared."""
-    parts = (answer.required, answer.applied, answer.seen, answer.balance, answer.slopes)
-    widths = [int(np.prod(part.shape[1:])) for part in parts]
-    # All side by side: each pass of the filter begins with the same solution of its equations at rest.
-    flat = [part.reshape(len(part), width) for part, width in zip(parts, widths, strict=True)]
-    kept = np.split(keep(np.concatenate(flat, axis=1)), np.cumsum(widths)[:-1], axis=1)
-    sides = [side.reshape(len(side), *part.shape[1:]) for side, part in zip(kept, parts, strict=True)]
-    required, applied, seen, balance, slopes = sides
-    return Response(required, applied, balance, seen, slopes)
+@dataclass(frozen=True)
+class Asked:
+    """What is asked of a machine along one record, as `respond` has it."""
+
+    model: Model
+    theta: Array
+    m: Motion
+    experiment: Experiment
+    columns: tuple[int, ...]
+    known: Following
+    origin: Array | None
 
 
-def _rigid(model: Model, theta: Array, m: Motion, columns: Sequence[int], channels: Sequence[str]) -> Response:
-    required, applied, jacobian = model.core.inverse_dynamics(
-        theta, m.position, m.velocity, m.acceleration, m.inputs, m.dt, list(columns)
+def _responded(ask: Asked, channels: Sequence[str]) -> Response:
+    """The sum of what the motion needs, of what the drives deliver, and of what shows of either."""
+    model, own, hidden = ask.model, has_own_drives(ask.model), has_hidden(ask.model, ask.m.joints)
+    if not own and not hidden:
+        return _rigid(ask, channels)
+    if own and hidden:
+        ask = replace(ask, origin=None)  # where drives and what they swing come together there is no tangent
+    # What is no channel of a drive shows in a run of drives, as long as no link bends.
+    of_drives = [c for c in channels if own and (not bends(model) or shows_drives_alone(model, [c]))]
+    others = [c for c in channels if c not in of_drives]
+    needs = _bent(ask, others) if hidden else _carried(ask)
+    drives = _driven(ask, of_drives) if own else _delivered(ask)
+    order = [[*of_drives, *others].index(c) for c in channels]
+    ours, theirs = slice(len(of_drives)), slice(len(others))
+    seen = np.concatenate([drives[0][:, ours], needs[0][:, theirs]], axis=1)[:, order]
+    slopes = np.concatenate([drives[1][:, ours], needs[1][:, theirs]], axis=1)[:, order]
+    joints = [-place for place in range(len(ask.m.joints), 0, -1)]
+    balance = needs[1][:, joints] - drives[1][:, joints]
+    return Response(needs[0][:, joints], drives[0][:, joints], balance, seen, slopes)
+
+
+def _rigid(ask: Asked, channels: Sequence[str]) -> Response:
+    m, joints = ask.m, len(ask.m.joints)
+    motion = (m.position, m.velocity, m.acceleration, m.inputs, m.dt)
+    required, applied, slopes = ask.model.core.inverse_dynamics(ask.theta, *motion, list(ask.columns))
+    efforts, balance = ask.known.filtered(np.hstack([required, applied]), slopes)
+    nothing = np.zeros((len(efforts), len(channels)))
+    return Response(
+        efforts[:, :joints], efforts[:, joints:], balance, nothing, np.zeros((*nothing.shape, len(ask.columns)))
     )
-    rows = m.kept
-    nothing = np.zeros((len(m.time[rows]), len(channels)))
-    slopes = np.zeros((*nothing.shape, len(columns)))
-    return Response(required[rows], applied[rows], jacobian[rows], nothing, slopes)
+
+
+def _carried(ask: Asked) -> Pair:
+    """Effort that the motion needs at the joints, all of which were measured."""
+    part = ask.known.memo.once(("carried", ask.model.structure), partial(carried, ask.model))
+    return ask.known.answer(part, ask.theta, ask.columns, partial(_required, part.model, ask.m))
+
+
+def _required(model: Model, m: Motion, theta: Array, columns: Sequence[int]) -> Pair:
+    efforts, slopes = model.core.required(theta, m.position, m.velocity, m.acceleration, m.dt, list(columns))
+    return efforts, slopes
+
+
+def _bent(ask: Asked, channels: Sequence[str]) -> Pair:
+    """Channels, then efforts at the measured joints, where links bend or joints move that nobody measures."""
+    known, origin, split = ask.known, ask.origin, None
+    if not has_own_drives(ask.model):
+        split = bending_of(ask.model, ask.m.joints, known)
+        if split is None:
+            # A joint that winds up has no tangent, but laws on its measured side do not feel that either.
+            split, origin = bending_of(ask.model, ask.m.joints, known, wound=True), None
+    part = split.bare if split else whole(ask.model)
+    read = read_where_bent(ask.m.joints, channels)
+
+    def swing(values: Array, columns: Sequence[int]) -> Pair:
+        return picked(part.model, *_swung(part.model, values, columns, ask.m, known), slice(None), read)
+
+    values, slopes = known.answer(part, ask.theta, ask.columns, swing, read, origin)
+    if split is None or split.laws is None or split.shell is None:
+        return values, slopes
+    laws, shell, width = split.laws, split.shell, len(channels)
+    every = ask.theta[laws.places].tobytes()
+    more, added = known.answer(laws, ask.theta, ask.columns, partial(_of_laws, ask, laws.model, shell), every)
+    return (
+        np.hstack([values[:, :width], values[:, width:] + more]),
+        np.concatenate([slopes[:, :width], slopes[:, width:] + added], axis=1),
+    )
+
+
+def read_where_bent(joints: Sequence[str], channels: Sequence[str]) -> tuple[str, ...]:
+    """Outputs that are read of a motion that is worked out, in their order."""
+    return (*channels, *(f"{joint}.effort" for joint in joints))
+
+
+def bending_of(model: Model, joints: tuple[str, ...], known: Following, *, wound: bool | None = None) -> Bending | None:
+    """`vpm.identify.parts.bending`, built once for all models of one structure."""
+    return known.memo.once(("bending", model.structure, joints, wound), partial(bending, model, joints, wound=wound))
+
+
+def _of_laws(ask: Asked, laws: Model, shell: Part, theta: Array, columns: Sequence[int]) -> Pair:
+    """What a rigid machine needs more than the one that lacks the laws of its joints, and the derivative."""
+    efforts, slopes = _required(laws, ask.m, theta, columns)
+    names = [laws.parameter_names[column] for column in columns]
+    common = [place for place, name in enumerate(names) if name in shell.model.parameter_names]
+    asked = [shell.model.index(names[place]) for place in common]
+    less, own = _required(shell.model, ask.m, ask.theta[shell.places], asked)
+    slopes[:, :, common] -= own
+    return efforts - less, slopes
+
+
+def _delivered(ask: Asked) -> Pair:
+    """Efforts of drives that follow from their commands, on the measured joints."""
+    efforts, slopes = ask.model.core.delivered(ask.theta, ask.m.inputs, ask.m.dt, list(ask.columns))
+    measured = [place for place, joint in enumerate(ask.model.joints) if joint in ask.m.joints]
+    return ask.known.filtered(efforts[:, measured], slopes[:, measured])
 
 
 def shows_drives_alone(model: Model, channels: Sequence[str]) -> bool:
@@ -225,124 +297,83 @@ def shows_drives_alone(model: Model, channels: Sequence[str]) -> bool:
     return all(channel.rpartition(".")[0] in model.actuators for channel in channels)
 
 
-def _with_drives(
-    model: Model,
-    theta: Array,
-    m: Motion,
-    experiment: Experiment,
-    wanted: tuple[Sequence[int], Sequence[str]],
-    memory: DriveMemory,
-    origin: Array | None,
-) -> Response:
-    """Drives with states of their own, on the joints' motion.
-
-    The effort that the motion needs and what the drives do along it do not depend on each other.
-    """
-    columns, channels = wanted
+def _driven(ask: Asked, channels: Sequence[str]) -> Pair:
+    """Channels, then efforts at the measured joints, of drives with states of their own, which feel these alone."""
+    model, joints = ask.model, ask.m.joints
+    drives = None
     if shows_drives_alone(model, channels):
-        outputs, by_drives = apart(model, theta, m, experiment, wanted, memory, origin)
-    else:
-        outputs, by_drives = together(model, theta, m, experiment, wanted, memory)
-    required, slopes = needed(model, theta, m, columns, memory)
-    balance = slopes - by_drives[:, len(channels) :]
-    seen = by_drives[:, : len(channels)]
-    return Response(required, outputs[:, len(channels) :], balance, outputs[:, : len(channels)], seen)
+        drives = ask.known.memo.once(("drives", model.structure, joints), partial(drives_of, model, joints))
+    return _together(ask, channels) if drives is None else _one_by_one(ask, channels, drives)
 
 
-@lru_cache(maxsize=128)
-def _unsplit(shape: Shape, joints: tuple[str, ...]) -> tuple[Model, NDArray[np.int64]] | None:
-    """A machine without the effects that split its joints, if it has the measured ``joints`` then, and its parameters.
-
-    The motor side of a split joint keeps the measured motion and the drives: these answer as in the machine as it was.
-    """
-    bare = model = shape.model
-    for effect in model.effects:
-        candidate = bare.without_effect(*effect.key)
-        bare = candidate if len(candidate.joints) < len(bare.joints) else bare
-    if bends(model) or tuple(bare.joints) != joints:
-        return None
-    return bare, np.array([model.index(name) for name in bare.parameter_names], dtype=np.int64)
-
-
-def _with_known_drives(
-    model: Model,
-    unsplit: tuple[Model, NDArray[np.int64]],
-    theta: Array,
-    m: Motion,
-    experiment: Experiment,
-    wanted: tuple[Sequence[int], Sequence[str]],
-    known: tuple[DriveMemory, Kept],
-) -> Response:
-    """Drives with states of their own on measured joints, behind which hang others that effects have split off."""
-    (bare, places), (columns, channels), (memory, near) = unsplit, wanted, known
-    own = {int(place): number for number, place in enumerate(places)}
-    felt = [number for number, column in enumerate(columns) if column in own]
-    asked = [own[columns[number]] for number in felt]
-    outputs, by_drives = apart(bare, theta[places], m, experiment, (asked, channels), memory)
-    effort = [model.output_channels.index(f"{joint}.effort") for joint in m.joints]
-    values, slopes = _hidden(model, theta, m, columns, near)
-    required = memory.keep(values[:, effort])
-    balance = np.zeros((*required.shape, len(columns)))
-    if columns:
-        balance += memory.keep(slopes[:, effort].reshape(len(slopes), -1)).reshape(balance.shape)
-    balance[:, :, felt] -= by_drives[:, len(channels) :]
-    seen = np.zeros((len(required), len(channels), len(columns)))
-    seen[:, :, felt] = by_drives[:, : len(channels)]
-    return Response(required, outputs[:, len(channels) :], balance, outputs[:, : len(channels)], seen)
+def _one_by_one(ask: Asked, channels: Sequence[str], drives: Drives) -> Pair:
+    """Drives that do not feel each other, one after the other."""
+    start, m, rows = ask.theta if ask.origin is None else ask.origin, ask.m, len(channels)
+    internal = first_drives(drives.bare.model, start[drives.bare.places], m, ask.experiment)
+    answers = []
+    for part in drives.parts:
+        read = [channel for channel in channels if channel.rpartition(".")[0] in part.model.actuators]
+        pushed = replace(m, inputs=m.inputs[:, part.inputs])
+        places = [*(channels.index(channel) for channel in read), *range(rows, rows + len(m.joints))]
+        answers.append((places, _run(ask, part, pushed, read, internal[part.states], ask.origin)))
+    samples = len(answers[0][1][0])
+    total = np.zeros((samples, rows + len(m.joints)))
+    derivative = np.zeros((*total.shape, len(ask.columns)))
+    for places, (values, slopes) in answers:
+        total[:, places] += values
+        derivative[:, places] += slopes
+    return total, derivative
 
 
-def _with_both(
-    model: Model,
-    theta: Array,
-    m: Motion,
-    experiment: Experiment,
-    wanted: tuple[Sequence[int], Sequence[str]],
-    known: Kept,
-) -> Response:
-    """Drives with states of their own on measured joints, behind which others hang that nobody measures.
+def _together(ask: Asked, channels: Sequence[str]) -> Pair:
+    """Drives of the machine as a whole, on the motion of all its joints."""
+    model, m = ask.model, ask.m
+    motion = whole_motion(model, ask.experiment, ask.theta, m.cutoff) if has_hidden(model, m.joints) else m
+    internal = first_drives(model, ask.theta, m, ask.experiment)
+    values, slopes = _run(ask, whole(model), motion, channels, internal, None)
+    measured = [place for place, joint in enumerate(model.joints, len(channels)) if joint in m.joints]
+    kept = [*range(len(channels)), *measured]
+    return values[:, kept], slopes[:, kept]
 
-    Such drives feel the measured motion alone: what they deliver does not depend on the hidden one.
-    """
-    columns, channels = wanted
-    required, slopes = _hidden(model, theta, m, columns, known)
-    whole = whole_motion(model, experiment, theta, m.cutoff)
-    internal = first_drives(model, theta, m, experiment)
-    outputs, jacobian = driven(model, theta, whole, experiment, columns, internal)
-    rows, joints = m.kept, [place for place, joint in enumerate(model.joints) if joint in m.joints]
-    effort = [model.output_channels.index(f"{model.joints[place]}.effort") for place in joints]
-    drives = [len(model.output_channels) + place for place in joints]
-    return Response(
-        required[rows][:, effort],
-        outputs[rows][:, drives],
-        (slopes[:, effort] - jacobian[:, drives])[rows],
-        *picked(model, outputs, jacobian, rows, channels),
+
+def _run(ask: Asked, part: Part, m: Motion, channels: Sequence[str], internal: Array, origin: Array | None) -> Pair:
+    """Channels, then efforts at all joints, of the drives of a part that begin in some states."""
+    known = ask.known
+    work = partial(
+        shown_and_efforts,
+        part.model,
+        m=m,
+        experiment=ask.experiment,
+        channels=channels,
+        internal=internal,
+        integrator=known.integrator,
     )
+    more = (known.commands, known.integrator, *channels, internal.tobytes())
+    return known.answer(part, ask.theta, ask.columns, work, more, origin)
 
 
-def _swung(model: Model, theta: Array, columns: Sequence[int], m: Motion, known: Kept) -> tuple[Array, Array]:
-    """As `_hidden`, with derivatives on fewer samples where gauges hold links: each costs as much as the outputs.
+def _swung(model: Model, theta: Array, columns: Sequence[int], m: Motion, known: Following) -> Pair:
+    """Outputs of `guided`, with derivatives on fewer samples where gauges hold links: each costs as much as they do.
 
     What rings freely would lose its phase by that.
     """
     every, hold = int(1.0 / (SLOPE_SAMPLES * m.cutoff * m.dt)), known.hold
     if not columns or hold is None or every < 2:
-        return _hidden(model, theta, m, columns, known)
+        outputs, _, jacobian = guided(model, theta, m, columns, known)
+        return outputs, jacobian
     from scipy.interpolate import CubicSpline
 
-    outputs, _ = _hidden(model, theta, m, (), known)
+    outputs, _, _ = guided(model, theta, m, (), known)
     quantities = ("position", "velocity", "acceleration", "time")
     few = replace(m, **{name: getattr(m, name)[::every] for name in quantities}, dt=every * m.dt)
-    _, slopes = _hidden(model, theta, few, columns, Kept(replace(hold, rate=hold.rate[::every]), known.departure))
+    _, _, slopes = guided(model, theta, few, columns, replace(known, hold=replace(hold, rate=hold.rate[::every])))
     grid, places = every * np.arange(len(few.time)), np.arange(len(m.time))
     return outputs, np.asarray(CubicSpline(grid, slopes)(np.minimum(places, grid[-1])))
 
 
-def _hidden(model: Model, theta: Array, m: Motion, columns: Sequence[int], known: Kept) -> tuple[Array, Array]:
-    outputs, _, jacobian = guided(model, theta, m, columns, known)
-    return outputs, jacobian
-
-
-def guided(model: Model, theta: Array, m: Motion, columns: Sequence[int], known: Kept) -> tuple[Array, Array, Array]:
+def guided(
+    model: Model, theta: Array, m: Motion, columns: Sequence[int], known: Following
+) -> tuple[Array, Array, Array]:
     """Outputs along the motion of the measured joints, all else free or held by gauges, states, and derivative."""
     hold, coordinates = known.hold, len(model.coordinates)
     setup = Setup()

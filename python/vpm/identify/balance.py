@@ -13,14 +13,24 @@ from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, IdentificationError
 from vpm.experiment import Experiment, Motion
-from vpm.identify.along import Response, bends, check_along, guided, has_own_drives, respond, shown_channels
+from vpm.identify.along import (
+    Response,
+    bending_of,
+    bends,
+    check_along,
+    guided,
+    has_own_drives,
+    read_where_bent,
+    respond,
+    shown_channels,
+)
+from vpm.identify.answers import Following, Memo
 from vpm.identify.beginning import BegunAnywhere
 from vpm.identify.counted import Counted, settled
-from vpm.identify.drive_memory import DriveMemory
 from vpm.identify.gauges import gauge_gains, hold_of
 from vpm.identify.parallel import in_order
+from vpm.identify.parts import Bending
 from vpm.identify.problem import FEWEST_SAMPLES, Block
-from vpm.identify.reuse import Kept, parts_of
 from vpm.initial import joint_motion
 from vpm.model import Model
 from vpm.simulate import AUTOMATIC
@@ -91,10 +101,9 @@ class InverseDynamicsProblem(BegunAnywhere):
         self.joints = tuple(measured[place] for place in self._joints)
         #: Channels beside the balance that are compared too: what shows inside of drives, strains of links.
         self.shown = shown_channels(model, measured, experiments)
-        self._memories = tuple(DriveMemory(m.parallel, integrator) for m in self.motions)
         self._compared = tuple(self._measured(m, e) for m, e in zip(self.motions, self.experiments, strict=True))
         self._gains = self._hold_gains(model)
-        self._kept = self._held(self.experiments, self.motions, None)
+        self._known = self._held(self.experiments, self.motions, [integrator] * len(self.motions), None)
         self.workers = 1
         self.blocks = self._lay_out(model)
         #: What is left at the true values, as far as that is known; see `vpm.identify.own_simulation`.
@@ -110,16 +119,14 @@ class InverseDynamicsProblem(BegunAnywhere):
         """The same of other records of the same lengths, filtered, counted and weighed as these are."""
         motions = self._motions(experiments, [m.cutoff for m in self.motions])
         pairs = list(zip(motions, experiments, strict=True))
-        memories = [DriveMemory(m.parallel, one.integrator) for m, one in zip(motions, self._memories, strict=True)]
         same = copy(self)
         vars(same).update(
             experiments=tuple(experiments),
             motions=motions,
             expected=0.0,
             _whole=tuple(replace(m, edge=0) for m in motions),
-            _memories=tuple(memories),
             _compared=tuple(self._measured(m, e) for m, e in pairs),
-            _kept=self._held(experiments, motions, self.departures),
+            _known=self._held(experiments, motions, self.integrators, self.departures),
         )
         return same
 
@@ -138,7 +145,7 @@ class InverseDynamicsProblem(BegunAnywhere):
     @property
     def integrators(self) -> tuple[str, ...]:
         """How drives with states of their own are run along each record."""
-        return tuple(memory.integrator for memory in self._memories)
+        return tuple(known.integrator for known in self._known)
 
     def take_long_steps(self) -> None:
         """Run drives by one step of second order for each sample, along the records where that shows nothing.
@@ -149,23 +156,21 @@ class InverseDynamicsProblem(BegunAnywhere):
         model = self.nominal
         if not has_own_drives(model):
             return
-        for record, memory in enumerate(self._memories):
-            known, exact = memory.integrator, self._answer(model, model.theta, record)
-            memory.take(LONG_STEPS)
+        for record, known in enumerate(self._known):
+            exact, quick = self._answer(model, model.theta, record), replace(known, integrator=LONG_STEPS)
             try:
-                rough = self._answer(model, model.theta, record)
+                rough = self._answer(model, model.theta, record, known=quick)
             except DivergedError:
-                rough = None
-            if rough is None or not _alike(exact, rough, self._compared[record]):
-                memory.take(known)
+                continue
+            if _alike(exact, rough, self._compared[record]):
+                self._known = (*self._known[:record], quick, *self._known[record + 1 :])
 
     def later(self) -> InverseDynamicsProblem:
         """The same, but for commands, each of which holds from the sample after its own on."""
         moved = tuple(replace(m, inputs=np.concatenate([m.inputs[:1], m.inputs[:-1]])) for m in self._whole)
         same = copy(self)
         # What drives answered to commands at their own times is no answer to these; what the motion needs is.
-        memories = tuple(memory.under(commands=1) for memory in self._memories)
-        vars(same).update(_whole=moved, _memories=memories)
+        vars(same).update(_whole=moved, _known=tuple(replace(known, commands=1) for known in self._known))
         return same
 
     def evaluate(
@@ -191,16 +196,23 @@ class InverseDynamicsProblem(BegunAnywhere):
         return gauge_gains(model, self.experiments, middle)
 
     def _held(
-        self, experiments: Sequence[Experiment], motions: Sequence[Motion], departures: Array | None
-    ) -> tuple[Kept, ...]:
-        holds = (hold_of(self._gains, e, m) for e, m in zip(experiments, motions, strict=True))
+        self,
+        experiments: Sequence[Experiment],
+        motions: Sequence[Motion],
+        integrators: Sequence[str],
+        departures: Array | None,
+    ) -> tuple[Following, ...]:
         begun = [None] * len(motions) if departures is None else departures
-        return tuple(Kept(hold, departure) for hold, departure in zip(holds, begun, strict=True))
+        memo, parts = Memo(), zip(motions, experiments, integrators, begun, strict=True)
+        return tuple(
+            Following(m.parallel, steps, 0, hold_of(self._gains, e, m), departure, record, memo)
+            for record, (m, e, steps, departure) in enumerate(parts)
+        )
 
     def begun(self, departures: Array | None) -> Self:
         """See :class:`BegunAnywhere`; by coordinates, then rates."""
         same = super().begun(departures)
-        vars(same).update(_kept=self._held(self.experiments, self.motions, departures))
+        vars(same).update(_known=self._held(self.experiments, self.motions, self.integrators, departures))
         return same
 
     def open_states(self, model: Model) -> tuple[Array, int]:
@@ -216,36 +228,23 @@ class InverseDynamicsProblem(BegunAnywhere):
 
     def hidden_states(self, model: Model, record: int) -> Array:
         """Coordinates, then rates (N, 2 coordinates), along one record."""
-        return guided(model, model.theta, self._whole[record], (), self._kept[record])[1]
+        return guided(model, model.theta, self._whole[record], (), self._known[record])[1]
+
+    def bending(self, model: Model) -> Bending | None:
+        """What of a machine bends, or flies, along these records; see `vpm.identify.parts.bending`."""
+        return bending_of(model, self.motions[0].joints, self._known[0])
 
     def share(self, whole: Model, others: Sequence[tuple[Model, Sequence[str]]]) -> None:
-        """Let ``others`` take how links bend from ``whole``, which moves as they do; see `vpm.identify.reuse.Kept`.
+        """Let ``others`` have how links bend from ``whole``, of which this was asked and which moves as they do.
 
         With each goes the list of its own parameters: those that ``whole`` was not differentiated by have no influence.
         """
-        for m, kept in zip(self.motions, self._kept, strict=True):
-            source = parts_of(whole, m.joints)
-            for model, own in others:
-                target = parts_of(model, m.joints)
-                if source is not None and target is not None:
-                    pair = (source, whole.theta[source.places]), (target, model.theta[target.places])
-                    kept.share(*pair, own)
-
-    def share_again(self, base: Model, others: Sequence[Model]) -> bool:
-        """Let ``others``, which move as ``base`` does, have its motion and the derivatives that `share` gave before.
-
-        Returns
-        -------
-        bool
-            Whether all of them were shared before, at values not far from these.
-        """
-        self.evaluate(base, base.theta)
-        for m, kept in zip(self.motions, self._kept, strict=True):
-            parts = [(parts_of(model, m.joints), model.theta) for model in (base, *others)]
-            known = [(part, theta[part.places]) for part, theta in parts if part is not None]
-            if len(known) < len(parts) or not kept.share_again(known[0], known[1:]):
-                return False
-        return True
+        read = read_where_bent(self.motions[0].joints, self.shown)
+        if (source := self.bending(whole)) is None:
+            return
+        targets = [(target.bare, model.theta, own) for model, own in others if (target := self.bending(model))]
+        for known in self._known:
+            known.share((source.bare, whole.theta), targets, read)
 
     def added(self, efforts: Sequence[Array]) -> Array:
         """What efforts add to the residual, filtered and weighed as it is, shape (n, k).
@@ -270,13 +269,17 @@ class InverseDynamicsProblem(BegunAnywhere):
         return m.time[m.retained], answer.applied[:, self._joints], answer.required[:, self._joints]
 
     def _answer(
-        self, model: Model, theta: Array, record: int, columns: Sequence[int] = (), origin: Array | None = None
+        self,
+        model: Model,
+        theta: Array,
+        record: int,
+        columns: Sequence[int] = (),
+        origin: Array | None = None,
+        known: Following | None = None,
     ) -> Response:
         """What shows along one record, filtered."""
-        whole, experiment, memory = self._whole[record], self.experiments[record], self._memories[record]
-        return respond(
-            model, theta, whole, experiment, columns, self.shown, memory, kept=self._kept[record], origin=origin
-        )
+        whole, experiment, known = self._whole[record], self.experiments[record], known or self._known[record]
+        return respond(model, theta, whole, experiment, columns, self.shown, known, origin)
 
     def strengths(self, model: Model, theta: Array | None = None) -> Array:
         """Root mean square of the applied effort on each joint over all records: what its errors are relative to."""

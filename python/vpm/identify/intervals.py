@@ -26,7 +26,7 @@ from vpm.identify.ties import tied, untied
 from vpm.results import Result
 
 if TYPE_CHECKING:
-    from vpm.identify.fit import Fit
+    from vpm.identify.fitted import Fit
 
 Array = NDArray[np.float64]
 

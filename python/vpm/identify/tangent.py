@@ -12,7 +12,6 @@ from vpm.errors import DivergedError
 from vpm.identify.along import bends, has_hidden, has_own_drives, shows_drives_alone
 from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.estimation import Estimate, Worth, estimate
-from vpm.identify.reuse import parts_of
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -42,7 +41,7 @@ class Tangent:
 
 def has_tangent(model: Model, data: InverseDynamicsProblem) -> bool:
     """Whether along the motion links bend, or several drives have states, and nothing else is worked out there."""
-    return drives_on_tangent(model, data) or all(parts_of(model, m.joints) is not None for m in data.motions)
+    return drives_on_tangent(model, data) or data.bending(model) is not None
 
 
 def drives_on_tangent(model: Model, data: InverseDynamicsProblem) -> bool:

@@ -7,7 +7,8 @@ from dataclasses import replace
 
 from vpm.experiment import Experiment, as_records
 from vpm.identify.comparison import comparison
-from vpm.identify.fit import Fit, beside_first_states
+from vpm.identify.fitted import Fit
+from vpm.identify.onward import beside_first_states
 from vpm.identify.problem import gaps
 from vpm.model import Model
 

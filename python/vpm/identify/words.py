@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
-from vpm.identify.fit import Fit
+from vpm.identify.fitted import Fit
 from vpm.identify.intervals import Bootstrap, Profile, bootstrap, profile_intervals
 from vpm.identify.unseen import Gaps
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from vpm.errors import MissingExtraError
 from vpm.files import make_folder, replacing, write_text
-from vpm.identify.fit import Fit
+from vpm.identify.fitted import Fit
 
 _COLUMNS = ("name", "start", "value", "std", "low", "high", "unit")
 

@@ -1,8 +1,7 @@
-"""What drives answered before is what they answer again; and their noise has the colour that they give it."""
+"""What parts of a machine answered before is what they answer again; noise of drives has the colour they give it."""
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -18,9 +17,9 @@ from vpm.discrepancy.floor import noise_floor
 from vpm.discrepancy.structure import structure
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.identify.along import Response
-from vpm.identify.drive_answers import SLOPE_STEP, apart, together
-from vpm.identify.drive_memory import DriveMemory
-from vpm.identify.drives_apart import drives_of
+from vpm.identify.answers import Memo
+from vpm.identify.drives import SLOPE_STEP
+from vpm.identify.parts import carried, drives_of
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -138,27 +137,49 @@ def test_the_size_of_coloured_noise_is_read_off_its_quiet_part(exact: Exact) -> 
 
 def test_cylinders_of_a_firm_supply_answer_one_by_one_as_they_do_together() -> None:
     model = Model.from_toml(shared_case("hydraulic_leg", "none", 21).true_text)
-    one_by_one = drives_of(model)
-    assert [drives.model.actuators for drives in one_by_one] == [("hip_drive",), ("knee_drive",)]
+
+    def groups(machine: Model) -> list[tuple[str, ...]]:
+        drives = drives_of(machine, machine.joints)
+        assert drives is not None
+        return [part.model.actuators for part in drives.parts]
+
+    assert groups(model) == [("hip_drive",), ("knee_drive",)]
     sagging = model.with_effect("supply_drop", at="pump", resistance=1e9, time_constant=0.01)
-    assert [drives.model.actuators for drives in drives_of(sagging)] == [("hip_drive", "knee_drive")]
+    assert groups(sagging) == [("hip_drive", "knee_drive")]
 
 
-def test_the_answers_of_single_cylinders_make_up_that_of_the_machine() -> None:
+def test_the_answers_of_single_cylinders_make_up_that_of_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     case = shared_case("hydraulic_leg", "none", 21)
     model = Model.from_toml(case.true_text).with_effect("sensor_offset", at="knee_encoder", value=0.01)
-    training = InverseDynamicsProblem(model, case.train[:1])
-    m, record = training.motions[0], training.experiments[0]
-    memory, columns = DriveMemory(m.parallel), [model.index("pump.oil.bulk_modulus"), model.index("upper.mass")]
-    answers = [work(model, model.theta, m, record, (columns, training.shown), memory) for work in (apart, together)]
-    for one, other in zip(*answers, strict=True):
-        largest = np.abs(other).max(axis=0)
-        assert (np.abs(one - other).max(axis=0) <= 1e-4 * largest).all()
+    columns = [model.index("pump.oil.bulk_modulus"), model.index("upper.mass")]
+    apart = InverseDynamicsProblem(model, case.train[:1])
+    values, slopes = apart.evaluate(model, model.theta, columns)
+    monkeypatch.setattr(import_module(Response.__module__), "drives_of", lambda *_: None)
+    whole, whole_slopes = InverseDynamicsProblem(model, case.train[:1]).evaluate(model, model.theta, columns)
+    for block in apart.blocks:
+        own = block.samples
+        assert np.abs(values[own] - whole[own]).max() <= 1e-4 * np.abs(whole[own]).max()
+        largest = np.abs(whole_slopes[own]).max(axis=0)
+        assert (np.abs(slopes[own] - whole_slopes[own]).max(axis=0) <= 1e-4 * largest).all()
 
 
-def test_a_memory_forgets_what_is_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(sys.modules["vpm.identify.drive_memory"], "MOST_NUMBERS", 50)
-    memory = DriveMemory(lambda values: values)
+def test_what_carries_the_effort_of_a_motion_has_no_cylinders() -> None:
+    """What the motion needs is the same without them, as are its derivatives."""
+    case = shared_case("hydraulic_leg", "none", 21)
+    model = Model.from_toml(case.true_text).with_effect("sensor_offset", at="knee_encoder", value=0.01)
+    part, m = carried(model), InverseDynamicsProblem(model, case.train[:1]).motions[0]
+    assert not part.model.actuators
+    motion = (m.position[:50], m.velocity[:50], m.acceleration[:50], m.dt)
+    names = ("upper.mass", "knee_encoder.offset.value")
+    alone = part.model.core.required(model.theta[part.places], *motion, [part.model.index(name) for name in names])
+    whole = model.core.required(model.theta, *motion, [model.index(name) for name in names])
+    for one, other in zip(alone, whole, strict=True):
+        np.testing.assert_allclose(one, other, rtol=1e-12, atol=1e-12 * np.abs(other).max())
+
+
+def test_a_memo_forgets_what_is_oldest(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(import_module(Memo.__module__), "MOST_NUMBERS", 50)
+    memo = Memo()
     worked: list[int] = []
 
     def work(key: int, names: Sequence[str]) -> tuple[Array, Array]:
@@ -166,5 +187,5 @@ def test_a_memory_forgets_what_is_oldest(monkeypatch: pytest.MonkeyPatch) -> Non
         return np.ones((10, 1)), np.ones((10, 1, len(names)))
 
     for key in (1, 2, 3, 3, 2, 1):
-        memory.recall(key, ["a"], partial(work, key))
+        memo.recall(key, ["a"], partial(work, key))
     assert worked == [1, 2, 3, 1]

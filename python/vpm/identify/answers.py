@@ -1,0 +1,194 @@
+"""What parts of a machine answer along a record, remembered by what it depends on: most questions are asked again."""
+
+from __future__ import annotations
+
+import math
+from collections import OrderedDict
+from collections.abc import Callable, Hashable, Sequence
+from dataclasses import dataclass, field
+from threading import Lock
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.identify.gauges import Hold
+from vpm.identify.parts import Part
+from vpm.simulate import AUTOMATIC
+
+Array = NDArray[np.float64]
+#: Numbers (n, k) along a record, and their derivatives (n, k, columns).
+Pair = tuple[Array, Array]
+#: From (N, k) to the (n, k) that are compared.
+Filter = Callable[[Array], Array]
+#: Unfiltered numbers of a part, and their derivatives, by its values and the places of its parameters.
+Work = Callable[[Array, Sequence[int]], Pair]
+Built = TypeVar("Built")
+
+#: Answers that are kept for all records: what one round of a search asks, the next one asks again.
+KEPT = 1000
+#: Numbers that are kept for all records; the answer asked for last stays whatever its size.
+MOST_NUMBERS = 40_000_000
+
+
+@dataclass(frozen=True)
+class Answer:
+    """Numbers (n, k) along a record and, by parameter name, their derivatives (n, k)."""
+
+    values: Array
+    slopes: dict[str, Array]
+
+    @property
+    def numbers(self) -> int:
+        """How many numbers it holds."""
+        return self.values.size * (1 + len(self.slopes))
+
+
+class Memo:
+    """Answers by what they depend on; safe to be used by several threads."""
+
+    def __init__(self) -> None:
+        self._lock = Lock()
+        self._answers: OrderedDict[Hashable, Answer] = OrderedDict()
+        self._built: OrderedDict[Hashable, object] = OrderedDict()
+        self._numbers = 0
+
+    def recall(self, key: Hashable, names: Sequence[str], work: Callable[[Sequence[str]], Pair]) -> Pair:
+        """Numbers (n, k) and derivatives (n, k, names); ``work`` gives those by the names that are not known."""
+        known = self.known(key)
+        missing = [name for name in names if known is None or name not in known.slopes]
+        if known is None or missing:
+            values, slopes = work(missing)
+            fresh = {name: np.ascontiguousarray(slopes[:, :, place]) for place, name in enumerate(missing)}
+            # What is read elsewhere is never changed: an answer that learnt more takes its place.
+            known = Answer(known.values, {**known.slopes, **fresh}) if known else Answer(values, fresh)
+            self.keep(key, known)
+        columns = [known.slopes[name] for name in names]
+        return known.values, np.stack(columns, axis=2) if columns else np.zeros((*known.values.shape, 0))
+
+    def known(self, key: Hashable) -> Answer | None:
+        """An answer that is remembered."""
+        with self._lock:
+            if key in self._answers:
+                self._answers.move_to_end(key)
+            return self._answers.get(key)
+
+    def once(self, key: Hashable, build: Callable[[], Built]) -> Built:
+        """What holds whatever the values are, such as a part, built when it is asked for first."""
+        with self._lock:
+            if key in self._built:
+                return self._built[key]  # type: ignore[return-value]
+        built = build()
+        with self._lock:
+            self._built[key] = built
+            while len(self._built) > KEPT:
+                self._built.popitem(last=False)
+        return built
+
+    def keep(self, key: Hashable, answer: Answer) -> None:
+        """Remember an answer; what was asked for longest ago is forgotten."""
+        with self._lock:
+            before = self._answers.pop(key, None)
+            self._answers[key] = answer
+            self._numbers += answer.numbers - (before.numbers if before else 0)
+            while len(self._answers) > KEPT or (self._numbers > MOST_NUMBERS and len(self._answers) > 1):
+                _, oldest = self._answers.popitem(last=False)
+                self._numbers -= oldest.numbers
+
+
+@dataclass(frozen=True, eq=False)
+class Following:
+    """How machines follow one record, and what they answered to it before.
+
+    Attributes
+    ----------
+    keep : callable
+        Filter of the record.
+    integrator : str
+        How drives are run along the motion, as `vpm.simulate.Setup` names it.
+    commands : int
+        Which commands they are given: 0 for those of the record.
+    hold : Hold, optional
+        Gauges that hold the links along the record.
+    departure : ndarray, optional
+        By how much what is free begins away from rest.
+    record : int
+        Its number, among those that share the memo.
+    memo : Memo
+    """
+
+    keep: Filter
+    integrator: str = AUTOMATIC
+    commands: int = 0
+    hold: Hold | None = None
+    departure: Array | None = None
+    record: int = 0
+    memo: Memo = field(default_factory=Memo)
+
+    def filtered(self, values: Array, slopes: Array) -> Pair:
+        """Numbers (N, k) and their derivatives (N, k, columns) at the samples that are compared."""
+        (rows, *shape), width = slopes.shape, values.shape[1]
+        # All side by side: each pass of the filter begins with the same solution of its equations at rest.
+        both = self.keep(np.hstack([values, slopes.reshape(rows, math.prod(shape))]))
+        return np.ascontiguousarray(both[:, :width]), both[:, width:].reshape(len(both), *shape)
+
+    def answer(
+        self,
+        part: Part,
+        theta: Array,
+        columns: Sequence[int],
+        work: Work,
+        more: Hashable = (),
+        origin: Array | None = None,
+    ) -> Pair:
+        """Filtered numbers (n, k) of a part and their derivative (n, k, columns).
+
+        Parameters
+        ----------
+        part : Part
+        theta : ndarray, shape (P,)
+            Of the whole machine.
+        columns : sequence of int
+            Its parameters to differentiate by.
+        work : callable
+        more : hashable, optional
+            All else that the answer depends on.
+        origin : ndarray, shape (P,), optional
+            The answer is taken from the tangent at these values, not worked out at ``theta``.
+        """
+        values, names = theta[part.places], part.model.parameter_names
+        start = values if origin is None else np.where(part.felt, origin[part.places], values)
+        own = {int(part.places[place]): int(place) for place in np.flatnonzero(part.felt)}
+        felt = [number for number, column in enumerate(columns) if column in own]
+        moved = np.flatnonzero(values != start).tolist()
+        asked = list(dict.fromkeys([*(own[columns[number]] for number in felt), *moved]))
+
+        def worked(missing: Sequence[str]) -> Pair:
+            return self.filtered(*work(start, [names.index(name) for name in missing]))
+
+        key = self._key(part, start, more)
+        found, slopes = self.memo.recall(key, [names[place] for place in asked], worked)
+        derivative = np.zeros((*found.shape, len(columns)))
+        derivative[:, :, felt] = slopes[:, :, [asked.index(own[columns[number]]) for number in felt]]
+        return found + slopes @ (values - start)[asked] if moved else found, derivative
+
+    def share(
+        self, one: tuple[Part, Array], others: Sequence[tuple[Part, Array, Sequence[str]]], more: Hashable
+    ) -> None:
+        """Let other parts have the answer of ``one``, each with the values of its whole machine.
+
+        Of its own parameters, which come last, those that ``one`` was not differentiated by have no influence.
+        """
+        part, theta = one
+        known = self.memo.known(self._key(part, theta[part.places], more))
+        if known is None:
+            return
+        nothing = np.zeros_like(known.values)
+        for other, values, own in others:
+            names = [name for name in other.model.parameter_names if name in known.slopes or name in own]
+            slopes = {name: known.slopes.get(name, nothing) for name in names}
+            self.memo.keep(self._key(other, values[other.places], more), Answer(known.values, slopes))
+
+    def _key(self, part: Part, values: Array, more: Hashable) -> Hashable:
+        """What an answer depends on, for the values of its part."""
+        return self.record, part.model.structure, values[part.felt].tobytes(), more

@@ -1,0 +1,222 @@
+"""Parts of a machine that answer to a measured motion each by itself, each with only what its answer depends on.
+
+Along a given motion no mass and no law of a joint changes what a drive does, no drive the effort that the motion needs,
+and neither laws nor faults of drives how links bend: the balance is a sum. A candidate then asks for the part that it
+changes, and the others answer from memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from operator import itemgetter
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.catalogue import EFFECTS
+from vpm.model import Model
+from vpm.model.effects import Effect
+
+Indices = NDArray[np.int64]
+Content = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Part:
+    """A machine that answers for a part of another one; the values of its model mean nothing.
+
+    Attributes
+    ----------
+    model : Model
+    places : ndarray of int
+        Its parameters among those of the whole machine.
+    felt : ndarray of bool
+        Which of them change its answer.
+    inputs, states : ndarray of int
+        Its inputs, and its states of drives and supplies, among those of the whole machine, or of the bare one of
+        `Drives`.
+    """
+
+    model: Model
+    places: Indices
+    felt: NDArray[np.bool_]
+    inputs: Indices
+    states: Indices
+
+
+@dataclass(frozen=True)
+class Bending:
+    """A machine of which not all that moves was measured: what moves it, and what adds to its efforts.
+
+    Attributes
+    ----------
+    bare : Part
+        Without the laws of its joints and the faults of its drives.
+    laws, shell : Part, optional
+        Both with rigid links and no play: their difference in effort is that of the laws. None without laws.
+    """
+
+    bare: Part
+    laws: Part | None = None
+    shell: Part | None = None
+
+
+@dataclass(frozen=True)
+class Drives:
+    """Drives on joints that were all measured, those together that share a supply that gives way.
+
+    Attributes
+    ----------
+    bare : Part
+        The machine with rigid links, without joints that effects have split off.
+    parts : tuple of Part
+    """
+
+    bare: Part
+    parts: tuple[Part, ...]
+
+
+def whole(model: Model) -> Part:
+    """The machine as it is."""
+    return _part(model, model, set(model.parameter_names))
+
+
+def carried(model: Model) -> Part:
+    """All that the effort of a motion may depend on: nothing of cylinders, supplies and controllers."""
+    gone = {name for name in model.actuators if model.actuator_type(name) == "hydraulic"}
+    gone |= {*model.supplies, *model.controllers}
+    content = model.to_dict()
+    content = {key: entry for key, entry in content.items() if key not in {"supplies", "controllers"}}
+    for kind in ("actuators", "sensors"):
+        entries = content.get(kind, {})
+        gone |= {name for name, entry in entries.items() if _owner(entry.get("measures", name)) in gone}
+        content[kind] = {name: entry for name, entry in entries.items() if name not in gone}
+    content["effects"] = [entry for entry in content.get("effects", ()) if entry["at"] not in gone]
+    kept = Model.from_dict(content)
+    return _part(model, kept, set(kept.parameter_names))
+
+
+def drives_of(model: Model, joints: tuple[str, ...]) -> Drives | None:
+    """Split a machine into what its drives do on the measured ``joints``, which they feel alone.
+
+    The motor side of a joint that effects have split keeps the measured motion and the drives: these answer as in the
+    machine without such effects. None where that has other joints.
+    """
+    bare = model
+    for effect in model.effects if tuple(model.joints) != joints else ():
+        candidate = bare.without_effect(*effect.key)
+        bare = candidate if len(candidate.joints) < len(bare.joints) else bare
+    if tuple(bare.joints) != joints:
+        return None
+    bare = bare.at("rigid") if bare.beams else bare
+    parts = tuple(_drives(bare, model, group) for group in _groups(bare))
+    return Drives(_part(model, bare, set(bare.parameter_names), bare), parts)
+
+
+def moves_drives(model: Model, name: str) -> bool:
+    """Whether a parameter can change what drives do along a given motion; none of bodies, joints and gravity can."""
+    owner = _owner(name)
+    return owner not in model.joints and owner not in model.bodies and owner != "world"
+
+
+def bending(model: Model, joints: tuple[str, ...], *, wound: bool | None = None) -> Bending | None:
+    """Split a machine whose measured ``joints`` are all that it has beside plays; None where nothing bends or flies.
+
+    Joints that are ``wound`` up count as plays do. By default they do where a joint remembers its way: a motion that is
+    worked out carries no memory along, and the measured joint, on the side of the motor, is the one that remembers.
+    """
+    wound = any(effect.type.memory for effect in model.effects) if wound is None else wound
+    splitting = [e for e in model.effects if e.type.has_play or (wound and e.type.splits)]
+    plays = [e for e in splitting if model.joint_behind(e.at)]
+    flying = {model.joint_behind(e.at) for e in plays}
+    if any(e.side == "link" and model.joint_behind(e.at) for e in model.effects):
+        return None  # what acts behind a spring moves it
+    if tuple(joint for joint in model.joints if joint not in flying) != joints:
+        return None
+    if not model.core.n_elastic and (not plays or any(e.type.rotor for e in model.effects)):
+        return None  # a rotor is what flies against
+    aside = [e for e in model.effects if e.type.site in {"joint", "actuator"} and not e.type.splits]
+    if len(aside) + len(plays) < sum(e.type.site in {"joint", "actuator"} for e in model.effects):
+        return None
+    return _bending(model, plays, aside)
+
+
+def _bending(model: Model, plays: Sequence[Effect], aside: Sequence[Effect]) -> Bending:
+    content = model.to_dict()
+    bare = _without(content, aside)
+    owners = {*model.actuators, *model.controllers}
+    moving = _part(model, bare, {name for name in bare.parameter_names if _owner(name) not in owners})
+    laws = [effect for effect in aside if effect.type.site == "joint"]
+    if not laws:
+        return Bending(moving)
+    read = [effect for effect in model.effects if effect.type.site == "sensor"]
+    felt = {name for effect in (*laws, *read) for name in effect.parameter_names.values()}
+    # With rigid links; a beam that bends by an effect does so at every level.
+    bent = [*plays, *(effect for effect in model.effects if effect.type.motion == "bending")]
+    rigid = bool(model.core.n_elastic)
+    with_laws, shell = (_without(content, effects, rigid=rigid) for effects in (bent, [*bent, *aside]))
+    return Bending(moving, _part(model, with_laws, felt), _part(model, shell, felt))
+
+
+def _without(content: Content, effects: Sequence[Effect], *, rigid: bool = False) -> Model:
+    """The machine of a model file's content without some effects, and with rigid links."""
+    gone = {(effect.name, effect.at, effect.side) for effect in effects}
+    of = itemgetter("type", "at")
+    kept = [entry for entry in content.get("effects", ()) if (*of(entry), entry.get("side", "motor")) not in gone]
+    changed = {**content, "effects": kept}
+    if rigid:
+        changed["beams"] = {name: {**beam, "level": "rigid"} for name, beam in content["beams"].items()}
+    return Model.from_dict(changed)
+
+
+def _groups(model: Model) -> list[tuple[str, ...]]:
+    """Names of drives that belong together: those of one supply with a state, such as a pressure that sags."""
+    if model.beams:
+        return [tuple(model.actuators)]
+    giving_way = {_owner(name) for name in model.internal_names} & set(model.supplies)
+    groups: dict[str, list[str]] = {}
+    for name in model.actuators:
+        supply = model.supply_of_actuator(name)
+        groups.setdefault(f"supply {supply}" if supply in giving_way else name, []).append(name)
+    return [tuple(group) for group in groups.values()]
+
+
+def _drives(model: Model, machine: Model, group: Sequence[str]) -> Part:
+    """Some of the drives, without laws of joints, controllers and all that belongs to other drives alone."""
+    content = model.to_dict()
+    content.pop("controllers", None)
+    joints = {joint for name in group for joint in model.joints_of_actuator(name)}
+    felt, sensors = {*group, *joints, *model.supplies}, content.get("sensors", {})
+    content["sensors"] = {name: entry for name, entry in sensors.items() if _owner(entry["measures"]) in felt}
+    content["actuators"] = {name: content["actuators"][name] for name in group}
+    sites = {*group, *model.supplies, *content["sensors"]}
+    effects = [entry for entry in content.get("effects", ()) if entry["at"] in sites]
+    content["effects"] = [entry for entry in effects if EFFECTS[entry["type"]].site != "joint"]
+    alone = Model.from_dict(content)
+    return _part(machine, alone, {name for name in alone.parameter_names if moves_drives(alone, name)}, model)
+
+
+def _owner(name: str) -> str:
+    return name.partition(".")[0]
+
+
+def _part(model: Model, alone: Model, felt: Collection[str], within: Model | None = None) -> Part:
+    """A machine for a part of ``model``, whose answer changes with the parameters ``felt`` alone.
+
+    Its inputs and states are those of a machine ``within`` that, if it is another one.
+    """
+    names, within = alone.parameter_names, within or model
+    return Part(
+        alone,
+        _places(names, model.parameter_names),
+        np.array([name in felt for name in names], dtype=np.bool_),
+        _places(alone.inputs, within.inputs),
+        _places(alone.internal_names, within.internal_names),
+    )
+
+
+def _places(names: Sequence[str], among: Sequence[str]) -> Indices:
+    places = {name: place for place, name in enumerate(among)}
+    return np.array([places[name] for name in names], dtype=np.int64)

@@ -1,0 +1,180 @@
+"""Names of what a model is missing: from a ranking of the training records, or from a search on balances of effort."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Literal, TypeVar
+
+from vpm.catalogue import EFFECTS
+from vpm.discrepancy.ambiguity import Rivals, rivals
+from vpm.discrepancy.by_ranking import free_joints, searched, why_not_ranked
+from vpm.discrepancy.by_ranking import notes as notes_of
+from vpm.discrepancy.confirmation import Data, Judged
+from vpm.discrepancy.contacts import with_told_contacts
+from vpm.discrepancy.overlooked import overlooked
+from vpm.discrepancy.search import Search, further, search
+from vpm.discrepancy.side_by_side import SideBySide
+from vpm.discrepancy.standing import in_order, replaced, timed_again
+from vpm.discrepancy.told_apart import told_apart
+from vpm.errors import DiagnosisError, VpmError
+from vpm.experiment import Experiment
+from vpm.model import Model
+from vpm.ranking import Ranking, Settings, rank
+from vpm.simulate import Setup
+
+#: What an interrupted diagnosis says of itself.
+STOPPED = "stopped by Ctrl-C before every candidate was tried: this is what was known until then"
+#: Which way the names came.
+RANKED = "names come from a ranking of the training records"
+SEARCHED = "names come from a search on balances of effort, for {reason}"
+NOT_SEARCHED = "a search on balances of effort does not try {effects}"
+#: Said where names come from a search.
+UNSEEN = "the joint {joint} has no drive, so that no balance of effort sees what acts there, and nothing is said of it"
+#: Said where an error follows a search, and what such an error is.
+FAILED = "{what} could not be computed: {error}"
+BROKEN = (ValueError, ArithmeticError, LookupError)
+
+Tell = Callable[[str], None]
+#: Where names come from.
+Names = Literal["ranking", "search"]
+RANKING: Names = "ranking"
+Found = TypeVar("Found")
+
+
+def ranking_of(
+    model: Model,
+    records: tuple[Sequence[Experiment], Sequence[Experiment]],
+    by: tuple[Names, Sequence[str] | None, int],
+    setup: Setup,
+    tell: Tell,
+    each: SideBySide,
+    notes: list[str],
+) -> Ranking | None:
+    """A ranking of the training records where names are to come from one and it covers the machine.
+
+    Unseen records only say, at the end, how much of their error what was found leaves.
+
+    ``by`` says where names come from, of which effects, and how many at most. What keeps it from that is noted.
+    """
+    names, effects, limit = by
+    training, unseen = records
+    if names != "ranking":
+        notes.extend(_not_searched(effects, f'names="{names}" was asked for'))
+        return None
+    reason = why_not_ranked(model, training)
+    if not reason:
+        tell("ranking what could be missing")
+        try:
+            return rank(
+                model,
+                training,
+                unseen,
+                effects=effects,
+                settings=Settings(effects=limit),
+                setup=setup,
+                workers=each.workers,
+                tell=tell,
+                progress=each.progress,
+            )
+        except KeyboardInterrupt:
+            return Ranking((), (), model, model, interrupted=True, hold=setup.course)
+        except (VpmError, ArithmeticError) as error:
+            reason = f"a ranking fails: {error}"
+    notes.append(SEARCHED.format(reason=reason))
+    notes.extend(_not_searched(effects, reason))
+    notes.extend(UNSEEN.format(joint=joint) for joint in free_joints(model))
+    return None
+
+
+def named(
+    ranking: Ranking | None,
+    recalibrated: Judged,
+    data: Data,
+    by: tuple[Names, Sequence[str] | None, int],
+    tell: Tell,
+    each: SideBySide,
+    notes: list[str],
+) -> tuple[Search, tuple[Rivals, ...], bool]:
+    """What is missing by a ranking or else by a search, what else would do, and whether Ctrl-C left that open."""
+    _, effects, limit = by
+    screened = _searchable(effects)
+    if ranking is not None:
+        tell("measuring what was named on unseen records")
+        found, ambiguous = searched(ranking, recalibrated, data, Settings(effects=limit), effects)
+        told = {one.key for one in ranking.effects}
+        lost = [one for one in found.refused if (one.name, one.site) in told]
+        notes.extend([RANKED, *notes_of(found.accepted), *([STOPPED] if found.interrupted else [])])
+        notes.extend(f"the ranking names {one.name} at {one.site}: {one.reason}" for one in lost)
+        return found, ambiguous, False
+    found = search(recalibrated, data, screened, limit, tell, each)
+    if found.interrupted:
+        notes.append(STOPPED)
+    tell("looking for what else would do in the place of each effect")
+    nothing: tuple[Rivals, ...] = ()
+    settle = partial(_settled, found, data, screened, limit, tell, each)
+    try:
+        (found, ambiguous), late = until_stopped(settle, (found, nothing))
+    except BROKEN as error:
+        notes.append(FAILED.format(what="what else would do in the place of each effect", error=error))
+        ambiguous, late = nothing, False
+    return found, ambiguous, late
+
+
+def _settled(
+    found: Search, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: SideBySide
+) -> tuple[Search, tuple[Rivals, ...]]:
+    """Names and their order when each effect has been taken out again, with what would do in its place.
+
+    Where something takes the place of an effect, or comes in beside it as runs of the model ask for it, the search goes
+    on beside that.
+    """
+    known = rivals(found.final, data, found.accepted, effects, each, found.last)
+    for _ in range(limit):
+        changed, known = replaced(found, known, data)
+        if changed is found:
+            changed, known = timed_again(found, known, data)
+        if changed is found and not found.interrupted:
+            changed, known = told_apart(found, known, data, each)
+        if changed is found and not found.interrupted:
+            changed = overlooked(found, data, each)
+        if changed is found:
+            break
+        found = changed if found.interrupted else further(changed, data, effects, limit, tell, each)
+        if len(found.accepted) != 1 or len(known) != 1 or found.final is not changed.final:
+            known = rivals(found.final, data, found.accepted, effects, each, found.last)
+    found, known = in_order(found, known)
+    return with_told_contacts(found, data, each), known
+
+
+def until_stopped(work: Callable[[], Found], nothing: Found) -> tuple[Found, bool]:
+    """What some work gives, or ``nothing`` if Ctrl-C ended it, and whether it did."""
+    try:
+        return work(), False
+    except KeyboardInterrupt:
+        return nothing, True
+
+
+def _searchable(effects: Sequence[str] | None) -> Sequence[str] | None:
+    """Those of the effects asked for that a search tries; all of these if not given."""
+    return None if effects is None else [name for name in effects if EFFECTS[name].screened]
+
+
+def _not_searched(effects: Sequence[str] | None, reason: str) -> list[str]:
+    """What is to be said of effects that were asked for and that a search does not try.
+
+    Raises
+    ------
+    DiagnosisError
+        There are no others; ``reason`` says why no ranking tries them.
+    """
+    left_out = [name for name in effects or () if not EFFECTS[name].screened]
+    if not left_out:
+        return []
+    told = ", ".join(left_out)
+    if not _searchable(effects):
+        raise DiagnosisError(
+            f"a search on balances of effort does not try {told}, and a ranking, which does, is no way here: {reason}; "
+            "ask for other effects"
+        )
+    return [NOT_SEARCHED.format(effects=told)]
