@@ -151,6 +151,27 @@ def test_a_stiff_bushing_comes_to_the_loop(parallelogram: Model) -> None:
     assert away[1] < 0.05 * away[0]
 
 
+def test_mujoco_accelerates_the_same(parallelogram: Model) -> None:
+    """Its constraints are soft: with the hardest impedance they let go a ten thousandth of what loops hold."""
+    mujoco = pytest.importorskip("mujoco")
+    hinge, hard = 'type="hinge" axis="0 1 0"', 'solimp="0.9999 0.9999 0.001"'
+    crank = '<inertial pos="0.15 0 0" mass="1" diaginertia="1e-4 7.5e-3 7.5e-3"/>'
+    spec = f"""<mujoco><option gravity="0 0 -9.81"/><worldbody>
+    <body name="left"><joint {hinge}/>{crank}
+      <body name="coupler" pos="0.3 0 0"><joint {hinge}/>
+        <inertial pos="0.25 0 0" mass="2" diaginertia="1e-4 0.042 0.042"/></body></body>
+    <body name="right" pos="0.5 0 0"><joint {hinge}/>{crank}</body></worldbody>
+    <equality><connect body1="coupler" body2="right" anchor="0.5 0 0" {hard}/></equality></mujoco>"""
+    machine = mujoco.MjModel.from_xml_string(spec)
+    data = mujoco.MjData(machine)
+    x = parallelogram.state({"left_crank.position": 0.7, "left_crank.velocity": 2.0})
+    data.qpos[:], data.qvel[:] = x[:3], x[3:]
+    data.qfrc_applied[0] = -0.05 * 2.0  # friction of the left crank
+    mujoco.mj_forward(machine, data)
+    ours = parallelogram.forward_dynamics(x[:3], x[3:], np.zeros(3))
+    assert data.qacc == pytest.approx(ours, rel=1e-3)
+
+
 def test_a_linear_model_in_independent_coordinates(parallelogram: Model) -> None:
     linear = parallelogram.linearize({"left_crank.position": math.pi / 2})
     assert linear.states == ("left_crank.position", "left_crank.velocity")
@@ -288,6 +309,7 @@ def test_a_model_with_loops_is_written_and_read(parallelogram: Model) -> None:
 
 def test_karl_agrees_with_its_linkage() -> None:
     model, karl = load("karl"), linkages.load(EXAMPLES / "karl" / "karl.toml")
+    assert isinstance(karl, linkages.Karl)
     for strokes in ((0.20, 0.18), (0.22, 0.2), (0.24, 0.22)):
         q = model.loops.assembled({"stroke1": strokes[0], "stroke2": strokes[1]})
         poses = karl.direct(strokes)
@@ -319,8 +341,9 @@ def test_karl_loses_control_at_the_published_strokes(
     """The eight singular strokes of D'Imperio 2016, section 2.4.1: as printed, and those of the closed form."""
     found = [place.value for place in load("karl").loops.singularities(stroke, held, guess)]
     assert sorted(found) == pytest.approx(sorted(published), abs=6e-5)
-    linkage = linkages.load(EXAMPLES / "karl" / "karl.toml").singularities()
-    exact = np.asarray(linkage.strokes)
+    karl = linkages.load(EXAMPLES / "karl" / "karl.toml")
+    assert isinstance(karl, linkages.Karl)
+    exact = np.asarray(karl.singularities().strokes)
     assert all(np.abs(exact - value).min() < 1e-10 for value in found)
 
 
@@ -411,7 +434,7 @@ def random_machine(seed: int) -> Model:
                 "axis": unit(),
             }
             last[chain] = name
-    closed = {
+    closed: dict[str, Any] = {
         "type": ("spherical", "revolute", "rigid")[seed % 3],
         "a": {"parent": last["a"]},
         "b": {"parent": last["b"]},
@@ -492,7 +515,8 @@ def test_a_flexible_rod_in_a_slider_crank() -> None:
     r, L, w, dt = 0.1, 0.4, 30.0, 2e-4
     x = model.state({"crank.position": 0.0, "crank.velocity": w})
     outputs, states, _ = run(model, x, 801, dt, "rosenbrock")
-    n, t = len(model.coordinates), dt * np.arange(801)
+    n = len(model.coordinates)
+    t: Array = dt * np.arange(801.0)
     assert gaps(model, states[::100])[0] < 1e-12
     energy = [sum(model.energy(s[:n], s[n : 2 * n])) for s in states[::100]]
     assert np.ptp(energy) < 1e-7 * energy[0]

@@ -18,7 +18,7 @@ from vpm.model.loop_rest import rest
 from vpm.numbers import array_of, number_of
 
 if TYPE_CHECKING:
-    from vpm.model.model import Model
+    from vpm.model.evaluation import Evaluations
 
 Array = NDArray[np.float64]
 
@@ -66,7 +66,7 @@ class Loops:
     >>> model.loops.efforts(q, v, a)
     """
 
-    def __init__(self, model: Model) -> None:
+    def __init__(self, model: Evaluations) -> None:
         self._model = model
 
     @cached_property
@@ -204,7 +204,7 @@ class Loops:
     def accelerations(self, q: ArrayLike, v: ArrayLike, given: Mapping[str, float]) -> Array:
         """Accelerations of all coordinates that follow from those of the independent ones, shape (n,)."""
         state, names = self.at(q, v), tuple(given)
-        a = self.transmission(q, names) @ np.array([given[name] for name in names])
+        a: Array = self.transmission(q, names) @ np.array([given[name] for name in names])
         free = [place for place, name in enumerate(self._model.coordinates) if name not in names]
         a[free] += least(state.jacobian[:, free], -state.drift)
         return a

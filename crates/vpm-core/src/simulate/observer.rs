@@ -112,7 +112,7 @@ impl Noise<'_> {
 }
 
 /// What closed loops take away.
-pub(super) const OBSERVED: &str = "an observer, which would correct states one by one";
+pub(super) const OBSERVED: &str = "an observer that corrects states one by one";
 
 /// The innovations of an extended Kalman filter on `readings` from `initial_state`, with its gains; a mere table of inputs is held.
 ///
