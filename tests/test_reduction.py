@@ -122,9 +122,10 @@ def test_point_masses_have_the_kinetic_energy_of_the_solid_in_any_motion() -> No
     )
     q *= 1e-2
     # The modes of all nodes, again: the fields of the link are those of its point masses alone.
-    from vpm.reduction.craig_bampton import _own_modes, _Tied
+    from vpm.reduction.craig_bampton import _own_modes
+    from vpm.reduction.tied import Tied
 
-    tied = _Tied(structure)
+    tied = Tied(structure)
     basis = np.hstack([tied.constraint_modes(), tied.fixed_modes(MODES)])
     shapes = tied.nodal(_own_modes(tied, basis, MODES)[1]).reshape(-1, 3, MODES)
 
