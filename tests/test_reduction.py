@@ -122,9 +122,10 @@ def test_point_masses_have_the_kinetic_energy_of_the_solid_in_any_motion() -> No
     )
     q *= 1e-2
     # The modes of all nodes, again: the fields of the link are those of its point masses alone.
-    from vpm.reduction.craig_bampton import _own_modes, _Tied
+    from vpm.reduction.craig_bampton import _own_modes
+    from vpm.reduction.tied import Tied
 
-    tied = _Tied(structure)
+    tied = Tied(structure)
     basis = np.hstack([tied.constraint_modes(), tied.fixed_modes(MODES)])
     shapes = tied.nodal(_own_modes(tied, basis, MODES)[1]).reshape(-1, 3, MODES)
 
@@ -354,3 +355,40 @@ def test_an_archive_without_its_parts_is_refused(tmp_path: Path) -> None:
     np.savez(tmp_path / "bare.npz", nodes=structure.nodes)
     with pytest.raises(ReductionError, match="has no stiffness"):
         vpm.reduce(tmp_path / "bare.npz")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_damaged_files_of_links_are_told_in_a_sentence(seed: int) -> None:
+    random = np.random.default_rng(seed)
+    content = reduce_structure(witness(), 2).link.to_bytes()
+    for _ in range(20):
+        damaged = np.frombuffer(content, dtype=np.uint8).copy()
+        damaged[random.integers(damaged.size, size=8)] ^= np.uint8(1 << random.integers(8))
+        try:
+            ReducedLink.from_bytes(damaged.tobytes()[: random.integers(1, damaged.size + 1)])
+        except ModelError as error:
+            assert "vpm reduce" in str(error)  # noqa: PT017
+
+
+def test_links_whose_numbers_do_not_fit_are_refused() -> None:
+    link = reduce_structure(witness(), 2).link
+    changes: dict[str, dict[str, Any]] = {
+        "points of shape": {"points": link.points[1:]},
+        "above 0": {"squares": -link.squares},
+        "not finite": {"places": np.full_like(link.places, np.nan)},
+        "0 interfaces": {"interfaces": ()},
+        "2 modes have 3": {"point_curved": np.ones((link.masses.size, 2, 3)), "curved": np.ones((1, 2, 6))},
+    }
+    for part, change in changes.items():
+        with pytest.raises(ModelError, match=part):
+            replace(link, **change)
+
+
+def test_a_root_may_be_held_on_average() -> None:
+    """What holds less lets the bar swing slower, but little."""
+    structure = witness()
+    root, tip = structure.interfaces
+    averaged = reduce_structure(replace(structure, interfaces=(replace(root, tie="averaged"), tip)), 3)
+    shares = averaged.frequencies / reduce_structure(structure, 3).frequencies
+    assert (shares < 1.0).all()
+    assert (shares > 0.9).all()

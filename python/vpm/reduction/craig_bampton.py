@@ -10,17 +10,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 import scipy.linalg
-import scipy.sparse as sp
-import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
 from vpm.errors import ReductionError
 from vpm.model.reduced import MODES, ReducedLink
-from vpm.reduction.structure import Matrix, Structure, check_structure, check_units, rigid_motions
+from vpm.reduction.structure import Structure, check_structure, check_units, rigid_motions
+from vpm.reduction.tied import Tied
 
 Array = NDArray[np.float64]
 
@@ -104,7 +102,7 @@ def reduce_structure(structure: Structure, modes: int = 8) -> Reduction:
     if not 1 <= modes <= MODES:
         raise ReductionError(f"{modes} modes are asked for, but 1 to {MODES} are possible")
     check_structure(structure)
-    solid = _Tied(structure)
+    solid = Tied(structure)
     basis = np.hstack([solid.constraint_modes(), solid.fixed_modes(modes)])
     squares, shapes = _own_modes(solid, basis, modes)
     check_units(structure, float(np.sqrt(squares[0]) / (2.0 * np.pi)))
@@ -120,133 +118,7 @@ def reduce_structure(structure: Structure, modes: int = 8) -> Reduction:
     return Reduction(link, np.sqrt(squares) / (2.0 * np.pi), full, effective, shares, structure.total_mass)
 
 
-class _Tied:
-    """A solid whose interfaces are tied to frames: rigid ties are eliminated, averages stand as rows beside.
-
-    The unknowns are the displacements of all other nodes and the motions of rigidly tied frames.
-    """
-
-    def __init__(self, structure: Structure) -> None:
-        self.structure = structure
-        n = 3 * len(structure.nodes)
-        tied = [interface for interface in structure.interfaces if interface.tie == "rigid"]
-        held = {int(node) for interface in tied for node in interface.nodes}
-        free = np.array([node for node in range(len(structure.nodes)) if node not in held], dtype=np.intp)
-        if free.size == 0:
-            raise ReductionError("all nodes are tied rigidly to frames, so nothing can deform; name fewer nodes")
-        dofs = (3 * free[:, None] + np.arange(3)).ravel()
-        parts = [sp.csr_array((np.ones(dofs.size), (dofs, np.arange(dofs.size))), shape=(n, dofs.size))]
-        self.rows: list[Matrix] = []
-        self.arms = [
-            structure.nodes[i.nodes] - place for i, place in zip(structure.interfaces, structure.places, strict=True)
-        ]
-        size = dofs.size + 6 * len(tied)
-        for interface, arms in zip(structure.interfaces, self.arms, strict=True):
-            own = (3 * interface.nodes[:, None] + np.arange(3)).ravel()
-            motions = rigid_motions(arms)
-            if interface.tie == "rigid":
-                at = sum(part.shape[1] for part in parts)
-                rows = np.repeat(own, 6)
-                parts.append(sp.csr_array((motions.ravel(), (rows, np.tile(np.arange(6), own.size))), shape=(n, 6)))
-                self.rows.append(sp.csr_array((np.ones(6), (np.arange(6), at + np.arange(6))), shape=(6, size)))
-            else:
-                average = sp.csr_array(
-                    (np.linalg.pinv(motions).ravel(), (np.repeat(np.arange(6), own.size), np.tile(own, 6))),
-                    shape=(6, n),
-                )
-                self.rows.append(average)
-        self.tie = sp.csr_array(sp.hstack(parts))
-        self.rows = [row if row.shape[1] == size else sp.csr_array(row @ self.tie) for row in self.rows]
-        self.stiffness = sp.csr_array(self.tie.T @ structure.stiffness @ self.tie)
-        self.mass = sp.csr_array(self.tie.T @ structure.mass @ self.tie)
-
-    @property
-    def size(self) -> int:
-        """Number of unknowns."""
-        return int(self.stiffness.shape[0])
-
-    @cached_property
-    def free(self) -> _Held:
-        """Held at the root alone."""
-        return _Held(self.stiffness, self.rows[:1])
-
-    @cached_property
-    def fixed(self) -> _Held:
-        """Held at all interfaces."""
-        return _Held(self.stiffness, self.rows)
-
-    def constraint_modes(self) -> Array:
-        """Deflections by a unit motion of each interface but the root, the others held."""
-        motions = 6 * len(self.rows)
-        return self.fixed.solve(np.zeros((self.size, motions - 6)), np.eye(motions)[:, 6:])
-
-    def fixed_modes(self, count: int) -> Array:
-        """Slowest modes with all interfaces held."""
-        return _slowest(self.fixed, self.mass, count)[1]
-
-    def free_frequencies(self, count: int) -> Array:
-        """Slowest frequencies with the root held (Hz)."""
-        return np.sqrt(_slowest(self.free, self.mass, count)[0]) / (2.0 * np.pi)
-
-    def compliance(self) -> Array:
-        """Motions of the interfaces but the root under unit loads on them."""
-        rows = sp.csr_array(sp.vstack(self.rows[1:]))
-        loads = rows.T.toarray()
-        return np.asarray(rows @ self.free.solve(loads, np.zeros((6, loads.shape[1]))))
-
-    def nodal(self, shapes: Array) -> Array:
-        """Displacements of all nodes, shape (3 N, n)."""
-        return np.asarray(self.tie @ shapes)
-
-    def frames(self, shapes: Array) -> Array:
-        """Motions of the interfaces but the root, shape (m, 6, n)."""
-        return np.array([row @ shapes for row in self.rows[1:]])
-
-
-class _Held:
-    """A stiffness with some motions held: solved again and again by one factorisation."""
-
-    def __init__(self, stiffness: Matrix, rows: list[Matrix]) -> None:
-        self.n = int(stiffness.shape[0])
-        held = sp.csr_array(sp.vstack(rows))
-        self.scale = float(stiffness.diagonal().mean())
-        block = sp.csc_array(sp.block_array([[stiffness, self.scale * held.T], [self.scale * held, None]]))
-        try:
-            self.factors = spla.splu(block, permc_spec="MMD_AT_PLUS_A")
-        except RuntimeError:
-            raise ReductionError(
-                "the stiffness matrix is singular with the interfaces held: parts of it hang on nothing; join them"
-            ) from None
-
-    def solve(self, loads: Array, motions: Array) -> Array:
-        """Deflections under loads (columns) at given motions of what is held."""
-        return np.asarray(self.factors.solve(np.vstack([loads, self.scale * motions]))[: self.n])
-
-    def under(self, load: Array) -> Array:
-        """Deflection under one load, what is held at rest."""
-        padded = np.zeros(self.factors.shape[0])
-        padded[: self.n] = load
-        return np.asarray(self.factors.solve(padded)[: self.n])
-
-
-def _slowest(held: _Held, mass: Matrix, count: int) -> tuple[Array, Array]:
-    """Squared angular frequencies and modes of unit modal mass, slowest first, by shift and invert (Lanczos)."""
-    if count >= held.n - 1:
-        raise ReductionError(f"{count} modes are asked for, but the solid has {held.n} displacements; take fewer modes")
-    inverse = spla.LinearOperator((held.n, held.n), matvec=held.under, dtype=np.float64)
-    start = held.under(mass @ np.ones(held.n))
-    # Of the matrix itself eigsh takes the shape alone where the inverse is given.
-    values, shapes = spla.eigsh(mass, k=count, M=mass, sigma=0.0, OPinv=inverse, v0=start)
-    order = np.argsort(values)
-    if not values.min() > 0.0:
-        raise ReductionError(
-            f"the stiffness matrix has the squared frequency {values.min():.3g} 1/s^2 with its interfaces held; it "
-            "has to be above 0, so export it without loads"
-        )
-    return values[order], shapes[:, order]
-
-
-def _own_modes(solid: _Tied, basis: Array, count: int) -> tuple[Array, Array]:
+def _own_modes(solid: Tied, basis: Array, count: int) -> tuple[Array, Array]:
     """Slowest modes within a basis, of unit modal mass; the largest entry of each is positive."""
     basis = basis / np.sqrt(np.einsum("ij,ij->j", basis, solid.mass @ basis))
     stiffness, mass = basis.T @ (solid.stiffness @ basis), basis.T @ (solid.mass @ basis)
@@ -256,7 +128,7 @@ def _own_modes(solid: _Tied, basis: Array, count: int) -> tuple[Array, Array]:
     return values[:count], shapes
 
 
-def _second(solid: _Tied, fields: Array, frames: Array) -> tuple[Array, Array] | None:
+def _second(solid: Tied, fields: Array, frames: Array) -> tuple[Array, Array] | None:
     """Second derivatives by each pair of modes, of all displacements and of the frames; None where unknown.
 
     A deflection of second order is what undoes the stress of the second-order strain: ``K gamma = -int B^T C sym(A_i^T
