@@ -21,6 +21,7 @@ PACKAGE = ROOT / "python" / "vpm"
 
 OPTIONAL = {
     *("asammdf", "control", "h5py", "jinja2", "matplotlib", "mcap", "nptdms", "pandas", "pyarrow", "pyulog", "rosbags"),
+    "skfem",
 }
 """Libraries of the extras: a plain install has none of them."""
 

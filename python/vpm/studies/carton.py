@@ -110,11 +110,12 @@ def motion() -> tuple[Array, Array]:
 
 def fold(model: Model) -> Fold:
     """Turn the carton under its finger."""
-    import vpm
+    from vpm.experiment import Experiment
+    from vpm.simulate import simulate
 
     time, angle = motion()
-    log = vpm.Experiment.from_arrays(time, {"fold.position": angle}, units={"fold.position": "rad"}, name="fold")
-    run = vpm.simulate(model, log, "prescribed_motion", cutoff=CUTOFF, integrator="adaptive")
+    log = Experiment.from_arrays(time, {"fold.position": angle}, units={"fold.position": "rad"}, name="fold")
+    run = simulate(model, log, "prescribed_motion", cutoff=CUTOFF, integrator="adaptive")
     return Fold(np.interp(run.time, time, angle), run["finger.normal_force"], -run["crease.position"])
 
 

@@ -74,6 +74,15 @@ class Yoke:
         arc = 0.5 * np.pi * self.turn
         return np.cumsum([0.0, self.leg, arc, 0.5 * (self.top - self.pad), 0.5 * self.pad])
 
+    def clear(self, places: Array) -> NDArray[np.bool_]:
+        """Which places, shape (3, ...), are one and a half thicknesses along the arch from its ends and the pad."""
+        ends, inner = self.lengths(), 0.5 * self.spacing - self.turn
+        side, z = np.abs(places[0]), places[2]
+        angle = np.clip(np.arctan2(z - self.leg, np.maximum(side - inner, 0.0)), 0.0, 0.5 * np.pi)
+        way = np.minimum(z, self.leg) + self.turn * angle + np.maximum(0.0, inner - side)
+        far = 1.5 * self.thickness
+        return np.asarray((way > far) & (way < ends[3] - far))
+
     def bend(self, along: Array, across: Array, depth: Array) -> Array:
         """Places of points given by the way along the middle line, the way outwards from it, and y."""
         ends = self.lengths()
