@@ -85,6 +85,8 @@ def _refine(found: Search, progress: Progress) -> None:
         count = sum(mesh.size - 1 for mesh in found.motion.meshes)
         run = _Run(found, lambda text, count=count: progress(f"{count} intervals, {text}"), warm=number > 0)
         run.solve()
+        if run.status not in _GOOD and number == 0:
+            run = _calm(found, progress) or run
         if run.status not in _GOOD:
             if number == 0:
                 raise OptimisationError(_why(found, run))
@@ -108,6 +110,29 @@ def _refine(found: Search, progress: Progress) -> None:
         if number < task.refinements:
             found.motion = found.motion.on(meshes)
     found.notes.append(f"After {task.refinements} refinements the mesh is still coarser than the tolerance asks for.")
+
+
+def _calm(found: Search, progress: Progress) -> _Run | None:
+    """The same from a motion of least energy in a fixed time, which is found more easily; the longest time first."""
+    task, start = found.task, found.motion
+    for share in (1.0, 0.5):
+        times = tuple(part.longest**share * part.shortest ** (1.0 - share) for part in task.phases)
+        phases = tuple(
+            replace(part, shortest=time, longest=time) for part, time in zip(task.phases, times, strict=True)
+        )
+        found.task = replace(task, phases=phases, weights={"energy": 1.0})
+        easier = _Run(found, lambda text: progress(f"least energy in a fixed time first: {text}"), warm=False)
+        easier.z = easier.form.pack(replace(start, durations=np.array(times)))
+        easier.solve()
+        found.task = task
+        if easier.status in _GOOD:
+            found.motion = easier.motion
+            run = _Run(found, lambda text: progress(f"from least energy: {text}"), warm=False)
+            run.solve()
+            if run.status in _GOOD:
+                return run
+            found.motion = start
+    return None
 
 
 class _Run:
@@ -202,22 +227,21 @@ def _watch(run: _Run) -> Any:  # noqa: ANN401
 
 def _why(found: Search, run: _Run) -> str:
     """Why there is no motion: the nearest one with all limits kept, what it misses and which limits bind."""
-    name, status = "the task", run.status
     soft = _Run(found, lambda _: None, warm=False)
     soft.solve(soft=True)
     missed = soft.form.missed(soft.z)
-    if soft.status in _GOOD and missed:
-        what, unit, amount, _ = missed[0]
-        held = binding(found.channels, found.task, soft.motion)
-        limits = f"; on the way {' and '.join(held)}" if held else ""
-        return (
-            f"no motion fulfils {name}: the nearest one misses {what} by {amount:.4g} {unit}{limits}; allow more of these, "
-            "more time, or ask for less"
-        )
-    if soft.status in _GOOD:
-        return f"the search for a motion ended with {status}, though one exists; give other limits of time or more intervals"
-    worst = _worst(soft)
-    return f"no motion was found within the limits ({soft.status}): {worst}; allow more, or give more intervals"
+    if soft.status not in _GOOD:
+        return f"no motion was found within the limits ({soft.status}): {_worst(soft)}; allow more, or more intervals"
+    if not missed:
+        return f"the search ended with {run.status}, though motions exist; give more intervals or other limits of time"
+    what, unit, there, wanted = missed[0]
+    held = binding(found.channels, found.task, soft.motion)
+    limits = f", and {' and '.join(held)}" if held else ""
+    unit = "" if unit == "1" else f" {unit}"
+    return (
+        f"the search found no motion that fulfils the task: the nearest one has {what} {there:.5g}{unit} in place of {wanted:.5g}{unit}{limits}; "
+        "allow more, or ask for less"
+    )
 
 
 def _worst(run: _Run) -> str:
@@ -235,8 +259,7 @@ def binding(channels: Channels, task: Fitted, motion: MeshMotion) -> tuple[str, 
     found = []
     own, total = channels.own, motion.starts[-1]
     times = np.linspace(0.0, total, 1001)
-    states, rates, commands = motion.at(times)
-    del rates
+    states, _, commands = motion.at(times)
     outputs = channels.outputs(states, commands)
     values = dict(zip(own.channels, outputs.T, strict=True))
     values |= dict(zip(own.states, states.T, strict=True)) | dict(zip(own.commands, commands.T, strict=True))
@@ -253,6 +276,11 @@ def binding(channels: Channels, task: Fitted, motion: MeshMotion) -> tuple[str, 
             if share >= 0.005:
                 unit = "" if limit.unit == "1" else f" {limit.unit}"
                 found.append(f"{limit.channel} is at its {word} of {end:.4g}{unit} for {100.0 * share:.0f} % of the time")
+            if limit.channel in own.commands and any(
+                held is not None and abs(held[own.commands.index(limit.channel)] - end) <= 1e-3 * width
+                for held in motion.rests
+            ):
+                found.append(f"{limit.channel} is at its {word} of {end:.4g} {limit.unit} while it holds the machine at rest")
     return tuple(found)
 
 

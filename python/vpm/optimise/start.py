@@ -81,23 +81,34 @@ def _nearest(
     for one in limits:
         if one.channel in names:
             low[names.index(one.channel)], high[names.index(one.channel)] = one.least, one.most
-    rows = [channels[one.channel] for one in end.conditions]
+    slack = ca.SX.sym("slack", len(end.conditions))
+    rows = [channels[one.channel] - slack[at] for at, one in enumerate(end.conditions)]
     least, most = [one.least for one in end.conditions], [one.most for one in end.conditions]
     point = ca.vertcat(own.x, own.u)
     if end.rest:
-        rows.append(own.rates)
-        least += [0.0] * len(own.states)
-        most += [0.0] * len(own.states)
+        half = sum(name.endswith(".velocity") for name in own.states)
+        low[half : 2 * half] = high[half : 2 * half] = 0.0
+        rows.append(own.rates[half:])
+        least += [0.0] * (len(own.states) - half)
+        most += [0.0] * (len(own.states) - half)
     function = ca.substitute([ca.vertcat(*rows)], [channels.slope, channels.T], [ca.SX.zeros(command.size), ca.SX(1.0)])[0]
-    near = np.concatenate([state, command])
+    state = state.copy()
+    for one in end.conditions:
+        if one.channel in own.states:
+            at = own.states.index(one.channel)
+            state[at] = _within(state[at], one)
+    near = np.concatenate([state, command, np.zeros(len(end.conditions))])
+    low, high = (np.append(part, np.full(len(end.conditions), end_)) for part, end_ in ((low, -LARGE), (high, LARGE)))
     size = np.maximum(1.0, np.abs(near))
-    problem = {"x": point, "f": ca.sumsqr((point - near) / size), "g": function}
+    point = ca.vertcat(point, slack)
+    away = (point - near) / size
+    problem = {"x": point, "f": ca.sumsqr(away) + 1e6 * ca.sumsqr(slack), "g": function}
     options = {"print_time": False, "error_on_fail": False, "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 300}}
     solver = ca.nlpsol("rest", "ipopt", problem, options)
     found = np.array(solver(x0=np.clip(near, low, high), lbx=low, ubx=high, lbg=least, ubg=most)["x"].full()).ravel()
     if not np.all(np.isfinite(found)):
         found = near
-    return found[: state.size], found[state.size :]
+    return found[: state.size], found[state.size : state.size + command.size]
 
 
 def scales(task: Fitted, channels: Channels, points: Sequence[tuple[Array, Array]]) -> Scales:

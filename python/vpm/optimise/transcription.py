@@ -322,14 +322,15 @@ class Transcription:
         return MeshMotion(self.meshes, z[self._t : self._r] * self.scales.durations, states, commands, rests)
 
     def missed(self, z: Array) -> list[tuple[str, str, float, float]]:
-        """Conditions that a soft solution misses: name, unit, by how much, and the same in sizes; worst first."""
+        """Conditions that a soft solution misses: name, unit, what it has and what was asked for; worst first."""
         slack = z[self._s :].reshape(-1, 2)
         soft = sorted({row for row, column, _ in self._linear if column >= self._s})
         found = []
         for number, (over, under) in zip(soft, slack, strict=True):
-            row = self.rows[number]
-            found.append((row.name, row.unit, float(over - under) * row.scale, float(abs(over - under))))
-        return sorted((one for one in found if one[3] > 1e-6), key=lambda one: -one[3])
+            row, size = self.rows[number], float(over - under)
+            wanted = row.most if size > 0.0 else row.least
+            found.append((abs(size), (row.name, row.unit, wanted + size * row.scale, wanted)))
+        return [one for size, one in sorted(found, reverse=True) if size > 1e-6]
 
 
 def _sparse(entries: list[tuple[int, int, float]], shape: tuple[int, int]) -> coo_array:
