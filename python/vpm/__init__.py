@@ -40,6 +40,7 @@ if TYPE_CHECKING:
     from vpm.many import Case, diagnose_many
     from vpm.model import Dynamics, Model
     from vpm.observer import Noise, Observation, Observer, observe
+    from vpm.optimise import Optimum, optimise
     from vpm.ranking import Ranking, rank
     from vpm.realtime import write_fmu
     from vpm.report import Report, report, write_report
@@ -79,6 +80,7 @@ __all__ = [
     "Observation",
     "Observer",
     "OilFit",
+    "Optimum",
     "Ranking",
     "Report",
     "Run",
@@ -106,6 +108,7 @@ __all__ = [
     "linkages",
     "narx",
     "observe",
+    "optimise",
     "rank",
     "realtime",
     "report",
@@ -154,6 +157,8 @@ _HOMES = {
     "Observation": "vpm.observer",
     "Observer": "vpm.observer",
     "observe": "vpm.observer",
+    "Optimum": "vpm.optimise",
+    "optimise": "vpm.optimise",
     "Ranking": "vpm.ranking",
     "rank": "vpm.ranking",
     "write_fmu": "vpm.realtime",

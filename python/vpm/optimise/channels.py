@@ -1,4 +1,4 @@
-"""Channels of a model as expressions of a point: its state, its commands and their slopes, the duration of its phase."""
+"""Channels of a model as expressions of a point: state, commands and their slopes, duration of the phase."""
 
 from __future__ import annotations
 

@@ -113,8 +113,8 @@ def _read(
             value = terms.expression(found["what"]) if found else None
             if found is None or value is None:
                 raise OptimisationError(
-                    f"{model.name}: a law of the model searches for its value ({line.strip()[:60]}), and an optimisation "
-                    "needs laws with derivatives; replace that effect"
+                    f"{model.name}: a law of the model searches for its value ({line.strip()[:60]}), and an "
+                    "optimisation needs laws with derivatives; replace that effect"
                 )
             if found["place"] is None:
                 terms.local[found["name"]] = value

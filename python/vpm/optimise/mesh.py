@@ -6,6 +6,8 @@ Source: J. T. Betts, "Practical Methods for Optimal Control and Estimation Using
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
@@ -13,6 +15,7 @@ from numpy.typing import NDArray
 from vpm.optimise.channels import Channels
 from vpm.optimise.collocation import STAGES
 from vpm.optimise.motion import MeshMotion
+from vpm.optimise.task import RATE, Fitted
 from vpm.optimise.transcription import Scales
 
 Array = NDArray[np.float64]
@@ -24,38 +27,46 @@ CHECKED = _AT + 0.5
 
 
 def errors(channels: Channels, motion: MeshMotion, scales: Scales) -> tuple[Array, ...]:
-    """Error of each interval of each phase, in sizes of the states."""
-    found = []
+    """Error of each interval of each phase, in sizes of the states: of the program, or what the motion reaches."""
+    found, sizes = [], np.maximum(scales.states, np.abs(motion.states).max(axis=0))
     for phase in range(len(motion.meshes)):
         nodes, _ = motion.of_phase(phase)
         width = np.diff(nodes)
         times = (nodes[:-1, None] + width[:, None] * CHECKED).ravel()
         states, rates, commands = motion.at(times)
-        missed = np.abs(rates - channels.rates(states, commands)) / scales.states
+        missed = np.abs(rates - channels.rates(states, commands)) / sizes
         sums = np.einsum("i,kix->kx", _WEIGHTS, missed.reshape(width.size, CHECKED.size, -1))
         found.append(width * np.nan_to_num(sums, nan=np.inf).max(axis=1))
     return tuple(found)
 
 
-def bends(motion: MeshMotion, scales: Scales) -> tuple[Array, ...]:
+def bends(task: Fitted, names: Sequence[str], motion: MeshMotion, scales: Scales) -> tuple[Array, ...]:
     """What the straight course of commands costs in each interval, as a share of the optimum.
 
     A jump of a command by its size that is drawn out over a share h of the motion costs h^2/6 of the least time of a
-    mass; a bend in between costs its share of that.
+    mass, and less than a jump costs its share. Where the rate of a command is limited, it is the rate that jumps.
     """
     found = []
     total = float(motion.durations.sum())
     for phase, mesh in enumerate(motion.meshes):
-        width = np.diff(mesh)
-        slope = np.diff(motion.commands[phase] / scales.commands, axis=0) / width[:, None]
-        share = width * motion.durations[phase] / total
+        width, duration = np.diff(mesh), motion.durations[phase]
         cost = np.zeros(width.size)
         if width.size > 1:
-            turn = np.abs(np.diff(slope, axis=0)).max(axis=1)
+            slope = np.diff(motion.commands[phase], axis=0) / (width[:, None] * duration)
+            turn = np.abs(np.diff(slope, axis=0))
+            rates = np.array([_rate(task, phase, name) for name in names])
+            share = width * duration / total
             for at, side in ((slice(0, -1), width[:-1]), (slice(1, None), width[1:])):
-                cost[at] = np.maximum(cost[at], np.minimum(turn * side, 2.0) * share[at] ** 2 / 6.0)
+                free = turn * side[:, None] * duration / scales.commands
+                jump = np.where(rates > 0.0, turn / np.where(rates > 0.0, rates, 1.0), free).max(axis=1)
+                cost[at] = np.maximum(cost[at], np.minimum(jump, 2.0) * share[at] ** 2 / 6.0)
         found.append(cost)
     return tuple(found)
+
+
+def _rate(task: Fitted, phase: int, name: str) -> float:
+    """Limit of the rate of a command, or zero."""
+    return max((one.size for one in task.phases[phase].limits if one.channel == f"{name}{RATE}"), default=0.0)
 
 
 def finer(mesh: Array, error: Array, bend: Array, tolerance: float) -> Array:

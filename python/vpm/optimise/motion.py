@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -55,7 +54,7 @@ class MeshMotion:
         parts = [spread(self.of_phase(phase)[0])[1:] for phase in range(len(self.meshes))]
         return np.concatenate([[0.0], *parts])
 
-    def at(self, times: Array, phases: Sequence[int] | None = None) -> tuple[Array, Array, Array]:
+    def at(self, times: Array) -> tuple[Array, Array, Array]:
         """States, their rates and commands at some times, of the phases that they fall into."""
         nx, nu = self.states.shape[1], self.commands[0].shape[1]
         states, rates, commands = np.empty((times.size, nx)), np.empty((times.size, nx)), np.empty((times.size, nu))

@@ -39,7 +39,7 @@ class Optimum(Result):
     durations : dict of str to float
         Of each phase, s.
     time : ndarray, shape (N,)
-        Of the log, s.
+        Of the log, s; the machine moves from zero on, and stands before if it begins at rest.
     data : ndarray, shape (N, C)
         All outputs of the model; commands are those held until the next sample.
     channels, units : tuple of str
@@ -59,6 +59,8 @@ class Optimum(Result):
         Limits that hold the motion back.
     played : dict of str to float
         How far a simulation of the log by vpm strays, as a share of each channel's range: joints, markers and gauges.
+    played_in_full : dict of str to float
+        The same on the model of the file, where the search took another level of detail; else empty.
     notes : tuple of str
     """
 
@@ -86,6 +88,7 @@ class Optimum(Result):
     iterations: int
     binding: tuple[str, ...]
     played: dict[str, float]
+    played_in_full: dict[str, float]
     notes: tuple[str, ...]
 
     @property
@@ -140,15 +143,23 @@ class Optimum(Result):
         return moves and not channel.endswith((".acceleration", ".effort", ".force", ".fx", ".fy", ".fz"))
 
     def __str__(self) -> str:
-        parts = ", ".join(f"{name} {1e3 * value:.4g} ms" for name, value in self.durations.items())
-        lines = [
-            f"{self.name}: {self.status}, {self.duration:.6g} s ({parts}), goal {self.objective:.6g}",
-            f"  {self.intervals} intervals, {self.rounds} meshes, {self.iterations} iterations; equations are missed by "
-            f"{self.error:.1e} of the states' sizes between points",
-            f"  played by vpm in samples of {1e3 * (self.time[1] - self.time[0]):.4g} ms it strays by at most "
-            f"{self.strayed:.1e} of a channel's range",
-        ]
-        return "\n".join([*lines, *(f"  {text}" for text in self.binding), *(f"  note: {text}" for text in self.notes)])
+        parts = ", ".join(f"{name} {1e3 * value:.5g} ms" for name, value in self.durations.items())
+        return "\n".join([
+            f"{self.name}: {self.status}, goal {self.objective:.6g}, {parts}",
+            f"  {self.intervals} intervals, {self.rounds} meshes, {self.iterations} iterations; between points the "
+            f"equations are missed by {self.error:.1e} of the states' sizes",
+            *self._strayed("", self.played),
+            *self._strayed(" at the level of the model file", self.played_in_full),
+            *(f"  {text}" for text in self.binding),
+            *(f"  note: {text}" for text in self.notes),
+        ])  # fmt: skip
+
+    def _strayed(self, where: str, played: dict[str, float]) -> list[str]:
+        if not played:
+            return []
+        worst, step = max(played, key=lambda name: played[name]), 1e3 * float(self.time[1] - self.time[0])
+        words = f"played by vpm{where} in samples of {step:.4g} ms"
+        return [f"  {words}, {worst} strays most, by {played[worst]:.1e} of its range"]
 
     def _headline(self) -> Mapping[str, object]:
         shown = ("name", "status", "objective", "intervals", "error")

@@ -7,7 +7,6 @@ their places by constant sparse matrices.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -75,7 +74,6 @@ class Program:
         jacobian = _Entries(*_triplets(csc_array(self.A)), self.A.shape)
         gradient = ca.densify((1 - p) * own + p * slack)
         hessian = _Entries(*_empty(), (nz, nz))
-        terms: list[tuple[_Entries, Any, Any]] = []
         for group in self.groups:
             nv, nr = group.variables.numel(), group.results.numel()
             v = ca.reshape(ca.mtimes(_dm(group.V), z), nv, group.count)
@@ -92,11 +90,12 @@ class Program:
             mult = ca.SX.sym("m", nr)
             H = ca.hessian(ca.dot(mult, group.results), group.variables)[0]
             weights = ca.reshape(
-                ca.mtimes(_dm(csc_array(B.T)), lam_g) + lam_f * (1 - p) * ca.mtimes(_dm(csc_array(d.T)), 1), nr, group.count
+                ca.mtimes(_dm(csc_array(B.T)), lam_g) + lam_f * (1 - p) * ca.mtimes(_dm(csc_array(d.T)), 1),
+                nr,
+                group.count,
             )
             hf = ca.vec(ca.Function("H", [group.variables, mult], [_nonzeros(H)]).map(group.count)(v, weights))
             hessian.add(_products(csc_array(group.V.T), group.V, _pattern(H), (nv, nv), group.count, upper=True), hf)
-            terms.append((hessian, H, hf))
         options = {
             "grad_f": ca.Function("grad_f", [z, p], [cost, gradient.T], ["x", "p"], ["f", "grad_f_x"]),
             "jac_g": ca.Function("jac_g", [z, p], [total, jacobian.matrix()], ["x", "p"], ["g", "jac_g_x"]),
@@ -110,15 +109,13 @@ class Program:
         }
         return {"x": z, "p": p, "f": cost, "g": total}, options
 
-    def solver(self, options: dict[str, Any], callback: Any) -> Callable[..., dict[str, Any]]:  # noqa: ANN401
+    def solver(self, options: dict[str, Any], callback: Any) -> Any:  # noqa: ANN401
         """IPOPT on the program, called with start, bounds and ``p``."""
         ca = casadi()
         if not self._solvers:
             self._solvers["problem"], self._solvers["derivatives"] = self.functions()
         settings = {"print_time": False, "error_on_fail": False, "iteration_callback": callback, "ipopt": options}
-        return ca.nlpsol(  # type: ignore[no-any-return]
-            "solver", "ipopt", self._solvers["problem"], {**settings, **self._solvers["derivatives"]}
-        )
+        return ca.nlpsol("solver", "ipopt", self._solvers["problem"], {**settings, **self._solvers["derivatives"]})
 
 
 class _Entries:
@@ -127,7 +124,8 @@ class _Entries:
     def __init__(self, rows: Indices, columns: Indices, constants: Array, shape: tuple[int, int]) -> None:
         self.shape = shape
         self._rows, self._columns, self._values = [rows], [columns], [constants]
-        self._of, self._sources, self._sizes = [np.full(rows.size, -1)], [], 0
+        self._of, self._sizes = [np.full(rows.size, -1)], 0
+        self._sources: list[Expression] = []
 
     def add(self, products: tuple[Indices, Indices, Indices, Array], source: Expression) -> None:
         rows, columns, of, values = products
@@ -183,7 +181,13 @@ def _triplets(matrix: csc_array) -> tuple[Indices, Indices, Array]:
 
 
 def _products(
-    left: csc_array, right: csr_array, places: tuple[Indices, Indices], size: tuple[int, int], count: int, *, upper: bool = False
+    left: csc_array,
+    right: csr_array,
+    places: tuple[Indices, Indices],
+    size: tuple[int, int],
+    count: int,
+    *,
+    upper: bool = False,
 ) -> tuple[Indices, Indices, Indices, Array]:
     """Entries of ``left D right``, where D holds ``count`` blocks of one pattern: row, column, entry of D, factor."""
     left, right = csc_array(left), csr_array(right)

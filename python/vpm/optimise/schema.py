@@ -48,15 +48,14 @@ class Boundary(Entry):
     """What holds at the beginning of a motion or at the end of a phase."""
 
     rest: Switch = False
-    free: tuple[Text, ...] = ()
     channels: dict[str, Bounds] = Field(default_factory=dict)
 
 
 def _as_boundary(given: object) -> object:
-    """Channels stand beside the two words in the file, and in a table of their own here."""
+    """Channels stand beside the word in the file, and in a table of their own here."""
     if not isinstance(given, Mapping):
         return given
-    words = {key: value for key, value in given.items() if key in {"rest", "free"}}
+    words = {key: value for key, value in given.items() if key == "rest"}
     return {**words, "channels": {key: value for key, value in given.items() if key not in words}}
 
 
@@ -71,6 +70,7 @@ class PhaseEntry(Entry):
     duration: Bounds
     intervals: Intervals = 15
     limits: dict[str, Bounds] = Field(default_factory=dict)
+    guess: dict[str, Bounds] = Field(default_factory=dict)
     end: Ends = Boundary()
 
 
@@ -86,6 +86,8 @@ class Document(Entry):
     """A whole task file."""
 
     task: Text
+    level: Text | dict[str, Text] | None = None
+    set: dict[str, Bounds] = Field(default_factory=dict)
     minimise: Text | dict[str, Number] | None = None
     maximise: Text | None = None
     duration: Bounds | None = None
@@ -93,11 +95,13 @@ class Document(Entry):
     tolerance: Annotated[float, Field(strict=True, gt=0.0, le=0.1)] = 1e-5
     refinements: Annotated[int, Field(strict=True, ge=0, le=12)] = 6
     time_step: Bounds = Range(value=1e-3)
+    before: Bounds = Range(value=0.1)
     after: Bounds = Range(value=0.0)
     periodic: Switch = False
     begin: Annotated[Boundary, BeforeValidator(_as_boundary)] = Boundary(rest=True)
     end: Ends = Boundary()
     limits: dict[str, Bounds] = Field(default_factory=dict)
+    guess: dict[str, Bounds] = Field(default_factory=dict)
     obstacles: tuple[ObstacleEntry, ...] = ()
     phases: tuple[PhaseEntry, ...] = ()
 

@@ -15,7 +15,7 @@ from vpm.optimise.channels import Channels
 from vpm.optimise.equations import casadi, equations
 from vpm.optimise.mesh import bends, errors, finer
 from vpm.optimise.motion import MeshMotion
-from vpm.optimise.start import complete, ends, scales, way
+from vpm.optimise.start import complete, ends, scales, simulated, way
 from vpm.optimise.task import Fitted, Limit
 from vpm.optimise.transcription import LARGE, Scales, Transcription
 
@@ -41,6 +41,7 @@ class Search:
     rounds: int = 0
     iterations: int = 0
     seconds: float = 0.0
+    known: bool = False
     notes: list[str] = field(default_factory=list)
 
 
@@ -52,8 +53,8 @@ class SearchInterruptedError(KeyboardInterrupt):
         self.search = search
 
 
-def search(model: Model, given: Fitted, progress: Progress) -> Search:
-    """The best motion on a mesh that is fine enough.
+def search(model: Model, given: Fitted, progress: Progress, start: MeshMotion | None = None) -> Search:
+    """The best motion on a mesh that is fine enough, from another motion if there is one.
 
     Raises
     ------
@@ -67,11 +68,12 @@ def search(model: Model, given: Fitted, progress: Progress) -> Search:
     points = ends(model, task, channels)
     sizes = scales(task, channels, points)
     meshes = tuple(np.linspace(0.0, 1.0, phase.intervals + 1) for phase in task.phases)
-    motion = way(task, channels, points, sizes.durations, meshes)
-    stiff = _stiff(model, given, progress)
-    if stiff is not None:
+    motion = start or way(task, channels, points, sizes.durations, meshes)
+    if start is None and any(phase.guess for phase in task.phases):
+        motion = simulated(model, task, channels, motion)
+    elif start is None and (stiff := _stiff(model, given, progress)) is not None:
         motion = _bent(channels, motion, stiff)
-    found = Search(channels, task, sizes, motion)
+    found = Search(channels, task, sizes, motion, known=start is not None)
     try:
         _refine(found, progress)
     except KeyboardInterrupt:
@@ -80,10 +82,10 @@ def search(model: Model, given: Fitted, progress: Progress) -> Search:
 
 
 def _refine(found: Search, progress: Progress) -> None:
-    task = found.task
+    task, start = found.task, found.motion
     for number in range(task.refinements + 1):
-        count = sum(mesh.size - 1 for mesh in found.motion.meshes)
-        run = _Run(found, lambda text, count=count: progress(f"{count} intervals, {text}"), warm=number > 0)
+        count = sum(mesh.size - 1 for mesh in start.meshes)
+        run = _Run(found, start, _prefixed(progress, f"{count} intervals"), warm=found.known or number > 0)
         run.solve()
         if run.status not in _GOOD and number == 0:
             run = _calm(found, progress) or run
@@ -94,10 +96,8 @@ def _refine(found: Search, progress: Progress) -> None:
             return
         found.motion, found.objective, found.status = run.motion, run.objective, "optimal"
         found.rounds = number + 1
-        wrong, bent = (part(*arguments) for part, arguments in (
-            (errors, (found.channels, found.motion, found.scales)),
-            (bends, (found.motion, found.scales)),
-        ))
+        wrong = errors(found.channels, found.motion, found.scales)
+        bent = bends(task, found.channels.own.commands, found.motion, found.scales)
         found.error = max(float(one.max()) for one in wrong)
         meshes = tuple(
             finer(mesh, error, bend, task.tolerance)
@@ -107,9 +107,12 @@ def _refine(found: Search, progress: Progress) -> None:
             if found.error > task.tolerance:
                 found.notes.append("The mesh has as many intervals as it may have.")
             return
-        if number < task.refinements:
-            found.motion = found.motion.on(meshes)
+        start = found.motion.on(meshes)
     found.notes.append(f"After {task.refinements} refinements the mesh is still coarser than the tolerance asks for.")
+
+
+def _prefixed(progress: Progress, what: str) -> Progress:
+    return lambda text: progress(f"{what}, {text}")
 
 
 def _calm(found: Search, progress: Progress) -> _Run | None:
@@ -121,41 +124,42 @@ def _calm(found: Search, progress: Progress) -> _Run | None:
             replace(part, shortest=time, longest=time) for part, time in zip(task.phases, times, strict=True)
         )
         found.task = replace(task, phases=phases, weights={"energy": 1.0})
-        easier = _Run(found, lambda text: progress(f"least energy in a fixed time first: {text}"), warm=False)
-        easier.z = easier.form.pack(replace(start, durations=np.array(times)))
-        easier.solve()
+        slow = replace(start, durations=np.array(times))
+        easier = _Run(found, slow, _prefixed(progress, "least energy in a fixed time first"), warm=False)
         found.task = task
+        easier.solve()
         if easier.status in _GOOD:
-            found.motion = easier.motion
-            run = _Run(found, lambda text: progress(f"from least energy: {text}"), warm=False)
+            run = _Run(found, easier.motion, _prefixed(progress, "from least energy"), warm=False)
             run.solve()
             if run.status in _GOOD:
                 return run
-            found.motion = start
     return None
 
 
 class _Run:
     """IPOPT on one mesh, which keeps the best iterate."""
 
-    def __init__(self, found: Search, progress: Progress, *, warm: bool) -> None:
+    def __init__(self, found: Search, start: MeshMotion, progress: Progress, *, warm: bool) -> None:
         self.found, self.warm = found, warm
-        self.form = Transcription(found.channels.own, found.task, found.scales, found.motion.meshes)
+        self.form = Transcription(found.channels.own, found.task, found.scales, start.meshes)
         self.program = self.form.program()
-        self.status, self.objective, self.motion = "", float("nan"), found.motion
+        self.status, self.objective, self.motion = "", float("nan"), start
         self._progress = progress
-        self.z = self.form.pack(found.motion)
+        self.z = self.form.pack(start)
 
     def solve(self, *, soft: bool = False) -> None:
         options: dict[str, Any] = {
             "print_level": 0,
             "sb": "yes",
             "max_iter": ITERATIONS,
-            "tol": 1e-8,
+            "tol": min(1e-5, max(1e-8, 1e-2 * self.found.task.tolerance)),  # a hundredth of what the mesh may miss
             "mu_strategy": "adaptive",
         }
-        if self.warm and not soft:
-            options |= {"mu_strategy": "monotone", "mu_init": 1e-4, "bound_push": 1e-6, "bound_frac": 1e-6}
+        if not soft and (self.warm or any(phase.guess for phase in self.found.task.phases)):
+            # A start that keeps to the equations is not pushed far into the limits.
+            options |= {"mu_strategy": "monotone", "bound_mult_init_method": "mu-based", "mu_init": 1e-3}
+            if self.warm:
+                options |= {"mu_init": 1e-4, "bound_push": 1e-6, "bound_frac": 1e-6}
         watch = _watch(self)
         solver = self.program.solver(options, watch)
         bounds = self.form.bounds(soft=soft)
@@ -176,14 +180,16 @@ class _Run:
         self.motion = self.form.unpack(self.z)
 
     def _keep(self) -> None:
-        """Hand the best iterate to the search."""
-        self.found.motion = self.form.unpack(self.z)
+        """Hand the last iterate to the search, unless the optimum on a coarser mesh is there."""
+        if self.found.rounds:
+            self.found.notes.append("Ctrl-C ended the search before the mesh was fine enough.")
+        else:
+            self.found.motion, self.found.objective = self.form.unpack(self.z), self.objective
 
     def seen(self, z: Array, cost: float, violation: float) -> None:
         """An iterate of IPOPT."""
         self.found.iterations += 1
-        self.z = z
-        self.found.objective = cost
+        self.z, self.objective = z, cost
         self._progress(f"iteration {self.found.iterations}: {cost:.6g}, misses {violation:.1e}")
 
 
@@ -227,7 +233,7 @@ def _watch(run: _Run) -> Any:  # noqa: ANN401
 
 def _why(found: Search, run: _Run) -> str:
     """Why there is no motion: the nearest one with all limits kept, what it misses and which limits bind."""
-    soft = _Run(found, lambda _: None, warm=False)
+    soft = _Run(found, found.motion, lambda _: None, warm=False)
     soft.solve(soft=True)
     missed = soft.form.missed(soft.z)
     if soft.status not in _GOOD:
@@ -239,8 +245,8 @@ def _why(found: Search, run: _Run) -> str:
     limits = f", and {' and '.join(held)}" if held else ""
     unit = "" if unit == "1" else f" {unit}"
     return (
-        f"the search found no motion that fulfils the task: the nearest one has {what} {there:.5g}{unit} in place of {wanted:.5g}{unit}{limits}; "
-        "allow more, or ask for less"
+        f"the search found no motion that fulfils the task: the nearest one has {what} {there:.5g}{unit} in place of "
+        f"{wanted:.5g}{unit}{limits}; allow more, or ask for less"
     )
 
 
@@ -275,12 +281,16 @@ def binding(channels: Channels, task: Fitted, motion: MeshMotion) -> tuple[str, 
             share = float(np.mean(np.abs(course - end) <= 1e-3 * max(width, 1e-12))) if abs(end) < LARGE else 0.0
             if share >= 0.005:
                 unit = "" if limit.unit == "1" else f" {limit.unit}"
-                found.append(f"{limit.channel} is at its {word} of {end:.4g}{unit} for {100.0 * share:.0f} % of the time")
+                found.append(
+                    f"{limit.channel} is at its {word} of {end:.4g}{unit} for {100.0 * share:.0f} % of the time"
+                )
             if limit.channel in own.commands and any(
                 held is not None and abs(held[own.commands.index(limit.channel)] - end) <= 1e-3 * width
                 for held in motion.rests
             ):
-                found.append(f"{limit.channel} is at its {word} of {end:.4g} {limit.unit} while it holds the machine at rest")
+                found.append(
+                    f"{limit.channel} is at its {word} of {end:.4g} {limit.unit} while it holds the machine at rest"
+                )
     return tuple(found)
 
 
@@ -304,9 +314,8 @@ def _stiff(model: Model, task: Fitted, progress: Progress) -> MeshMotion | None:
             for one in task.phases
         )
         begin = replace(task.begin, conditions=kept(task.begin.conditions))
-        free = tuple(name for name in task.free if name in known)
-        coarse = replace(task, phases=phases, begin=begin, free=free, refinements=0)
-        return search(rigid, coarse, lambda text: progress(f"rigid links first: {text}")).motion
+        coarse = replace(task, phases=phases, begin=begin, refinements=0)
+        return search(rigid, coarse, _prefixed(progress, "rigid links first")).motion
     except VpmError:
         return None
 

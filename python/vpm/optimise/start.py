@@ -9,7 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
+from scipy.linalg import expm, matrix_balance
 
 from vpm.errors import VpmError
 from vpm.model import Model
@@ -24,16 +24,18 @@ from vpm.optimise.transcription import LARGE, Scales
 Array = NDArray[np.float64]
 #: Steps of the response that tells how far commands move a state.
 RESPONSE = 60
+#: Samples of a guess that is simulated.
+SAMPLES = 2000
 
 
 def complete(model: Model, task: Fitted) -> Fitted:
     """The task with a beginning that leaves nothing to chance: what it does not name is at zero, at rest or as in rest.
 
-    Periodic motions begin where it costs least, and so do states that the task calls free.
+    Periodic motions begin where it costs least; a state with a range begins within it.
     """
     if task.periodic:
         return task
-    named = {one.channel for one in task.begin.conditions} | set(task.free)
+    named = {one.channel for one in task.begin.conditions}
     joints, state = len(model.joints), standing(model, task)
     names = model.state_names[: joints if task.begin.rest else None]
     values = zip(names, model.state_units, state, strict=False)
@@ -46,7 +48,7 @@ def standing(model: Model, task: Fitted) -> Array:
     state = np.zeros(len(model.state_names))
     for one in task.begin.conditions:
         if one.channel in model.state_names[: len(model.coordinates)]:
-            state[model.state_names.index(one.channel)] = _within(0.0, one)
+            state[model.state_names.index(one.channel)] = one.near(0.0)
     joints, coordinates = len(model.joints), len(model.coordinates)
     with suppress(VpmError, ValueError):
         if coordinates > joints:
@@ -56,7 +58,7 @@ def standing(model: Model, task: Fitted) -> Array:
 
 
 def ends(model: Model, task: Fitted, channels: Channels) -> list[tuple[Array, Array]]:
-    """States and commands at the beginning and at the end of each phase, as near to each other as the conditions let."""
+    """States and commands at the beginning and at the end of each phase, each as near to the one before as can be."""
     state, command = standing(model, task), np.zeros(len(channels.own.commands))
     found = []
     for end, limits in zip(
@@ -91,18 +93,20 @@ def _nearest(
         rows.append(own.rates[half:])
         least += [0.0] * (len(own.states) - half)
         most += [0.0] * (len(own.states) - half)
-    function = ca.substitute([ca.vertcat(*rows)], [channels.slope, channels.T], [ca.SX.zeros(command.size), ca.SX(1.0)])[0]
+    function = ca.substitute(
+        [ca.vertcat(*rows)], [channels.slope, channels.T], [ca.SX.zeros(command.size), ca.SX(1.0)]
+    )[0]
     state = state.copy()
     for one in end.conditions:
         if one.channel in own.states:
             at = own.states.index(one.channel)
-            state[at] = _within(state[at], one)
+            state[at] = one.near(state[at])
     near = np.concatenate([state, command, np.zeros(len(end.conditions))])
     low, high = (np.append(part, np.full(len(end.conditions), end_)) for part, end_ in ((low, -LARGE), (high, LARGE)))
     size = np.maximum(1.0, np.abs(near))
     point = ca.vertcat(point, slack)
     away = (point - near) / size
-    problem = {"x": point, "f": ca.sumsqr(away) + 1e6 * ca.sumsqr(slack), "g": function}
+    problem = {"x": point, "f": ca.sumsqr(away) + 1e8 * ca.sumsqr(slack), "g": function}
     options = {"print_time": False, "error_on_fail": False, "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 300}}
     solver = ca.nlpsol("rest", "ipopt", problem, options)
     found = np.array(solver(x0=np.clip(near, low, high), lbx=low, ubx=high, lbg=least, ubg=most)["x"].full()).ravel()
@@ -139,12 +143,15 @@ def _response(channels: Channels, point: tuple[Array, Array], commands: Array, d
     jacobians = ca.Function("AB", [own.x, own.u], [ca.jacobian(own.rates, own.x), ca.jacobian(own.rates, own.u)])
     A, B = (np.array(one.full()) for one in jacobians(*point))
     step = duration / RESPONSE
-    if not np.all(np.isfinite(A)) or np.abs(A).max(initial=0.0) * step > 1e6:
+    if not np.all(np.isfinite(A)):
         return np.ones(len(own.states))
-    phi, moved, total = expm(A * step), B * commands, np.zeros(len(own.states))
-    for _ in range(RESPONSE):
-        total += np.abs(moved).sum(axis=1) * step
-        moved = phi @ moved
+    with np.errstate(over="ignore", invalid="ignore"):
+        balanced, T = matrix_balance(A)  # pressures are a million times larger than positions
+        phi = T @ expm(balanced * step) @ np.linalg.inv(T)
+        moved, total = B * commands, np.zeros(len(own.states))
+        for _ in range(RESPONSE):
+            total += np.abs(moved).sum(axis=1) * step
+            moved = phi @ moved
     return np.where(np.isfinite(total), np.minimum(total, 1e6), 1.0)
 
 
@@ -165,10 +172,21 @@ def way(
     return MeshMotion(meshes, durations, np.concatenate(states), tuple(commands), held_at)
 
 
+def simulated(model: Model, task: Fitted, channels: Channels, motion: MeshMotion) -> MeshMotion:
+    """The motion that the commands of the guess make from the beginning of another, simulated by vpm."""
+    held = np.zeros((len(motion.meshes), len(channels.own.commands)))
+    for row, phase in zip(held, task.phases, strict=True):
+        for one in phase.guess:
+            row[channels.own.commands.index(one.channel)] = one.near(0.0)
+    time = np.linspace(0.0, motion.starts[-1], SAMPLES + 1)
+    phases = np.clip(np.searchsorted(motion.starts, time, side="right") - 1, 0, len(held) - 1)
+    step = float(time[1])
+    _, states, _ = model.core.simulate(model.theta, motion.states[0], held[phases], step, 1, "adaptive")
+    found = np.stack([np.interp(motion.times, time, column) for column in np.array(states).T], axis=1)
+    commands = tuple(np.tile(row, (mesh.size, 1)) for row, mesh in zip(held, motion.meshes, strict=True))
+    return replace(motion, states=found, commands=commands)
+
+
 def _duration(shortest: float, longest: float) -> float:
     """Middle of a range of durations, as a factor of both."""
     return math.sqrt(shortest * longest)
-
-
-def _within(value: float, limit: Limit) -> float:
-    return min(max(value, limit.least), limit.most)

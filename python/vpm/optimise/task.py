@@ -18,6 +18,8 @@ from vpm.optimise.schema import GOALS, Boundary, Document, PhaseEntry, Range, sc
 from vpm.units import convert
 
 RATE = ".rate"
+#: Samples that a log may have.
+MOST_SAMPLES = 1_000_000
 Keys = tuple[str | int, ...]
 
 
@@ -36,6 +38,12 @@ class Limit:
     unit: str
     least: float
     most: float
+
+    def near(self, value: float) -> float:
+        """Where a search may begin: the middle of both ends, or the value between them that is nearest to another."""
+        if math.isfinite(self.least) and math.isfinite(self.most):
+            return 0.5 * (self.least + self.most)
+        return min(max(value, self.least), self.most)
 
     @property
     def size(self) -> float:
@@ -71,6 +79,8 @@ class Phase:
         Of the first mesh.
     limits : tuple of Limit
     end : End
+    guess : tuple of Limit
+        Constant commands whose motion the search begins with; a smooth way between the ends without them.
     """
 
     name: str
@@ -79,6 +89,7 @@ class Phase:
     intervals: int
     limits: tuple[Limit, ...]
     end: End
+    guess: tuple[Limit, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -88,8 +99,6 @@ class Fitted:
     Attributes
     ----------
     begin : End
-    free : tuple of str
-        States that the optimisation chooses at the beginning.
     phases : tuple of Phase
     weights : dict of str to float
         Of time, energy and channels at the end, in what is made least.
@@ -98,7 +107,6 @@ class Fitted:
     """
 
     begin: End
-    free: tuple[str, ...]
     phases: tuple[Phase, ...]
     weights: dict[str, float]
     obstacles: tuple[tuple[str, tuple[float, ...], float], ...]
@@ -106,6 +114,7 @@ class Fitted:
     tolerance: float
     refinements: int
     time_step: float
+    before: float
     after: float
 
 
@@ -155,6 +164,26 @@ class Task:
         """What the file calls it."""
         return self._document.task
 
+    def machine(self, model: Model) -> Model:
+        """The model at the level of detail and with the values that the task asks for.
+
+        Raises
+        ------
+        OptimisationError
+            The model has no such level or parameter.
+        """
+        where = "level"
+        try:
+            if self._document.level is not None:
+                model = model.at(self._document.level)
+            where, values = "set", {}
+            for name, given in self._document.set.items():
+                unit = model.parameters[name].unit if name in model.parameters else "1"
+                values[name] = self._limit(given, unit, ("set", name), name).least
+            return model.with_parameters(values) if values else model
+        except ModelError as error:
+            self._refuse(where, f"is wrong: {error}")
+
     def __repr__(self) -> str:
         goal = ", ".join(self._weights())
         return f"Task({self.name!r}: least {goal}, {max(1, len(self._document.phases))} phase(s))"
@@ -167,7 +196,7 @@ class Task:
         Raises
         ------
         OptimisationError
-            A channel is unknown, a unit is wrong, a range is empty, or a limit is missing without which nothing is least.
+            A channel is unknown, a unit is wrong, a range is empty, or a limit is missing.
         """
         document = self._document
         phases = tuple(self._phases(model))
@@ -175,13 +204,8 @@ class Task:
         for name in weights:
             if name not in GOALS:
                 self._unit(model, name, ("minimise",))
-        known = {*model.state_names}
-        for name in document.begin.free:
-            if name not in known:
-                self._refuse(place("begin", "free"), f'names "{name}", no state; {near_match(name, known)}')
         fitted = Fitted(
             begin=self._end(model, document.begin, ("begin",)),
-            free=document.begin.free,
             phases=phases,
             weights=weights,
             obstacles=tuple((one.marker, one.center, one.radius) for one in document.obstacles),
@@ -189,8 +213,10 @@ class Task:
             tolerance=document.tolerance,
             refinements=document.refinements,
             time_step=self._time(document.time_step, "time_step"),
+            before=self._limit(document.before, "s", ("before",), "before").least if document.begin.rest else 0.0,
             after=self._limit(document.after, "s", ("after",), "after").least,
         )
+        self._check_samples(fitted)
         self._check_obstacles(model)
         self._check_commands(model, fitted)
         return fitted
@@ -202,7 +228,8 @@ class Task:
         if not entries:
             if document.duration is None:
                 self._refuse("duration", "is missing; add for example duration = { least = 0.1, most = 2.0 }")
-            entries = (PhaseEntry(name="motion", duration=document.duration, intervals=document.intervals),)
+            one = PhaseEntry(name="motion", duration=document.duration, intervals=document.intervals)
+            entries = (one.model_copy(update={"guess": document.guess}),)
         elif document.duration is not None:
             self._refuse("duration", "stands beside phases, which have durations of their own; remove it")
         for at, entry in enumerate(entries):
@@ -210,7 +237,9 @@ class Task:
             duration = self._limit(entry.duration, "s", (*keys, "duration"), "duration")
             if not 0.0 < duration.least <= duration.most < math.inf:
                 self._refuse(place(*keys, "duration"), "has to lie between two positive times; give least and most")
-            limits = {name: self._channel(model, name, given, ("limits", name)) for name, given in document.limits.items()}
+            limits = {
+                name: self._channel(model, name, given, ("limits", name)) for name, given in document.limits.items()
+            }
             for name, given in entry.limits.items():
                 limits[name] = self._channel(model, name, given, (*keys, "limits", name))
             end = entry.end
@@ -218,7 +247,14 @@ class Task:
                 both = {**end.channels, **document.end.channels}
                 end = Boundary(rest=end.rest or document.end.rest, channels=both)
             found = self._end(model, end, (*keys, "end"))
-            yield Phase(entry.name, duration.least, duration.most, entry.intervals, tuple(limits.values()), found)
+            guess = tuple(self._guess(model, name, one, (*keys, "guess", name)) for name, one in entry.guess.items())
+            times = (duration.least, duration.most)
+            yield Phase(entry.name, *times, entry.intervals, tuple(limits.values()), found, guess)
+
+    def _guess(self, model: Model, name: str, given: Range, keys: Keys) -> Limit:
+        if name not in model.input_channels:
+            self._refuse(place(*keys), f"is no command; {near_match(name, model.input_channels)}")
+        return self._channel(model, name, given, keys)
 
     def _end(self, model: Model, given: Boundary, keys: Keys) -> End:
         found = (self._channel(model, name, one, (*keys, name)) for name, one in given.channels.items())
@@ -255,17 +291,24 @@ class Task:
             self._refuse(name, f"is {found:g} s, but has to be above 0 s; correct it")
         return found
 
+    def _check_samples(self, fitted: Fitted) -> None:
+        around = fitted.before + fitted.after
+        count = (sum(phase.longest for phase in fitted.phases) + around) / fitted.time_step
+        if not (min(fitted.before, fitted.after) >= 0.0 and count <= MOST_SAMPLES):
+            rest = f"makes a log of {count:.3g} samples with the longest duration, and {MOST_SAMPLES} fit"
+            self._refuse("time_step", f"{rest}; make it longer")
+
     def _unit(self, model: Model, name: str, keys: Keys) -> str:
         """Unit of a channel, a state, or the rate of one of them."""
-        states = dict(zip(model.state_names, model.state_units, strict=True))
-        if name in model.output_channels:
-            return str(model.channel_unit(name))
-        if name in states:
-            return states[name]
-        if name.endswith(RATE):
-            unit = self._unit(model, name.removesuffix(RATE), keys)
-            return "1/s" if unit == "1" else f"{unit}/s"
-        self._refuse(place(*keys), f"is no channel of {model.name}; {near_match(name, (*model.output_channels, *states))}")
+        known = {channel: str(model.channel_unit(channel)) for channel in model.output_channels}
+        known |= dict(zip(model.state_names, model.state_units, strict=True))
+        base = name
+        while base not in known and base.endswith(RATE):
+            base = base.removesuffix(RATE)
+        if base not in known:
+            self._refuse(place(*keys), f"is no channel of {model.name}; {near_match(name, known)}")
+        rates = (len(name) - len(base)) // len(RATE)
+        return known[base] + "/s" * rates if known[base] != "1" or not rates else "1/s" + "/s" * (rates - 1)
 
     def _check_obstacles(self, model: Model) -> None:
         markers = {name.removesuffix(".x") for name in model.output_channels if name.endswith(".x")}

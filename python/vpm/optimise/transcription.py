@@ -17,7 +17,7 @@ from scipy.sparse import coo_array, csc_array, csr_array
 
 from vpm.optimise.channels import Channels
 from vpm.optimise.collocation import DERIVATIVE, POINTS, STAGES, WEIGHTS
-from vpm.optimise.equations import Equations, casadi
+from vpm.optimise.equations import Equations, Expression, casadi
 from vpm.optimise.motion import MeshMotion
 from vpm.optimise.program import Group, Program
 from vpm.optimise.task import RATE, End, Fitted, Limit
@@ -58,8 +58,9 @@ class Transcription:
         points = STAGES * sum(mesh.size - 1 for mesh in meshes) + 1
         nodes = np.cumsum([0, *(mesh.size for mesh in meshes)])
         self._u = points * self.nx + self.nu * nodes
-        self._t = int(self._u[-1])
-        self._r = self._t + len(meshes)
+        # Each interval has a duration of its own, equal to its neighbour's: a column of all would fill the matrix.
+        self._t = int(self._u[-1]) + np.cumsum([0, *(mesh.size - 1 for mesh in meshes)])
+        self._r = int(self._t[-1])
         self._s = self._r + self.nu * sum(self.rests)
         self.points = points
         self.rows: list[Row] = []
@@ -79,6 +80,10 @@ class Transcription:
         """Where the commands of a node begin."""
         return int(self._u[phase]) + node * self.nu
 
+    def t(self, phase: int, interval: int) -> int:
+        """Where the duration of a phase stands, as an interval sees it."""
+        return int(self._t[phase]) + interval
+
     def r(self, end: int) -> int:
         """Where the commands of the rest at an end begin."""
         return self._r + self.nu * sum(self.rests[:end])
@@ -92,7 +97,7 @@ class Transcription:
             self._command_rates(phase, mesh)
             first += STAGES * (mesh.size - 1)
             self._end(self.task.phases[phase].end, phase + 1, first, phase, mesh.size - 1)
-            self._cost.append((self._t + phase, self.task.weights.get("time", 0.0) * self.scales.durations[phase]))
+            self._cost.append((self.t(phase, 0), self.task.weights.get("time", 0.0) * self.scales.durations[phase]))
         self._path(0, [(0, 0, 0.0)], 0)
         self._end(self.task.begin, 0, 0, 0, 0)
         self._joined()
@@ -105,7 +110,8 @@ class Transcription:
         if energy:
             results.append(T * ca.sumsqr(own.u) * energy)
         group = ca.vertcat(*results)
-        size, places, puts = self.nx + bool(energy), [], []
+        size, puts = self.nx + bool(energy), []
+        places: list[list[tuple[int, int, float]]] = []
         for k, width in enumerate(widths):
             for i in range(STAGES):
                 at = len(places)
@@ -154,7 +160,7 @@ class Transcription:
                         self._linear += [
                             (row, self.u(phase, k + 1) + column, 1.0),
                             (row, self.u(phase, k) + column, -1.0),
-                            (row, self._t + phase, -end * T * width / size),
+                            (row, self.t(phase, k), -end * T * width / size),
                         ]
 
     def _end(self, end: End, number: int, point: int, phase: int, node: int) -> None:
@@ -162,7 +168,8 @@ class Transcription:
         ca = casadi()
         last = number == len(self.meshes)
         goals = {name: weight for name, weight in self.task.weights.items() if name in self.channels} if last else {}
-        values, puts = [], []
+        values: list[Expression] = []
+        puts = []
         for one in end.conditions:
             row = self._scaled(one)
             puts.append((self._soft(row), len(values), 1.0))
@@ -181,13 +188,17 @@ class Transcription:
             sizes = self.scales.states / self.scales.durations[phase]
             when = "the beginning" if number == 0 else f"the end of {self.task.phases[phase].name}"
             rows = [
-                (self._soft(Row(f"rest of {name} at {when}", "1/s", 0.0, 0.0, size)), at, 1.0)
-                for at, (name, size) in enumerate(zip(self.own.states, sizes, strict=True))
+                (self._soft(Row(f"the rate of {name} at {when}", f"{unit} per s", 0.0, 0.0, size)), at, 1.0)
+                for at, (name, unit, size) in enumerate(zip(self.own.states, self.own.state_units, sizes, strict=True))
             ]
             self._groups.append((self.own.rates / sizes, [place], rows))
 
     def _joined(self) -> None:
-        """Commands with a limit of their rate do not jump; periodic motions end as they begin."""
+        """Intervals share the duration of their phase, commands with limited rates do not jump, periods close."""
+        for phase, mesh in enumerate(self.meshes):
+            for k in range(mesh.size - 2):
+                row = self._row(Row("the duration", "1", 0.0, 0.0, 1.0))
+                self._linear += [(row, self.t(phase, k), 1.0), (row, self.t(phase, k + 1), -1.0)]
         last = len(self.meshes) - 1
         for column, name in enumerate(self.own.commands):
             limited = [any(one.channel == f"{name}{RATE}" for one in phase.limits) for phase in self.task.phases]
@@ -221,7 +232,7 @@ class Transcription:
             found += [(self.nx + c, left, (1.0 - share) * size), (self.nx + c, right, share * size)]
             slope = self.nx + self.nu + c
             found += [(slope, left, -size / width), (slope, right, size / width)]
-        return [*found, (self.nv - 1, self._t + phase, self.scales.durations[phase])]
+        return [*found, (self.nv - 1, self.t(phase, interval), self.scales.durations[phase])]
 
     def _is_bound(self, channel: str) -> bool:
         base = channel.removesuffix(RATE)
@@ -276,8 +287,8 @@ class Transcription:
         sizes |= {name: ("u", at, self.scales.commands[at]) for at, name in enumerate(self.own.commands)}
         first = 0
         for phase, (part, mesh) in enumerate(zip(self.task.phases, self.meshes, strict=True)):
-            low[self._t + phase] = part.shortest / self.scales.durations[phase]
-            high[self._t + phase] = part.longest / self.scales.durations[phase]
+            own = slice(self.t(phase, 0), self.t(phase, mesh.size - 1))
+            low[own], high[own] = (end / self.scales.durations[phase] for end in (part.shortest, part.longest))
             last = first + STAGES * (mesh.size - 1)
             for one in part.limits:
                 if one.channel not in sizes:
@@ -302,8 +313,11 @@ class Transcription:
         """Variables of a motion."""
         z = np.zeros(self.size)
         z[: self.points * self.nx] = (motion.states / self.scales.states).ravel()
-        z[self.points * self.nx : self._t] = np.concatenate([(u / self.scales.commands).ravel() for u in motion.commands])
-        z[self._t : self._r] = motion.durations / self.scales.durations
+        z[self.points * self.nx : self._t[0]] = np.concatenate(
+            [(u / self.scales.commands).ravel() for u in motion.commands]
+        )
+        counts = [mesh.size - 1 for mesh in self.meshes]
+        z[self._t[0] : self._r] = np.repeat(motion.durations / self.scales.durations, counts)
         held = [one / self.scales.commands for one in motion.rests if one is not None]
         if held:
             z[self._r : self._s] = np.concatenate(held)
@@ -313,13 +327,14 @@ class Transcription:
         """Motion of variables."""
         states = z[: self.points * self.nx].reshape(-1, self.nx) * self.scales.states
         commands = tuple(
-            z[self._u[at] : self._u[at + 1]].reshape(-1, self.nu) * self.scales.commands for at in range(len(self.meshes))
+            z[self._u[at] : self._u[at + 1]].reshape(-1, self.nu) * self.scales.commands
+            for at in range(len(self.meshes))
         )
         rests = tuple(
             z[self.r(end) : self.r(end) + self.nu] * self.scales.commands if there else None
             for end, there in enumerate(self.rests)
         )
-        return MeshMotion(self.meshes, z[self._t : self._r] * self.scales.durations, states, commands, rests)
+        return MeshMotion(self.meshes, z[self._t[:-1]] * self.scales.durations, states, commands, rests)
 
     def missed(self, z: Array) -> list[tuple[str, str, float, float]]:
         """Conditions that a soft solution misses: name, unit, what it has and what was asked for; worst first."""
@@ -334,7 +349,6 @@ class Transcription:
 
 
 def _sparse(entries: list[tuple[int, int, float]], shape: tuple[int, int]) -> coo_array:
-    rows, columns, values = (np.array(part) for part in zip(*entries, strict=True)) if entries else ([], [], [])
-    return coo_array((np.asarray(values, dtype=np.float64), (rows, columns)), shape=shape)
-
-
+    rows = np.array([one[0] for one in entries], dtype=np.int64)
+    columns = np.array([one[1] for one in entries], dtype=np.int64)
+    return coo_array((np.array([one[2] for one in entries], dtype=np.float64), (rows, columns)), shape=shape)
