@@ -114,7 +114,13 @@ class Program:
         ca = casadi()
         if not self._solvers:
             self._solvers["problem"], self._solvers["derivatives"] = self.functions()
-        settings = {"print_time": False, "error_on_fail": False, "iteration_callback": callback, "ipopt": options}
+        settings = {
+            "print_time": False,
+            "error_on_fail": False,
+            "show_eval_warnings": False,
+            "iteration_callback": callback,
+            "ipopt": options,
+        }
         return ca.nlpsol("solver", "ipopt", self._solvers["problem"], {**settings, **self._solvers["derivatives"]})
 
 

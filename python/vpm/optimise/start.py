@@ -78,41 +78,50 @@ def _nearest(
     ca, own = casadi(), channels.own
     if not end.conditions and not end.rest:
         return state, command
-    names = (*own.states, *own.commands)
-    low, high = np.full(len(names), -LARGE), np.full(len(names), LARGE)
-    for one in limits:
-        if one.channel in names:
-            low[names.index(one.channel)], high[names.index(one.channel)] = one.least, one.most
     slack = ca.SX.sym("slack", len(end.conditions))
     rows = [channels[one.channel] - slack[at] for at, one in enumerate(end.conditions)]
     least, most = [one.least for one in end.conditions], [one.most for one in end.conditions]
-    point = ca.vertcat(own.x, own.u)
-    if end.rest:
-        half = sum(name.endswith(".velocity") for name in own.states)
-        low[half : 2 * half] = high[half : 2 * half] = 0.0
+    half = sum(name.endswith(".velocity") for name in own.states)
+    if end.rest:  # velocities are zero by their bounds
         rows.append(own.rates[half:])
         least += [0.0] * (len(own.states) - half)
         most += [0.0] * (len(own.states) - half)
-    function = ca.substitute(
-        [ca.vertcat(*rows)], [channels.slope, channels.T], [ca.SX.zeros(command.size), ca.SX(1.0)]
-    )[0]
-    state = state.copy()
-    for one in end.conditions:
-        if one.channel in own.states:
-            at = own.states.index(one.channel)
-            state[at] = one.near(state[at])
-    near = np.concatenate([state, command, np.zeros(len(end.conditions))])
-    low, high = (np.append(part, np.full(len(end.conditions), end_)) for part, end_ in ((low, -LARGE), (high, LARGE)))
-    size = np.maximum(1.0, np.abs(near))
-    point = ca.vertcat(point, slack)
-    away = (point - near) / size
-    problem = {"x": point, "f": ca.sumsqr(away) + 1e8 * ca.sumsqr(slack), "g": function}
-    options = {"print_time": False, "error_on_fail": False, "ipopt": {"print_level": 0, "sb": "yes", "max_iter": 300}}
+    still = [channels.slope, channels.T], [ca.SX.zeros(command.size), ca.SX(1.0)]
+    near = np.concatenate([_towards(own.states, end, state), command, np.zeros(len(end.conditions))])
+    low, high = _bounds((*own.states, *own.commands), limits, near.size)
+    if end.rest:
+        low[half : 2 * half] = high[half : 2 * half] = 0.0
+    point = ca.vertcat(own.x, own.u, slack)
+    away = (point - near) / np.maximum(1.0, np.abs(near))
+    # A condition is missed only where it cannot be met: by a hair it costs more than any way from the start.
+    problem = {
+        "x": point,
+        "f": ca.sumsqr(away) + 1e8 * ca.sumsqr(slack),
+        "g": ca.substitute([ca.vertcat(*rows)], *still)[0],
+    }
+    ipopt = {"print_level": 0, "sb": "yes", "max_iter": 300}
+    options = {"print_time": False, "error_on_fail": False, "show_eval_warnings": False, "ipopt": ipopt}
     solver = ca.nlpsol("rest", "ipopt", problem, options)
     found = np.array(solver(x0=np.clip(near, low, high), lbx=low, ubx=high, lbg=least, ubg=most)["x"].full()).ravel()
-    if not np.all(np.isfinite(found)):
-        found = near
+    found = found if np.all(np.isfinite(found)) else near
     return found[: state.size], found[state.size : state.size + command.size]
+
+
+def _towards(names: Sequence[str], end: End, state: Array) -> Array:
+    """A state with those that an end names where it wants them."""
+    found = state.copy()
+    for one in end.conditions:
+        if one.channel in names:
+            found[names.index(one.channel)] = one.near(found[names.index(one.channel)])
+    return found
+
+
+def _bounds(names: Sequence[str], limits: Sequence[Limit], size: int) -> tuple[Array, Array]:
+    low, high = np.full(size, -LARGE), np.full(size, LARGE)
+    for one in limits:
+        if one.channel in names:
+            low[names.index(one.channel)], high[names.index(one.channel)] = one.least, one.most
+    return low, high
 
 
 def scales(task: Fitted, channels: Channels, points: Sequence[tuple[Array, Array]]) -> Scales:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
+from copy import deepcopy
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
@@ -134,6 +135,7 @@ class Task:
 
     def __init__(self, content: Mapping[str, object], *, path: str | None = None) -> None:
         self._path = path
+        self._content = dict(content)
         try:
             check_plain(content, path)
             self._document = Document.model_validate(content)
@@ -163,6 +165,11 @@ class Task:
     def name(self) -> str:
         """What the file calls it."""
         return self._document.task
+
+    @property
+    def content(self) -> dict[str, Any]:
+        """What the file holds, to be changed into another task."""
+        return deepcopy(self._content)
 
     def machine(self, model: Model) -> Model:
         """The model at the level of detail and with the values that the task asks for.
@@ -318,7 +325,9 @@ class Task:
                 self._refuse(place("obstacles", at, "marker"), rest)
 
     def _check_commands(self, model: Model, fitted: Fitted) -> None:
-        """Nothing is least where a command may grow without end."""
+        """Nothing can be chosen without commands, and nothing is least where one may grow without end."""
+        if not model.input_channels:
+            raise OptimisationError(f"{model.name} has no actuator, so there is no command to find; add one")
         if fitted.weights.get("energy", 0.0) > 0.0:
             return
         for name in model.input_channels:
