@@ -98,7 +98,7 @@ class Transcription:
             first += STAGES * (mesh.size - 1)
             self._end(self.task.phases[phase].end, phase + 1, first, phase, mesh.size - 1)
             self._cost.append((self.t(phase, 0), self.task.weights.get("time", 0.0) * self.scales.durations[phase]))
-        self._path(0, [(0, 0, 0.0)], 0)
+        self._path(0, [(0, 0, 0.0)])
         self._end(self.task.begin, 0, 0, 0, 0)
         self._joined()
 
@@ -125,9 +125,9 @@ class Transcription:
                     puts.append((-1, at * size + self.nx, width * WEIGHTS[i]))
         self._groups.append((group, places, puts))
         where = [(k, first + STAGES * k + i + 1, POINTS[i]) for k in range(widths.size) for i in range(STAGES)]
-        self._path(phase, where, first)
+        self._path(phase, where)
 
-    def _path(self, phase: int, where: list[tuple[int, int, float]], _first: int) -> None:
+    def _path(self, phase: int, where: list[tuple[int, int, float]]) -> None:
         """Limits of what is neither a state nor a command, at points (interval, point, share)."""
         ca = casadi()
         limits = [one for one in self.task.phases[phase].limits if not self._is_bound(one.channel)]
