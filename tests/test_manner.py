@@ -29,6 +29,9 @@ from vpm.plain import plain
 ROOT = Path(__file__).resolve().parent.parent
 BAND = ("--channel", "motor.command", "--unit", "A", "--band", "1", "20", "--period", "1", "--time-step", "0.01")
 LIMITS = "[shoulder]\nposition = [-1.5, 1.5]\nspeed = 3.0\nacceleration = 15.0\n"
+TURN = (
+    'task = "turn"\nminimise = "energy"\nduration = 1.0\nintervals = 5\n[end]\nrest = true\n"shoulder.position" = 0.5\n'
+)
 LOG = "short.csv"
 
 #: Words behind each command; files are in the folder that it runs in.
@@ -46,6 +49,7 @@ CASES: dict[str, tuple[str | Path, ...]] = {
     "simplify": (MODEL, LOG, "--tolerance", "0.5"),
     "budget": (MODEL, "--steps", "2000", "--latency", "0"),
     "compile": (MODEL, "--c", "c"),
+    "optimise": (MODEL, "turn.toml"),
     "linkage": (ROOT / "examples" / "karl" / "karl.toml",),
     "study": ("carton", "--mesh", "1"),
     "view": (MODEL, "--page", "arm.html"),
@@ -83,6 +87,7 @@ def strict(text: str) -> dict[str, object]:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("manner")
     (place / LOG).write_text("\n".join(TRAIN.read_text(encoding="utf-8").splitlines()[:2002]), encoding="utf-8")
+    (place / "turn.toml").write_text(TURN, encoding="utf-8")
     (place / "limits.toml").write_text(LIMITS, encoding="utf-8")
     answers = json.loads((ROOT / "docs" / "proving_ground.json").read_text(encoding="utf-8"))
     (place / "answers.json").write_text(json.dumps(answers[:20]), encoding="utf-8")
@@ -104,6 +109,8 @@ def test_every_command_has_a_case_and_a_row_on_the_page() -> None:
 
 @pytest.mark.parametrize("name", CASES)
 def test_every_command_writes_one_document(name: str, folder: Path) -> None:
+    if name == "optimise":
+        pytest.importorskip("casadi", reason="CasADi is not installed")
     done = command(*name.split(), *CASES[name], "--json", cwd=folder)
     assert done.returncode == 0, done.stderr
     document = strict(done.stdout)

@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from vpm.many import Case, diagnose_many
     from vpm.model import Dynamics, Model
     from vpm.observer import Noise, Observation, Observer, observe
+    from vpm.optimise import Optimum, optimise
     from vpm.ranking import Ranking, rank
     from vpm.realtime import write_fmu
     from vpm.reduction import Reduction, reduce
@@ -90,6 +91,7 @@ __all__ = [
     "Observation",
     "Observer",
     "OilFit",
+    "Optimum",
     "Ranking",
     "Reduction",
     "Report",
@@ -121,6 +123,7 @@ __all__ = [
     "linkages",
     "narx",
     "observe",
+    "optimise",
     "rank",
     "realtime",
     "reduce",
@@ -177,6 +180,8 @@ _HOMES = {
     "Observation": "vpm.observer",
     "Observer": "vpm.observer",
     "observe": "vpm.observer",
+    "Optimum": "vpm.optimise",
+    "optimise": "vpm.optimise",
     "Ranking": "vpm.ranking",
     "rank": "vpm.ranking",
     "write_fmu": "vpm.realtime",

@@ -26,6 +26,7 @@ from vpm import (
     identify_command,
     import_command,
     info_command,
+    optimise_command,
     prove_command,
     rank_command,
     reduce_command,
@@ -121,6 +122,7 @@ app.command(epilog=check_command.EXAMPLES)(check_command.check)
 app.command(epilog=identify_command.EXAMPLES)(identify_command.identify)
 app.command(epilog=diagnose_command.EXAMPLES)(diagnose_command.diagnose)
 app.command(epilog=rank_command.EXAMPLES)(rank_command.rank)
+app.command(epilog=optimise_command.EXAMPLES)(optimise_command.optimise)
 app.command(epilog=prove_command.EXAMPLES)(prove_command.prove)
 app.command(epilog=study_command.EXAMPLES)(study_command.study)
 app.command(epilog=view_command.EXAMPLES)(view_command.view)

@@ -135,6 +135,23 @@ class ReductionError(VpmError):
     """A solid or its matrices cannot be reduced to a flexible link."""
 
 
+class OptimisationError(VpmError):
+    """A task of an optimisation is wrong, does not fit its model, or no motion fulfils it.
+
+    Attributes
+    ----------
+    where : str or None
+        Place in the file, for example ``limits."motor.command"``.
+    path : str or None
+        File that the task was read from.
+    """
+
+    def __init__(self, message: str, *, where: str | None = None, path: str | None = None) -> None:
+        super().__init__(message)
+        self.where = where
+        self.path = path
+
+
 class ExecutorError(VpmError):
     """Work cannot be given to an executor, a worker refused it, or its worker died with it again and again.
 

@@ -132,6 +132,7 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "vpm.narx.validation": ("NarxValidation",),
     "vpm.observer.noise": ("Noise",),
     "vpm.observer.observation": ("Observation",),
+    "vpm.optimise.optimum": ("Optimum",),
     "vpm.ranking.judgement": ("Judgement",),
     "vpm.ranking.result": ("Gap", "Ranked", "Ranking"),
     "vpm.realtime.loop": ("LoopReport",),

@@ -1,0 +1,79 @@
+"""Radau's points of an interval, and the polynomials through them.
+
+Source: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II", 2nd edition 1996, section IV.5: Radau IIA of
+three stages has order five, and its last point is the end of the interval, so it is stiffly accurate.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.polynomial import legendre
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+#: Points in each interval.
+STAGES = 3
+
+
+def _points() -> Array:
+    """Roots of ``P_(s-1) - P_s`` on [0, 1], of which the last is 1."""
+    coefficients = np.zeros(STAGES + 1)
+    coefficients[STAGES - 1 :] = 1.0, -1.0
+    return np.sort(0.5 * (legendre.legroots(coefficients).real + 1.0))
+
+
+#: Where the points are, as shares of an interval.
+POINTS = _points()
+#: The same with the beginning of the interval in front.
+NODES = np.concatenate([[0.0], POINTS])
+_POWERS = np.linalg.inv(np.vander(NODES, increasing=True))
+
+
+def values(at: Array) -> Array:
+    """What gives a polynomial at ``at`` from its values at the nodes, shape (at, STAGES + 1)."""
+    return np.asarray(np.vander(at, STAGES + 1, increasing=True) @ _POWERS)
+
+
+def slopes(at: Array) -> Array:
+    """What gives its derivative by the share of the interval, shape (at, STAGES + 1)."""
+    powers = np.vander(at, STAGES + 1, increasing=True)
+    grown = np.zeros_like(powers)
+    grown[:, 1:] = powers[:, :-1] * np.arange(1, STAGES + 1)
+    return np.asarray(grown @ _POWERS)
+
+
+#: Derivatives at the points, shape (STAGES, STAGES + 1).
+DERIVATIVE = slopes(POINTS)
+#: Weights of the quadrature on the points, exact for polynomials of degree 4.
+WEIGHTS = np.linalg.solve(np.vander(POINTS, increasing=True).T, 1.0 / np.arange(1, STAGES + 1))
+
+
+def spread(mesh: Array) -> Array:
+    """Times of the nodes and points of a mesh, each once, shape (STAGES * intervals + 1,)."""
+    inner = mesh[:-1, None] + np.diff(mesh)[:, None] * POINTS
+    return np.concatenate([mesh[:1], inner.ravel()])
+
+
+def at_times(mesh: Array, states: Array, times: Array) -> tuple[Array, Array]:
+    """States and their rates by the polynomials of each interval.
+
+    Parameters
+    ----------
+    mesh : ndarray, shape (K + 1,)
+        s.
+    states : ndarray, shape (STAGES * K + 1, nx)
+        At `spread` of the mesh.
+    times : ndarray, shape (N,)
+        s.
+
+    Returns
+    -------
+    tuple of ndarray, shapes (N, nx)
+    """
+    interval = np.clip(np.searchsorted(mesh, times, side="right") - 1, 0, mesh.size - 2)
+    width = np.diff(mesh)[interval]
+    share = np.clip((times - mesh[interval]) / width, 0.0, 1.0)
+    own = states[STAGES * interval[:, None] + np.arange(STAGES + 1)]
+    found = np.einsum("nj,njx->nx", values(share), own)
+    return found, np.einsum("nj,njx->nx", slopes(share), own) / width[:, None]

@@ -1,0 +1,129 @@
+"""Form of a task file: which keys there are and what kind of value each takes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import BaseModel, BeforeValidator, Field, ValidationError
+
+from vpm.errors import near_match
+from vpm.model.entry import Entry, Number, Switch, Text, Vector
+from vpm.model.messages import Problem, place, shown
+from vpm.model.schema import keys_of
+
+#: Words of `minimise` that are no channels.
+GOALS = ("time", "energy")
+_RANGE = 'a number, a list [least, most] or a table like { least = -1.0, most = 1.0, unit = "rad" }'
+
+
+class Range(Entry):
+    """A value, or what lies between two; a missing unit means SI."""
+
+    value: Number | None = None
+    least: Number | None = None
+    most: Number | None = None
+    unit: Text | None = None
+
+
+def _as_range(given: object) -> object:
+    if isinstance(given, Range):
+        return given
+    if isinstance(given, Mapping):
+        value, ends = "value" in given, "least" in given or "most" in given
+        if value == ends:
+            raise ValueError(f"has to be {_RANGE}")
+        return given
+    if isinstance(given, int | float) and not isinstance(given, bool):
+        return {"value": given}
+    if isinstance(given, list | tuple) and len(given) == 2:
+        return {"least": given[0], "most": given[1]}
+    raise ValueError(f"has to be {_RANGE}")
+
+
+Bounds = Annotated[Range, BeforeValidator(_as_range)]
+
+
+class Boundary(Entry):
+    """What holds at the beginning of a motion or at the end of a phase."""
+
+    rest: Switch = False
+    channels: dict[str, Bounds] = Field(default_factory=dict)
+
+
+def _as_boundary(given: object) -> object:
+    """Channels stand beside the word in the file, and in a table of their own here."""
+    if not isinstance(given, Mapping):
+        return given
+    words = {key: value for key, value in given.items() if key == "rest"}
+    return {**words, "channels": {key: value for key, value in given.items() if key not in words}}
+
+
+Ends = Annotated[Boundary, BeforeValidator(_as_boundary)]
+Intervals = Annotated[int, Field(strict=True, ge=1, le=500)]
+
+
+class PhaseEntry(Entry):
+    """A part of the motion with a duration, limits and an end of its own."""
+
+    name: Text
+    duration: Bounds
+    intervals: Intervals = 15
+    limits: dict[str, Bounds] = Field(default_factory=dict)
+    guess: dict[str, Bounds] = Field(default_factory=dict)
+    end: Ends = Boundary()
+
+
+class ObstacleEntry(Entry):
+    """A ball that a marker keeps out of."""
+
+    marker: Text
+    center: Vector
+    radius: Annotated[float, Field(strict=True, gt=0.0, allow_inf_nan=False)]
+
+
+class Document(Entry):
+    """A whole task file."""
+
+    task: Text
+    level: Text | dict[str, Text] | None = None
+    set: dict[str, Bounds] = Field(default_factory=dict)
+    minimise: Text | dict[str, Number] | None = None
+    maximise: Text | None = None
+    duration: Bounds | None = None
+    intervals: Intervals = 20
+    tolerance: Annotated[float, Field(strict=True, gt=0.0, le=0.1)] = 1e-5
+    refinements: Annotated[int, Field(strict=True, ge=0, le=12)] = 6
+    time_step: Bounds = Range(value=1e-3)
+    before: Bounds = Range(value=0.1)
+    after: Bounds = Range(value=0.0)
+    periodic: Switch = False
+    begin: Annotated[Boundary, BeforeValidator(_as_boundary)] = Boundary(rest=True)
+    end: Ends = Boundary()
+    limits: dict[str, Bounds] = Field(default_factory=dict)
+    guess: dict[str, Bounds] = Field(default_factory=dict)
+    obstacles: tuple[ObstacleEntry, ...] = ()
+    phases: tuple[PhaseEntry, ...] = ()
+
+
+_TABLES: Mapping[str, type[BaseModel]] = {"phases": PhaseEntry, "obstacles": ObstacleEntry}
+
+
+def schema_problems(error: ValidationError) -> list[Problem]:
+    """What the schema found, as sentences; unknown keys come first, for what is missing is often what is misspelt."""
+    found = sorted(error.errors(include_url=False), key=lambda one: one["type"] != "extra_forbidden")
+    return [_problem(dict(one)) for one in found]
+
+
+def _problem(found: dict[str, Any]) -> Problem:
+    keys = tuple(key for key in found["loc"] if key != "channels" and not str(key).startswith("dict["))
+    kind, context = found["type"], found.get("ctx", {})
+    if kind == "extra_forbidden":
+        table = _TABLES.get(str(keys[0]), Document) if len(keys) <= 3 else Range
+        known = keys_of(table) if keys[0] in _TABLES or len(keys) == 1 else keys_of(Range)
+        return Problem(place(*keys), f"is not a known key; {near_match(str(keys[-1]), known)}")
+    if kind == "missing":
+        return Problem(place(*keys), "is missing; add it")
+    if kind == "value_error":
+        return Problem(place(*keys), f"{context['error']}; it is {shown(found['input'])}")
+    return Problem(place(*keys), f"is wrong ({found['msg'].lower()}); it is {shown(found['input'])}")
