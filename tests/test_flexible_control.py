@@ -152,6 +152,22 @@ def test_growing_and_decaying_parts_are_the_closed_form() -> None:
     assert parts.backward @ np.array([1.0, -5.0]) == pytest.approx(0.0, abs=1e-12)
 
 
+def test_motions_that_begin_to_grow_on_the_way_are_told() -> None:
+    # A pole at -3 that is at +3 for a while: what it grows by is no bounded motion of either kind.
+    time = np.arange(0.0, 30.0, 0.05)
+
+    def rates(at: Array, states: Array) -> tuple[Array, Array]:
+        pole = np.where((at > 5.0) & (at < 25.0), 3.0, -3.0)
+        return pole[:, None] * states + np.exp(-((at - 6.0) ** 2))[:, None], pole[:, None, None]
+
+    guess = np.zeros((len(time), 1))
+    guess[3] = 1.0
+    with pytest.raises(SimulationError, match=r"grow: 0 where it begins, 1 at 5\.95 s"):
+        solve(rates, time, guess, (np.array([[-3.0]]), np.array([[-3.0]])))
+    with pytest.raises(SimulationError, match="1 where it ends"):
+        solve(rates, time, guess, (np.array([[-3.0]]), np.array([[3.0]])))
+
+
 def test_the_inversion_of_a_linear_link_is_the_closed_form() -> None:
     found, length = plan(), 2.0 * LINK
     # Rods about their ends; the tip at L q1 + l q2 prescribes q1.
@@ -206,12 +222,28 @@ def test_the_feed_forward_played_on_the_model_gives_the_target() -> None:
     assert np.abs(found.commands[found.time < 0.0]).max() > 0.05 * np.abs(found.commands).max()
 
 
+def played(model: Model, found: vpm.FlexibleFeedforward) -> Array:
+    """The tip of the model itself under the commands alone."""
+    sim = vpm.Simulation(model, found.time_step, state=found.state[0], substeps=4)
+    return sim.run(vpm.FlexibleController(model, found), found.time[-1] - found.time[0])["tip.y"]
+
+
 def test_a_large_motion_played_on_the_model_gives_the_target() -> None:
+    move = vpm.TargetMotion.rest_to_rest([0.0], [0.4], 0.4)
+    errors = []
+    for step in (1e-3, 5e-4):
+        found = vpm.flexible_feedforward(rods(), move, ["tip.y"], time_step=step)
+        errors.append(np.abs(played(rods(), found) - found.target[1:, 0]).max())
+    assert errors[0] < 1e-6
+    # What is left is that commands are held: it falls with the square of the time step.
+    assert errors[0] / errors[1] == pytest.approx(4.0, rel=0.05)
+
+
+def test_a_way_through_points_is_followed() -> None:
     move = vpm.TargetMotion.through([0.0, 0.3, 0.6], [[0.0], [0.3], [0.4]])
     found = vpm.flexible_feedforward(rods(), move, ["tip.y"])
-    sim = vpm.Simulation(rods(), 1e-3, state=found.state[0], substeps=4)
-    run = sim.run(vpm.FlexibleController(rods(), found), len(found.time) * 1e-3 - 1e-3)
-    assert np.abs(run["tip.y"] - found.target[1:, 0]).max() < 2e-4
+    # A kink of the third derivative at the ends, where the spline begins, is followed to the order of the step.
+    assert np.abs(played(rods(), found) - found.target[1:, 0]).max() < 2e-4
     series = vpm.flexible_feedforward(rods(), move, ["tip.y"], method="inertial")
     # Terms of the series below a millionth of the motion are left out.
     assert np.abs(series.reached - series.target).max() < 1e-6 * 0.4
@@ -297,6 +329,17 @@ def test_a_controller_holds_a_machine_that_is_not_its_model() -> None:
     assert controller.step_times(50).shape == (50,)
     assert controller.time == pytest.approx(plan().time[0])
     assert "observer" in repr(controller)
+    poses = vpm.state_feedback(
+        rods(),
+        {"hub": [-0.1, 0.1]},
+        deviations={"tip.y": 1e-3, "hub.velocity": 0.1},
+        efforts={"motor": 0.5},
+        integrate={"tip.y": 1e-4},
+    )
+    over_poses = vpm.FlexibleController(rods(), plan(), poses, NOISE, channels=list(NOISE.readings))
+    again = vpm.Simulation(wrong, 1e-3, substeps=2).run(over_poses, seconds)
+    # On so short a way the gains of poses are those of the motion.
+    np.testing.assert_allclose(again["tip.y"], held["tip.y"], atol=1e-3 * SMALL)
 
 
 def test_a_feed_forward_is_a_log_for_the_servos_of_a_model() -> None:
