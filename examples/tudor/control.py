@@ -145,8 +145,25 @@ class Laboratory:
             "rigid, PD": Servos(self.model, self.plans["rigid"]),
             "sag, PD": Servos(self.model, self.plans["quasi_static"]),
             "flexible, PD": Servos(self.model, flexible),
-            "flexible, LQR": vpm.FlexibleController(self.model, flexible, self.feedback, self.noise, limits=LIMITS),
+            "flexible, LQR": vpm.FlexibleController(
+                self.model,
+                flexible,
+                self.feedback,
+                self.noise,
+                limits=LIMITS,
+                # The cheapest steps are as good for an observer that is corrected in each of them.
+                integrator="linearly_implicit",
+            ),
         }
+
+    def alone(self) -> float:
+        """Largest error of the tip where the controller's model plays the plan by itself, m."""
+        plan = self.plans["inversion"]
+        sim = vpm.Simulation(self.model, STEP, state=plan.state[0], substeps=4)
+        shown = sim.run(vpm.FlexibleController(self.model, plan), plan.time[-1] - plan.time[0])
+        tip = np.column_stack([shown[f"tip.{axis}"] for axis in AXES])
+        moving = (plan.time[1:] >= 0.0) & (plan.time[1:] <= MOVE)
+        return float(np.linalg.norm(tip - plan.target[1:], axis=1)[moving].max())
 
     def play(self, machine: vpm.Model, controller: Servos | vpm.FlexibleController, seed: int = 0) -> Array:
         """Error of the tip (N, 3), m, from the first sample of the target on."""
@@ -189,6 +206,7 @@ def main(folder: Path, seeds: int) -> None:
     cases: dict[str, vpm.Model] = {"nominal": laboratory.finer}
     cases |= {f"10 % wrong, seed {seed}": wrong(laboratory.finer, seed) for seed in range(seeds)}
     cases |= {name: hide(laboratory.finer) for name, hide in HIDDEN.items()}
+    print(f"the plan played on its own model, without feedback: {1e3 * laboratory.alone():.6f} mm")
     names = list(laboratory.controllers())
     print("largest error of the tip, and residual vibration, mm")
     print(f"{'':26}" + "".join(f"{name:>20}" for name in names) + "      better than rigid by")
@@ -203,9 +221,11 @@ def main(folder: Path, seeds: int) -> None:
         print(f"worst of {seeds} seeds: better than rigid by {factors[0]:.1f} (error), {factors[1]:.1f} (vibration)")
     own = laboratory.controllers()["flexible, LQR"]
     times = own.step_times(5000, thread_time) if isinstance(own, vpm.FlexibleController) else np.zeros(1)
-    quantiles = {name: float(np.quantile(times, q)) for name, q in (("p50", 0.5), ("p99", 0.99), ("p99.9", 0.999))}
+    quantiles = {name: float(np.quantile(times, q)) for name, q in (("p50", 0.5), ("p90", 0.9), ("p99", 0.99))}
     told = ", ".join(f"{name} {1e6 * value:.0f} us" for name, value in quantiles.items())
-    print(f"a step of observer, feedback and feed-forward: {told}; {100 * quantiles['p99.9'] / STEP:.1f} % of 1 ms")
+    print(
+        f"a step of observer, feedback and feed-forward: {told}; {100 * quantiles['p90'] / STEP:.1f} % of 1 ms at p90"
+    )
     _draw(drawn, folder / "control.png")
     print(f"wrote {folder / 'control.png'}")
 

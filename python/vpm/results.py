@@ -72,7 +72,7 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "vpm.compare.correlation": ("Correlation",),
     "vpm.compare.regions": ("Bin", "Region", "Where"),
     "vpm.control.feedback": ("StateFeedback",),
-    "vpm.control.feedforward": ("FlexibleFeedforward",),
+    "vpm.control.plan": ("FlexibleFeedforward",),
     "vpm.control.schedule": ("Schedule",),
     "vpm.discrepancy.diagnosis": (
         "AcceptedEffect",

@@ -2,7 +2,8 @@
 
 from vpm.control.controller import FlexibleController
 from vpm.control.feedback import StateFeedback, state_feedback
-from vpm.control.feedforward import FlexibleFeedforward, flexible_feedforward
+from vpm.control.feedforward import flexible_feedforward
+from vpm.control.plan import FlexibleFeedforward
 from vpm.control.target import TargetMotion
 
 __all__ = [

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vpm.control.feedback import StateFeedback, at_axes
-from vpm.control.feedforward import FlexibleFeedforward
+from vpm.control.plan import FlexibleFeedforward
 from vpm.errors import SimulationError, near_match
 from vpm.model import Model
 from vpm.observer import Noise, Observer

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vpm.control.feedforward import FlexibleFeedforward
+from vpm.control.plan import FlexibleFeedforward
 from vpm.control.schedule import TIME, Schedule
 from vpm.errors import SimulationError, near_match
 from vpm.linear import LinearModel

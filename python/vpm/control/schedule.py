@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vpm.control.feedforward import FlexibleFeedforward
+from vpm.control.plan import FlexibleFeedforward
 from vpm.errors import SimulationError, near_match
 from vpm.model import Model
 from vpm.numbers import array_of

@@ -20,6 +20,8 @@ Rates = Callable[[Array, Array], tuple[Array, Array]]
 CLOSE, STEPS = 1e-9, 40
 #: Steps below this share of the motion that no longer shrink are rounding of stiff internal motions.
 ROUNDED = 1e-4
+#: Places at which a motion is looked at that could not be inverted.
+LOOKS = 21
 
 
 class Split(NamedTuple):
@@ -71,8 +73,8 @@ def solve(rates: Rates, times: Array, guess: Array, ends: tuple[Array, Array]) -
     nx = guess.shape[1]
     if len(first) + len(last) != nx:
         raise SimulationError(
-            f"{nx - len(first)} internal motions grow by themselves where the motion begins, {len(last)} where it "
-            "ends; choose an output, or a way, along which their number stays the same"
+            f"internal motions that grow by themselves: {nx - len(first)} where the motion begins, {len(last)} where "
+            "it ends; choose an output, or a way, along which their number stays the same"
         )
     states, rest = guess.copy(), (guess[0].copy(), guess[-1].copy())
     size = np.abs(guess).max(axis=0) + 1e-3 * np.abs(guess).max()
@@ -89,10 +91,25 @@ def solve(rates: Rates, times: Array, guess: Array, ends: tuple[Array, Array]) -
         if relative < CLOSE or 0.5 * error < relative < ROUNDED:
             return states
         error = relative
+    reason = _turning(rates, times, guess) or f"the last step was {error:.2g} of the motion"
     raise SimulationError(
-        f"the inversion does not converge (the last step was {error:.2g} of the motion); "
-        "take a slower motion, keep it off singular poses, or begin with a coarser level of the links"
+        f"the inversion does not converge ({reason}); take a slower motion, keep it off singular poses, "
+        'take a coarser level of the links, or method = "inertial"'
     )
+
+
+def _turning(rates: Rates, times: Array, guess: Array) -> str:
+    """Where along the way another number of internal motions grows than at its start, in words; else nothing.
+
+    Then what grows in one part may die out in another, and nothing bounded need be left (the dichotomy of W. Coppel,
+    "Dichotomies in Stability Theory", 1978).
+    """
+    some = np.unique(np.linspace(0, len(times) - 1, LOOKS).astype(int))
+    counts = [len(split(matrix).backward) for matrix in rates(times[some], guess[some])[1]]
+    other = next((place for place, count in enumerate(counts) if count != counts[0]), None)
+    if other is None:
+        return ""
+    return f"internal motions that grow: {counts[0]} where it begins, {counts[other]} at {times[some][other]:.3g} s"
 
 
 def between(times: Array, states: Array, slopes: Array) -> tuple[Array, Array]:
