@@ -70,6 +70,42 @@ at = "spring"
 stiffness = 1.0
 """
 )
+#: A hand of 1 kg on two crossed rails.
+GANTRY = """
+name = "gantry"
+gravity = [0.0, 0.0, 0.0]
+
+[bodies.bridge]
+mass = 1.0
+
+[bodies.hand]
+mass = 1.0
+
+[joints.along]
+type = "prismatic"
+parent = "world"
+child = "bridge"
+axis = [1.0, 0.0, 0.0]
+
+[joints.across]
+type = "prismatic"
+parent = "bridge"
+child = "hand"
+axis = [0.0, 1.0, 0.0]
+
+[markers.finger]
+parent = "hand"
+
+[actuators.first]
+joint = "along"
+gain = 1.0
+command_unit = "N"
+
+[actuators.second]
+joint = "across"
+gain = 1.0
+command_unit = "N"
+"""
 PENDULUM = """
 name = "pendulum"
 gravity = [0.0, 0.0, -9.81]
@@ -259,6 +295,26 @@ def test_phases_have_ends_of_their_own() -> None:
     peak, second = math.sqrt(0.5 * (1.0 + 4.0)), math.sqrt(0.5 * (1.0 + 8.0))
     first, last = (2.0 * peak - 1.0) / 2.0, (2.0 * second - 1.0) / 2.0
     assert list(found.durations.values()) == pytest.approx([first, last], rel=2e-4)
+
+
+def test_a_marker_keeps_out_of_a_ball() -> None:
+    center, radius = np.array([1.0, -0.1]), 0.4
+    task = {
+        "task": "around",
+        "minimise": "energy",
+        "duration": 2.0,
+        "tolerance": 1e-3,
+        "end": {"rest": True, "along.position": 2.0, "across.position": 0.0},
+    }
+    ball = {"marker": "finger", "center": [*center, 0.0], "radius": radius}
+    model = vpm.Model.from_toml(GANTRY)
+    straight, around = vpm.optimise(model, task), vpm.optimise(model, {**task, "obstacles": [ball]})
+    away = np.hypot(around["finger.x"] - center[0], around["finger.y"] - center[1])
+    assert away.min() == pytest.approx(radius, rel=1e-2)
+    # Straight on, 2 kg and the cubic; the way around costs more, and by symmetry is widest above the ball.
+    assert straight.objective == pytest.approx(12.0 * 4.0 * 4.0 / 8.0, rel=1e-6)
+    assert around.objective > straight.objective
+    assert around["finger.y"].max() == pytest.approx(center[1] + radius, abs=0.01)
 
 
 def test_a_periodic_motion_ends_as_it_begins() -> None:
