@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import runpy
+import signal
 from pathlib import Path
 
 import numpy as np
@@ -388,6 +389,16 @@ def test_ctrl_c_keeps_the_optimum_of_the_mesh_before() -> None:
     assert found.duration == pytest.approx(2.0 * math.sqrt(1.5), rel=1e-2)
     assert any("Ctrl-C" in note for note in found.notes)
     assert "iteration" in said[0]
+
+
+def test_a_signal_on_the_first_mesh_keeps_the_last_iterate() -> None:
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(OptimisationInterruptedError) as stopped:
+        vpm.optimise(vpm.Model.from_toml(CART), dash(3.0, 4.0), progress=lambda _: signal.raise_signal(signal.SIGINT))
+    found = stopped.value.result
+    assert (found.status, found.rounds, found.iterations) == ("interrupted", 0, 1)
+    assert found.mesh_states.shape == (61, 2)
+    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_the_command_writes_a_log_that_a_simulation_plays(tmp_path: Path) -> None:

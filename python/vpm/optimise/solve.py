@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -166,7 +170,8 @@ class _Run:
         bounds = self.form.bounds(soft=soft)
         start = np.clip(self.z, bounds["lbx"], bounds["ubx"])
         try:
-            result = solver(x0=start, p=float(soft), **bounds)
+            with _listening(watch):
+                result = solver(x0=start, p=float(soft), **bounds)
         except KeyboardInterrupt:
             self._keep()
             raise
@@ -192,6 +197,24 @@ class _Run:
         self.found.iterations += 1
         self.z, self.objective = z, cost
         self._progress(f"iteration {self.found.iterations}: {cost:.6g}, misses {violation:.1e}")
+
+
+@contextmanager
+def _listening(watch: Any) -> Iterator[None]:  # noqa: ANN401
+    """Ctrl-C ends the search after the iteration: inside of one the library would take it for an error."""
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or before in {signal.SIG_IGN, None}:
+        yield
+        return
+
+    def press(_number: int, _frame: FrameType | None) -> None:
+        watch.interrupted = True
+
+    signal.signal(signal.SIGINT, press)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _watch(run: _Run) -> Any:  # noqa: ANN401
