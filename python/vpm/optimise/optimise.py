@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from vpm.errors import OptimisationError, VpmError
 from vpm.model import Model
 from vpm.optimise.channels import Channels
+from vpm.optimise.kept import binding, passed
 from vpm.optimise.motion import MeshMotion
 from vpm.optimise.optimum import Optimum
-from vpm.optimise.solve import Progress, Search, SearchInterruptedError, binding, search
+from vpm.optimise.solve import Progress, Search, SearchInterruptedError, search
 from vpm.optimise.task import Fitted, Task, as_task
 
 Array = NDArray[np.float64]
@@ -126,7 +127,7 @@ def _optimum(models: tuple[Model, Model], name: str, found: Search) -> Optimum:
         binding=binding(channels, found.task, motion),
         played={},
         played_in_full={},
-        notes=tuple(found.notes),
+        notes=(*found.notes, *passed(channels, found.task, motion)),
     )
     played, notes = _played(models[0], optimum)
     in_full, more = _played(models[1], optimum) if models[1] is not models[0] else ({}, ())

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import signal
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from types import FrameType
 from typing import Any
 
 import numpy as np
@@ -13,11 +17,12 @@ from vpm.errors import OptimisationError, VpmError
 from vpm.model import Model
 from vpm.optimise.channels import Channels
 from vpm.optimise.equations import casadi, equations
+from vpm.optimise.kept import binding
 from vpm.optimise.mesh import bends, errors, finer
 from vpm.optimise.motion import MeshMotion
 from vpm.optimise.start import complete, ends, scales, simulated, way
 from vpm.optimise.task import Fitted, Limit
-from vpm.optimise.transcription import LARGE, Scales, Transcription
+from vpm.optimise.transcription import Scales, Transcription
 
 Array = NDArray[np.float64]
 #: Called with a sentence about what is being done.
@@ -165,7 +170,8 @@ class _Run:
         bounds = self.form.bounds(soft=soft)
         start = np.clip(self.z, bounds["lbx"], bounds["ubx"])
         try:
-            result = solver(x0=start, p=float(soft), **bounds)
+            with _listening(watch):
+                result = solver(x0=start, p=float(soft), **bounds)
         except KeyboardInterrupt:
             self._keep()
             raise
@@ -191,6 +197,24 @@ class _Run:
         self.found.iterations += 1
         self.z, self.objective = z, cost
         self._progress(f"iteration {self.found.iterations}: {cost:.6g}, misses {violation:.1e}")
+
+
+@contextmanager
+def _listening(watch: Any) -> Iterator[None]:  # noqa: ANN401
+    """Ctrl-C ends the search after the iteration: inside of one the library would take it for an error."""
+    before = signal.getsignal(signal.SIGINT)
+    if threading.current_thread() is not threading.main_thread() or before in {signal.SIG_IGN, None}:
+        yield
+        return
+
+    def press(_number: int, _frame: FrameType | None) -> None:
+        watch.interrupted = True
+
+    signal.signal(signal.SIGINT, press)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def _watch(run: _Run) -> Any:  # noqa: ANN401
@@ -258,44 +282,6 @@ def _worst(run: _Run) -> str:
     missed = np.maximum(bounds["lbg"] - g, g - bounds["ubg"])
     row = run.form.rows[int(np.argmax(missed))]
     return f"it misses {row.name} by {missed.max() * row.scale:.4g} {row.unit}"
-
-
-def binding(channels: Channels, task: Fitted, motion: MeshMotion) -> tuple[str, ...]:
-    """Limits that hold the motion back, with the share of the time."""
-    found = []
-    own, total = channels.own, motion.starts[-1]
-    times = np.linspace(0.0, total, 1001)
-    states, _, commands = motion.at(times)
-    outputs = channels.outputs(states, commands)
-    values = dict(zip(own.channels, outputs.T, strict=True))
-    values |= dict(zip(own.states, states.T, strict=True)) | dict(zip(own.commands, commands.T, strict=True))
-    for limit in _all_limits(task):
-        base = limit.channel.removesuffix(".rate")
-        course = values.get(limit.channel)
-        if course is None:
-            course = np.gradient(values[base], times) if base in values else None
-        if course is None or limit.least == limit.most:
-            continue
-        width = limit.most - limit.least if np.isfinite(limit.most - limit.least) else limit.size
-        for word, end in (("least", limit.least), ("most", limit.most)):
-            share = float(np.mean(np.abs(course - end) <= 1e-3 * max(width, 1e-12))) if abs(end) < LARGE else 0.0
-            if share >= 0.005:
-                unit = "" if limit.unit == "1" else f" {limit.unit}"
-                found.append(
-                    f"{limit.channel} is at its {word} of {end:.4g}{unit} for {100.0 * share:.0f} % of the time"
-                )
-            if limit.channel in own.commands and any(
-                held is not None and abs(held[own.commands.index(limit.channel)] - end) <= 1e-3 * width
-                for held in motion.rests
-            ):
-                found.append(
-                    f"{limit.channel} is at its {word} of {end:.4g} {limit.unit} while it holds the machine at rest"
-                )
-    return tuple(found)
-
-
-def _all_limits(task: Fitted) -> list[Limit]:
-    return list(dict.fromkeys(one for phase in task.phases for one in phase.limits))
 
 
 def _stiff(model: Model, task: Fitted, progress: Progress) -> MeshMotion | None:
