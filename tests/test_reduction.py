@@ -163,7 +163,7 @@ def test_sag_is_that_of_the_beam() -> None:
     np.testing.assert_allclose(places[0], places[1], rtol=2e-3, atol=1e-9)
 
 
-@pytest.mark.parametrize("tie", ["rigid", "averaged"])
+@pytest.mark.parametrize("tie", ["rigid", pytest.param("averaged", marks=pytest.mark.nightly)])
 def test_a_load_along_the_link_softens_it_as_it_does_a_beam(tie: str) -> None:
     """A third of the load of buckling, pressing or pulling; without what is quadratic in the modes nothing changes."""
     critical = np.pi**2 * STEEL["young"] * SIZE[0] * SIZE[1] ** 3 / 12.0 / (4.0 * SIZE[2] ** 2)

@@ -28,7 +28,7 @@ class Tied:
         self.arms = [structure.nodes[interface.nodes] - place for interface, place in places]
         self.tie = self._ties()
         # A rigid tie is averaged to what it was: one row serves both kinds.
-        own = [np.linalg.pinv(rigid_motions(arms)) for arms in self.arms]
+        own: list[Array] = [np.linalg.pinv(rigid_motions(arms)).astype(np.float64) for arms in self.arms]
         size = 3 * len(structure.nodes)
         self.rows: list[Matrix] = [
             sp.csr_array(_at(average.T, interface.nodes, size).T @ self.tie)

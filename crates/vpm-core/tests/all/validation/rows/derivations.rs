@@ -123,6 +123,7 @@ pub fn name(level: Level) -> String {
         Level::Hermite(n) => ["hermite".to_owned(), n.to_string()],
         Level::Strain(n) => ["strain".to_owned(), n.to_string()],
         Level::Elements(n) => ["elements".to_owned(), n.to_string()],
+        Level::Reduced(n) => ["reduced".to_owned(), n.to_string()],
     };
     format!("{kind}({count})")
 }
