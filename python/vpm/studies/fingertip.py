@@ -140,7 +140,7 @@ def classes(step: Pressed) -> Array:
     return np.array([rings[(middle >= a) & (middle < b)].sum() for a, b in pairwise(edges)])
 
 
-def fingertip(fineness: int = 3) -> Study:
+def fingertip(fineness: int = 2) -> Study:
     """Run the study.
 
     Parameters
@@ -258,7 +258,7 @@ def penalties(fineness: int = 1, way: float = 1e-3) -> Table:
     """Force and overlap by the contact stiffness alone, and with rounds of augmented Lagrange."""
     rows = []
     ways = [0.5 * way, way]
-    for factor in (0.1, 1.0, 10.0, 100.0):
+    for factor in (0.01, 0.1, 1.0, 10.0):
         body = FINGER.body(fineness)
         body.penalty *= factor
         seen = press(body, ways, start=-FINGER.radius, augmented=False)[-1]

@@ -16,8 +16,9 @@ Array = NDArray[np.float64]
 
 #: Newton steps, halvings of a step, halvings of a load step, rounds of contact.
 STEPS, HALVINGS, CUTS, ROUNDS = 30, 6, 6, 12
-#: Balance that counts as reached, of a force of the body's size; overlap that counts as none, of the way pressed.
-BALANCE, OVERLAP = 1e-9, 1e-4
+#: Balance that counts as reached, of a force of the body's size; overlap that counts as none, of the way pressed;
+#: change of the force between rounds that counts as none.
+BALANCE, OVERLAP, SETTLED = 1e-9, 1e-4, 1e-4
 
 
 class _StuckError(Exception):
@@ -123,14 +124,19 @@ def _advance(
 
 
 def _settled(body: SoftBody, state: State, obstacle: Obstacle, way: float, augmented: bool) -> tuple[State, int]:
-    """Balance on an obstacle, with contact pressures that leave no overlap."""
-    total = 0
+    """Balance on an obstacle, with contact pressures that leave no overlap that the mesh could avoid.
+
+    An element in which the contact ends has fewer freedoms than points, so that some overlap may stay for ever. Rounds
+    end when they no longer move the force.
+    """
+    total, before = 0, np.inf
     for _ in range(ROUNDS):
         state, steps = _newton(body, state, obstacle)
-        total += steps
-        if not augmented or _overlap(body, state, obstacle) < OVERLAP * way:
+        total, force = total + steps, body.force(state, obstacle)
+        settled = abs(force - before) <= SETTLED * abs(force)
+        if not augmented or settled or _overlap(body, state, obstacle) < OVERLAP * way:
             return state, total
-        state.multiplier = body.touch(state, obstacle)
+        state.multiplier, before = body.touch(state, obstacle), force
     raise _StuckError
 
 
