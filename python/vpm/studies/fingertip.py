@@ -132,7 +132,7 @@ def indent(finger: Finger, fineness: int, depths: Array = STEPS) -> Curve:
 
 def classes(step: Pressed) -> Array:
     """Area that bears each class of pressure, and what is beyond the last class, mm^2."""
-    fine = np.linspace(0.0, step.radius[-1], 4001)
+    fine = np.linspace(0.0, step.contact_radius, 4001)
     pressure = 1e-3 * np.interp(fine, step.radius, step.pressure)
     rings = 1e6 * np.pi * np.diff(fine**2)
     edges = [*CLASSES, np.inf]
