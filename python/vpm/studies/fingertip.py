@@ -206,7 +206,12 @@ def _areas(finest: dict[str, Curve]) -> Table:
         for k, name in enumerate(names)
     ]
     rows.append(("above 45 kPa", None, None, *(float(each[-1]) for each in ours.values())))
-    return Table("Area by pressure at 3 mm, mm^2", ("pressure", "measured", "printed model", *ours), tuple(rows))
+    return Table(
+        "Area by pressure at 3 mm, mm^2",
+        ("pressure", "measured", "printed model", *ours),
+        tuple(rows),
+        "Pressures are means of edges of the mesh: the fall to zero at the end of the contact lies within one of them.",
+    )
 
 
 def _convergence(levels: dict[str, list[Curve]]) -> Table:
