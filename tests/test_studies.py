@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from command_line import vpm as command
 pytest.importorskip("skfem", reason="scikit-fem is not installed (pip install 'vpm-dynamics[fem]')")
 
 from study_solids import curved_bar
-from vpm.errors import VpmError
+from vpm.errors import MissingExtraError, VpmError
 from vpm.studies import run_study
 from vpm.studies.carton import LEVER, carton, crease_stiffness, fold
 from vpm.studies.crease import Damage, elastica
@@ -63,7 +64,7 @@ def test_pressed_cylinder_is_uniaxial(stretch: float) -> None:
     assert stress[0] - stress[3] * inverse / stretch == pytest.approx(float(RUBBER.equibiaxial(stretch)), rel=1e-9)
 
 
-def slipping_cylinder(way: float) -> tuple[Pressed, float, float, float]:
+def slipping_cylinder(way: float) -> tuple[Pressed, float, float, NDArray[np.float64]]:
     """A cylinder whose top is held along the axis alone, pressed from below; its force by the closed form."""
     radius = height = 1e-2
     body = block(height, radius / 3.0, RUBBER, 1)
@@ -72,12 +73,9 @@ def slipping_cylinder(way: float) -> tuple[Pressed, float, float, float]:
     seen = press(body, [0.5 * way, way], start=0.0)[-1]
     outer = 3.0 * height
     stretch = 1.0 - way / height
-    return (
-        seen,
-        -float(RUBBER.uniaxial(stretch)) * np.pi * outer**2,
-        stretch,
-        float(np.max(body.skin.global_coordinates()[0])),
-    )
+    force = -float(RUBBER.uniaxial(stretch)) * np.pi * outer**2
+    rest = np.sort(np.asarray(body.skin.global_coordinates()[0]).mean(axis=1))
+    return seen, force, stretch, rest
 
 
 def axis_dofs(body: SoftBody) -> NDArray[np.int64]:
@@ -96,7 +94,9 @@ def wholly_touched(body: SoftBody) -> SoftBody:
 def test_elements_pass_the_patch_test_at_large_strain() -> None:
     seen, force, stretch, rest = slipping_cylinder(2e-3)
     assert seen.force == pytest.approx(force, rel=1e-4)
-    assert seen.radius[-1] == pytest.approx(rest * stretch**-0.5, rel=1e-4)
+    np.testing.assert_allclose(seen.radius, rest * stretch**-0.5, rtol=1e-4)
+    true = force / (np.pi * (3e-2) ** 2) * stretch
+    np.testing.assert_allclose(seen.pressure, true, rtol=1e-3)
 
 
 @pytest.mark.nightly
@@ -116,10 +116,10 @@ def test_finger_keeps_its_energy_and_classes_cover_the_contact() -> None:
     assert abs(curve.balance()) < 5e-3
     last = curve.steps[-1]
     assert np.all(np.diff([step.force for step in curve.steps]) > 0.0)
-    # All classes together bear the force: what is below 5 kPa is a thin rim.
-    borne = np.sum(0.5 * (last.pressure[1:] + last.pressure[:-1]) * np.pi * np.diff(last.radius**2))
-    assert borne == pytest.approx(last.force, rel=0.05)
-    assert float(classes(last).sum()) <= 1.1e6 * last.area
+    # Pressures over their shadow bear the force.
+    borne = np.trapezoid(2.0 * np.pi * last.radius * last.pressure, last.radius)
+    assert borne == pytest.approx(last.force, rel=0.15)
+    assert 0.5e6 * last.area < float(classes(last).sum()) <= 1e6 * last.area * (1.0 + 1e-9)
 
 
 def test_curved_bar_converges_with_the_second_order() -> None:
@@ -225,9 +225,16 @@ def test_study_writes_its_files(frame: dict[str, Stressed], tmp_path: Path) -> N
 
 
 def test_command_refuses_in_one_sentence() -> None:
-    done = command("study", "kneee")
-    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
-    assert "knee" in done.stderr
+    done = command("study", "kneee", "-q")
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1] == 'error: there is no study "kneee"; did you mean "knee"?'
+
+
+def test_missing_library_is_told_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "skfem", None)
+    with pytest.raises(MissingExtraError, match=r"vpm-dynamics\[fem\]"):
+        run_study("fingertip", 1)
+    assert carton(level="rigid").joints == ("fold", "crease")  # needs no elements
 
 
 @pytest.mark.nightly

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from vpm.command import console, fillable
+from vpm.command import console, fillable, progress
 from vpm.manner import give, wrote
 
 EXAMPLES = "Example:  vpm study carton\n\nExample:  vpm study fingertip --mesh 1 --out fingertip"
@@ -23,7 +23,9 @@ def study(
     """Run a study on solids and soft bodies, and show its figures beside the printed ones (extra fem)."""
     from vpm.studies import run_study
 
-    found = run_study(name, mesh)
+    with progress() as tell:
+        tell(f"running the study {name}")
+        found = run_study(name, mesh)
     give(study=found.to_dict())
     for line in str(found).splitlines():
         console.print(line, markup=False)

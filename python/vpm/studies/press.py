@@ -16,8 +16,9 @@ Array = NDArray[np.float64]
 
 #: Newton steps, halvings of a step, halvings of a load step, rounds of contact.
 STEPS, HALVINGS, CUTS, ROUNDS = 30, 6, 6, 12
-#: Balance that counts as reached, of a force of the body's size; overlap that counts as none, of the way pressed.
-BALANCE, OVERLAP = 1e-9, 1e-4
+#: Balance that counts as reached, of a force of the body's size; overlap that counts as none, of the way pressed;
+#: change of the force between rounds that counts as none.
+BALANCE, OVERLAP, SETTLED = 1e-9, 1e-4, 1e-4
 
 
 class _StuckError(Exception):
@@ -37,7 +38,7 @@ class Pressed:
     energy : float
         Elastic, J.
     radius, pressure : ndarray
-        Radius now (m) and true pressure (Pa) at the points of the skin, from the axis outwards.
+        Radius now (m) and mean true pressure (Pa) of the edges of the skin, from the axis outwards.
     contact_radius : float
         m.
     overlap : float
@@ -123,14 +124,19 @@ def _advance(
 
 
 def _settled(body: SoftBody, state: State, obstacle: Obstacle, way: float, augmented: bool) -> tuple[State, int]:
-    """Balance on an obstacle, with contact pressures that leave no overlap."""
-    total = 0
+    """Balance on an obstacle, with contact pressures that leave no overlap that the mesh could avoid.
+
+    An element in which the contact ends has fewer freedoms than points, so that some overlap may stay for ever. Rounds
+    end when they no longer move the force.
+    """
+    total, before = 0, np.inf
     for _ in range(ROUNDS):
         state, steps = _newton(body, state, obstacle)
-        total += steps
-        if not augmented or _overlap(body, state, obstacle) < OVERLAP * way:
+        total, force = total + steps, body.force(state, obstacle)
+        settled = abs(force - before) <= SETTLED * abs(force)
+        if not augmented or settled or _overlap(body, state, obstacle) < OVERLAP * way:
             return state, total
-        state.multiplier = body.touch(state, obstacle)
+        state.multiplier, before = body.touch(state, obstacle), force
     raise _StuckError
 
 
@@ -194,27 +200,29 @@ def _searched(
 
 
 def _seen(body: SoftBody, state: State, way: float, obstacle: Obstacle, steps: int) -> Pressed:
-    """What a balance shows; true pressures from those of the undeformed surface by the areas of rings."""
-    nominal = body.touch(state, obstacle)
-    rest = np.asarray(body.skin.global_coordinates()[0])
+    """What a balance shows."""
+    touching = body.touch(state, obstacle) > 0.0
     now = body.gap(state, obstacle)[1]
-    order = np.argsort(rest, axis=None)
-    r0, r1, t = (np.ravel(each)[order] for each in (rest, now, nominal))
-    pressure = t * _stretch(body, state, r0, order)
-    touching = t > 0.0
-    edge = float(r1[touching].max()) if touching.any() else 0.0
-    after = r1[~touching & (r1 > edge)]
+    edge = float(now[touching].max()) if touching.any() else 0.0
+    after = now[~touching & (now > edge)]
     contact = 0.5 * (edge + float(after.min())) if edge and after.size else edge
     force, energy = body.force(state, obstacle), body.energy(state)
-    return Pressed(way, force, energy, r1, pressure, contact, _overlap(body, state, obstacle), state, steps)
+    radius, pressure = _pressures(body, state, obstacle)
+    return Pressed(way, force, energy, radius, pressure, contact, _overlap(body, state, obstacle), state, steps)
 
 
-def _stretch(body: SoftBody, state: State, rest: Array, order: NDArray[np.int64]) -> Array:
-    """Undeformed area of the skin by the area of its shadow on the plate, at each point."""
-    field = body.skin.interpolate(state.displacement)
-    normal = np.asarray(body.skin.normals)
+def _pressures(body: SoftBody, state: State, obstacle: Obstacle) -> tuple[Array, Array]:
+    """Mean true pressure of each edge: its force over its shadow on the obstacle, from the axis outwards.
+
+    Within an edge the pressures at the points jump about that mean, which alone the mesh can tell.
+    """
+    field, normal = body.skin.interpolate(state.displacement), np.asarray(body.skin.normals)
     along = np.stack([-normal[1], normal[0]])
     grow = along[0] + np.einsum("jkq,jkq->kq", np.asarray(field.grad)[0], along)
-    now = np.ravel(np.asarray(body.skin.global_coordinates())[0] + np.asarray(field)[0])[order]
-    shadow = np.abs(np.ravel(grow)[order])
-    return np.asarray(rest / np.maximum(now * shadow, 1e-12 * np.max(rest)))
+    rest = np.asarray(body.skin.global_coordinates()[0])
+    now = rest + np.asarray(field)[0]
+    force = np.sum(body.touch(state, obstacle) * rest * body.skin.dx, axis=1)
+    shadow = np.sum(now * np.abs(grow) * body.skin.dx, axis=1)
+    order = np.argsort(rest.mean(axis=1))
+    pressure = force / np.maximum(shadow, 1e-12 * float(np.max(rest)) ** 2)
+    return np.asarray(now.mean(axis=1)[order]), np.asarray(pressure[order])

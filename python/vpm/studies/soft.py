@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 #: Points of integration: exact for polynomials of this order on each element.
 ORDER = 5
+#: The same for contact: three points on an edge, about its freedoms; more could not all be without overlap.
+TOUCH = 5
 
 
 @dataclass(frozen=True)
@@ -94,7 +96,7 @@ class SoftBody:
         self.basis = skfem.Basis(self.mesh, skfem.ElementVector(skfem.ElementQuad2()), intorder=ORDER)
         self.inner = skfem.Basis(self.mesh, skfem.ElementQuad1DG(), intorder=ORDER)
         self.skin = skfem.FacetBasis(
-            self.mesh, skfem.ElementVector(skfem.ElementQuad2()), facets=self.contact, intorder=2 * ORDER
+            self.mesh, skfem.ElementVector(skfem.ElementQuad2()), facets=self.contact, intorder=TOUCH
         )
         self.merge = self._merged()
         on_axis = self.mesh.facets_satisfying(lambda x: np.abs(x[0]) < 1e-9, boundaries_only=True)
