@@ -17,6 +17,7 @@ from vpm.errors import CoreError, ModelError, VpmError
 from vpm.experiment import Experiment
 from vpm.identify import identify
 from vpm.model import Model
+from vpm.scenario import Scenario
 from vpm.simulate import Setup
 
 Array = NDArray[np.float64]
@@ -296,6 +297,18 @@ def test_machine_code_steps_as_the_laws_do(parallelogram: Model) -> None:
                 simulation.step([0.1])
         assert pair[0].state == pytest.approx(pair[1].state, abs=1e-9)
         assert gaps(parallelogram, [pair[1].state])[0] < 1e-12
+
+
+def test_a_scenario_closes_the_loops_of_its_start(tmp_path: Path) -> None:
+    path = tmp_path / "swing.toml"
+    model = EXAMPLES / "loops" / "parallelogram.toml"
+    text = 'scenario = "swing"\nduration = 0.1\ntime_step = 1e-3\n[initial]\n"left_crank.position" = 0.5\n'
+    path.write_text(f"{text}[[runs]]\nname = 'loop'\nmodel = '{model}'\n")
+    result = Scenario.load(path).run()
+    assert not result.failures
+    final = {row.channel: row.final for row in result.extremes("loop")}
+    assert final["left_crank.position"] > 0.6
+    assert final["elbow.position"] == pytest.approx(-final["left_crank.position"], abs=1e-11)
 
 
 def test_a_model_with_loops_is_written_and_read(parallelogram: Model) -> None:

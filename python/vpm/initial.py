@@ -14,7 +14,7 @@ from vpm.errors import ExperimentError
 from vpm.experiment import Experiment, Motion, joints_from_shafts, motion
 from vpm.model import Model
 from vpm.model.commanded import commanded_states
-from vpm.model.loop_states import measured
+from vpm.model.loop_states import kept, measured
 from vpm.model.settled import follow, rest
 
 Array = NDArray[np.float64]
@@ -101,6 +101,7 @@ def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
     if coordinates > joints and model.loops:
         valued = model.with_parameters(dict(zip(model.parameter_names, theta.tolist(), strict=True)))
         state[:coordinates] = valued.equilibrium(state[:joints])[0]
+        kept(model, state)
     elif coordinates > joints:
         state[:coordinates] = model.core.equilibrium(theta, state[:joints])[0]
     internal = _internal(model, experiment, theta, state[:coordinates], 0)

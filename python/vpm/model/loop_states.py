@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import ModelError
+from vpm.model.loop_algebra import least
 
 if TYPE_CHECKING:
     from vpm.model.evaluation import Evaluations
@@ -32,6 +33,13 @@ def close(model: Evaluations, state: Array, named: Mapping[str, float]) -> None:
 
     state[:n] = model.loops.assembled(of(".position"))
     state[n : 2 * n] = model.loops.velocities(state[:n], of(".velocity"))
+
+
+def kept(model: Evaluations, state: Array) -> None:
+    """Put the nearest rates into a state that keep its loops closed, after its links were bent."""
+    n = len(model.coordinates)
+    jacobian = model.loops.at(state[:n]).jacobian
+    state[n : 2 * n] -= least(jacobian, jacobian @ state[n : 2 * n])
 
 
 def measured(model: Evaluations, position: Array, velocity: Array, seen: Sequence[str]) -> tuple[Array, Array]:

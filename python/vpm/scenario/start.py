@@ -7,8 +7,9 @@ from collections.abc import Collection, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import near_match
+from vpm.errors import ModelError, near_match
 from vpm.model import Model
+from vpm.model.loop_states import close, kept
 from vpm.model.settled import rest
 from vpm.scenario.messages import refuse
 from vpm.scenario.schema import Document
@@ -21,9 +22,9 @@ Array = NDArray[np.float64]
 def start_state(document: Document, owner: str, model: Model, inputs: Mapping[str, Array]) -> Array:
     """State at time zero, shape (nx,).
 
-    What the scenario names is as it says. Else joints are at zero and at rest, flexible links are deflected as in
-    their equilibrium there, and drives are as in a machine that has stood there without commands, its logged supplies
-    at their first pressure.
+    What the scenario names is as it says. Else joints are at zero and at rest, or close loops, flexible links are
+    deflected as in their equilibrium there, and drives are as in a machine that has stood there without commands, its
+    logged supplies at their first pressure.
 
     Parameters
     ----------
@@ -48,6 +49,11 @@ def start_state(document: Document, owner: str, model: Model, inputs: Mapping[st
         column = names.index(name)
         state[column] = si_value(given, model.state_units[column], keys)
     joints, coordinates = len(model.joints), len(model.coordinates)
+    if model.loops:
+        try:
+            close(model, state, {name: float(state[names.index(name)]) for name in document.initial})
+        except ModelError as error:
+            refuse("initial", f"leaves {owner} open: {error}")
     if not any(name in document.initial for name in names[joints:coordinates]):
         _deflect(state, joints, coordinates, owner, model)
     theta = model.theta.copy()
@@ -67,6 +73,8 @@ def _deflect(state: Array, joints: int, coordinates: int, owner: str, model: Mod
         return
     try:
         state[:coordinates] = model.equilibrium(state[:joints])[0]
+        if model.loops:
+            kept(model, state)
     except ValueError as error:
         rest = f"leaves the flexible links of {owner} without an equilibrium ({error})"
         refuse("initial", f"{rest}; name another position, or states of the links")

@@ -53,7 +53,7 @@ pub enum ConnectionError {
     /// A state in which loops are open.
     #[error(
         "the state leaves loop `{closure}` open by {gap:.4e} (m, or the cosine of an angle that has to be a right one); close the loops first, \
-         as model.state and model.assembled do"
+         as model.state does"
     )]
     LoopOpen {
         /// Name of the loop.

@@ -246,7 +246,7 @@ impl<S: Scalar> Loops<S> {
 
     /// Replaces `misses` by what the equations take to mend them.
     fn solve(&self, misses: &mut [S]) {
-        misses.iter_mut().zip(&self.chosen).for_each(|(miss, &counts)| *miss = *miss * counts);
+        misses.iter_mut().zip(&self.chosen).for_each(|(miss, &counts)| *miss *= counts);
         self.factors.solve(misses);
     }
 
