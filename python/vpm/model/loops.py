@@ -220,7 +220,7 @@ class Loops:
         state = self.at(self.assembled() if q is None else q)
         m, n = state.jacobian.shape
         redundant = m - state.rank
-        said = f"{redundant} of them are redundant" if redundant else "none of them is redundant"
+        said = f"{redundant or 'none'} of them {'are' if redundant > 1 else 'is'} redundant"
         return (
             f"closed loops {', '.join(self.names)}: {m} equations, of which {state.rank} are independent ({said}), "
             f"so that {n - state.rank} of {n} coordinates are free"
