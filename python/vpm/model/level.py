@@ -41,6 +41,8 @@ FORMS: Mapping[str, _Form] = {
     "strain": _Form("the number of polynomials per component", 1, 12),
     "elements": _Form("the number of elements", 1, 100),
 }
+#: Levels whose kinematics know a shape at rest; the others interpolate a deflection from a straight axis.
+CURVED = ("rigid", "lumped", "bezier", "strain", "elements")
 LEVEL_NAMES: tuple[str, ...] = ("rigid", *FORMS)
 
 
