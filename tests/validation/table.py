@@ -61,8 +61,8 @@ _UNCOMPUTED = {
     "`tudor.merit.static_fit`, `.first_mode`, `.scale`": "of a public record that is not part of the repository; "
     "`tests/test_merit.py` compares them where it is at hand",
     "`narx.reported.sigma`": "of a record that nobody else has",
-    "`ident.table5_2.stiffness`": "measured on the leg, and 2.2 and 2.6 times as stiff at twice the gain; a controller's "
-    "`P / l^2` is twice, see `ident.stiffness_from_gain`",
+    "`ident.table5_2.stiffness`": "measured on the leg, and 2.2 and 2.6 times as stiff at twice the gain; a "
+    "controller's `P / l^2` is twice, see `ident.stiffness_from_gain`",
     "`ident.table5_3.Kv_hip`, `.beta_hip`": "of records that nobody else has; what such a regression finds where the "
     "truth is known: `oil.compliance`, `oil.flow_gain`",
 }
