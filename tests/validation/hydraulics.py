@@ -9,7 +9,7 @@ import vpm
 from drive_texts import RIG
 from hydraulic_reference import AREA, CHIRP, RATIO, STEP, VALUES, Array, chirp, held
 from model_texts import changed
-from validation.row import Row, against, row
+from validation.row import Row, accepted, against, row
 
 CHANNELS = ("servo.pressure_a", "servo.pressure_b", "axis.position", "axis.velocity")
 BARE = RIG[: RIG.index("[[effects]]")].replace("internal_leakage = 1.7e-13", "")
@@ -19,7 +19,7 @@ AIR = ("oil = {", "oil = { air = { fraction = 0.005, exponent = 1.4, reference_p
 
 def rig() -> list[Row]:
     """Every row of the rig."""
-    return [*_closed_forms(), *_air(), *_responses(), _recovery()]
+    return [*_closed_forms(), *_sizes(), *_air(), *_responses(), _recovery()]
 
 
 def _closed_forms() -> list[Row]:
@@ -37,6 +37,29 @@ def _closed_forms() -> list[Row]:
         "hyd.natural_frequency": frequency,
     }
     return [against(VALUES[name], value) for name, value in found.items()]
+
+
+def _sizes() -> list[Row]:
+    """Areas and gain as the linear machine has them: what pressures do to the piston, the valve to the pressures."""
+    model = vpm.Model.from_toml(BARE)
+    parameters, linear = model.parameters, model.linearize()
+    state = dict(zip(model.state_names, linear.state, strict=True))
+    row_of = {name: linear.states.index(name) for name in ("axis.velocity", "servo.chamber_a", "servo.chamber_b")}
+    pushes = linear.A[row_of["axis.velocity"]]
+    mass = model.mass_matrix(model.equilibrium([0.0])[0])[0, 0]
+    area_a, area_b = mass * pushes[row_of["servo.chamber_a"]], -mass * pushes[row_of["servo.chamber_b"]]
+    give = -linear.A[row_of["servo.chamber_a"], row_of["axis.velocity"]] / area_a
+    supply = parameters["pump.pressure"].value
+    opened = model.linearize({"servo.spool": 1e-3})
+    flow = opened.A[row_of["servo.chamber_a"], opened.states.index("servo.spool")] / give
+    gain = flow / np.sqrt(supply - state["servo.chamber_a"])
+    wanted = accepted("cylinder")
+    found = {
+        "hyd.area_ratio": area_b / area_a,
+        "hyd.Ap": area_a,
+        "hyd.Kv_normalised": gain * parameters["servo.valve.stroke"].value,
+    }
+    return [against(wanted[name], value) for name, value in found.items()]
 
 
 def _without_load(current: float) -> list[float]:

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from validation.row import Array, Row, row
+from validation.row import Array, Row, accepted, row
 from vpm import impedance
 
 #: Gain P (N m/rad) and lever (m) of the hip: 8.23e4 and 1.65e5 N/m, D'Imperio (2016), table 5.2: 8.30e4, 1.84e5 N/m.
 GAINS, LEVER, DERIVATIVE = (150.0, 300.0), 42.7e-3, 6.0
 MASS, SPEED, GRAVITY = 12.0, 1.0, 9.81
+WANTED = accepted("joints")
 
 
 def joint_loop(proportional: float) -> impedance.Loop:
@@ -45,17 +46,17 @@ def rows() -> list[Row]:
     planted = "SciPy's DOP853 at 1e-11 with known k, c"
     table = [
         row(
-            "factor of a stop, stop and rebound, full cycle",
+            "ident.loss_factor_stop, of a stop, stop and rebound, full cycle",
             [impedance.stop_factor(quarters) for quarters in (1, 2, 4)],
-            [1.23370055, 4.934802201, 19.7392088],
+            WANTED["ident.loss_factor_stop"]["value"],
             "E dt/(c dl^2)",
             closed,
             relative=1e-9,
         ),
         row(
-            "stiffness of loops: P / l^2, lever 42.7 mm, P = 150 and 300 N m/rad",
+            "ident.stiffness_from_gain, of loops: P / l^2, lever 42.7 mm, P = 150 and 300 N m/rad",
             [loop.stiffness for loop in loops],
-            [82268.86562, 164537.7312],
+            WANTED["ident.stiffness_from_gain"]["value"],
             "N/m",
             "closed form: P / l^2",
             relative=1e-9,

@@ -34,6 +34,8 @@ def rows() -> list[Row]:
         errors = [_largest_error(step, scheme) for step in STEPS]
         found[f"narx.{name}.max_error"] = errors
         found[f"narx.{name}.order"] = np.log2(errors[-2] / errors[-1])
+    errors = [_backward_error(step) for step in STEPS]
+    found |= {"narx.backward_euler.max_error": errors, "narx.backward_euler.order": np.log2(errors[-2] / errors[-1])}
     return [*(against(VALUES[name], value) for name, value in found.items()), _recovery()]
 
 
@@ -68,6 +70,18 @@ def _largest_error(step: float, scheme: Any) -> float:
     exact = _exact(time)
     run = _element(step, scheme).simulate_free_run(_length(time), (float(exact[0]), float(exact[1])))
     return float(np.abs(run - exact).max())
+
+
+def _backward_error(step: float) -> float:
+    """Largest error of a run by backward Euler, `(1 + tau/h) F = tau/h F' + k0 (s - s0) + tau/h (k0 + k1) (s - s')`."""
+    time = step * np.arange(round(1.0 / step) + 1)
+    exact, length, share = _exact(time), _length(time), C1 / K1 / step
+    now, before = K0 + share * (K0 + K1), -share * (K0 + K1)
+    terms = [[(0, 1)], [(1, 0)], [(1, 1)], []]
+    coefficients = np.array([share, now, before, -K0 * S0]) / (1.0 + share)
+    element = narx.Narx.from_terms("force", ["length"], terms, coefficients)
+    run = element.simulate_free_run({"time": time, "force": exact, "length": length})
+    return float(np.abs(run.values - exact).max())
 
 
 def _multiplier() -> float:

@@ -82,6 +82,12 @@ pub trait Ode<S> {
     /// Integration", section IV.8).
     fn arrive(&mut self, _x: &mut [S], _step: Option<f64>) {}
 
+    /// How long (s) from `x` on, at the speeds of now, nothing is met that its rates do not tell of: the least time in which an open contact
+    /// closes; infinite where none does. Steps of controlled error end there, since an error cannot tell of what no stage has met.
+    fn horizon(&mut self, _x: &[S]) -> f64 {
+        f64::INFINITY
+    }
+
     /// Writes a natural size of every state, in its unit: what a change of the state is small beside. Step control takes it for absolute
     /// tolerances.
     fn scales(&self, scales: &mut [f64]) {

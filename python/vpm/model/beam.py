@@ -11,25 +11,39 @@ from vpm.model.entry import ONE, ORIGIN, ZERO, Entry, Number, ParameterValue, Qu
 from vpm.model.level import USUAL, Component, Level, parse_level
 from vpm.model.reduced import ReducedLink, link_of
 
+#: Keys that lead to a value inside of a table.
+Way = tuple[str | int, ...]
+
 
 class Material(Entry):
     """Isotropic linear elastic material: Young's modulus, Poisson's ratio, density."""
 
+    units: ClassVar[Mapping[str, str]] = {"young": "Pa", "poisson": "1", "density": "kg/m^3"}
     young: ParameterValue
     poisson: ParameterValue = Quantity(value=0.3)
     density: ParameterValue
+
+    def numbers(self, way: Way) -> dict[Way, tuple[Quantity, str]]:
+        """Parameters and their units, by the way to each; `way` leads to the material."""
+        return {(*way, key): (getattr(self, key), unit) for key, unit in self.units.items()}
 
 
 class _Section(Entry):
     """Sizes of a cross-section; `at` is the arc length it stands at, where there are several."""
 
     units: ClassVar[Mapping[str, str]]
+    #: Whether its stiffness follows from a shape and one material, which is that of the beam if it names none.
+    solid: ClassVar[bool] = True
     at: Number | None = None
+    material: Material | None = None
 
     @property
-    def sizes(self) -> dict[str, Quantity]:
-        """Parameters by key."""
-        return {key: getattr(self, key) for key in self.units}
+    def numbers(self) -> dict[Way, tuple[Quantity, str]]:
+        """Parameters and their units, by the way to each inside of the table."""
+        sizes: dict[Way, tuple[Quantity, str]] = {
+            (key,): (getattr(self, key), unit) for key, unit in self.units.items() if getattr(self, key) is not None
+        }
+        return sizes | ({} if self.material is None else self.material.numbers(("material",)))
 
 
 class Rectangle(_Section):
@@ -70,7 +84,7 @@ class IBeam(_Section):
 
 
 class Given(_Section):
-    """Any other section, by its numbers: area, second moments, torsion constant, shear factors."""
+    """Any other shape of one material, by its numbers: area, second moments, torsion constant, shear factors."""
 
     units: ClassVar[Mapping[str, str]] = {
         "area": "m^2",
@@ -89,7 +103,75 @@ class Given(_Section):
     shear_y: ParameterValue = Quantity(value=5 / 6)
 
 
-Section = Annotated[Rectangle | Circle | Tube | IBeam | Given, Field(discriminator="shape")]
+class Layer(Material):
+    """One layer of a laminate."""
+
+    units: ClassVar[Mapping[str, str]] = {"thickness": "m", **Material.units}
+    thickness: ParameterValue
+
+
+class Layers(_Section):
+    """Layers of one width, glued along y, the first one lowest; the axis is the neutral one."""
+
+    units: ClassVar[Mapping[str, str]] = {"width": "m"}
+    solid: ClassVar[bool] = False
+    shape: Literal["layers"]
+    width: ParameterValue
+    layers: Annotated[tuple[Layer, ...], Field(min_length=1, max_length=60)]
+
+    @property
+    def numbers(self) -> dict[Way, tuple[Quantity, str]]:
+        """Parameters and their units, by the way to each inside of the table."""
+        found = super().numbers
+        for i, layer in enumerate(self.layers):
+            found |= layer.numbers(("layers", i))
+        return found
+
+
+class Stiffness(_Section):
+    """Stiffness and mass per length, without a shape: measured, or of a program for sections."""
+
+    units: ClassVar[Mapping[str, str]] = {
+        "bending_x": "N m^2",
+        "bending_y": "N m^2",
+        "torsion": "N m^2",
+        "extension": "N",
+        "shear_x": "N",
+        "shear_y": "N",
+        "mass": "kg/m",
+        "inertia_x": "kg m",
+        "inertia_y": "kg m",
+    }
+    solid: ClassVar[bool] = False
+    shape: Literal["stiffness"]
+    bending_x: ParameterValue
+    bending_y: ParameterValue
+    torsion: ParameterValue
+    extension: ParameterValue
+    shear_x: ParameterValue | None = None
+    shear_y: ParameterValue | None = None
+    mass: ParameterValue
+    inertia_x: ParameterValue = ZERO
+    inertia_y: ParameterValue = ZERO
+
+
+Section = Annotated[
+    Rectangle | Circle | Tube | IBeam | Given | Layers | Stiffness,
+    Field(discriminator="shape"),
+]
+
+
+#: All kinds of sections.
+SECTION_KINDS = (Rectangle, Circle, Tube, IBeam, Given, Layers, Stiffness)
+
+
+class Rest(Entry):
+    """Curvature and twist (1/m) where nothing loads the beam; `at` is the arc length, where there are several."""
+
+    at: Number | None = None
+    bending_x: Number = 0.0
+    bending_y: Number = 0.0
+    torsion: Number = 0.0
 
 
 class Damping(Entry):
@@ -113,7 +195,7 @@ def _different(components: tuple[Component, ...]) -> tuple[Component, ...]:
 
 
 class Beam(Entry):
-    """Flexible link, fixed to its parent at its root: a straight beam along z of the root frame, or a reduced solid.
+    """Flexible link, fixed to its parent at its root: a beam whose axis leaves it along z, or a reduced solid.
 
     Without its `velocity_terms` no products of rates load it; without `second_order` its deflection is linear in its
     coordinates.
@@ -132,9 +214,22 @@ class Beam(Entry):
     reduced: Text | None = None
     stiffness_factor: ParameterValue = ONE
     mass_factor: ParameterValue = ONE
+    rest: Rest | None = None
+    rests: Annotated[tuple[Rest, ...], Field(min_length=1)] | None = None
     damping: Damping = Damping()
     velocity_terms: Switch = True
     second_order: Switch = True
+
+    @property
+    def is_of_one_material(self) -> bool:
+        """Whether all of its sections are made of its material."""
+        sections = [section for _, section in sections_of(self)]
+        return self.material is not None and all(one.solid and one.material is None for one in sections)
+
+    @property
+    def curvature(self) -> tuple[Rest, ...]:
+        """Shape at rest: nothing if it is straight, one entry if its curvature is constant."""
+        return (self.rests or ()) if self.rest is None else (self.rest,)
 
     @property
     def detail(self) -> Level:
@@ -157,6 +252,11 @@ def sections_of(beam: Beam) -> list[tuple[tuple[str | int, ...], Section]]:
     if beam.section is not None:
         return [(("section",), beam.section)]
     return [(("section", i), section) for i, section in enumerate(beam.sections or ())]
+
+
+def section_parameter(beam: str, section: Way, inside: Way) -> str:
+    """Dotted name of a number of a section; that of a material of its own goes without the word."""
+    return ".".join(map(str, (beam, *section, *(key for key in inside if key != "material"))))
 
 
 class Gauge(Entry):

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS, effects_for_site
-from vpm.model.beam import End, Gauge, Line, Marker, Section, sections_of
+from vpm.model.beam import End, Gauge, Layers, Line, Marker, Material, Rest, Section, section_parameter, sections_of
 from vpm.model.checked import Checked
 from vpm.model.connection_compile import (
     bushing_json,
@@ -142,15 +142,16 @@ def _beam(name: str, structure: Structure, index: Mapping[str, int]) -> dict[str
     beam = structure.document.beams[name]
     level = beam.detail
     modes = len(level.coordinates(beam.deforms))
-    own = ("young", "poisson", "density") if beam.solid is None else _FACTORS
+    own = _FACTORS if beam.solid is not None else () if beam.material is None else tuple(Material.units)
     return {
         "name": name,
         **frame_json(structure.frames[name]),
         "length": beam.reach,
         "level": level.name if level.name == "rigid" else {level.name: level.number},
         "deforms": list(beam.deforms),
-        "material": {key: index[f"{name}.{o}"] for key, o in zip(("young", "poisson", "density"), own, strict=True)},
+        **({"material": {key: index[f"{name}.{o}"] for key, o in zip(Material.units, own, strict=True)}} if own else {}),
         "sections": [_section(name, way, section, index) for way, section in sections_of(beam)],
+        **({} if not beam.curvature else {"rest": [_rest(rest) for rest in beam.curvature]}),
         "damping": {
             "stiffness": index.get(f"{name}.damping.stiffness"),
             "mass": index.get(f"{name}.damping.mass"),
@@ -162,9 +163,23 @@ def _beam(name: str, structure: Structure, index: Mapping[str, int]) -> dict[str
 
 
 def _section(beam: str, way: tuple[str | int, ...], section: Section, index: Mapping[str, int]) -> dict[str, Any]:
-    prefix = ".".join((beam, *map(str, way)))
-    sizes = {key: index[f"{prefix}.{key}"] for key in section.sizes}
-    return {"at": section.at or 0.0, "shape": {"shape": section.shape, **sizes}}
+    places = {inside: index[section_parameter(beam, way, inside)] for inside in section.numbers}
+    sizes = {str(inside[0]): at for inside, at in places.items() if len(inside) == 1}
+    shape: dict[str, Any] = {"shape": section.shape, **sizes}
+    if isinstance(section, Layers):
+        shape["layers"] = [
+            {
+                "thickness": places["layers", i, "thickness"],
+                "material": {key: places["layers", i, key] for key in Material.units},
+            }
+            for i in range(len(section.layers))
+        ]
+    own = {str(inside[1]): at for inside, at in places.items() if inside[0] == "material"}
+    return {"at": section.at or 0.0, "shape": shape, **({"material": own} if own else {})}
+
+
+def _rest(rest: Rest) -> dict[str, Any]:
+    return {"at": rest.at or 0.0, "curvature": [rest.bending_x, rest.bending_y, rest.torsion]}
 
 
 def _gauge(name: str, gauge: Gauge, structure: Structure) -> dict[str, Any]:

@@ -9,7 +9,7 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from vpm.errors import near_match
-from vpm.model.beam import Circle, Damping, End, Given, IBeam, Material, Part, Rectangle, Tube
+from vpm.model.beam import SECTION_KINDS, Damping, End, Layer, Material, Part, Rest
 from vpm.model.contact import EXAMPLES as CONNECTION_EXAMPLES
 from vpm.model.contact import NESTED as CONNECTION_TABLES
 from vpm.model.contact import TAGS
@@ -57,8 +57,11 @@ _NESTED: Mapping[str, tuple[type[BaseModel], ...]] = {
     "dh": (DenavitHartenberg,),
     "material": (Material,),
     "damping": (Damping,),
-    "section": (Rectangle, Circle, Tube, IBeam, Given),
-    "sections": (Rectangle, Circle, Tube, IBeam, Given),
+    "section": SECTION_KINDS,
+    "sections": SECTION_KINDS,
+    "layers": (Layer,),
+    "rest": (Rest,),
+    "rests": (Rest,),
     "from": (End,),
     "to": (End,),
     "barrel": (Part,),

@@ -42,6 +42,8 @@ FORMS: Mapping[str, _Form] = {
     "elements": _Form("the number of elements", 1, 100),
     "reduced": _Form("the number of modes of a reduced solid", 1, 64),
 }
+#: Levels whose kinematics know a shape at rest; the others interpolate a deflection from a straight axis.
+CURVED = ("rigid", "lumped", "bezier", "strain", "elements")
 LEVEL_NAMES: tuple[str, ...] = ("rigid", *FORMS)
 
 

@@ -13,7 +13,7 @@ from typing import Literal
 
 from vpm.catalogue import EFFECTS, POSITIVE
 from vpm.errors import UnitError
-from vpm.model.beam import Beam, Line, Part, sections_of
+from vpm.model.beam import Beam, Line, Part, section_parameter, sections_of
 from vpm.model.connection_parameters import bushing_rows, contact_rows
 from vpm.model.controller import Controller
 from vpm.model.drive_parameters import Row, actuator_rows, supply_rows
@@ -227,22 +227,18 @@ def _rotor_slot(name: str, rotor: Quantity, structure: Structure) -> Slot:
 def _beam_slots(name: str, beam: Beam) -> Iterator[Slot]:
     """Material, sections, damping; the effort of a motion is linear in none of them, for they bend the beam."""
     keys, damping = ("beams", name), beam.damping
-    if beam.material is None:  # a reduced solid
+    if beam.solid is not None:
         for key in ("stiffness_factor", "mass_factor"):
             yield Slot(f"{name}.{key}", (*keys, key), getattr(beam, key), "1", _ABOVE_ZERO, "shape")
-    else:
-        for key, unit, bounds in (
-            ("young", "Pa", _ABOVE_ZERO),
-            ("poisson", "1", _POISSON),
-            ("density", "kg/m^3", _ABOVE_ZERO),
-        ):
-            yield Slot(f"{name}.{key}", (*keys, "material", key), getattr(beam.material, key), unit, bounds, "shape")
+    for inside, (quantity, unit) in ({} if beam.material is None else beam.material.numbers(())).items():
+        way = (*keys, "material", *inside)
+        yield Slot(f"{name}.{inside[-1]}", way, quantity, unit, _size_range(inside[-1], unit), "shape")
     for way, section in sections_of(beam):
         place_in_file = ("section",) if len(way) == 1 else ("sections", *way[1:])
-        for key, quantity in section.sizes.items():
-            dotted = ".".join((name, *map(str, way), key))
-            unit = section.units[key]
-            yield Slot(dotted, (*keys, *place_in_file, key), quantity, unit, _size_range(unit), "shape")
+        for inside, (quantity, unit) in section.numbers.items():
+            dotted = section_parameter(name, way, inside)
+            bounds = _size_range(inside[-1], unit)
+            yield Slot(dotted, (*keys, *place_in_file, *inside), quantity, unit, bounds, "shape")
     for key, unit in (("stiffness", "s"), ("mass", "1/s")):
         if (quantity := getattr(damping, key)) is not None:
             way = (*keys, "damping", key)
@@ -252,9 +248,13 @@ def _beam_slots(name: str, beam: Beam) -> Iterator[Slot]:
         yield Slot(f"{name}.damping.ratios.{i}", way, quantity, "1", _NOT_NEGATIVE, "shape", _FEEDING)
 
 
-def _size_range(unit: str) -> tuple[float, float]:
-    """Range of a size of a section; second moments of thin ones are far below the least length, 1e-12 m^4 and less."""
-    return _ABOVE_ZERO if unit in {"m", "1"} else (_LEAST, math.inf)
+def _size_range(key: str | int, unit: str) -> tuple[float, float]:
+    """Range of a number of a section; second moments of thin ones are below the least length, 1e-12 m^4 and less."""
+    if key == "poisson":
+        return _POISSON
+    if unit == "kg m":
+        return _NOT_NEGATIVE
+    return (_LEAST, math.inf) if unit in {"m^2", "m^4"} else _ABOVE_ZERO
 
 
 def _line_slots(name: str, line: Line) -> Iterator[Slot]:

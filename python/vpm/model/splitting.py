@@ -82,6 +82,7 @@ def splitting_problems(document: Document, names: Mapping[str, str]) -> Iterator
     """
     split: dict[str, int] = {}
     for position, entry in enumerate(document.effects):
+        yield from _stiffness_problems(position, entry, document)
         bends = entry.traits.motion == "bending" and entry.at in names
         if not (bends or splits_joint(entry, document)):
             continue
@@ -103,6 +104,14 @@ def splitting_problems(document: Document, names: Mapping[str, str]) -> Iterator
                     f'{rest}, so nothing between the drive of "{joint}" and {"the bending" if bends else "the spring"} '
                     "has inertia; give it, or a rotor_inertia of the joint",
                 )
+
+
+def _stiffness_problems(position: int, entry: EffectEntry, document: Document) -> Iterator[Problem]:
+    """A stiffness of the tip for a link whose sections have no modulus in common that it could stand for."""
+    beam = document.beams.get(entry.at)
+    if entry.traits.motion == "bending" and beam is not None and not beam.is_of_one_material:
+        rest = f"sets the modulus of {entry.at}, whose sections are not all of its material"
+        yield Problem(place("effects", position), f"{rest}; give the stiffness in the sections, or remove the effect")
 
 
 def stop_problems(document: Document, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:

@@ -255,6 +255,13 @@ class Skeleton:
 
 def _equal_radius(shape: Content, frames: Frames) -> float:
     """Radius (m) of the round bar with the area of a section; of a tube its outer one."""
+    if shape["shape"] == "stiffness":
+        # A bar that resists bending as it resists extension: EJ / EA = r^2 / 4.
+        bending = min(frames.value(shape[key]) for key in ("bending_x", "bending_y"))
+        return float(2.0 * np.sqrt(bending / frames.value(shape["extension"])))
+    if shape["shape"] == "layers":
+        height = sum(frames.value(layer["thickness"]) for layer in shape["layers"])
+        return float(np.sqrt(frames.value(shape["width"]) * height / np.pi))
     size = {key: frames.value(place) for key, place in shape.items() if key != "shape"}
     match shape["shape"]:
         case "circle":

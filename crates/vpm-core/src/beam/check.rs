@@ -1,8 +1,9 @@
 //! Whether a beam can exist as it is described.
 
-use super::entry::{BeamEntry, Level};
+use super::entry::{BeamEntry, Component, Level};
 use super::reduced::Reduced;
-use super::{Section, not_negative, positive};
+use super::rest::STRAIGHT;
+use super::{Section, Shape, not_negative, positive};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 
@@ -33,6 +34,7 @@ impl<S: Scalar> BeamEntry<S> {
             None => {
                 self.check_level()?;
                 self.check_sections()?;
+                self.check_rest()?;
             }
         }
         self.check_damping()
@@ -40,8 +42,9 @@ impl<S: Scalar> BeamEntry<S> {
 
     fn check_reduced(&self, reduced: &Reduced) -> Result<()> {
         reduced.check(&self.name)?;
-        positive(&format!("{}.stiffness_factor", self.name), self.material.young)?;
-        positive(&format!("{}.mass_factor", self.name), self.material.density)?;
+        let (stiffness, mass) = self.factors();
+        positive(&format!("{}.stiffness_factor", self.name), stiffness)?;
+        positive(&format!("{}.mass_factor", self.name), mass)?;
         let (modes, interfaces) = (reduced.solid().squares.len(), reduced.solid().interfaces.len());
         if self.length != interfaces as f64 {
             return Err(self.domain("length", "be the number of interfaces beside that at the root", self.length));
@@ -57,7 +60,7 @@ impl<S: Scalar> BeamEntry<S> {
     }
 
     /// An error of a number of this beam, called `{name}.{what}`.
-    fn domain(&self, what: &str, condition: &'static str, value: f64) -> Error {
+    pub(super) fn domain(&self, what: &str, condition: &'static str, value: f64) -> Error {
         Error::Domain { path: format!("{}.{what}", self.name), condition, value }
     }
 
@@ -94,14 +97,48 @@ impl<S: Scalar> BeamEntry<S> {
         for (place, entry) in self.sections.iter().enumerate() {
             let what = if several { format!("section.{place}") } else { "section".to_owned() };
             self.check_place(&format!("{what}.at"), entry.at)?;
-            Section::new(entry.shape, self.material).map_err(|error| self.named(error, &what))?;
+            let material = entry.material.as_ref().or(self.material.as_ref());
+            Section::of(&entry.shape, material).map_err(|error| self.named(error, &what))?;
+            self.check_shear(&entry.shape, &what)?;
             let Some(before) = place.checked_sub(1).map(|before| &self.sections[before]) else { continue };
             if entry.at <= before.at {
                 return Err(self.domain(&format!("{what}.at"), "lie beyond the section before it", entry.at));
             }
             if before.shape.between(&entry.shape, 0.5).is_none() {
-                let condition = "have the same kind of shape as the section before it";
+                let condition = "have the same kind of shape as the section before it, with as many layers";
                 return Err(self.domain(&format!("{what}.shape"), condition, place as f64));
+            }
+        }
+        Ok(())
+    }
+
+    /// Whether a section given by its moduli has those that its beam shears with.
+    fn check_shear(&self, shape: &Shape<S>, what: &str) -> Result<()> {
+        let Shape::Stiffness(moduli) = shape else { return Ok(()) };
+        let shears = [("shear_x", Component::ShearX, moduli.shear_x), ("shear_y", Component::ShearY, moduli.shear_y)];
+        for (name, component, modulus) in shears {
+            if modulus.is_none() && self.deforms.contains(&component) {
+                let condition = "be given for a beam that deforms in it";
+                return Err(self.domain(&format!("{what}.{name}"), condition, 0.0));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_rest(&self) -> Result<()> {
+        let Some(first) = self.rest.first() else { return Ok(()) };
+        if matches!(self.level, Level::Modal(_) | Level::Deflection(_) | Level::Hermite(_)) {
+            return Err(self.domain("rest", STRAIGHT, first.at));
+        }
+        for (place, entry) in self.rest.iter().enumerate() {
+            self.check_place(&format!("rest.{place}.at"), entry.at)?;
+            for curvature in entry.curvature {
+                if !curvature.is_finite() {
+                    return Err(Error::NonFinite { path: format!("{}.rest.{place}", self.name), value: curvature });
+                }
+            }
+            if place > 0 && entry.at <= self.rest[place - 1].at {
+                return Err(self.domain(&format!("rest.{place}.at"), "lie beyond the place before it", entry.at));
             }
         }
         Ok(())

@@ -12,7 +12,7 @@ use super::lumped::LumpedAxis;
 use super::profile::Profile;
 use super::reduced::{Fields as ReducedFields, Reduced, ReducedAxis};
 use super::segment::{Segment, damps_locally};
-use super::strain::{PlaneAxis, Rule, SpaceAxis};
+use super::strain::Rule;
 use crate::error::Result;
 use crate::scalar::Scalar;
 use crate::spatial::{SpatialInertia, Vector3};
@@ -21,6 +21,9 @@ use crate::spatial::{SpatialInertia, Vector3};
 const STRAIN_STATIONS: usize = 4;
 /// Stations on each element.
 const ELEMENT_STATIONS: usize = 3;
+
+/// What holds where the terms of second order are left out.
+const LINEAR: &str = "be straight and untwisted where the deflection is linear in the coordinates (second_order)";
 
 /// Up to which order in the deflection the map is right.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,6 +72,9 @@ impl<S: Scalar> Beam<S> {
         if let Some(reduced) = &entry.reduced {
             return Self::reduced(entry, reduced, marks, order);
         }
+        if order == Order::First && integrated(entry.level) && !profile.rest().is_straight() {
+            return Err(entry.domain("rest", LINEAR, entry.rest[0].at));
+        }
         match entry.level {
             Level::Rigid => Self::segmented(entry, &profile, (&[], 1), marks),
             Level::Lumped(n) => Self::segmented(entry, &profile, (&entry.deforms, n), marks),
@@ -102,24 +108,35 @@ impl<S: Scalar> Beam<S> {
             Order::Second => {
                 let elements = matches!(entry.level, Level::Elements(_));
                 let rule = if elements { Rule::Elements } else { Rule::Sections };
-                PlaneAxis::new(&fields, &at, rule)
-                    .map_or_else(|| Axis::Space(SpaceAxis::new(&fields, &at)), Axis::Plane)
+                Axis::integrated(&fields, &at, &profile.rest(), rule)
             }
         };
         let inertia = places.iter().map(|place| profile.slice(place.at, place.weight)).collect::<Result<_>>()?;
         let stiffness = fields.stiffness(profile)?;
-        let groups = groups(|component| {
+        let groups = groups(profile, |component| {
             (0..fields.len()).filter(|&k| fields.components[k] == component as usize).collect::<Vec<_>>()
         });
         let segments = match entry.level {
             Level::Elements(n) if order == Order::Second && damps_locally(entry) => {
-                Segment::elements(&entry.deforms, entry.length, n, &at)?
+                Segment::elements(&entry.deforms, (entry.length, n), &at, &profile.rest())?
             }
             _ => Segment::whole(&axis, fields.len(), at.len()),
         };
         let heavy = places.iter().map(Place::is_heavy).collect();
         let (map, damping, couplings) = (Map::Fields(fields), Vec::new(), Vec::new());
-        let beam = Self { axis, map, inertia, heavy, marks, stiffness, damping, damped: false, couplings, segments };
+        let beam = Self {
+            eccentric: profile.is_eccentric(),
+            axis,
+            map,
+            inertia,
+            heavy,
+            marks,
+            stiffness,
+            damping,
+            damped: false,
+            couplings,
+            segments,
+        };
         beam.damped(entry, &groups)
     }
 
@@ -133,25 +150,38 @@ impl<S: Scalar> Beam<S> {
         let middles = LumpedAxis::middles(components, segments, entry.length);
         let (places, marks) = merged(middles.iter().map(|&at| Place { at, weight: 1.0 }).collect(), marks);
         let at: Vec<f64> = places.iter().map(|place| place.at).collect();
-        let axis = LumpedAxis::new(components, segments, entry.length, &at);
+        let axis = LumpedAxis::new(components, (segments, entry.length), &at, &profile.rest());
         let whole = |place: &Place| match place.weight {
             0.0 => Ok(SpatialInertia::zero()),
             _ => LumpedAxis::segment(profile, place.at, segments),
         };
         let inertia = places.iter().map(whole).collect::<Result<_>>()?;
         let (stiffness, each) = (axis.stiffness(profile)?, components.len());
-        let groups =
-            groups(|component| (0..axis.len()).filter(|&k| components[k % each] == component).collect::<Vec<_>>());
+        let groups = groups(profile, |component| {
+            (0..axis.len()).filter(|&k| components[k % each] == component).collect::<Vec<_>>()
+        });
         let (map, coordinates) = (Map::Springs(axis.clone()), axis.len());
         let heavy = places.iter().map(Place::is_heavy).collect();
         let axis = Axis::Lumped(axis);
         let segments = if !components.is_empty() && damps_locally(entry) {
-            Segment::hinged(components, entry.length, segments, &at)
+            Segment::hinged(components, (entry.length, segments), &at, &profile.rest())
         } else {
             Segment::whole(&axis, coordinates, at.len())
         };
         let (damping, couplings) = (Vec::new(), Vec::new());
-        let beam = Self { axis, map, inertia, heavy, marks, stiffness, damping, damped: false, couplings, segments };
+        let beam = Self {
+            eccentric: profile.is_eccentric(),
+            axis,
+            map,
+            inertia,
+            heavy,
+            marks,
+            stiffness,
+            damping,
+            damped: false,
+            couplings,
+            segments,
+        };
         beam.damped(entry, &groups)
     }
 
@@ -166,19 +196,32 @@ impl<S: Scalar> Beam<S> {
         };
         let masses = points.len();
         let axis = ReducedAxis::new(n, points, marks.iter().map(frame).collect());
-        let point = |&mass: &f64| SpatialInertia::point_mass(entry.material.density * mass, Vector3::zero());
+        let (stiffer, heavier) = entry.factors();
+        let point = |&mass: &f64| SpatialInertia::point_mass(heavier * mass, Vector3::zero());
         let carried = marks.iter().map(|_| SpatialInertia::zero());
         let inertia: Vec<_> = solid.masses.iter().map(point).chain(carried).collect();
         let mut stiffness = vec![S::zero(); n * n];
         for (place, &square) in solid.squares[..n].iter().enumerate() {
-            stiffness[place * n + place] = entry.material.young * square;
+            stiffness[place * n + place] = stiffer * square;
         }
         let heavy = (0..inertia.len()).map(|station| station < masses).collect();
         let marks = (masses..inertia.len()).collect();
         let axis = Axis::Reduced(axis);
         let segments = Segment::whole(&axis, n, inertia.len());
         let (map, damping, couplings) = (Map::Modes(n), Vec::new(), Vec::new());
-        let beam = Self { axis, map, inertia, heavy, marks, stiffness, damping, damped: false, couplings, segments };
+        let beam = Self {
+            axis,
+            map,
+            inertia,
+            heavy,
+            eccentric: false,
+            marks,
+            stiffness,
+            damping,
+            damped: false,
+            couplings,
+            segments,
+        };
         let alone: Vec<Vec<usize>> = (0..n).map(|mode| vec![mode]).collect();
         beam.damped(entry, &alone)
     }
@@ -204,10 +247,15 @@ fn filled<S: Scalar>(row: &[S]) -> Range<usize> {
     first..row.iter().rposition(filled).map_or(first, |last| last + 1)
 }
 
-/// Coordinates that couple in a straight beam at rest: each bending with the shear of its plane.
-fn groups(of: impl Fn(Component) -> Vec<usize>) -> [Vec<usize>; 4] {
+/// Coordinates that couple at rest: in a straight beam with its mass on the axis each bending with the shear of its plane, else all.
+fn groups<S: Scalar>(profile: &Profile<S>, of: impl Fn(Component) -> Vec<usize>) -> Vec<Vec<usize>> {
+    if profile.is_eccentric() || !profile.rest().is_straight() {
+        let mut all: Vec<usize> = Component::ALL.into_iter().flat_map(of).collect();
+        all.sort_unstable();
+        return vec![all];
+    }
     let both = |bending, shear| [of(bending), of(shear)].concat();
-    [
+    vec![
         both(Component::BendingX, Component::ShearY),
         both(Component::BendingY, Component::ShearX),
         of(Component::Torsion),

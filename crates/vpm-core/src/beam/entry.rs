@@ -5,9 +5,11 @@ use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::{Map, Value};
 
 use super::reduced::Reduced;
+use super::rest::RestEntry;
 use super::section::Material;
 use super::shape::Shape;
 use crate::mount::Mount;
+use crate::scalar::Scalar;
 
 /// A component of the strain screw `(theta_x', theta_y', theta_z', v_x' - theta_y, v_y' + theta_x, v_z')`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -57,14 +59,30 @@ pub enum Level {
     Reduced(usize),
 }
 
-/// The shape of the section at one place of the axis.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// The section at one place of the axis.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SectionEntry<P> {
     /// Arc length from the root in m.
     pub at: f64,
     /// The shape there.
     pub shape: Shape<P>,
+    /// Its material, if it is not that of the beam.
+    #[serde(default = "none")]
+    pub material: Option<Material<P>>,
+}
+
+impl<P> SectionEntry<P> {
+    /// A section of the beam's material.
+    pub fn new(at: f64, shape: Shape<P>) -> Self {
+        Self { at, shape, material: None }
+    }
+
+    /// The same section over another parameter type.
+    fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> SectionEntry<T> {
+        let shape = self.shape.map(f);
+        SectionEntry { at: self.at, shape, material: self.material.as_ref().map(|material| material.map(f)) }
+    }
 }
 
 /// What takes energy out of a beam that vibrates.
@@ -92,7 +110,7 @@ impl<P> Default for DampingEntry<P> {
     }
 }
 
-/// A straight beam along z of its root frame, over any parameter type: `BeamEntry<usize>` holds places in a parameter vector.
+/// A beam that leaves its root along z, over any parameter type: `BeamEntry<usize>` holds places in a parameter vector.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(remote = "Self", deny_unknown_fields)]
 pub struct BeamEntry<P> {
@@ -110,14 +128,18 @@ pub struct BeamEntry<P> {
     pub level: Level,
     /// The strains it may have; all others are rigid.
     pub deforms: Vec<Component>,
-    /// What it is made of; of a reduced solid `young` and `density` are factors on its stiffness and its mass.
-    pub material: Material<P>,
-    /// One section if all are alike, otherwise several, between which sizes are interpolated linearly.
+    /// What sections of one material are made of that name none.
+    #[serde(default = "none")]
+    pub material: Option<Material<P>>,
+    /// One section if all are alike, otherwise several, between which sizes and materials are interpolated linearly.
     pub sections: Vec<SectionEntry<P>>,
+    /// Curvature and twist where nothing loads it, at ascending places; none if it is straight, one if they are constant.
+    #[serde(default)]
+    pub rest: Vec<RestEntry>,
     /// Its damping.
     #[serde(default = "DampingEntry::default")]
     pub damping: DampingEntry<P>,
-    /// The reduced solid that takes the place of sections.
+    /// The reduced solid that takes the place of sections; `young` and `density` are factors on its stiffness and its mass then.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reduced: Option<Reduced>,
 }
@@ -125,8 +147,6 @@ pub struct BeamEntry<P> {
 impl<P> BeamEntry<P> {
     /// The same beam over another parameter type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> BeamEntry<T> {
-        let section =
-            |section: &SectionEntry<P>, f: &mut _| SectionEntry { at: section.at, shape: section.shape.map(f) };
         BeamEntry {
             name: self.name.clone(),
             on: self.on,
@@ -135,8 +155,9 @@ impl<P> BeamEntry<P> {
             length: self.length,
             level: self.level,
             deforms: self.deforms.clone(),
-            material: self.material.map(f),
-            sections: self.sections.iter().map(|entry| section(entry, f)).collect(),
+            material: self.material.as_ref().map(|material| material.map(f)),
+            sections: self.sections.iter().map(|entry| entry.map(f)).collect(),
+            rest: self.rest.clone(),
             damping: DampingEntry {
                 stiffness: self.damping.stiffness.as_ref().map(&mut *f),
                 mass: self.damping.mass.as_ref().map(&mut *f),
@@ -144,6 +165,13 @@ impl<P> BeamEntry<P> {
             },
             reduced: self.reduced.clone(),
         }
+    }
+}
+
+impl<S: Scalar> BeamEntry<S> {
+    /// Factors on stiffness and mass of a reduced solid: its material's `young` and `density`.
+    pub(crate) fn factors(&self) -> (S, S) {
+        self.material.as_ref().map_or((S::one(), S::one()), |material| (material.young, material.density))
     }
 }
 

@@ -11,13 +11,14 @@ use super::gauge::Gauge;
 use super::lumped::LumpedAxis;
 use super::motion::Sections;
 use super::reduced::ReducedAxis;
+use super::rest::Rest;
 use super::segment::Segment;
-use super::strain::{PlaneAxis, Slices, SpaceAxis, Sums};
+use super::strain::{PlaneAxis, Rule, Slices, SpaceAxis, Sums};
 use crate::error::Result;
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, SpatialInertia, Vector3};
 
-/// A straight beam along z of its root frame, or a reduced solid: a map from elastic coordinates to sections, inertia at sections, and constant
+/// A beam that leaves its root along z, or a reduced solid: a map from elastic coordinates to sections, inertia at sections, and constant
 /// matrices of stiffness and damping.
 ///
 /// By virtual work `M = sum J^T m J` over the stations, and likewise for the velocity terms and gravity: the same sums at every level,
@@ -25,6 +26,8 @@ use crate::spatial::{Pose, SpatialInertia, Vector3};
 #[derive(Clone, Debug)]
 pub struct Beam<S> {
     pub(super) axis: Axis,
+    /// Whether the centre of mass of a section may lie beside the axis.
+    pub(super) eccentric: bool,
     pub(super) map: Map,
     pub(super) inertia: Vec<SpatialInertia<S>>,
     /// Whether inertia is lumped at a station, or it only carries something.
@@ -60,6 +63,12 @@ pub(super) enum Map {
 }
 
 impl Axis {
+    /// The exact map of strains: in a plane where it bends in one and is straight at rest, else in space.
+    pub(super) fn integrated(fields: &Fields, places: &[f64], rest: &Rest, rule: Rule) -> Self {
+        let plane = if rest.is_straight() { PlaneAxis::new(fields, places, rule) } else { None };
+        plane.map_or_else(|| Self::Space(SpaceAxis::new(fields, places, rest)), Self::Plane)
+    }
+
     /// Numbers of partial sums that a motion needs.
     pub(super) fn scratch(&self) -> usize {
         match self {
@@ -170,7 +179,7 @@ impl<S: Scalar> Beam<S> {
     }
 
     fn is_slice(&self, station: usize) -> bool {
-        self.heavy[station] && !self.marks.contains(&station)
+        self.heavy[station] && !self.eccentric && !self.marks.contains(&station)
     }
 
     /// Its parts, root to tip, in which some of its coordinates act alone.

@@ -4,6 +4,7 @@ use super::entry::Component;
 use super::motion::Sections;
 use super::profile::Profile;
 use super::quadrature::composite;
+use super::rest::{Rest, lift};
 use crate::error::Result;
 use crate::scalar::Scalar;
 use crate::spatial::{Matrix3, Pose, SpatialInertia, Twist, Vector3};
@@ -27,8 +28,8 @@ pub(super) struct LumpedAxis {
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Step {
-    /// Along the axis, in m.
-    Shift(f64),
+    /// Along the rigid axis.
+    Shift(Pose<f64>),
     /// Through the hinge with that number.
     Hinge(usize),
     /// A section.
@@ -37,27 +38,27 @@ enum Step {
 
 impl LumpedAxis {
     /// An axis of `segments` with hinges of these components; with none of them it is rigid.
-    pub fn new(components: &[Component], segments: usize, length: f64, places: &[f64]) -> Self {
+    pub fn new(components: &[Component], (segments, length): (usize, f64), places: &[f64], rest: &Rest) -> Self {
         let mut axis = Self { components: components.to_vec(), segments, length, steps: Vec::new() };
         let (mut here, mut next) = (0.0, 0);
         for &place in places {
             // A section at a hinge belongs to the segment before it, at the clamp to the first one.
             while next < segments && (axis.hinge(next) < place || next == 0) {
-                axis.shift(&mut here, axis.hinge(next));
+                axis.shift(&mut here, axis.hinge(next), rest);
                 if !components.is_empty() {
                     axis.steps.push(Step::Hinge(next));
                 }
                 next += 1;
             }
-            axis.shift(&mut here, place);
+            axis.shift(&mut here, place, rest);
             axis.steps.push(Step::Section);
         }
         axis
     }
 
-    fn shift(&mut self, here: &mut f64, to: f64) {
+    fn shift(&mut self, here: &mut f64, to: f64, rest: &Rest) {
         if to > *here {
-            self.steps.push(Step::Shift(to - *here));
+            self.steps.push(Step::Shift(rest.across(*here, to)));
             *here = to;
         }
     }
@@ -80,11 +81,10 @@ impl LumpedAxis {
 
     /// Inertia of a whole segment, in the axes of the section in its middle.
     pub fn segment<S: Scalar>(profile: &Profile<S>, middle: f64, segments: usize) -> Result<SpatialInertia<S>> {
-        let half = 0.5 * profile.length() / segments as f64;
+        let (half, rest) = (0.5 * profile.length() / segments as f64, profile.rest());
         let mut inertia = SpatialInertia::zero();
         for at in composite(POINTS, &pieces(profile, middle - half, middle + half)) {
-            let across = Vector3::from_f64([0.0, 0.0, at.place - middle]);
-            inertia += Pose::new(Matrix3::identity(), across).inertia(profile.slice(at.place, at.weight)?);
+            inertia += lift(&rest.across(middle, at.place)).inertia(profile.slice(at.place, at.weight)?);
         }
         Ok(inertia)
     }
@@ -130,8 +130,8 @@ impl LumpedAxis {
         let mut moving = out.begin(station, n);
         for step in &self.steps {
             match *step {
-                Step::Shift(size) => {
-                    let across = Pose::new(Matrix3::identity(), Vector3::from_f64([0.0, 0.0, size]));
+                Step::Shift(across) => {
+                    let across = lift(&across);
                     moving.advance(&across, Twist::zero(), Twist::zero());
                     carry(&across, &mut out.columns[station * n..(station + 1) * n]);
                 }

@@ -17,6 +17,7 @@
 
 pub mod basis;
 mod check;
+mod composite;
 mod construct;
 mod damping;
 mod deflection;
@@ -31,6 +32,7 @@ mod motion;
 mod profile;
 pub mod quadrature;
 mod reduced;
+mod rest;
 pub mod section;
 mod segment;
 pub mod shape;
@@ -38,11 +40,13 @@ pub mod strain;
 pub mod two_node;
 
 pub use basis::Basis;
+pub use composite::{Laminate, Layer, Moduli};
 pub use entry::{BeamEntry, Component, DampingEntry, Level, SectionEntry};
 pub use flexible::Beam;
 pub use gauge::Gauge;
 pub use motion::{SectionMotion, Sections};
 pub use reduced::{Field as ReducedField, Reduced, Solid};
+pub use rest::RestEntry;
 pub use section::{Material, Section};
 pub(crate) use segment::Segment;
 pub use shape::{Properties, Shape};

@@ -1,8 +1,9 @@
 //! Sections along the axis of a beam.
 
-use super::entry::BeamEntry;
+use super::entry::{BeamEntry, SectionEntry};
 use super::quadrature::{Station, composite};
-use super::{Section, Shape};
+use super::rest::Rest;
+use super::{Material, Section, Shape};
 use crate::error::Result;
 use crate::scalar::Scalar;
 use crate::spatial::{SpatialInertia, Symmetric3, Vector3};
@@ -39,8 +40,9 @@ impl<'a, S: Scalar> Profile<'a, S> {
 
     /// Arc lengths between which the section changes smoothly and shape functions with these `breaks` are smooth, ascending.
     pub fn breaks(&self, breaks: &[f64]) -> Vec<f64> {
-        let sections = &self.entry.sections;
-        let inside = sections.iter().map(|entry| entry.at).filter(|&at| at > 0.0 && at < self.length());
+        let (sections, rest) = (&self.entry.sections, &self.entry.rest);
+        let places = sections.iter().map(|entry| entry.at).chain(rest.iter().map(|entry| entry.at));
+        let inside = places.filter(|&at| at > 0.0 && at < self.length());
         let mut all: Vec<f64> = breaks.iter().copied().chain(inside).collect();
         all.sort_by(f64::total_cmp);
         all.dedup_by(|b, a| *b - *a < 1e-12 * self.length());
@@ -54,27 +56,47 @@ impl<'a, S: Scalar> Profile<'a, S> {
 
     /// The section at `mu`.
     pub fn at(&self, mu: f64) -> Result<Section<S>> {
-        Section::new(self.shape(mu), self.entry.material)
-    }
-
-    fn shape(&self, mu: f64) -> Shape<S> {
         let sections = &self.entry.sections;
-        let next = sections.iter().position(|entry| entry.at > mu);
-        match next {
-            None => sections[sections.len() - 1].shape,
-            Some(0) => sections[0].shape,
+        let own = |entry: &SectionEntry<S>| Section::of(&entry.shape, self.material(entry));
+        match sections.iter().position(|entry| entry.at > mu) {
+            None => own(&sections[sections.len() - 1]),
+            Some(0) => own(&sections[0]),
             Some(next) => {
                 let (before, after) = (&sections[next - 1], &sections[next]);
                 let part = (mu - before.at) / (after.at - before.at);
-                before.shape.between(&after.shape, part).unwrap_or(before.shape)
+                let shape = before.shape.between(&after.shape, part);
+                let materials = self.material(before).zip(self.material(after));
+                let material = materials.map(|(here, there)| self.mixed(here, there, part));
+                Section::of(shape.as_ref().unwrap_or(&before.shape), material.as_ref())
             }
         }
     }
 
+    fn material<'b>(&'b self, entry: &'b SectionEntry<S>) -> Option<&'b Material<S>> {
+        entry.material.as_ref().or(self.entry.material.as_ref())
+    }
+
+    /// The material in between; where no section has its own, that of the beam as it is.
+    fn mixed(&self, here: &Material<S>, there: &Material<S>, part: f64) -> Material<S> {
+        let alike = self.entry.sections.iter().all(|entry| entry.material.is_none());
+        if alike { *here } else { here.between(there, part) }
+    }
+
+    /// Whether the centre of mass may lie beside the axis.
+    pub fn is_eccentric(&self) -> bool {
+        self.entry.sections.iter().any(|entry| matches!(entry.shape, Shape::Layers(_)))
+    }
+
+    /// The shape at rest.
+    pub fn rest(&self) -> Rest {
+        Rest::new(&self.entry.rest)
+    }
+
     /// A slice of the beam of that length, in section axes, its centre in the origin.
     pub fn slice(&self, mu: f64, length: f64) -> Result<SpatialInertia<S>> {
-        let [x, y, z, mass, ..] = self.at(mu)?.inertia.map(|density| density * length);
-        let zero = S::zero();
-        Ok(SpatialInertia::new(mass, Vector3::zero(), Symmetric3::from_array([x, y, z, zero, zero, zero])))
+        let Section { inertia, center, .. } = self.at(mu)?;
+        let ([x, y, z, mass, ..], zero) = (inertia.map(|density| density * length), S::zero());
+        let center = center.map_or_else(Vector3::zero, |[x, y]| Vector3::new(x, y, zero));
+        Ok(SpatialInertia::new(mass, center, Symmetric3::from_array([x, y, z, zero, zero, zero])))
     }
 }

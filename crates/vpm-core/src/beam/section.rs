@@ -32,15 +32,26 @@ impl<S: Scalar> Material<S> {
         self.young / ((self.poisson + 1.0) * 2.0)
     }
 
-    fn check(&self) -> Result<()> {
-        positive("material.young", self.young)?;
-        positive("material.density", self.density)?;
+    /// Checks the material, whose numbers are called `{path}.young` and so on.
+    pub(super) fn check_at(&self, path: &str) -> Result<()> {
+        positive(&format!("{path}.young"), self.young)?;
+        positive(&format!("{path}.density"), self.density)?;
         let poisson = self.poisson.inspect();
         if poisson > -1.0 && poisson <= 0.5 {
             return Ok(());
         }
         let condition = "lie above -1 and not above 0.5, as for every isotropic elastic solid";
-        Err(Error::Domain { path: "material.poisson".to_owned(), condition, value: poisson })
+        Err(Error::Domain { path: format!("{path}.poisson"), condition, value: poisson })
+    }
+
+    /// The material at `part` (0 to 1) of the way to another, each number in between.
+    pub(super) fn between(&self, other: &Self, part: f64) -> Self {
+        let mix = |here: S, there: S| here * (1.0 - part) + there * part;
+        Self {
+            young: mix(self.young, other.young),
+            poisson: mix(self.poisson, other.poisson),
+            density: mix(self.density, other.density),
+        }
     }
 }
 
@@ -49,8 +60,10 @@ impl<S: Scalar> Material<S> {
 pub struct Section<S = f64> {
     /// `diag K = (EJx, EJy, GJ, ax GA, ay GA, EA)`: N m^2 three times, then N three times.
     pub stiffness: [S; 6],
-    /// Inertia per length `rho (Jx, Jy, Jx + Jy, A, A, A)`: kg m three times, then kg/m three times.
+    /// Inertia per length `rho (Jx, Jy, Jx + Jy, A, A, A)` about the centre of mass: kg m three times, then kg/m three times.
     pub inertia: [S; 6],
+    /// Centre of mass along x and y in m, of sections that may have it beside the axis.
+    pub center: Option<[S; 2]>,
 }
 
 impl<S: Scalar> Section<S> {
@@ -58,7 +71,24 @@ impl<S: Scalar> Section<S> {
     ///
     /// Twist resists with the torsion constant of Saint-Venant and moves with the polar moment, which differ unless the section is round.
     pub fn new(shape: Shape<S>, material: Material<S>) -> Result<Self> {
-        material.check()?;
+        Self::of(&shape, Some(&material))
+    }
+
+    /// As [`Section::new`]; layers and given moduli need no material.
+    pub fn of(shape: &Shape<S>, material: Option<&Material<S>>) -> Result<Self> {
+        match (shape, material) {
+            (Shape::Layers(laminate), _) => laminate.section(),
+            (Shape::Stiffness(moduli), _) => moduli.section(),
+            (_, Some(material)) => Self::solid(shape, *material),
+            (_, None) => {
+                let condition = "be given for a section of one material";
+                Err(Error::Domain { path: "material.young".to_owned(), condition, value: 0.0 })
+            }
+        }
+    }
+
+    fn solid(shape: &Shape<S>, material: Material<S>) -> Result<Self> {
+        material.check_at("material")?;
         let Properties { area, moment_x, moment_y, torsion, shear_x, shear_y } = shape.properties(material.poisson)?;
         let (young, shear, density) = (material.young, material.shear(), material.density);
         let across = [shear_x, shear_y].map(|factor| factor * shear * area);
@@ -67,6 +97,7 @@ impl<S: Scalar> Section<S> {
         Ok(Self {
             stiffness: [young * moment_x, young * moment_y, shear * torsion, across[0], across[1], young * area],
             inertia: [turn_x, turn_y, turn_x + turn_y, line, line, line],
+            center: None,
         })
     }
 
@@ -87,7 +118,7 @@ impl<S: Scalar> Section<S> {
                 return Err(Error::Domain { path: "section.inertia".to_owned(), condition, value: value.inspect() });
             }
         }
-        Ok(Self { stiffness, inertia })
+        Ok(Self { stiffness, inertia, center: None })
     }
 
     /// Mass per length in kg/m.

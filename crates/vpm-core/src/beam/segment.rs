@@ -10,7 +10,8 @@ use super::fields::{Field, Fields, Interpolated};
 use super::flexible::Axis;
 use super::lumped::LumpedAxis;
 use super::motion::Sections;
-use super::strain::{PlaneAxis, Rule, Slices, SpaceAxis, Sums};
+use super::rest::Rest;
+use super::strain::{Rule, Slices, Sums};
 use crate::error::Result;
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, SpatialInertia};
@@ -33,6 +34,7 @@ pub(crate) struct Segment {
 
 /// What lies between two places of a beam.
 struct Cut {
+    begin: f64,
     size: f64,
     stations: Range<usize>,
     /// Arc lengths of its sections from its begin.
@@ -47,13 +49,17 @@ impl Segment {
     }
 
     /// The elements of a beam of linear strains with stations at `places`, in its deflected shape as exact as the whole.
-    pub(super) fn elements(deforms: &[Component], length: f64, count: usize, places: &[f64]) -> Result<Vec<Self>> {
+    pub(super) fn elements(
+        deforms: &[Component],
+        (length, count): (f64, usize),
+        places: &[f64],
+        rest: &Rest,
+    ) -> Result<Vec<Self>> {
         let each = deforms.len();
         let segment = |(number, cut): (usize, Cut)| {
             // The functions of the first node, component by component, then those of the second.
             let fields = Fields::new(Interpolated::Strain, nodal(deforms, cut.size)?);
-            let axis = PlaneAxis::new(&fields, &cut.places, Rule::Elements)
-                .map_or_else(|| Axis::Space(SpaceAxis::new(&fields, &cut.places)), Axis::Plane);
+            let axis = Axis::integrated(&fields, &cut.places, &rest.from(cut.begin), Rule::Elements);
             let at = |node: usize| (0..each).map(move |component| component * (count + 1) + node);
             let coordinates = at(number).chain(at(number + 1)).collect();
             let shared = if number == 0 { 0 } else { each };
@@ -63,10 +69,15 @@ impl Segment {
     }
 
     /// The rigid segments of a lumped beam with stations at `places`, each with the hinge at its begin.
-    pub(super) fn hinged(components: &[Component], length: f64, count: usize, places: &[f64]) -> Vec<Self> {
+    pub(super) fn hinged(
+        components: &[Component],
+        (length, count): (f64, usize),
+        places: &[f64],
+        rest: &Rest,
+    ) -> Vec<Self> {
         let each = components.len();
         let segment = |(number, cut): (usize, Cut)| Self {
-            axis: Axis::Lumped(LumpedAxis::new(components, 1, cut.size, &cut.places)),
+            axis: Axis::Lumped(LumpedAxis::new(components, (1, cut.size), &cut.places, &rest.from(cut.begin))),
             coordinates: (number * each..(number + 1) * each).collect(),
             shared: 0,
             stations: cut.stations,
@@ -126,7 +137,7 @@ pub(super) fn damps_locally<S: Scalar>(entry: &BeamEntry<S>) -> bool {
     entry.damping.mass.is_none() && entry.damping.ratios.is_empty()
 }
 
-/// A straight axis in parts of equal length, with the sections of each.
+/// An axis in parts of equal length, with the sections of each.
 fn cuts(length: f64, count: usize, places: &[f64]) -> Vec<Cut> {
     let node = |number: usize| length * number as f64 / count as f64;
     let mut first = 0;
@@ -140,7 +151,7 @@ fn cuts(length: f64, count: usize, places: &[f64]) -> Vec<Cut> {
             local.push(end - begin);
         }
         first += own;
-        Cut { size: end - begin, stations, places: local }
+        Cut { begin, size: end - begin, stations, places: local }
     };
     (0..count).map(cut).collect()
 }

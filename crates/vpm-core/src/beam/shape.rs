@@ -4,12 +4,13 @@ use std::f64::consts::PI;
 
 use serde::{Deserialize, Serialize};
 
+use super::composite::{Laminate, Moduli};
 use super::positive;
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 
 /// The shape of a section in the axes x and y, over any parameter type; all lengths in m.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "shape", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Shape<P = f64> {
     /// A full rectangle.
@@ -42,8 +43,12 @@ pub enum Shape<P = f64> {
         /// Thickness of the web.
         web: P,
     },
-    /// Anything else, by its numbers.
+    /// Any other shape of one material, by its numbers.
     Given(Properties<P>),
+    /// Layers of several materials.
+    Layers(Laminate<P>),
+    /// Stiffness and mass per length, without a shape.
+    Stiffness(Moduli<P>),
 }
 
 /// What the law of a beam needs to know about a shape.
@@ -82,6 +87,8 @@ impl<P> Shape<P> {
                 shear_x: f(&numbers.shear_x),
                 shear_y: f(&numbers.shear_y),
             }),
+            Self::Layers(laminate) => Shape::Layers(laminate.map(f)),
+            Self::Stiffness(moduli) => Shape::Stiffness(moduli.map(f)),
         }
     }
 }
@@ -92,8 +99,16 @@ impl<S: Scalar> Shape<S> {
         if std::mem::discriminant(self) != std::mem::discriminant(other) {
             return None;
         }
-        let mut ends = Vec::with_capacity(6);
-        other.map(&mut |&size| ends.push(size));
+        let sizes = |shape: &Self| {
+            let mut sizes = Vec::with_capacity(6);
+            shape.map(&mut |&size| sizes.push(size));
+            sizes
+        };
+        let ends = sizes(other);
+        // Layers, and shear that is not given, can differ in number.
+        if ends.len() != sizes(self).len() {
+            return None;
+        }
         let mut ends = ends.into_iter();
         Some(self.map(&mut |&size| ends.next().map_or(size, |end| size * (1.0 - part) + end * part)))
     }
@@ -115,6 +130,10 @@ impl<S: Scalar> Shape<S> {
             }
             Self::I { width, height, flange, web } => i_section(width, height, flange, web),
             Self::Given(properties) => properties.checked(),
+            Self::Layers(_) | Self::Stiffness(_) => {
+                let condition = "be a shape of one material";
+                Err(Error::Domain { path: "section.shape".to_owned(), condition, value: 0.0 })
+            }
         }
     }
 }

@@ -102,12 +102,12 @@ impl<S: Scalar> TreeEffect<S> {
             Self::StructuralDamping { beam, time } => add_damping(&mut parts.beams[beam], time),
             Self::LinkFlexibility { beam, stiffness, time } => {
                 let entry = &mut parts.beams[beam];
-                if let Some(root) = entry.sections.first() {
-                    let properties = root.shape.properties(entry.material.poisson)?;
+                if let (Some(root), Some(material)) = (entry.sections.first(), &mut entry.material) {
+                    let properties = root.shape.properties(material.poisson)?;
                     let bends = |component: &&Component| matches!(component, Component::BendingX | Component::BendingY);
                     let about_x = !matches!(entry.deforms.iter().find(bends), Some(Component::BendingY));
                     let moment = if about_x { properties.moment_x } else { properties.moment_y };
-                    entry.material.young = stiffness * (entry.length / 3.0) / moment;
+                    material.young = stiffness * (entry.length / 3.0) / moment;
                 }
                 add_damping(entry, time);
             }

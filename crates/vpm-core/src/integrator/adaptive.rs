@@ -14,6 +14,8 @@ const SHORTEST: f64 = 1e-12;
 const TOLERANCES: [f64; 2] = [1e-12, 0.1];
 /// How much shorter the next step may be.
 const SHORTER: f64 = 0.2;
+/// Part of a step down to which one is cut where a contact closes: what is left of the way in takes no further step.
+const NEAREST: f64 = 1e-3;
 /// Part of the length that the error allows which is used.
 const CAUTION: f64 = 0.9;
 
@@ -50,6 +52,9 @@ impl Rule {
 /// next is `min(max(0.9 E^(-1/4), 1/5), 5)` times as long, not longer after a refused one. Where two steps are left, they are equal.
 /// Source: Hairer & Wanner 1996, "Solving Ordinary Differential Equations II", sections IV.7 and IV.8, equations 8.19 to 8.21, with
 /// the largest error in the place of the mean, so that states at rest do not hide one that moves.
+/// A step from where a contact is open ends where it closes at the speed of now ([`Ode::horizon`]), unless that is next to no step: a
+/// contact that closes and opens within a step has no stage to tell of it. What decelerates arrives in steps that become quadratically
+/// shorter.
 /// What decides are values alone: derivatives that the number type carries are those of the steps taken.
 /// The step goes on where the last call left it; [`Adaptive::reset`] forgets it. The work is bounded by the number of steps, not by
 /// the time. Checked: the tolerance; that the end is reached within the steps; the error follows the tolerance.
@@ -184,7 +189,7 @@ impl<S: Scalar> Adaptive<S> {
         ode.scales(&mut self.scales);
         let rule = self.rule;
         let (mut gone, mut steps, mut longest) = (0.0, Steps::default(), rule.longer);
-        let mut fresh = true;
+        let (mut fresh, mut ahead) = (true, f64::INFINITY);
         let (mut step, floor) = (self.proposed.unwrap_or(rule.first * duration), rule.floor * duration);
         while gone < duration {
             let left = duration - gone;
@@ -194,8 +199,11 @@ impl<S: Scalar> Adaptive<S> {
                 _ => step,
             };
             if fresh {
+                // Work that is bounded has no steps to spare.
+                ahead = if floor > 0.0 { f64::INFINITY } else { ode.horizon(x) };
                 self.method.linearise(ode, x);
             }
+            let taken = taken.min(ahead.max(NEAREST * step));
             let verdict = self.attempt(ode, x, taken);
             let stuck = Stuck { state: verdict.state, reached: gone, step: taken, many: false };
             let length = taken * (CAUTION / verdict.error.sqrt().sqrt()).clamp(SHORTER, longest);
@@ -203,7 +211,7 @@ impl<S: Scalar> Adaptive<S> {
                 x.copy_from_slice(&self.next);
                 ode.arrive(x, (floor > 0.0).then_some(taken));
                 gone = if taken < left { gone + taken } else { duration };
-                // A step that the end cut short says nothing against the longer one.
+                // A step that the end or a contact cut short says nothing against the longer one.
                 step = floor.max(if taken < step { step.max(length) } else { length });
                 (steps.accepted, longest, fresh) = (steps.accepted + 1, rule.longer, true);
             } else if taken <= floor.max(SHORTEST * duration) {

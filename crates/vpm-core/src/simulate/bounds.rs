@@ -5,7 +5,7 @@ use nalgebra::{Cholesky, DMatrix};
 use super::names::state_name;
 use crate::actuator::Drive;
 use crate::actuator::hydraulic::HydraulicDrive;
-use crate::beam::{BeamEntry, Section};
+use crate::beam::{BeamEntry, Section, SectionEntry};
 use crate::body::Body;
 use crate::description::Description;
 use crate::error::Diverged;
@@ -187,9 +187,10 @@ fn fastest(body: &Body<f64>) -> f64 {
 /// What a beam stores, J, whose strongest section is stretched by 1 from end to end; a reduced solid, moved as far as it is large.
 fn largest_energy(beam: &BeamEntry<f64>) -> f64 {
     if let Some(reduced) = &beam.reduced {
-        return beam.material.young * reduced.largest_energy();
+        return beam.factors().0 * reduced.largest_energy();
     }
-    let sections = beam.sections.iter().filter_map(|entry| Section::new(entry.shape, beam.material).ok());
+    let material = |entry: &'_ SectionEntry<f64>| entry.material.or(beam.material);
+    let sections = beam.sections.iter().filter_map(|entry| Section::of(&entry.shape, material(entry).as_ref()).ok());
     0.5 * beam.length * sections.map(|section| section.stiffness[5]).fold(0.0, f64::max)
 }
 

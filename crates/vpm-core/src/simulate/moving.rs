@@ -183,6 +183,10 @@ impl<S: Scalar> Ode<S> for Moving<'_, S> {
         self.system.arrive(&mut x[..dim], step);
     }
 
+    fn horizon(&mut self, x: &[S]) -> f64 {
+        self.system.horizon(&x[..x.len() - 1])
+    }
+
     fn scales(&self, scales: &mut [f64]) {
         let (machine, time) = scales.split_at_mut(self.system.dim());
         self.system.scales(machine);

@@ -214,6 +214,15 @@ impl<S: Scalar> Dynamics<S> {
         Some(self.data.composite.frames[place.frame].pose * Pose::from_f64(place.pose))
     }
 
+    /// The least time, s, in which an open contact closes at the speeds of a state; infinite where none does.
+    pub(crate) fn time_to_contact(&mut self, state: &[S]) -> f64 {
+        let (n, Self { model, data, connections, .. }) = (self.coordinates(), self);
+        frames(model, data, &state[..n], &state[n..2 * n]);
+        poses(model, data);
+        let closing = connections.contacts.iter().map(|contact| contact.time_to_close(&data.composite.frames));
+        closing.fold(f64::INFINITY, f64::min)
+    }
+
     /// Puts all frames where they are at `q`.
     fn place(&mut self, q: &[S]) {
         let Self { model, data, loads, .. } = self;

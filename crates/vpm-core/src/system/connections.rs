@@ -208,6 +208,15 @@ impl<S: Scalar> PlacedContact<S> {
 }
 
 impl<S: Scalar> PlacedContact<S> {
+    /// The time, s, in which it closes at the speed of now; infinite for one that is closed, or opens.
+    pub(crate) fn time_to_close(&self, frames: &[FrameSlot<S>]) -> f64 {
+        let FrameSlot { pose, velocity, .. } = &frames[self.frame];
+        let depth = self.plane.depth(pose.point(self.point)).inspect();
+        let speed = pose.rotation * (velocity.linear + velocity.angular.cross(self.point));
+        let closing = -speed.dot(self.plane.normal()).inspect();
+        if depth < 0.0 && closing > 0.0 { -depth / closing } else { f64::INFINITY }
+    }
+
     /// The force as a wrench on the frame, about its origin and in its axes.
     #[inline]
     fn wrench(&self, slot: &FrameSlot<S>, touch: &Touch<S>) -> Wrench<S> {

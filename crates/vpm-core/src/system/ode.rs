@@ -443,6 +443,16 @@ impl<S: Scalar> Ode<S> for System<S> {
         self.routines.matrix(&Kind::Prepared, x, matrix, x.len(), rates);
     }
 
+    fn horizon(&mut self, x: &[S]) -> f64 {
+        if self.dynamics.connections.contacts.is_empty() {
+            return f64::INFINITY;
+        }
+        match S::plain(x) {
+            Some(plain) => self.dynamics.time_to_contact(plain),
+            None => self.dynamics.time_to_contact(&x.iter().map(Scalar::re).collect::<Vec<_>>()),
+        }
+    }
+
     fn arrive(&mut self, x: &mut [S], step: Option<f64>) {
         if self.dynamics.loops.is_some() && !self.turning.is_resting() {
             self.close(x);

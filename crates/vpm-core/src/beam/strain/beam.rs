@@ -2,6 +2,7 @@
 
 use crate::beam::fields::{self, Fields, Interpolated};
 use crate::beam::quadrature::gauss;
+use crate::beam::rest::Rest;
 use crate::beam::{Basis, Component, Section, not_negative};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
@@ -50,7 +51,7 @@ impl StrainBeam {
         let rule = gauss(stations, 0.0, length);
         let places: Vec<f64> = rule.iter().map(|at| at.place).chain([length]).collect();
         let inertia = rule.iter().map(|at| at.weight).chain([0.0]).map(|weight| slice(&section, weight)).collect();
-        Ok(Self { axis: SpaceAxis::new(&fields, &places), fields, section, damping, length, inertia })
+        Ok(Self { axis: SpaceAxis::new(&fields, &places, &Rest::default()), fields, section, damping, length, inertia })
     }
 
     /// How many coordinates the beam has.

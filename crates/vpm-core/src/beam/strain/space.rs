@@ -3,12 +3,13 @@
 use crate::beam::fields::Fields;
 use crate::beam::motion::Sections;
 use crate::beam::quadrature::gauss;
+use crate::beam::rest::Rest;
 use crate::scalar::{Dual, Scalar};
 use crate::spatial::{Matrix3, Pose, Twist, Vector3};
 
 use super::exponential::{Tangent, exponential};
 
-/// A straight axis, cut into pieces that one exponential each crosses.
+/// An axis, cut into pieces that one exponential each crosses.
 #[derive(Clone, Debug)]
 pub(in crate::beam) struct SpaceAxis {
     /// The component of each coordinate, 0 to 5.
@@ -21,6 +22,8 @@ pub(in crate::beam) struct SpaceAxis {
 #[derive(Clone, Copy, Debug)]
 struct Piece {
     size: f64,
+    /// Integral of the strain at rest over the piece, then its first moment about the middle per size.
+    rest: [Twist<f64>; 2],
     /// Whether a section stands at its end.
     section: bool,
 }
@@ -37,14 +40,17 @@ pub(super) struct Crossing<S> {
 }
 
 impl SpaceAxis {
-    /// An axis with sections at `places`, ascending, cut there and at the breaks of the shape functions.
-    pub fn new(fields: &Fields, places: &[f64]) -> Self {
+    /// An axis with sections at `places`, ascending, cut there and at the breaks of the shape functions and of the shape at rest.
+    pub fn new(fields: &Fields, places: &[f64], rest: &Rest) -> Self {
         let (mut pieces, mut rows, mut begin) = (Vec::new(), Vec::new(), 0.0);
         for &place in places {
-            let inside = fields.breaks().into_iter().filter(|&at| at > begin && at < place);
-            for end in inside.chain(std::iter::once(place)).collect::<Vec<_>>() {
+            let inside = fields.breaks().into_iter().chain(rest.breaks()).filter(|&at| at > begin && at < place);
+            let mut ends: Vec<f64> = inside.chain(std::iter::once(place)).collect();
+            ends.sort_by(f64::total_cmp);
+            ends.dedup();
+            for end in ends {
                 rows.extend(moments(fields, begin, end).concat());
-                pieces.push(Piece { size: end - begin, section: end == place });
+                pieces.push(Piece { size: end - begin, rest: rest.moments(begin, end), section: end == place });
                 begin = end;
             }
         }
@@ -72,8 +78,10 @@ impl SpaceAxis {
 
     /// As [`SpaceAxis::cross`], but the acceleration only if it is asked for.
     fn cross_as_asked<S: Scalar>(&self, piece: usize, (c, rates): (&[S], &[S]), accelerates: bool) -> Crossing<S> {
-        let (size, rows) = (self.pieces[piece].size, self.rows(piece));
-        let [mut whole, moment] = rows.map(|row| self.sum(row, c));
+        let (Piece { size, rest, .. }, rows) = (self.pieces[piece], self.rows(piece));
+        let [mut whole, mut moment] = rows.map(|row| self.sum(row, c));
+        let turn = |rest: Twist<f64>| Vector3::from_f64(rest.angular.to_array());
+        (whole.angular, moment.angular) = (whole.angular + turn(rest[0]), moment.angular + turn(rest[1]));
         whole.linear.z = whole.linear.z + size;
         let [whole_rate, moment_rate] = rows.map(|row| self.sum(row, rates));
         let screw = whole + whole.cross(moment);

@@ -37,8 +37,9 @@ fn unit(level: Level, deforms: &[Component], [ratio, twist, stretch]: [f64; 3]) 
         shear_y: shear,
     });
     BeamEntry {
-        material: Material { young, poisson: 0.0, density: 1.0 / area },
-        sections: vec![SectionEntry { at: 0.0, shape }],
+        material: Some(Material { young, poisson: 0.0, density: 1.0 / area }),
+        sections: vec![SectionEntry::new(0.0, shape)],
+        rest: Vec::new(),
         ..entry(level, deforms, 1.0, [1.0, 1.0])
     }
 }
@@ -112,7 +113,7 @@ fn in_space_chains_of_two_node_elements_tend_to_it() -> Result<()> {
     bent.motion(&q, &vec![0.0; q.len()], &mut out);
     let exact = out.at[bent.mark(0)].pose;
     assert!(exact.rotation.columns[2].z < 0.5_f64.cos(), "the tip leans {}", exact.rotation.columns[2].z);
-    let section = Section::new(beam.sections[0].shape, beam.material)?;
+    let section = Section::of(&beam.sections[0].shape, beam.material.as_ref())?;
     let solved = |count: usize| -> Result<[f64; 6]> {
         let chain = TwoNodeChain::new(&section, 1.0, count)?;
         let mut x = chain.straight();
@@ -144,7 +145,7 @@ fn a_soft_swing_keeps_its_energy() -> Result<()> {
         parts.bodies.push(trees::body(&mut Random::new(1), "pin", Mount::World, JointKind::Revolute));
         let mut strip = entry(Level::Bezier(4), deforms, 0.8, [0.02, 0.02]);
         (strip.on, strip.damping) = (Mount::Body(0), DampingEntry::default());
-        strip.material = Material { young: 2e7, poisson: 0.3, density: 1100.0 };
+        strip.material = Some(Material { young: 2e7, poisson: 0.3, density: 1100.0 });
         parts.beams.push(strip);
         let joint = &mut parts.bodies[0].joint;
         (joint.axis, joint.rotation, joint.translation) = ([0.0, 1.0, 0.0], trees::UPRIGHT, STILL);

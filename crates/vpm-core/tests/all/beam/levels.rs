@@ -24,8 +24,9 @@ fn unit(level: Level, deforms: &[Component]) -> BeamEntry<f64> {
         shear_y: 1.0,
     });
     BeamEntry {
-        material: Material { young: 1.0 / small, poisson: 0.0, density: 1.0 },
-        sections: vec![SectionEntry { at: 0.0, shape }],
+        material: Some(Material { young: 1.0 / small, poisson: 0.0, density: 1.0 }),
+        sections: vec![SectionEntry::new(0.0, shape)],
+        rest: Vec::new(),
         ..entry(level, deforms, 1.0, [1.0, 1.0])
     }
 }

@@ -2,6 +2,8 @@
 
 mod bezier_basis;
 mod bezier_large;
+mod composite;
+mod curved;
 mod first_order;
 mod levels;
 mod linear;

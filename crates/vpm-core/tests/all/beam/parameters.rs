@@ -14,8 +14,8 @@ use crate::common::entries::{ALL, entry};
 fn tapered<P>(level: Level, deforms: &[Component], mut with: impl FnMut(f64) -> P) -> BeamEntry<P> {
     let base = BeamEntry {
         sections: vec![
-            SectionEntry { at: 0.0, shape: Shape::Rectangle { width: 0.02, height: 0.01 } },
-            SectionEntry { at: 0.8, shape: Shape::Rectangle { width: 0.015, height: 0.008 } },
+            SectionEntry::new(0.0, Shape::Rectangle { width: 0.02, height: 0.01 }),
+            SectionEntry::new(0.8, Shape::Rectangle { width: 0.015, height: 0.008 }),
         ],
         damping: DampingEntry { stiffness: Some(1e-4), mass: Some(0.3), ratios: vec![0.01, 0.02, 0.03] },
         ..entry(level, deforms, 0.8, [1.0, 1.0])
@@ -212,23 +212,26 @@ fn impossible_beams_are_refused_by_name() {
         ("`arm.deforms` must name at least one component", Box::new(|beam| beam.deforms.clear())),
         ("`arm.deforms` must name every component once", Box::new(|beam| beam.deforms.push(BendingX))),
         ("`arm.section.width` must be positive", Box::new(move |beam| beam.sections[0].shape = rectangle(-1.0, 0.1))),
-        ("`arm.young` must be positive", Box::new(|beam| beam.material.young = 0.0)),
-        ("`arm.poisson` must lie above -1", Box::new(|beam| beam.material.poisson = 0.6)),
-        ("`arm.density` must be a finite number", Box::new(|beam| beam.material.density = f64::NAN)),
+        ("`arm.young` must be positive", Box::new(|beam| beam.material.iter_mut().for_each(|of| of.young = 0.0))),
+        ("`arm.poisson` must lie above -1", Box::new(|beam| beam.material.iter_mut().for_each(|of| of.poisson = 0.6))),
+        (
+            "`arm.density` must be a finite number",
+            Box::new(|beam| beam.material.iter_mut().for_each(|of| of.density = f64::NAN)),
+        ),
         ("`arm.sections` must hold at least one section", Box::new(|beam| beam.sections.clear())),
         ("`arm.damping.mass` must be zero or positive", Box::new(|beam| beam.damping.mass = Some(-1.0))),
         ("`arm.damping.ratios.1` must be zero or positive", Box::new(|beam| beam.damping.ratios = vec![0.1, -0.1])),
         (
             "`arm.section.1.at` must lie between 0 and the length",
-            Box::new(move |beam| beam.sections.push(SectionEntry { at: 0.9, shape: rectangle(0.1, 0.1) })),
+            Box::new(move |beam| beam.sections.push(SectionEntry::new(0.9, rectangle(0.1, 0.1)))),
         ),
         (
             "`arm.section.1.at` must lie beyond the section before it",
-            Box::new(move |beam| beam.sections.push(SectionEntry { at: 0.0, shape: rectangle(0.1, 0.1) })),
+            Box::new(move |beam| beam.sections.push(SectionEntry::new(0.0, rectangle(0.1, 0.1)))),
         ),
         (
             "`arm.section.1.shape` must have the same kind of shape",
-            Box::new(|beam| beam.sections.push(SectionEntry { at: 0.8, shape: Shape::Circle { diameter: 0.1 } })),
+            Box::new(|beam| beam.sections.push(SectionEntry::new(0.8, Shape::Circle { diameter: 0.1 }))),
         ),
     ];
     for (expected, change) in cases {

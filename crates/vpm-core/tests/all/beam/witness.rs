@@ -217,8 +217,8 @@ fn bases_of_one_kinematics_agree() -> Result<()> {
 fn all_levels_have_the_mass_of_the_rigid_beam() -> Result<()> {
     let taper = |level, deforms: &[Component]| {
         let mut beam = entry(level, deforms, 0.8, [0.02, 0.01]);
-        beam.sections.push(SectionEntry { at: 0.5, shape: Shape::Rectangle { width: 0.012, height: 0.008 } });
-        beam.sections.push(SectionEntry { at: 0.8, shape: Shape::Rectangle { width: 0.01, height: 0.008 } });
+        beam.sections.push(SectionEntry::new(0.5, Shape::Rectangle { width: 0.012, height: 0.008 }));
+        beam.sections.push(SectionEntry::new(0.8, Shape::Rectangle { width: 0.01, height: 0.008 }));
         beam
     };
     let whole = |level, deforms: &[Component]| -> Result<Vec<f64>> {

@@ -41,8 +41,9 @@ pub fn arm(level: Level, deforms: &[Component]) -> Parts<f64> {
         length,
         level,
         deforms: deforms.to_vec(),
-        material: Material { young: 210e9, poisson: 0.3, density: 7850.0 },
-        sections: vec![SectionEntry { at: 0.0, shape: Shape::Rectangle { width: 0.015, height: 0.004 } }],
+        material: Some(Material { young: 210e9, poisson: 0.3, density: 7850.0 }),
+        sections: vec![SectionEntry::new(0.0, Shape::Rectangle { width: 0.015, height: 0.004 })],
+        rest: Vec::new(),
         damping: DampingEntry { stiffness: Some(5e-4), ..DampingEntry::default() },
         reduced: None,
     };

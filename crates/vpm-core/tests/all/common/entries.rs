@@ -19,8 +19,9 @@ pub fn entry(level: Level, deforms: &[Component], length: f64, [width, height]: 
         length,
         level,
         deforms: deforms.to_vec(),
-        material: STEEL,
-        sections: vec![SectionEntry { at: 0.0, shape: Shape::Rectangle { width, height } }],
+        material: Some(STEEL),
+        sections: vec![SectionEntry::new(0.0, Shape::Rectangle { width, height })],
+        rest: Vec::new(),
         damping: DampingEntry::default(),
         reduced: None,
     }
@@ -37,4 +38,10 @@ pub fn mixes(levels: &[Level]) -> Vec<BeamEntry<f64>> {
 /// The same beam over another number type, without derivatives.
 pub fn lift<S: Scalar>(entry: &BeamEntry<f64>) -> BeamEntry<S> {
     entry.map(&mut |&value| S::from_f64(value))
+}
+
+/// The material of a beam of the tests, all of which have one.
+pub fn material<P: Copy>(beam: &BeamEntry<P>) -> Material<P> {
+    let Some(material) = beam.material else { unreachable!("a beam of the tests has a material") };
+    material
 }

@@ -79,8 +79,9 @@ pub fn beam(random: &mut Random, name: &str, on: Mount, level: Level, deforms: &
         length: 0.5 + 0.3 * random.unit(),
         level,
         deforms: deforms.to_vec(),
-        material: Material { young: 2e9, poisson: 0.3, density: 1500.0 },
-        sections: vec![SectionEntry { at: 0.0, shape: Shape::Rectangle { width: 0.03, height: 0.01 } }],
+        material: Some(Material { young: 2e9, poisson: 0.3, density: 1500.0 }),
+        sections: vec![SectionEntry::new(0.0, Shape::Rectangle { width: 0.03, height: 0.01 })],
+        rest: Vec::new(),
         damping: DampingEntry { stiffness: Some(1e-3), mass: Some(0.2), ratios: Vec::new() },
         reduced: None,
     }

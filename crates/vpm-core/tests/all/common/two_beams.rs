@@ -60,8 +60,9 @@ pub fn machine(count: usize, change: impl FnOnce(&mut Value)) -> Description {
             length,
             level: Level::Strain(count),
             deforms: vec![Component::BendingX],
-            material: MATERIAL,
-            sections: vec![SectionEntry { at: 0.0, shape: Shape::Given(strip()) }],
+            material: Some(MATERIAL),
+            sections: vec![SectionEntry::new(0.0, Shape::Given(strip()))],
+            rest: Vec::new(),
             damping: DampingEntry { stiffness: Some(DAMPING), ..DampingEntry::default() },
             reduced: None,
         });

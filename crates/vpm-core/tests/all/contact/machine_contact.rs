@@ -135,8 +135,9 @@ fn propped(level: Level, stiffness: f64, gap: f64) -> Description {
         length: 0.8,
         level,
         deforms: vec![Component::BendingX, Component::BendingY],
-        material: Material { young: 70e9, poisson: 0.3, density: 2700.0 },
-        sections: vec![SectionEntry { at: 0.0, shape: Shape::Rectangle { width: 0.02, height: 0.02 } }],
+        material: Some(Material { young: 70e9, poisson: 0.3, density: 2700.0 }),
+        sections: vec![SectionEntry::new(0.0, Shape::Rectangle { width: 0.02, height: 0.02 })],
+        rest: Vec::new(),
         damping: DampingEntry { stiffness: Some(1e-4), mass: None, ratios: Vec::new() },
         reduced: None,
     };

@@ -95,7 +95,7 @@ fn in_space(seed: u64, level: Level) -> Parts<f64> {
     parts.beams[2].on = section(&parts, 0, 0.3);
     let shape = Shape::Rectangle { width: 0.02, height: 0.03 };
     let tapers = &mut parts.beams[1];
-    tapers.sections.push(SectionEntry { at: tapers.length, shape });
+    tapers.sections.push(SectionEntry::new(tapers.length, shape));
     let (middle, tip, end) = (section(&parts, 0, 0.6), section(&parts, 0, 1.0), section(&parts, 2, 1.0));
     parts.bodies = vec![
         body(random, "base", Mount::World, JointKind::Prismatic),

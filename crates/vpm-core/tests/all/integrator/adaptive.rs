@@ -303,3 +303,62 @@ fn steps_without_their_coordinates_are_the_same() {
         assert!(x != y && largest_difference(&x, &y) < 1e-11, "{}: {x:?} {y:?}", method.name());
     }
 }
+
+/// A mass that a constant force pushes away from the ground, a stiff spring, which it touches for a while if it comes fast enough.
+struct Graze {
+    /// Whether it says when it will touch the ground.
+    tells: bool,
+}
+
+impl Graze {
+    const PUSH: f64 = 9.0;
+    const SPRING: f64 = 1e5;
+}
+
+impl Ode<f64> for Graze {
+    fn dim(&self) -> usize {
+        2
+    }
+
+    fn coordinates(&self) -> usize {
+        1
+    }
+
+    fn rhs(&mut self, x: &[f64], dxdt: &mut [f64]) {
+        (dxdt[0], dxdt[1]) = (x[1], Self::PUSH + Self::SPRING * (-x[0]).max(0.0));
+    }
+
+    fn jacobian(&mut self, x: &[f64], jacobian: &mut [f64]) {
+        jacobian.copy_from_slice(&[0.0, 1.0, if x[0] < 0.0 { -Self::SPRING } else { 0.0 }, 0.0]);
+    }
+
+    fn horizon(&mut self, x: &[f64]) -> f64 {
+        if self.tells && x[0] > 0.0 && x[1] < 0.0 { x[0] / -x[1] } else { f64::INFINITY }
+    }
+}
+
+#[test]
+fn contacts_shorter_than_a_step_are_met() {
+    // From far away, through 1 s of free flight, to a touch of 8 ms at 0.1 m/s, 1.5 s after the start; then up again.
+    let (arrival, speed) = (1.5, 0.1);
+    let start = |time: f64| [speed * time + 0.5 * Graze::PUSH * time * time, -speed - Graze::PUSH * time];
+    let fly = |tells: bool| {
+        let (mut ode, mut x) = (Graze { tells }, start(arrival).to_vec());
+        let mut adaptive = Adaptive::new(1e-6, 2).unwrap();
+        for _ in 0..3 {
+            adaptive.advance(&mut ode, &mut x, 1.0, &|| false).unwrap();
+        }
+        x
+    };
+    // On the ground it swings about PUSH / SPRING, begins at the surface with `speed`, and leaves with it.
+    let (rate, sag) = (Graze::SPRING.sqrt(), Graze::PUSH / Graze::SPRING);
+    let touch = 2.0 * (speed / rate / sag).atan() / rate;
+    let after = 3.0 - arrival - touch;
+    let exact = [speed * after + 0.5 * Graze::PUSH * after * after, speed + Graze::PUSH * after];
+    let met = fly(true);
+    assert!(largest_difference(&met, &exact) < 1e-4, "{met:?} is not {exact:?}");
+    // Without a word of it the steps go on as if there were no ground: the flight is a parabola to the end.
+    let free = start(arrival - 3.0);
+    let missed = fly(false);
+    assert!(largest_difference(&missed, &free) < 1e-9, "{missed:?} is not {free:?}");
+}

@@ -200,7 +200,7 @@ fn strip(level: Level) -> Parts<f64> {
     link.translation = [0.0; 3];
     link.rotation = [0.0, 0.0, 1.0, 0.0, 1.0, 0.0, -1.0, 0.0, 0.0];
     (link.length, link.deforms) = (0.44, vec![Component::BendingY]);
-    link.material = vpm_core::beam::Material { young: 210e9, poisson: 0.3, density: 7850.0 };
+    link.material = Some(vpm_core::beam::Material { young: 210e9, poisson: 0.3, density: 7850.0 });
     link.sections[0].shape = Shape::Rectangle { width: 0.004, height: 0.015 };
     let tip = section(&parts, 0, 1.0);
     parts.markers[0] = Marker { name: "tip".into(), on: tip, translation: [0.0; 3], rotation: UPRIGHT };
@@ -329,7 +329,7 @@ fn spin_up_follows_two_other_codes() -> Result<()> {
     parts.bodies[0].joint.axis = [0.0, -1.0, 0.0];
     let link = &mut parts.beams[0];
     (link.length, link.deforms) = (10.0, vec![Component::BendingY, Component::ShearX, Component::Extension]);
-    link.material = vpm_core::beam::Material { young: 2.8e7, poisson: 0.3, density: 1.2 };
+    link.material = Some(vpm_core::beam::Material { young: 2.8e7, poisson: 0.3, density: 1.2 });
     let shear = 1e7 / (2.8e7 / 2.6);
     let (moment_x, moment_y, torsion) = (5e-4, 5e-4, 1e-3);
     link.sections[0].shape =
@@ -365,7 +365,7 @@ fn a_falling_pendulum_follows_two_other_codes() -> Result<()> {
     let mut parts = strip(Level::Strain(8));
     let link = &mut parts.beams[0];
     link.length = 1.0;
-    link.material = vpm_core::beam::Material { young: 1e8, poisson: 0.3, density: 1100.0 };
+    link.material = Some(vpm_core::beam::Material { young: 1e8, poisson: 0.3, density: 1100.0 });
     link.sections[0].shape = Shape::Rectangle { width: 0.01, height: 0.02 };
     link.damping = vpm_core::beam::DampingEntry::default();
     // Hanging on a massless carrier: all inertia is the beam's.

@@ -14,6 +14,7 @@ use vpm_core::samples::Random;
 use vpm_core::simulate::{Run, Setting, Stepping, free_run, observed, prescribed};
 use vpm_core::table::Table;
 
+use crate::common::entries::material;
 use crate::common::trees::{beam, body, description, parameter, push, section};
 
 const PLAY: usize = 1;
@@ -122,7 +123,7 @@ fn sensitivities_of_partly_prescribed_motion_are_slopes() -> Result<()> {
     let motion = turning(30, 0.005);
     let names = ["gap", "contact", "grease", "spring", "rest"];
     let named = (0..d.n_parameters()).filter(|&k| names.contains(&d.parameter_names[k].as_str()));
-    let by: Vec<usize> = named.chain([d.beams[0].material.young]).collect();
+    let by: Vec<usize> = named.chain([material(&d.beams[0]).young]).collect();
     assert!(by.len() > names.len());
     let run = guided(&d, stepping, &motion, &[PLAY, 2], &by)?;
     let moved = |place: usize, sign: f64| {
@@ -158,7 +159,7 @@ fn gauges_that_hold_agree_with_and_without_derivatives() -> Result<()> {
             let strains = StrainRates { rate: Table::new("rate", &rate, rows, 1)?, gain: &[gain] };
             observed(setting, (moving, 0), &[PLAY, 2], Some(strains), &[])
         };
-        let (plain, lifted) = (run(&[], 50.0, 20)?, run(&[d.beams[0].material.young], 50.0, 20)?);
+        let (plain, lifted) = (run(&[], 50.0, 20)?, run(&[material(&d.beams[0]).young], 50.0, 20)?);
         let apart =
             |a: &Run, b: &Run| a.outputs.iter().zip(&b.outputs).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
         let (rounding, fine, free) =
@@ -171,7 +172,7 @@ fn gauges_that_hold_agree_with_and_without_derivatives() -> Result<()> {
 #[test]
 fn steps_along_a_motion_allocate_nothing() -> Result<()> {
     let d = geared(0.01);
-    let (motion, young) = (turning(3, 0.005), [d.beams[0].material.young]);
+    let (motion, young) = (turning(3, 0.005), [material(&d.beams[0]).young]);
     for method in [Method::LinearlyImplicit, Method::Rosenbrock] {
         for by in [&[][..], &young] {
             let allocations = |substeps: usize| -> Result<u64> {

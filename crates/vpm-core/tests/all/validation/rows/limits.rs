@@ -7,6 +7,7 @@ use vpm_core::ode::Ode;
 use vpm_core::{Result, evaluate};
 
 use super::{Row, Tolerance, difference};
+use crate::common::entries::material;
 use crate::common::two_link::arm;
 
 /// The joints, their rates and the efforts on them.
@@ -46,7 +47,7 @@ pub fn rows() -> Result<Vec<Row>> {
 /// Accelerations of the joints with beams that rest in this motion: their own accelerations vanish.
 fn settled(d: &Description, factor: f64, joints: usize) -> Result<Vec<f64>> {
     let mut theta = d.parameters.clone();
-    theta[d.beams[0].material.young] *= factor;
+    theta[material(&d.beams[0]).young] *= factor;
     let mut system = d.system::<f64>(&theta)?;
     let (n, [q, v, efforts]) = (d.n_coordinates(), STATE);
     let (elastic, mut x) = (n - joints, vec![0.0; 2 * n]);

@@ -58,8 +58,9 @@ fn circle(phi: f64) -> [f64; 2] {
 fn unit(level: Level, deforms: &[Component]) -> BeamEntry<f64> {
     let given = Properties { area: 1.0, moment_x: 1.0, moment_y: 1.0, torsion: 1.0, shear_x: 1.0, shear_y: 1.0 };
     BeamEntry {
-        material: Material { young: 1.0, poisson: 0.0, density: 1.0 },
-        sections: vec![SectionEntry { at: 0.0, shape: Shape::Given(given) }],
+        material: Some(Material { young: 1.0, poisson: 0.0, density: 1.0 }),
+        sections: vec![SectionEntry::new(0.0, Shape::Given(given))],
+        rest: Vec::new(),
         ..entries::entry(level, deforms, 1.0, [1.0, 1.0])
     }
 }

@@ -11,6 +11,7 @@ use vpm_core::samples::Random;
 use vpm_core::{Result, evaluate};
 
 use super::{Row, difference, slopes, vanishing};
+use crate::common::entries::material;
 use crate::common::trees;
 
 const DEFORMS: [Component; 3] = [Component::BendingX, Component::BendingY, Component::Torsion];
@@ -46,7 +47,7 @@ struct Hand {
 impl Hand {
     fn new(parts: &Parts<f64>, count: usize) -> Result<Self> {
         let (beam, size) = (&parts.beams[0], parts.beams[0].length / count as f64);
-        let properties = beam.sections[0].shape.properties(beam.material.poisson)?;
+        let properties = beam.sections[0].shape.properties(material(beam).poisson)?;
         let (mut bodies, mut springs) = (vec![parts.bodies[0].clone()], Vec::new());
         for hinge in 0..count {
             // From the clamp to the middle of the first segment, and from middle to middle.
@@ -88,15 +89,15 @@ impl Hand {
 /// `EJ` or `GJt`.
 fn stiffness(beam: &BeamEntry<f64>, section: &Properties<f64>, component: Component) -> f64 {
     match component {
-        Component::BendingX => beam.material.young * section.moment_x,
-        Component::BendingY => beam.material.young * section.moment_y,
-        _ => beam.material.young / (2.0 * (1.0 + beam.material.poisson)) * section.torsion,
+        Component::BendingX => material(beam).young * section.moment_x,
+        Component::BendingY => material(beam).young * section.moment_y,
+        _ => material(beam).young / (2.0 * (1.0 + material(beam).poisson)) * section.torsion,
     }
 }
 
 /// A bar from the origin along z: `m = rho A l`, transverse moments `rho J l + m l^2 / 12`, about the axis `rho (Jx + Jy) l`.
 fn segment(beam: &BeamEntry<f64>, section: &Properties<f64>, size: f64) -> Inertia<f64> {
-    let line = beam.material.density * size;
+    let line = material(beam).density * size;
     let mass = line * section.area;
     let across = [section.moment_x, section.moment_y].map(|moment| line * moment + mass * size * size / 12.0);
     let about = line * (section.moment_x + section.moment_y);

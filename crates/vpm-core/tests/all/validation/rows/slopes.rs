@@ -14,6 +14,7 @@ use vpm_core::{Error, Result};
 
 use super::derivations::name;
 use super::{Row, Tolerance, difference, vanishing};
+use crate::common::entries::material;
 use crate::common::trees;
 
 const SOURCE: &str = "central differences of fourth order";
@@ -79,7 +80,7 @@ fn sensitivities(d: &Description, level: Level) -> Result<Row> {
         return Err(Error::Description { message: "the beam of this arm is a rectangle".into() });
     };
     let rotor = d.bodies[0].rotor_inertia.unwrap_or_default();
-    let by = [beam.material.young, beam.material.density, width, rotor];
+    let by = [material(beam).young, material(beam).density, width, rotor];
     let mut start = vec![0.01; d.n_states()];
     start[0] = 0.7;
     let run = |theta: &[f64], sensitivities: &[usize]| {
