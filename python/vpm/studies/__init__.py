@@ -18,7 +18,7 @@ __all__ = ["STUDIES", "Compared", "Picture", "Study", "Table", "run_study"]
 #: What runs each study, and the mesh that it takes by itself.
 STUDIES: dict[str, tuple[Callable[[int], Study], int]] = {
     "knee": (knee, 4),
-    "fingertip": (fingertip, 2),
+    "fingertip": (fingertip, 3),
     "carton": (fold_carton, 4),
 }
 

@@ -140,7 +140,7 @@ def classes(step: Pressed) -> Array:
     return np.array([rings[(middle >= a) & (middle < b)].sum() for a, b in pairwise(edges)])
 
 
-def fingertip(fineness: int = 2) -> Study:
+def fingertip(fineness: int = 3) -> Study:
     """Run the study.
 
     Parameters
