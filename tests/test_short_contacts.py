@@ -27,7 +27,7 @@ stiffness = {SPRING}
 
 
 def test_a_touch_of_milliseconds_is_met_in_steps_of_a_second() -> None:
-    # It flies towards the ground, which error control lets it do in steps of a second, touches it after 1.5 s at 0.1 m/s
+    # It flies towards the ground, in steps of a second as far as error control goes, touches it after 1.5 s at 0.1 m/s
     # for 8 ms, and flies off. On the ground it swings about a sag of m g / k and leaves as fast as it came.
     start = [SPEED * ARRIVAL + 0.5 * PUSH * ARRIVAL**2, -SPEED - PUSH * ARRIVAL]
     simulation = vpm.Simulation(vpm.Model.from_toml(GRAZE), 1.0, integrator="adaptive", state=start)
