@@ -103,8 +103,19 @@ def test_the_offset_of_that_sensor_cannot_be_told_beside_it(machine: vpm.Model, 
     name = "bridge.offset.value"
     found = fitted(machine.with_effect("sensor_offset", at="bridge"), records, [DENSITY, name], BESIDE)
     assert [c.names for c in found.unidentifiable] == [(name,)]
-    assert any(s.startswith(f"{name} adds a constant to {STRAIN} and does nothing else") for s in found.warnings)
-    assert np.all(np.isfinite(list(found.offsets_std.values())))
+    (told,) = [sentence for sentence in found.warnings if name in sentence]
+    assert told.startswith(f"not identifiable from these data: {name} adds a constant to {STRAIN} and does nothing")
+    alone = fitted(machine, records, [DENSITY], BESIDE)
+    assert list(found.offsets_std.values()) == pytest.approx(list(alone.offsets_std.values()), rel=1e-6)
+
+
+def test_offsets_are_as_sure_beside_two_parameters_of_which_the_ratio_counts(
+    machine: vpm.Model, records: list[vpm.Experiment]
+) -> None:
+    both = fitted(machine, records, [DENSITY, "link.young"], BESIDE)
+    assert both.unidentifiable
+    alone = fitted(machine, records, [DENSITY], BESIDE)
+    assert list(both.offsets_std.values()) == pytest.approx(list(alone.offsets_std.values()), rel=1e-2)
 
 
 def test_nothing_changes_without_it(machine: vpm.Model, records: list[vpm.Experiment]) -> None:

@@ -308,8 +308,8 @@ def _told(model: Model, records: Sequence[Experiment], data: AnyProblem, fit: Fi
         held,
         data.blocks,
         len(fit.states) + len(offset_blocks(data)),
+        taken_by_offsets(fit, data),
     )
-    told += taken_by_offsets(fit, data)
     told += [sentence for _, sentence in border]
     told += constant_channels(model, records, data.blocks)
     told += lost_channels(fit.mode, fit.names, fit.after)

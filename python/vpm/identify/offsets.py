@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.identify.fitted import Fit
-from vpm.identify.identifiability import column_lengths
+from vpm.identify.identifiability import RANK_TOLERANCE, column_lengths
 from vpm.identify.objective import AnyProblem
 from vpm.identify.output_error import OutputErrorProblem
-from vpm.identify.problem import Block
+from vpm.identify.problem import Block, less_means
 from vpm.identify.sandwich import record_groups, sandwich
 from vpm.identify.ties import tied, untied
 
@@ -42,10 +42,10 @@ def with_offsets(fit: Fit, data: AnyProblem, weights: Array) -> Fit:
     for column, block in enumerate(off):
         constants[block.samples, column] = block.weight * block.moving
     values = constants.T @ residual / np.sum(constants**2, axis=0)
-    # What the data cannot see stayed where it was: offsets are those beside these values.
-    seen = np.concatenate([np.isfinite(fit.std), np.ones(jacobian.shape[1] - fit.std.size, dtype=np.bool_)])
-    columns = weights[:, None] * np.column_stack([jacobian[:, seen], constants])
-    columns = np.vstack([columns, _priors(fit, columns.shape[1], seen)])
+    known = _priors(fit, jacobian.shape[1])
+    seen = _seen(np.vstack([weights[:, None] * less_means(jacobian, off), known]))
+    columns = np.column_stack([weights[:, None] * jacobian @ seen, weights[:, None] * constants])
+    columns = np.vstack([columns, np.column_stack([known @ seen, np.zeros((len(known), len(off)))])])
     left = np.concatenate([weights * (residual - constants @ values), np.ones(len(columns) - residual.size)])
     lengths, outputs = column_lengths(columns), data.blocks[-1].samples.stop
     covariance = sandwich(columns / lengths, left, record_groups(data.blocks), range(outputs, len(left)))
@@ -55,19 +55,19 @@ def with_offsets(fit: Fit, data: AnyProblem, weights: Array) -> Fit:
     return replace(fit, offsets=found, offsets_std=deviations)
 
 
-def taken_by_offsets(fit: Fit, data: AnyProblem) -> list[str]:
-    """Sentences about parameters whose whole effect is a constant that offsets leave open."""
+def taken_by_offsets(fit: Fit, data: AnyProblem) -> dict[str, str]:
+    """What to say of parameters whose whole effect is a constant that offsets leave open."""
     blind = [c.names[0] for c in fit.unidentifiable if len(c.names) == 1]
     if not offset_blocks(data) or not blind:
-        return []
+        return {}
     slopes = _with_constants(fit, data)[1]
-    told = []
+    told = {}
     for name in blind:
         column = slopes[:, fit.names.index(name)]
         moved = dict.fromkeys(b.channel for b in offset_blocks(data) if np.any(column[b.samples]))
         if moved:
-            told.append(
-                f"{name} adds a constant to {', '.join(moved)} and does nothing else, so offsets take its place: fix "
+            told[name] = (
+                f"{name} adds a constant to {', '.join(moved)} and does nothing else, so offsets take its place; fix "
                 "it, or leave the channel out of offsets"
             )
     return told
@@ -81,12 +81,17 @@ def _with_constants(fit: Fit, data: AnyProblem) -> tuple[Array, Array]:
     return whole.evaluate(model, model.theta, [model.index(name) for name in fit.names], **given)
 
 
-def _priors(fit: Fit, columns: int, seen: NDArray[np.bool_]) -> Array:
-    """Rows that stand for what was known of the parameters that the data see."""
-    if fit.fitting is None or not fit.fitting.priors:
-        return np.zeros((0, columns))
-    known = [fit.model.parameters[name].uncertainty for name, s in zip(fit.names, seen, strict=False) if s]
+def _seen(slopes: Array) -> Array:
+    """Directions (p, k) in which a fit moved: in others it stayed where it was, and offsets are those beside that."""
+    lengths = column_lengths(slopes)
+    _, values, directions = np.linalg.svd(np.linalg.qr(slopes / lengths, mode="r"))
+    return np.asarray(directions[values > RANK_TOLERANCE * values[0]].T / lengths[:, None])
+
+
+def _priors(fit: Fit, columns: int) -> Array:
+    """Rows that stand for what was known of the parameters."""
+    known = [fit.model.parameters[name].uncertainty for name in fit.names]
     rows = np.zeros((len(known), columns))
-    for place, uncertainty in enumerate(known):
-        rows[place, place] = 1.0 / uncertainty if uncertainty else 0.0
+    if fit.fitting is not None and fit.fitting.priors:
+        np.fill_diagonal(rows, [1.0 / uncertainty if uncertainty else 0.0 for uncertainty in known])
     return rows[np.any(rows, axis=1)]
