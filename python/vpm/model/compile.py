@@ -149,7 +149,9 @@ def _beam(name: str, structure: Structure, index: Mapping[str, int]) -> dict[str
         "length": beam.reach,
         "level": level.name if level.name == "rigid" else {level.name: level.number},
         "deforms": list(beam.deforms),
-        **({"material": {key: index[f"{name}.{o}"] for key, o in zip(Material.units, own, strict=True)}} if own else {}),
+        **(
+            {"material": {key: index[f"{name}.{o}"] for key, o in zip(Material.units, own, strict=True)}} if own else {}
+        ),
         "sections": [_section(name, way, section, index) for way, section in sections_of(beam)],
         **({} if not beam.curvature else {"rest": [_rest(rest) for rest in beam.curvature]}),
         "damping": {

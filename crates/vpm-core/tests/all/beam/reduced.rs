@@ -1,6 +1,6 @@
 //! Reduced solids: their map, their matrices, and what is refused.
 
-use vpm_core::beam::{Beam, BeamEntry, Level, Reduced, ReducedField, Solid};
+use vpm_core::beam::{Beam, BeamEntry, Level, Material, Reduced, ReducedField, Solid};
 use vpm_core::samples::Random;
 use vpm_core::{Dual, Result};
 
@@ -31,7 +31,7 @@ fn solid(modes: usize) -> Solid {
 
 fn link(level: Level, solid: Solid) -> BeamEntry<f64> {
     let mut link = entry(level, &[], 2.0, [0.02, 0.01]);
-    (link.material.young, link.material.density) = (1.5, 2.0);
+    link.material = link.material.map(|material| Material { young: 1.5, density: 2.0, ..material });
     (link.sections, link.reduced) = (Vec::new(), Some(Reduced::new(solid)));
     link
 }

@@ -35,6 +35,7 @@ pub fn lift<S: Scalar>(parts: &Parts<f64>) -> Parts<S> {
         attachments: parts.attachments.clone(),
         drop_velocity_terms: parts.drop_velocity_terms,
         omissions: parts.omissions.clone(),
+        closed: parts.closed,
     }
 }
 
