@@ -41,6 +41,7 @@ Spread = Annotated[float, _option("Factor by which starts differ where neither u
 Seed = Annotated[int, _option("Of starts and bootstrap.")]
 FitState = Annotated[Words, _option("First state to fit, of each record or piece; repeat.")]
 KnownState = Annotated[Words, _option("STATE=VALUE in SI units: first state that is known; repeat.")]
+Offset = Annotated[Words, _option("Compared channel that is off by an unknown constant in each log; repeat.")]
 Piece = Annotated[float, _option("Length of the pieces of multiple shooting, s; 0 for none.")]
 Continuity = Annotated[float, _option("Weight of the gap between two pieces, in samples of it.")]
 Evaluations = Annotated[int, _option("Simulations after which a fit with settings is ended as it stands.")]

@@ -20,6 +20,7 @@ from vpm.identify.identifiability import column_lengths
 from vpm.identify.missing import missing_effects, whiteness
 from vpm.identify.moments import on_the_border
 from vpm.identify.objective import AnyProblem
+from vpm.identify.offsets import offset_blocks, taken_by_offsets, with_offsets
 from vpm.identify.onward import (
     UNSETTLED,
     beside_first_states,
@@ -126,6 +127,8 @@ def identify(
     data, found, own = beside_own(model, data, found, again, ties)
     fit = _dressed(model, data, found, before, [e.name for e in records], ties)
     fit = replace(fit, setup=setup, fitting=fitting, ties=ties)
+    if isinstance(found, _Engineered):
+        fit = with_offsets(fit, data, found.found.weights)
     fit = _judged(fit, data, found, records, checks, settled, own)
     return replace(fit, warnings=_told(model, records, data, fit, checks))
 
@@ -230,7 +233,8 @@ def _judged(
     slopes = found.jacobian[: data.blocks[-1].samples.stop]
     lengths = column_lengths(slopes)
     count = len(fit.names)
-    decided = freedom(slopes / lengths, data.blocks, count + len(fit.states) + unknown(data))[:count]
+    others = len(fit.states) + unknown(data) + len(offset_blocks(data))
+    decided = freedom(slopes / lengths, data.blocks, count + others)[:count]
     alike = own is None or own.alike
     fit = replace(with_first_states(fit, data, settled and alike), freedom=decided)
     # What is known beforehand no noise of records moves.
@@ -303,7 +307,8 @@ def _told(model: Model, records: Sequence[Experiment], data: AnyProblem, fit: Fi
         fit.unidentifiable,
         held,
         data.blocks,
-        len(fit.states),
+        len(fit.states) + len(offset_blocks(data)),
+        taken_by_offsets(fit, data),
     )
     told += [sentence for _, sentence in border]
     told += constant_channels(model, records, data.blocks)

@@ -60,6 +60,9 @@ class Fit(Result):
         ``{channel: standard deviation}`` that residuals were divided by, SI; empty where it was the signal's spread.
     states, states_std : dict
         Fitted first states, ``{"record, 0 s: axis.position": value}``, and their standard deviations, SI.
+    offsets, offsets_std : dict
+        What the channels of `Fitting.offsets` read too much in each record, ``{"record: gauge.strain": value}``, and
+        their standard deviations, SI. `before` and `after` do not count them.
     costs : ndarray, shape (starts,)
         Sum of squares that each start reached, the model's own values first.
     agreeing : int
@@ -101,6 +104,8 @@ class Fit(Result):
     noise: dict[str, float] = field(default_factory=dict)
     states: dict[str, float] = field(default_factory=dict)
     states_std: dict[str, float] = field(default_factory=dict)
+    offsets: dict[str, float] = field(default_factory=dict)
+    offsets_std: dict[str, float] = field(default_factory=dict)
     costs: Array = field(default_factory=lambda: np.zeros(0))
     agreeing: int = 1
     evaluations: int = 0

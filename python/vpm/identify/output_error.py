@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from functools import partial
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +15,7 @@ from vpm.experiment import Experiment, Motion
 from vpm.identify.beginning import BegunAnywhere
 from vpm.identify.first_state import add_first_state, first_state_slopes
 from vpm.identify.parallel import in_order
-from vpm.identify.problem import FEWEST_SAMPLES, Block
+from vpm.identify.problem import FEWEST_SAMPLES, Block, less_means
 from vpm.initial import initial_state, joint_motion
 from vpm.model import Model
 from vpm.simulate import Setup, SimulatedArrays, copied_channels, simulate_arrays, simulated_rows
@@ -40,6 +42,8 @@ class OutputErrorProblem(BegunAnywhere):
         Of the motion that the joints follow, Hz.
     workers : int
         Records that are simulated at a time; the residual does not depend on it.
+    offsets : sequence of str
+        Compared channels that are off by a constant in each record, which is taken off their residual.
     """
 
     def __init__(
@@ -52,6 +56,7 @@ class OutputErrorProblem(BegunAnywhere):
         setup: Setup | None = None,
         cutoff: float | None = None,
         workers: int = 1,
+        offsets: Sequence[str] = (),
     ) -> None:
         self.mode = mode
         self.workers = workers
@@ -60,12 +65,29 @@ class OutputErrorProblem(BegunAnywhere):
         follows = mode == "prescribed_motion"
         self._followed = [joint_motion(e, model, cutoff) if follows else None for e in self.experiments]
         self._channels = compared_channels(model, experiments, mode, channels)
+        self.offsets = tuple(offsets)
+        self._check_offsets()
         self.blocks = self._lay_out(model)
 
     @property
     def setup(self) -> Setup:
         """Integrator, substeps and horizon."""
         return self._setup
+
+    @property
+    def offset_blocks(self) -> tuple[Block, ...]:
+        """Channels of records that are off by a constant."""
+        return tuple(block for block in self.blocks if block.channel in self.offsets)
+
+    def with_offsets_left(self) -> Self:
+        """The same with these constants in its residual."""
+        same = copy(self)
+        same.offsets = ()
+        return same
+
+    def _left(self, values: Array) -> Array:
+        """What neither offsets nor first states explain of a residual (n,) or its derivative (n, columns)."""
+        return super()._left(less_means(values, self.offset_blocks))
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
         """Residual of the outputs and its derivative; see :class:`Problem`."""
@@ -130,7 +152,7 @@ class OutputErrorProblem(BegunAnywhere):
             moving = counts[rows].astype(np.float64)
             for channel in self._channels:
                 weight = 1.0 / spread[channel] if spread[channel] > 0.0 else 1.0
-                scale = float(np.sqrt(np.mean(experiment[channel][counts] ** 2)))
+                scale = self._scale(channel, experiment[channel][counts])
                 samples = slice(start, start + rows.size)
                 unit = model.channel_unit(channel)
                 blocks.append(
@@ -138,6 +160,17 @@ class OutputErrorProblem(BegunAnywhere):
                 )
                 start += rows.size
         return tuple(blocks)
+
+    def _check_offsets(self) -> None:
+        """Complain about offsets of channels that are not compared."""
+        for channel in self.offsets:
+            if channel not in self._channels:
+                repair = near_match(channel, self._channels)
+                raise IdentificationError(f"offsets: \"{channel}\" is not compared in mode '{self.mode}'; {repair}")
+
+    def _scale(self, channel: str, measured: Array) -> float:
+        """Size of a measured signal, of which an unknown offset is no part."""
+        return float(np.std(measured) if channel in self.offsets else np.sqrt(np.mean(measured**2)))
 
     def _counted(self, experiment: Experiment) -> NDArray[np.bool_]:
         """Samples that count: not those while the first state settles."""

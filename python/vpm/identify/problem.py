@@ -19,6 +19,8 @@ Array = NDArray[np.float64]
 
 #: A record with fewer samples after decimation says nothing about anything.
 FEWEST_SAMPLES = 12
+#: Share of a column that rounding may leave of a constant.
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,26 @@ class Problem(Protocol):
 def segments(problem: Problem) -> list[slice]:
     """The contiguous pieces of the residual vector."""
     return [block.samples for block in problem.blocks]
+
+
+def less_means(values: Array, blocks: Sequence[Block]) -> Array:
+    """What constants of some blocks leave of a residual (n,) or its derivative (n, columns).
+
+    The least squares beside constants are those of what is left (R. Frisch and F. Waugh, *Econometrica* 1, 1933;
+    variable projection: G. Golub and V. Pereyra, *SIAM J. Numerical Analysis* 10, 1973). Values are zero where a
+    sample does not count.
+    """
+    if not blocks or not np.all(np.isfinite(values)):
+        return values
+    left = values.copy()
+    for block in blocks:
+        rows, shape = values[block.samples], (-1, *[1] * (values.ndim - 1))
+        counts = block.moving.reshape(shape)
+        rest = (rows - rows.sum(axis=0) / counts.sum()) * counts
+        # Rounding is not to look like something that the data see.
+        lost = np.linalg.norm(rest, axis=0) <= ROUNDING * np.linalg.norm(rows, axis=0)
+        left[block.samples] = np.where(lost, 0.0, rest)
+    return left
 
 
 def gaps(problem: Problem, residual: Array) -> dict[str, tuple[float, float, str]]:

@@ -89,6 +89,7 @@ def remarks(
     limits: Mapping[str, tuple[float, float]],
     blocks: Sequence[Block],
     others: int = 0,
+    reasons: Mapping[str, str] | None = None,
 ) -> list[str]:
     """Sentences about parameters.
 
@@ -104,13 +105,17 @@ def remarks(
         What was compared.
     others : int
         Unknowns beside the parameters, such as first states.
+    reasons : mapping of str to str, optional
+        Why data see nothing of a parameter, where more is known than that.
     """
     told = []
     for name, (low, high) in limits.items():
         value = float(values[list(names).index(name)])
         side = "lower" if abs(value - low) <= abs(value - high) else "upper"
         told.append(f"{name} rests on its {side} bound {value:.6g}: widen it or question the model")
-    told += [f"not identifiable from these data: {combination}" for combination in unseen]
+    for combination in unseen:
+        alone = combination.names[0] if len(combination.names) == 1 else ""
+        told.append(f"not identifiable from these data: {(reasons or {}).get(alone, combination)}")
     blind = {name for combination in unseen for name in combination.names}
     for name, first, value, deviation in zip(names, start, values, std, strict=True):
         moved = abs(value - first)

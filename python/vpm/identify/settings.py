@@ -47,6 +47,9 @@ class Fitting(Storable):
     known_states : dict
         ``{state: value}``, SI, of first states that are known, such as a rest: ``{"axis.velocity": 0.0}``. They
         replace what the first samples of a record suggest, and hold for whole records.
+    offsets : tuple of str
+        Compared channels, such as those of strain gauges and load cells that drift, that are off by a constant of its
+        own in each record. It is fitted beside the parameters; no residual holds it. For output-error modes.
     piece : float
         Length, s, of the pieces of multiple shooting, each with first states of its own; 0 for whole records.
     continuity : float
@@ -71,6 +74,7 @@ class Fitting(Storable):
     spread: float = 3.0
     states: tuple[str, ...] = ()
     known_states: dict[str, float] = field(default_factory=dict)
+    offsets: tuple[str, ...] = ()
     piece: float = 0.0
     continuity: float = 10.0
     workers: int = 0
@@ -94,6 +98,10 @@ class Fitting(Storable):
         both = [name for name in self.known_states if name in self.states]
         if both:
             raise IdentificationError(f"{both[0]} is among known_states and among the fitted states; choose one")
+        if self.offsets and self.loss != "squares":
+            raise IdentificationError(
+                f"offsets are means, which outliers move, and loss is '{self.loss}'; take squares or leave offsets out"
+            )
         if not self.piece >= 0.0:
             raise IdentificationError(f"piece is {self.piece} s; give a positive time, or 0 for whole records")
 

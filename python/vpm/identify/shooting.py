@@ -63,7 +63,7 @@ class ShootingProblem(OutputErrorProblem):
         Length of the pieces, s; 0 for whole records.
     continuity : float
         Weight of a gap, in samples of a piece.
-    channels, setup, workers
+    channels, setup, workers, offsets
         As for `OutputErrorProblem`.
     """
 
@@ -80,6 +80,7 @@ class ShootingProblem(OutputErrorProblem):
         channels: Sequence[str] | None = None,
         setup: Setup | None = None,
         workers: int = 1,
+        offsets: Sequence[str] = (),
     ) -> None:
         if mode != "free_run" and (piece > 0.0 or mode != "closed_loop"):
             raise IdentificationError(
@@ -101,7 +102,7 @@ class ShootingProblem(OutputErrorProblem):
         for pieces in self.pieces:
             for place, value in self._known.items():
                 pieces.states[0, place] = value
-        super().__init__(model, experiments, mode, channels=channels, setup=setup, workers=workers)
+        super().__init__(model, experiments, mode, channels=channels, setup=setup, workers=workers, offsets=offsets)
         self._sizes = self._state_sizes(model)
         self._gap_columns = [
             (model.output_channels.index(c), place)
@@ -180,7 +181,7 @@ class ShootingProblem(OutputErrorProblem):
                 jacobian[row : row + len(block), :p] = block[:, :p]
                 jacobian[row : row + len(block), column : column + count] = block[:, p:]
                 row, column = row + len(block), column + count
-        return residual, jacobian
+        return self._left(residual), self._left(jacobian)
 
     def _record(
         self, model: Model, theta: Array, columns: list[int], number: int, values: Array
@@ -296,7 +297,7 @@ class ShootingProblem(OutputErrorProblem):
             rows = pieces.rows
             for channel in self._channels:
                 weight = 1.0 / spread[channel] if spread[channel] > 0.0 else 1.0
-                scale = float(np.sqrt(np.mean(experiment[channel][counts] ** 2)))
+                scale = self._scale(channel, experiment[channel][counts])
                 samples = slice(start, start + rows.size)
                 unit, moving = model.channel_unit(channel), counts[rows].astype(np.float64)
                 times = experiment.time[rows]

@@ -127,7 +127,7 @@ def _step(at: Point, low: Array, high: Array, reach: Array, damping: float) -> t
     target = np.concatenate([-image, np.zeros(free.size)])
     below, above = ((edge - at.x)[free] * lengths[free] for edge in (low, high))
     change = _boxed(damped, target, below, above)
-    change /= max(1.0, float(np.max(np.abs(change) / (lengths * reach)[free])))
+    change /= max(1.0, float(np.max(np.abs(change) / (lengths[free] * reach[free]))))
     step = np.zeros_like(at.x)
     step[free] = change / lengths[free]
     step = np.clip(at.x + step, low, high) - at.x

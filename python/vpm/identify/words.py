@@ -13,13 +13,16 @@ from vpm.identify.unseen import Gaps
 
 
 def told(fit: Fit) -> list[str]:
-    """Values with their deviations, first states, agreement of starts, noise, warnings and gaps, a line each."""
+    """Values with their deviations, first states, offsets, agreement of starts, noise, warnings, gaps, a line each."""
     lines = [
         f"{name:40s} {value:14.6g} ± {std:<10.3g} {unit}"
         for name, value, std, unit in zip(fit.names, fit.values, fit.std, fit.units, strict=True)
     ]
     lines += [
         f"{label:40s} {value:14.6g} ± {fit.states_std[label]:<10.3g} first state" for label, value in fit.states.items()
+    ]
+    lines += [
+        f"{label:40s} {value:14.6g} ± {fit.offsets_std[label]:<10.3g} offset" for label, value in fit.offsets.items()
     ]
     if fit.costs.size > 1:
         lines.append(f"{fit.agreeing} of {fit.costs.size} starts agree")
