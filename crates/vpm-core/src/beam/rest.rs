@@ -7,8 +7,9 @@ use super::strain::exponential;
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, Twist, Vector3};
 
-/// Turn, rad, of a step along the axis at most: the error of a step goes with its fifth power.
-const STEP: f64 = 0.02;
+/// Turn, rad, of a step along the axis at most, or the root of what its curvature changes by times its length if that is more: the error
+/// of a step goes with its fifth power.
+const STEP: f64 = 0.005;
 
 /// Curvature at one place of a beam at rest.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -85,8 +86,9 @@ impl Rest {
         cuts.push(end);
         let mut here = begin;
         for cut in cuts {
-            let turn = self.moments(here, cut)[0].angular;
-            let steps = (turn.dot(turn).sqrt() / STEP).ceil().max(1.0);
+            // The change of curvature times the length is twelve times the first moment.
+            let [turn, change] = self.moments(here, cut).map(|moment| moment.angular.dot(moment.angular).sqrt());
+            let steps = (turn.max((12.0 * change).sqrt()) / STEP).ceil().max(1.0);
             let first = here;
             for step in 1..=steps as usize {
                 let next = first + (cut - first) * step as f64 / steps;

@@ -62,12 +62,13 @@ fn a_bimetal_bends_about_its_neutral_axis() -> Result<()> {
 #[test]
 fn a_sandwich_shears_in_its_core() -> Result<()> {
     // Allen 1969, "Analysis and Design of Structural Sandwich Panels": with thin faces and a soft core, GA = G b d^2 / c, d between the
-    // middles of the faces and c the core.
+    // middles of the faces and c the core; what the core bends by itself is a third of a per cent here.
     let (width, face, core) = (0.05, 1e-5, 0.02);
-    let found = section(width, &[(face, ALUMINIUM), (core, FOAM), (face, ALUMINIUM)])?;
-    let (d, shear) = (core + face, FOAM.young / (2.0 * (1.0 + FOAM.poisson)));
-    close(found.stiffness[4], shear * width * d * d / core, 0.01, "GA through the core");
-    close(found.stiffness[0], ALUMINIUM.young * width * face * d * d / 2.0, 0.35, "EJ of the faces");
+    let soft = Material { young: 0.01 * FOAM.young, ..FOAM };
+    let found = section(width, &[(face, ALUMINIUM), (core, soft), (face, ALUMINIUM)])?;
+    let (d, shear) = (core + face, soft.young / (2.0 * (1.0 + soft.poisson)));
+    close(found.stiffness[4], shear * width * d * d / core, 1e-3, "GA through the core");
+    close(found.stiffness[0], ALUMINIUM.young * width * face * d * d / 2.0, 4e-3, "EJ of the faces");
     Ok(())
 }
 
@@ -159,7 +160,7 @@ fn a_wedge_vibrates_as_bessel_functions_say() -> Result<()> {
     // The wedge of Mabie & Rogers 1972 and Downs 1977: `w = s^(-1/2) C1(2 k s^(1/2))` with `s = 1 - mu / 2`, C the four Bessel functions of
     // Kirchhoff 1879; roots of its determinant for a clamp at the thick end, in double precision by SciPy.
     const ROOTS: [f64; 3] = [3.823_784_847_290_28, 18.317_260_904_174_73, 47.264_827_010_480_6];
-    for (level, tolerance) in [(Level::Strain(8), 1e-6), (Level::Bezier(9), 1e-6), (Level::Elements(24), 1e-3)] {
+    for (level, tolerance) in [(Level::Strain(8), 1e-5), (Level::Bezier(9), 1e-5), (Level::Elements(24), 1e-3)] {
         let modes = Beam::new(&thin_wedge(level), &[])?.modes()?;
         for (k, expected) in ROOTS.into_iter().enumerate() {
             close(modes.frequencies[k], expected, tolerance, &format!("{level:?} mode {k}"));
@@ -255,7 +256,7 @@ fn derivatives_by_layers_are_exact() -> Result<()> {
             let expected = (up[k] - down[k]) / (2.0 * step);
             let scale = (found.value / step * 1e-5).abs();
             let error = (found.gradient[parameter] - expected).abs();
-            assert!(error < 1e-6 * scale + 1e-6 * expected.abs(), "{parameter} {k}: {found:?} {expected}");
+            assert!(error <= 1e-6 * scale + 1e-6 * expected.abs(), "{parameter} {k}: {found:?} {expected}");
         }
     }
     Ok(())

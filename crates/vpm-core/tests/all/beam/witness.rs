@@ -32,7 +32,8 @@ fn in_a_plane_the_closed_map_is_the_product_of_exponentials() -> Result<()> {
     let (mut random, length) = (Random::new(8), 0.8);
     let marks: Vec<f64> = (1..=400).map(|k| length * f64::from(k) / 400.0).collect();
     for bending in [BendingX, BendingY] {
-        for level in [Level::Strain(3), Level::Elements(4)] {
+        // Along an element, which bends by up to 0.8 rad here, places are of sixth order in that.
+        for (level, tolerance) in [(Level::Strain(3), 1e-9), (Level::Elements(4), 1e-6)] {
             let plane = Beam::new(&entry(level, &[bending], length, [0.02, 0.01]), &marks)?;
             let space = Beam::new(&entry(level, &[bending, Torsion], length, [0.02, 0.01]), &marks)?;
             let n = plane.len();
@@ -42,10 +43,10 @@ fn in_a_plane_the_closed_map_is_the_product_of_exponentials() -> Result<()> {
             plane.motion(&q, &v, &mut flat);
             space.motion(&with_twist(&q), &with_twist(&v), &mut full);
             for (station, (a, b)) in flat.at.iter().zip(&full.at).enumerate() {
-                near(&pose(a.pose), &pose(b.pose), 1e-9);
-                assert!(apart(&[a.twist, a.acceleration], &[b.twist, b.acceleration]) < 1e-8);
+                near(&pose(a.pose), &pose(b.pose), tolerance);
+                assert!(apart(&[a.twist, a.acceleration], &[b.twist, b.acceleration]) < 10.0 * tolerance);
                 let columns = &full.columns[station * 2 * n..station * 2 * n + n];
-                assert!(apart(&flat.columns[station * n..(station + 1) * n], columns) < 1e-9);
+                assert!(apart(&flat.columns[station * n..(station + 1) * n], columns) < tolerance);
             }
         }
     }
