@@ -24,8 +24,8 @@ RELATIONS = frozenset({"requires", "contains", "confused_with"})
 #: Folders in which a word may be a field of a component of the model file, as ``rotor_inertia`` of a joint is.
 MODEL_FILE = frozenset({"model", "robots", "scenario"})
 #: Folders in which a dotted name may be that of an effect's parameter: where the model file becomes the description
-#: that the core reads, and where the demo says by which parameters a model would know its machine.
-PARAMETERS = frozenset({"model", "scenario", "demo"})
+#: that the core reads, and where the demo and studies say by which parameters a model knows its machine.
+PARAMETERS = frozenset({"model", "scenario", "demo", "studies"})
 LONGEST = 200
 
 

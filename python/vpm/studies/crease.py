@@ -70,7 +70,8 @@ def damaged(
         not_negative=("stiffness", "scale"),
     )
     try:
-        bare = model.without_effect("spring", "crease")
+        own = next(effect for effect in model.effects if effect.at == "crease")
+        bare = model.without_effect(own.name, own.at)
         values = {"stiffness": stiffness, "share": damage.share, "scale": damage.scale}
         first = fold(bare.with_effect(NAME, "crease", **values))
     finally:
