@@ -32,21 +32,22 @@ fn in_a_plane_the_closed_map_is_the_product_of_exponentials() -> Result<()> {
     let (mut random, length) = (Random::new(8), 0.8);
     let marks: Vec<f64> = (1..=400).map(|k| length * f64::from(k) / 400.0).collect();
     for bending in [BendingX, BendingY] {
-        // Along an element, which bends by up to 0.8 rad here, places are of sixth order in that.
-        for (level, tolerance) in [(Level::Strain(3), 1e-9), (Level::Elements(4), 1e-6)] {
+        // Places along an element follow a polynomial through its tangents, of sixth order in what it bends by, here up to 0.1 rad.
+        // Each derivative by that has an order less.
+        for (level, size, tolerance) in [(Level::Strain(3), 4.0, 1e-9), (Level::Elements(4), 0.5, 1e-7)] {
             let plane = Beam::new(&entry(level, &[bending], length, [0.02, 0.01]), &marks)?;
             let space = Beam::new(&entry(level, &[bending, Torsion], length, [0.02, 0.01]), &marks)?;
             let n = plane.len();
-            let [q, v] = [4.0, 5.0].map(|size| random.numbers(n, size));
+            let [q, v] = [size; 2].map(|size| random.numbers(n, size));
             let with_twist = |x: &[f64]| [x, &vec![0.0; n]].concat();
             let (mut flat, mut full) = (plane.sections(), space.sections());
             plane.motion(&q, &v, &mut flat);
             space.motion(&with_twist(&q), &with_twist(&v), &mut full);
             for (station, (a, b)) in flat.at.iter().zip(&full.at).enumerate() {
                 near(&pose(a.pose), &pose(b.pose), tolerance);
-                assert!(apart(&[a.twist, a.acceleration], &[b.twist, b.acceleration]) < 10.0 * tolerance);
+                assert!(apart(&[a.twist, a.acceleration], &[b.twist, b.acceleration]) < 30.0 * tolerance);
                 let columns = &full.columns[station * 2 * n..station * 2 * n + n];
-                assert!(apart(&flat.columns[station * n..(station + 1) * n], columns) < tolerance);
+                assert!(apart(&flat.columns[station * n..(station + 1) * n], columns) < 10.0 * tolerance);
             }
         }
     }
