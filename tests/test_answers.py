@@ -135,6 +135,7 @@ def test_the_size_of_coloured_noise_is_read_off_its_quiet_part(exact: Exact) -> 
     assert found.sum() == pytest.approx(spectrum.sum(), rel=0.35)
 
 
+@pytest.mark.nightly
 def test_cylinders_of_a_firm_supply_answer_one_by_one_as_they_do_together() -> None:
     model = Model.from_toml(shared_case("hydraulic_leg", "none", 21).true_text)
 

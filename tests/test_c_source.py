@@ -169,6 +169,9 @@ MACHINES = tuple(
 )
 
 
+#: Whose derivatives a compiler takes longest over: left to the night.
+LONG = {"curved_arm/model.toml", "reduced_link/arm.toml"}
+EACH = [pytest.param(name, marks=pytest.mark.nightly) if name in LONG else name for name in MACHINES]
 #: Machines of one slide that winds up, with effects in groups that act at once.
 OWN = {"both_sides": rubbing_on_both_sides, "geared": geared}
 
@@ -191,7 +194,7 @@ def test_all_machines_of_the_examples_can_be_written() -> None:
 
 
 @WITHOUT_COMPILER
-@pytest.mark.parametrize("name", [*MACHINES, *OWN])
+@pytest.mark.parametrize("name", [*EACH, *OWN])
 def test_examples_say_the_same_in_c(name: str, tmp_path: Path) -> None:
     model = machine(name)
     written = c_source(model, name="m")
@@ -227,7 +230,7 @@ def test_examples_say_the_same_in_c(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::vpm.errors.ValidityWarning")  # modes at random are far beyond small deflections
-@pytest.mark.parametrize("name", [*MACHINES, *OWN])
+@pytest.mark.parametrize("name", [*EACH, *OWN])
 def test_examples_say_the_same_as_machine_code_and_recorded(name: str) -> None:
     """The laws themselves against machine code, and against their record evaluated in numbers with derivatives."""
     model = machine(name)

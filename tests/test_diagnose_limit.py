@@ -30,6 +30,7 @@ def test_where_nothing_is_left_no_limit_is_seen() -> None:
     assert seen_limit(data, "axis", 0, np.zeros_like(residual)) is None
 
 
+@pytest.mark.nightly
 def test_a_limit_far_below_the_largest_command_is_named() -> None:
     """A loop whose drive gives no more asks for several times the limit; none of the usual starts is near it."""
     case = shared_case("arm2r", "saturation", 6001)

@@ -43,6 +43,7 @@ def test_a_spring_takes_the_place_of_the_constant_force_that_was_the_plainer_nam
     assert stiffness.value == pytest.approx(hidden.parameters["stiffness"], abs=3.0 * stiffness.std)
 
 
+@pytest.mark.nightly
 def test_a_constant_force_keeps_its_name_where_finer_laws_know_nothing_more() -> None:
     case = shared_case("axis_rotary", "bias_force", 2)
     tried = ["bias_force", "spring", "asymmetric_friction"]

@@ -55,6 +55,7 @@ def told(gain: str, friction: str, seed: int) -> Diagnosis:
     return diagnose(model, records[:1], records[1:], workers=1)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("gain", "friction", "seed"),
     [

@@ -150,6 +150,7 @@ def test_the_load_behind_unequal_directions_of_a_cylinder_is_named() -> None:
     assert gap < 0.76  # a linear model with a gain for each direction: 0.725
 
 
+@pytest.mark.nightly
 @needs_logs
 def test_without_a_load_to_blame_unequal_directions_stay_unexplained() -> None:
     found, _ = crane_with(load_known=True)

@@ -154,6 +154,7 @@ def test_constant_forces_and_drag_do_not_hide_a_delay() -> None:
     assert "ms early, or " in first.sentence or "ms late, or " in first.sentence
 
 
+@pytest.mark.nightly
 def test_a_pressure_ten_times_too_large_is_named_although_the_first_state_was_drawn_from_it() -> None:
     from blind import proving
 
