@@ -10,14 +10,14 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from vpm.errors import MissingExtraError, ReductionError
+from vpm.errors import ReductionError
+from vpm.reduction.library import finite_elements
 from vpm.reduction.structure import Interface, Structure
 
 Array = NDArray[np.float64]
 #: Meshes, tensors and modules of scikit-fem, which has no types.
 Mesh = Any
 Tensor = Any
-Library = Any
 
 #: Gauss rules of this order integrate products of two gradients of quadratic functions.
 _ORDER = 4
@@ -35,7 +35,7 @@ def box_mesh(size: tuple[float, ...], elements: tuple[int, ...]) -> Mesh:
     elements : tuple of int
         Along x, y and z.
     """
-    fem = _library("skfem", "scikit-fem")
+    fem = finite_elements()
     (width, height, length), (a, b, c) = size, elements
     lines = (
         np.linspace(-0.5, 0.5, a + 1) * width,
@@ -54,7 +54,7 @@ def read_mesh(path: Path, scale: float) -> Mesh:
     scale : float
         Length of its unit (m).
     """
-    fem, _ = _library("skfem", "scikit-fem"), _library("meshio", "meshio")
+    fem, _ = finite_elements(), finite_elements("meshio")
     if not path.is_file():
         raise ReductionError(f"{path} does not exist; check the path of the mesh")
     try:
@@ -87,7 +87,7 @@ def solid(
     young, poisson, density : float
         SI.
     """
-    fem, tensors = _library("skfem", "scikit-fem"), _library("skfem.helpers", "scikit-fem")
+    fem, tensors = finite_elements(), finite_elements("skfem.helpers")
     element = fem.ElementHex2() if isinstance(mesh, fem.MeshHex1) else fem.ElementTetP2()
     scalar = fem.Basis(mesh, element, intorder=_ORDER)
     if 3 * scalar.N > _LARGEST:
@@ -124,12 +124,3 @@ def solid(
         interfaces(nodes),
         stretching,
     )
-
-
-def _library(module: str, package: str) -> Library:
-    from importlib import import_module
-
-    try:
-        return import_module(module)
-    except ImportError:
-        raise MissingExtraError(package, "fem") from None

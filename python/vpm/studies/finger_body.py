@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import VpmError
-from vpm.studies.library import finite_elements
+from vpm.reduction.library import finite_elements
 from vpm.studies.material import Material
 from vpm.studies.soft import SoftBody
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bmat, csc_matrix, csr_matrix
 
+from vpm.reduction.library import finite_elements
 from vpm.studies.jet import Jet
-from vpm.studies.library import finite_elements
 from vpm.studies.material import Material, invariants
 
 if TYPE_CHECKING:

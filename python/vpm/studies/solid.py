@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.studies.library import finite_elements
+from vpm.reduction.library import finite_elements
 
 if TYPE_CHECKING:
     from skfem import MeshHex2

@@ -1,0 +1,22 @@
+"""The library of finite elements and its reader of meshes, where they are installed."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from types import ModuleType
+
+from vpm.errors import MissingExtraError
+
+
+def finite_elements(module: str = "skfem") -> ModuleType:
+    """scikit-fem, a module of it, or meshio.
+
+    Raises
+    ------
+    MissingExtraError
+        It is not installed.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        raise MissingExtraError("meshio" if module == "meshio" else "scikit-fem", "fem") from error
