@@ -85,12 +85,12 @@ def measure(engine: str, setting: str, motion: str, prepare: Callable[[], Run], 
     return Row(engine, setting, motion, distance, (float(strain[0]), float(strain[1])), tuple(wall), tuple(cpu))
 
 
-def own(motion: str, level: str, step: float) -> Callable[[], Run]:
+def own(motion: str, level: str, step: float, integrator: str = "additive") -> Callable[[], Run]:
     model, record = arm(P, level), log(motion, step)
     start = np.zeros(model.core.n_states)
 
     def run() -> tuple[Array, Array]:
-        found = vpm.simulate(model, record, integrator="additive", hold="cubic", initial_state=start)
+        found = vpm.simulate(model, record, integrator=integrator, hold="cubic", initial_state=start)
         return tip_and_strains(found)
 
     return lambda: run
