@@ -179,14 +179,14 @@ def test_identify_turns_a_model_round() -> None:
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of another kind")
 def test_ctrl_c_keeps_the_best_of_a_fit_and_writes_it(tmp_path: Path) -> None:
-    words = ["--mode", "closed_loop", "--substeps", "20", "--log", "--starts", "1000", "--workers", "1"]
+    words = ["--mode", "closed_loop", "--substeps", "4", "--log", "--starts", "1000", "--workers", "1"]
     command = [sys.executable, "-m", "vpm", "identify", str(MODEL), str(TRAIN), *words, "--out", str(tmp_path / "f")]
     with running(command) as process:
         assert process.stderr is not None
         for line in process.stderr:
             if line.startswith("evaluation 1:"):
                 break
-        work(process, 2.0)  # some more, so that there is a best
+        work(process, 1.0)  # some more, so that there is a best
         process.send_signal(signal.SIGINT)
         out, _ = process.communicate()
     assert process.returncode == 130
@@ -236,7 +236,9 @@ def test_rank_names_what_is_missing_and_writes_the_model(tmp_path: Path) -> None
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of another kind")
 def test_ctrl_c_reports_what_a_diagnosis_knows(tmp_path: Path) -> None:
     """One effect is found, and more are looked for: that one stands in the report and in the repaired model."""
-    words = ["--validate", str(VALIDATION), "--substeps", "20", "--out", str(tmp_path)]
+    words = ["--validate", str(VALIDATION), "--substeps", "20", "--out", str(tmp_path), "--workers", "1"]
+    for name in ("coulomb_friction", "stribeck_friction", "asymmetric_friction", "torque_ripple", "spring"):
+        words += ["--effect", name]
     command = [sys.executable, "-m", "vpm", "diagnose", str(MODEL), str(TRAIN), *words]
     with running(command) as process:
         assert process.stderr is not None

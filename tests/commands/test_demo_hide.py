@@ -11,10 +11,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from _pytest.mark import ParameterSet
 from rich.console import Console
 from scipy.integrate import solve_ivp
 
+from nightly import at_night
 from vpm.catalogue import EFFECTS
 from vpm.demo import generate, print_list, run_demo
 from vpm.demo.hidden import HIDDEN, LISTED, REFUSED
@@ -44,12 +44,8 @@ def test_every_listed_effect_can_be_made_and_is_in_the_catalogue() -> None:
     assert "tau = -force" in buffer.getvalue()
 
 
-def stories() -> list[ParameterSet]:
-    """All that can be hidden, every day one of each kind; what a user sees first has its test with the commands."""
-    return [pytest.param(name, marks=() if name in DAILY else pytest.mark.nightly) for name in LISTED[1:]]
-
-
-@pytest.mark.parametrize("hide", stories())
+# What a user sees first has its test with the commands.
+@pytest.mark.parametrize("hide", at_night(LISTED[1:], but=DAILY))
 def test_the_story_comes_out_right(hide: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The effect, those that come with it, and no other one; its values; and it is not in the shipped files."""
     # Drawing takes as long as the diagnosis, and has tests of its own.

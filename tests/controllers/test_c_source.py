@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from typer.testing import CliRunner
 
+from nightly import at_night
 from test_ball_joints import FRICTION, OVER, start, top
 from test_frictions import geared
 from test_sides import rubbing_on_both_sides
@@ -169,9 +170,14 @@ MACHINES = tuple(
 )
 
 
-#: Whose derivatives a compiler takes longest over: left to the night.
-LONG = {"curved_arm/model.toml", "reduced_link/arm.toml"}
-EACH = [pytest.param(name, marks=pytest.mark.nightly) if name in LONG else name for name in MACHINES]
+#: Rigid, flexible, hydraulic, with contact, on shafts: written outside of `make test-nightly`.
+DAILY = {
+    "arm/arm.toml",
+    "flexible_pendulum/flexible_pendulum.toml",
+    "hyl/rcm.toml",
+    "servo_cylinder/rig.toml",
+    "wrist/wrist.toml",
+}
 #: Machines of one slide that winds up, with effects in groups that act at once.
 OWN = {"both_sides": rubbing_on_both_sides, "geared": geared}
 
@@ -194,7 +200,7 @@ def test_all_machines_of_the_examples_can_be_written() -> None:
 
 
 @WITHOUT_COMPILER
-@pytest.mark.parametrize("name", [*EACH, *OWN])
+@pytest.mark.parametrize("name", [*at_night(MACHINES, but=DAILY), *OWN])
 def test_examples_say_the_same_in_c(name: str, tmp_path: Path) -> None:
     model = machine(name)
     written = c_source(model, name="m")
@@ -230,7 +236,7 @@ def test_examples_say_the_same_in_c(name: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.filterwarnings("ignore::vpm.errors.ValidityWarning")  # modes at random are far beyond small deflections
-@pytest.mark.parametrize("name", [*EACH, *OWN])
+@pytest.mark.parametrize("name", [*at_night(MACHINES, but=DAILY), *OWN])
 def test_examples_say_the_same_as_machine_code_and_recorded(name: str) -> None:
     """The laws themselves against machine code, and against their record evaluated in numbers with derivatives."""
     model = machine(name)

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from nightly import at_night
 from test_c_source import STRICT, places
 from vpm import Model, Simulation, write_fmu
 from vpm.linear import LinearModel
@@ -126,7 +127,7 @@ def reference(model: Model, step: float, commands: Array, state: Any) -> Array:
     return np.array(rows)
 
 
-@pytest.mark.parametrize("name", [*SIX, *(pytest.param(name, marks=pytest.mark.nightly) for name in MORE)])
+@pytest.mark.parametrize("name", at_night([*SIX, *MORE], but=SIX))
 def test_examples_are_valid_and_follow_simulations(name: str, tmp_path: Path) -> None:
     """Co-simulation, to 1e-9 of the largest value of each output, and model exchange by a solver that FMPy has."""
     model, step, state = machine(name), STEPS.get(name, 1e-3), STATES.get(name)

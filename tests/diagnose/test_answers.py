@@ -36,6 +36,7 @@ def exact() -> Exact:
     return model, training, InverseDynamicsProblem(model, case.validate, cutoff=cutoff)
 
 
+@pytest.mark.nightly
 def test_remembered_answers_are_those_of_a_problem_that_remembers_nothing(exact: Exact) -> None:
     model, training, _ = exact
     more = model.with_effect("hysteresis", at="axis", force=5.0, displacement=1e-3)
@@ -58,6 +59,7 @@ def test_remembered_answers_are_those_of_a_problem_that_remembers_nothing(exact:
     np.testing.assert_array_equal(first[1], slopes[:, :3])
 
 
+@pytest.mark.nightly
 def test_long_steps_show_less_than_the_noise(exact: Exact, monkeypatch: pytest.MonkeyPatch) -> None:
     """What no log shows is not worth three times the time; where it would show, steps stay short."""
     model, training, _ = exact
@@ -89,6 +91,7 @@ def test_long_steps_may_be_off_by_a_share_of_what_was_measured() -> None:
     assert not alike(exact, replace(exact, applied=1.01 * effort), np.full((50, 1), 20.0))
 
 
+@pytest.mark.nightly
 def test_what_later_commands_ask_for_is_not_remembered_from_others(exact: Exact) -> None:
     model, training, _ = exact
     residual, _ = training.evaluate(model, model.theta)
@@ -97,6 +100,7 @@ def test_what_later_commands_ask_for_is_not_remembered_from_others(exact: Exact)
     np.testing.assert_array_equal(training.evaluate(model, model.theta)[0], residual)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("name", ["slide.mass", "axis.friction.viscous", "servo.valve.flow_gain"])
 def test_the_derivative_by_parts_is_that_of_the_residual(exact: Exact, name: str) -> None:
     model, training, _ = exact
@@ -112,6 +116,7 @@ def test_the_derivative_by_parts_is_that_of_the_residual(exact: Exact, name: str
     assert np.abs(jacobian[:, 0] - slope).max() < 1e-5 * np.abs(slope).max()
 
 
+@pytest.mark.nightly
 def test_noise_of_a_valve_is_no_structure(exact: Exact) -> None:
     model, training, unseen = exact
     fitted, residual = (problem.evaluate(model, model.theta)[0] for problem in (training, unseen))
@@ -121,6 +126,7 @@ def test_noise_of_a_valve_is_no_structure(exact: Exact) -> None:
         assert 0.75 * size < floor[channel] < 1.5 * size
 
 
+@pytest.mark.nightly
 def test_the_size_of_coloured_noise_is_read_off_its_quiet_part(exact: Exact) -> None:
     model, training, _ = exact
     shape = next(each for each in noise_shapes(model, training) if each is not None)
@@ -149,6 +155,7 @@ def test_cylinders_of_a_firm_supply_answer_one_by_one_as_they_do_together() -> N
     assert groups(sagging) == [("hip_drive", "knee_drive")]
 
 
+@pytest.mark.nightly
 def test_the_answers_of_single_cylinders_make_up_that_of_the_machine(monkeypatch: pytest.MonkeyPatch) -> None:
     case = shared_case("hydraulic_leg", "none", 21)
     model = Model.from_toml(case.true_text).with_effect("sensor_offset", at="knee_encoder", value=0.01)
@@ -164,6 +171,7 @@ def test_the_answers_of_single_cylinders_make_up_that_of_the_machine(monkeypatch
         assert (np.abs(slopes[own] - whole_slopes[own]).max(axis=0) <= 1e-4 * largest).all()
 
 
+@pytest.mark.nightly
 def test_what_carries_the_effort_of_a_motion_has_no_cylinders() -> None:
     """What the motion needs is the same without them, as are its derivatives."""
     case = shared_case("hydraulic_leg", "none", 21)

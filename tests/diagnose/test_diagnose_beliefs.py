@@ -55,6 +55,7 @@ def test_what_a_balance_of_some_joints_drives_away_may_be_known_better() -> None
     assert driven_away(model, before, off, ranked=off.model) == {MASS: pytest.approx(5.0)}
 
 
+@pytest.mark.nightly
 def test_a_spring_that_turns_a_pendulum_upside_down_is_no_explanation() -> None:
     """A spring that hardens is, to fifth order, a linear one beside a centre of mass above the axis."""
     case = shared_case("axis_rotary", "cubic_spring", 43)

@@ -16,6 +16,7 @@ from vpm.discrepancy.confirmation import Data, Trial
 from vpm.discrepancy.round import Round
 
 
+@pytest.mark.nightly
 def test_a_force_and_a_tilt_that_a_balance_takes_for_each_other_are_told_apart() -> None:
     """They differ by a cosine of the angle: 4 % of what the balance leaves, eighty deviations of the noise in runs."""
     case = shared_case("axis_rotary", ("gravity_tilt", "stribeck_friction"), 102)
@@ -25,6 +26,7 @@ def test_a_force_and_a_tilt_that_a_balance_takes_for_each_other_are_told_apart()
     assert any("runs of the model itself ask for" in r.reason for r in why.refused if r.name == "bias_force")
 
 
+@pytest.mark.nightly
 def test_a_late_drive_is_named_for_a_force_where_one_reversal_outweighs_all_else() -> None:
     case = shared_case("axis_rotary", ("asymmetric_friction", "input_delay"), 7009)
     tried = ["asymmetric_friction", "bias_force", "input_delay"]
@@ -32,6 +34,7 @@ def test_a_late_drive_is_named_for_a_force_where_one_reversal_outweighs_all_else
     assert {effect.name for effect in why.effects} == {"asymmetric_friction", "input_delay"}
 
 
+@pytest.mark.nightly
 def test_an_effect_of_a_modest_part_is_named_if_runs_ask_for_all_of_it() -> None:
     """A dead zone takes a quarter of what a ripple leaves of the balance: seven deviations of the ten it would need."""
     case = shared_case("axis_rotary", ("dead_zone", "torque_ripple"), 102)
@@ -43,6 +46,7 @@ def test_an_effect_of_a_modest_part_is_named_if_runs_ask_for_all_of_it() -> None
     assert width.value == pytest.approx(hidden.parameters["width"], rel=0.1)
 
 
+@pytest.mark.nightly
 def test_runs_ask_for_nothing_where_nothing_is_missing() -> None:
     case = shared_case("axis_rotary", "parameters", 100)
     tried = ["torque_ripple", "dead_zone", "stribeck_friction"]
@@ -50,6 +54,7 @@ def test_runs_ask_for_nothing_where_nothing_is_missing() -> None:
     assert not why.effects
 
 
+@pytest.mark.nightly
 def test_a_spring_that_swings_above_the_band_of_a_balance_is_found_in_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Where a balance believes nothing; nothing was accepted before it, and it is examined as any other."""
     monkeypatch.setattr(Round, "best", lambda _: None)

@@ -13,6 +13,7 @@ from vpm.simulate import Setup
 CLOSE_TO_REST = "stribeck_friction"
 
 
+@pytest.mark.nightly
 def test_what_a_balance_hardly_sees_is_told_by_runs() -> None:
     """It fades below 1.5 % of the speed: fitted to the balance, it predicts unseen efforts worse than nothing does."""
     case = shared_case("axis_linear", "stribeck_friction", 18)
@@ -26,6 +27,7 @@ def test_what_a_balance_hardly_sees_is_told_by_runs() -> None:
     assert any("runs of the model itself" in note for note in found.notes)
 
 
+@pytest.mark.nightly
 def test_what_runs_tell_need_not_close_the_balance() -> None:
     """Of what the runs leave nine tenths go, of the balance nothing: a fit without physics finds more there."""
     case = shared_case("axis_rotary", "stribeck_friction", 3001)
@@ -34,6 +36,7 @@ def test_what_runs_tell_need_not_close_the_balance() -> None:
     assert why.verdict == "effect_found"
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("machine", "hidden", "seed"),
     [("axis_linear", "none", 3), ("axis_linear", "friction_drift", 9)],
@@ -47,6 +50,7 @@ def test_runs_ask_for_nothing_that_is_not_there(machine: str, hidden: str, seed:
     assert "runs of the model itself" in refused.reason
 
 
+@pytest.mark.nightly
 def test_known_parameters_are_no_misfit() -> None:
     """What a run leaves is judged with the parameters that suit it best, so that near the truth all values do."""
     case = shared_case("axis_linear", "none", 3)

@@ -8,6 +8,7 @@ import vpm
 from shared_cases import shared_case
 
 
+@pytest.mark.nightly
 def test_a_spring_that_may_rest_elsewhere_needs_no_constant_force_beside_it() -> None:
     case = shared_case("axis_rotary", "spring", 2)
     (hidden,) = case.truth.hidden
@@ -23,6 +24,7 @@ def test_a_spring_that_may_rest_elsewhere_needs_no_constant_force_beside_it() ->
     assert not any("rest" in other for ambiguity in why.ambiguous_with for other in ambiguity.others)
 
 
+@pytest.mark.nightly
 def test_a_difference_of_friction_with_a_size_of_its_own_needs_no_constant_force_beside_it() -> None:
     case = shared_case("axis_rotary", "asymmetric_friction", 2)
     (hidden,) = case.truth.hidden

@@ -64,6 +64,7 @@ def test_what_no_balance_sees_is_told_where_a_search_names(monkeypatch: pytest.M
     assert any(note.startswith("the joint slider has no drive") for note in why.notes)
 
 
+@pytest.mark.nightly
 def test_a_payload_on_the_trunk_and_friction_of_the_guide_are_told_apart() -> None:
     effects = ["payload", "coulomb_friction"]
     *train, test = logged(leg().with_effect("payload", at="carriage", mass=0.6))

@@ -11,6 +11,7 @@ from vpm.discrepancy.limit import seen_limit
 from vpm.identify import InverseDynamicsProblem
 
 
+@pytest.mark.nightly
 def test_a_limit_is_looked_for_where_the_residual_begins_to_grow_with_the_command() -> None:
     """Found in the residual that it leaves, however much larger the largest command is."""
     case = shared_case("axis_rotary", "none", 42)
@@ -23,6 +24,7 @@ def test_a_limit_is_looked_for_where_the_residual_begins_to_grow_with_the_comman
     assert seen_limit(data, "axis", 0, whole - cut) == pytest.approx(0.5 * largest, rel=0.05)
 
 
+@pytest.mark.nightly
 def test_where_nothing_is_left_no_limit_is_seen() -> None:
     case = shared_case("axis_rotary", "none", 42)
     data = InverseDynamicsProblem(case.model(), case.train)

@@ -15,6 +15,7 @@ from vpm.discrepancy.screening import probe
 RIVALS = (("bias_force", "axis"), ("sensor_offset", "gauge_a"), ("sensor_offset", "gauge_b"))
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("there", [("sensor_offset", "gauge_b"), ("bias_force", "axis")])
 def test_a_gauge_is_blamed_for_what_it_reads_and_not_for_a_load(there: tuple[str, str]) -> None:
     case = shared_case("servo_cylinder", "@".join(there), 42)

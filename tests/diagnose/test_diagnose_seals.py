@@ -39,6 +39,7 @@ def pressed() -> tuple[Data, Judged, Judged, float]:
     return loaded("pressure_dependent_friction", 43)
 
 
+@pytest.mark.nightly
 def test_pressures_tell_the_friction_of_seals(pressed: tuple[Data, Judged, Judged, float]) -> None:
     data, without, found, area = pressed
     told_of = seals(without, data)
@@ -47,6 +48,7 @@ def test_pressures_tell_the_friction_of_seals(pressed: tuple[Data, Judged, Judge
     assert told_of.unseen @ told_of.unseen < 0.7 * (found.unseen @ found.unseen)
 
 
+@pytest.mark.nightly
 def test_a_constant_force_is_not_the_explanation_of_it(pressed: tuple[Data, Judged, Judged, float]) -> None:
     data, without, found, _ = pressed
     rest = told(data, without, found)
@@ -56,6 +58,7 @@ def test_a_constant_force_is_not_the_explanation_of_it(pressed: tuple[Data, Judg
     assert rest.seals.sentence.startswith("Friction of the seals of servo")
 
 
+@pytest.mark.nightly
 def test_a_constant_force_that_is_there_stays_the_explanation() -> None:
     data, without, found, _ = loaded("bias_force", 43)
     rest = told(data, without, found)
@@ -63,6 +66,7 @@ def test_a_constant_force_that_is_there_stays_the_explanation() -> None:
     assert not rest.instead
 
 
+@pytest.mark.nightly
 def test_it_is_told_at_the_right_cylinder_of_a_leg() -> None:
     case = shared_case("hydraulic_leg", "pressure_dependent_friction@knee_drive", 21)
     model, free, data = balances(case)

@@ -51,6 +51,7 @@ def test_a_constant_force_keeps_its_name_where_finer_laws_know_nothing_more() ->
     assert [effect.name for effect in why.effects] == ["bias_force"]
 
 
+@pytest.mark.nightly
 def test_a_spring_that_looked_like_a_shifted_centre_of_mass_is_found_beside_the_constant_force() -> None:
     case = shared_case("axis_rotary", "spring", 106)
     (hidden,) = case.truth.hidden
@@ -66,6 +67,7 @@ def test_a_spring_that_looked_like_a_shifted_centre_of_mass_is_found_beside_the_
         assert parameter.value == pytest.approx(hidden.parameters[parameter.name], abs=3.0 * parameter.std)
 
 
+@pytest.mark.nightly
 def test_a_spring_is_screened_with_the_place_where_it_rests() -> None:
     case = shared_case("axis_rotary", "spring", 100)
     (hidden,) = case.truth.hidden
@@ -88,6 +90,7 @@ def test_a_rival_earns_its_additional_numbers_where_they_were_fitted(left: float
     assert earned(Gain(1.0, float(np.sqrt(left)), 1.0, 3.0, 1000), more) == paid
 
 
+@pytest.mark.nightly
 def test_a_search_goes_on_beside_what_took_the_place_of_an_effect(monkeypatch: pytest.MonkeyPatch) -> None:
     """Beside the true name a second effect stands clear; the name that went out does not come back."""
     naming = import_module("vpm.naming")

@@ -24,6 +24,7 @@ def case() -> Case:
     return shared_case("servo_cylinder", "dead_zone", 42)
 
 
+@pytest.mark.nightly
 def test_a_refit_leaves_what_a_recalibration_without_the_effect_made_of_the_oil(case: Case) -> None:
     stated = case.model()
     data = InverseDynamicsProblem(stated, case.train[:1])
@@ -40,6 +41,7 @@ def test_a_refit_leaves_what_a_recalibration_without_the_effect_made_of_the_oil(
     assert nearer_start(loaded, ("axis.bias.force",), known, data) is loaded
 
 
+@pytest.mark.nightly
 def test_a_wide_dead_zone_of_a_valve_is_found_from_there(case: Case) -> None:
     model, free, data = balances(case)
     oil = model.parameters["pump.oil.bulk_modulus"].value

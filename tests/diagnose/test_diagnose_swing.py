@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import pytest
+
 from shared_cases import shared_case
 from vpm.diagnosing import diagnose
 
 
+@pytest.mark.nightly
 def test_a_swing_as_white_as_noise_is_named() -> None:
     case = shared_case("axis_rotary", "joint_compliance", 1004)
     why = diagnose(case.model(), case.train, case.validate, effects=["joint_compliance"])

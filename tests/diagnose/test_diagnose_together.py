@@ -8,6 +8,7 @@ import vpm
 from shared_cases import shared_case
 
 
+@pytest.mark.nightly
 def test_a_late_drive_and_friction_that_is_missing_are_named_for_the_law_that_imitates_both() -> None:
     """Alone the lag takes four fifths of the training residual and predicts the unseen record worse than nothing."""
     case = shared_case("axis_linear", ("actuator_lag", "viscous_friction"), 5004)
@@ -24,6 +25,7 @@ def test_a_late_drive_and_friction_that_is_missing_are_named_for_the_law_that_im
     assert found["viscous_friction"].value == pytest.approx(truth["viscous_friction"]["viscous"], rel=0.05)
 
 
+@pytest.mark.nightly
 def test_one_effect_alone_gets_no_partner() -> None:
     case = shared_case("axis_linear", "viscous_friction", 5004)
     tried = ["actuator_lag", "input_delay", "viscous_friction", "hysteresis"]

@@ -143,6 +143,7 @@ def crane_with(load_known: bool) -> tuple[Diagnosis, float]:
     return found, crane.rms(crane.pressure(found.model, record), record, slice(512, None))
 
 
+@pytest.mark.nightly
 @needs_logs
 def test_the_load_behind_unequal_directions_of_a_cylinder_is_named() -> None:
     found, gap = crane_with(load_known=False)

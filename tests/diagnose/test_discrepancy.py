@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import json
+from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from nightly import at_night
 from synthetic import Truth, nominal, simulate_axis
 from vpm.diagnosing import diagnose
 from vpm.discrepancy import Diagnosis
@@ -30,42 +32,44 @@ def found(diagnosis: Diagnosis) -> list[str]:
     return [e.name for e in diagnosis.effects]
 
 
-@pytest.fixture(scope="module")
-def records() -> dict[str, Diagnosis]:
-    """One diagnosis for each hidden effect: a record to fit and another, of another seed, to judge."""
-    model = nominal()
-    result = {}
-    for name, truth in HIDDEN.items():
-        train, test = simulate_axis(truth, 2, SECONDS, first_seed=100)
-        result[name] = diagnose(model, train, test)
-    return result
+#: What is known of the size that each is found with, and the share that it may be off.
+SIZES = {
+    "coulomb_friction": ("axis.friction.coulomb", 9.0, 0.05),
+    "bias_force": ("axis.bias.force", 5.0, 0.05),
+    "spring": ("axis.spring.stiffness", 150.0, 0.10),
+    "torque_ripple": ("axis.ripple.period", 0.02, 0.01),
+    "input_delay": ("drive.delay.time", 0.007, 0.10),
+    "dead_zone": ("drive.dead_zone.width", 0.4, 0.15),
+    "actuator_lag": ("drive.lag.time_constant", 0.012, 0.15),
+}
+#: A friction, a force that depends on the place, a drive: those that are looked for outside of `make test-nightly`.
+EACH = at_night(HIDDEN, but=("coulomb_friction", "torque_ripple", "input_delay"))
 
 
-@pytest.mark.parametrize("name", HIDDEN)
-def test_names_the_hidden_effect(records: dict[str, Diagnosis], name: str) -> None:
-    diagnosis = records[name]
+@cache
+def of(name: str) -> Diagnosis:
+    """The diagnosis of a hidden effect: a record to fit and another, of another seed, to judge."""
+    train, test = simulate_axis(HIDDEN[name], 2, SECONDS, first_seed=100)
+    return diagnose(nominal(), train, test)
+
+
+@pytest.mark.parametrize("name", EACH)
+def test_names_the_hidden_effect(name: str) -> None:
+    diagnosis = of(name)
     assert diagnosis.verdict == "effect_found"
     assert found(diagnosis)[0] == name
     assert diagnosis.gap["axis.effort"].after < 0.7 * diagnosis.gap["axis.effort"].recalibrated
 
 
-@pytest.mark.parametrize("name", HIDDEN)
-def test_adds_nothing_else(records: dict[str, Diagnosis], name: str) -> None:
-    assert found(records[name]) == [name]
+@pytest.mark.parametrize("name", EACH)
+def test_adds_nothing_else(name: str) -> None:
+    assert found(of(name)) == [name]
 
 
-def test_finds_the_size_of_the_effect(records: dict[str, Diagnosis]) -> None:
-    expected = {
-        "coulomb_friction": ("axis.friction.coulomb", 9.0, 0.05),
-        "bias_force": ("axis.bias.force", 5.0, 0.05),
-        "spring": ("axis.spring.stiffness", 150.0, 0.10),
-        "torque_ripple": ("axis.ripple.period", 0.02, 0.01),
-        "input_delay": ("drive.delay.time", 0.007, 0.10),
-        "dead_zone": ("drive.dead_zone.width", 0.4, 0.15),
-        "actuator_lag": ("drive.lag.time_constant", 0.012, 0.15),
-    }
-    for name, (parameter, value, tolerance) in expected.items():
-        assert records[name].model.parameters[parameter].value == pytest.approx(value, rel=tolerance), name
+@pytest.mark.parametrize("name", EACH)
+def test_finds_the_size_of_the_effect(name: str) -> None:
+    parameter, value, tolerance = SIZES[name]
+    assert of(name).model.parameters[parameter].value == pytest.approx(value, rel=tolerance)
 
 
 def test_two_effects_at_once() -> None:
@@ -86,7 +90,7 @@ def test_agreement_is_called_agreement() -> None:
     assert diagnosis.verdict == "no_disagreement"
 
 
-@pytest.mark.parametrize("seeds", [8, pytest.param(50, marks=pytest.mark.nightly)])
+@pytest.mark.parametrize("seeds", [3, pytest.param(50, marks=pytest.mark.nightly)])
 def test_at_most_one_false_alarm_in_fifty_and_none_in_the_first(seeds: int) -> None:
     """Nothing is missing; mass, friction, noise of the encoder and of the force differ from seed to seed."""
     generator = np.random.default_rng(5)
@@ -110,8 +114,8 @@ def test_what_no_effect_explains_is_called_unexplained() -> None:
     assert diagnosis.verdict == "unexplained"
 
 
-def test_report_json_has_the_promised_keys(records: dict[str, Diagnosis], tmp_path: Path) -> None:
-    report = json.loads(records["coulomb_friction"].save_json(tmp_path / "report.json").read_text(encoding="utf-8"))
+def test_report_json_has_the_promised_keys(tmp_path: Path) -> None:
+    report = json.loads(of("coulomb_friction").save_json(tmp_path / "report.json").read_text(encoding="utf-8"))
     promised = {"verdict", "effects", "gap", "refused", "candidates", "ambiguous_with", "where"}
     assert set(report) >= promised
     (effect,) = report["effects"]
@@ -120,8 +124,8 @@ def test_report_json_has_the_promised_keys(records: dict[str, Diagnosis], tmp_pa
     assert all(set(entry) == {"name", "site", "reason"} for entry in report["refused"])
 
 
-def test_saved_diagnosis_loads_as_it_was(records: dict[str, Diagnosis], tmp_path: Path) -> None:
-    diagnosis = records["coulomb_friction"]
+def test_saved_diagnosis_loads_as_it_was(tmp_path: Path) -> None:
+    diagnosis = of("coulomb_friction")
     assert Diagnosis.load(diagnosis.save(tmp_path / "diagnosis.npz")) == diagnosis
 
 

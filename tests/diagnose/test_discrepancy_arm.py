@@ -24,12 +24,14 @@ def test_friction_is_found_at_the_joint_that_has_it() -> None:
     assert diagnosis.model.parameters["elbow.friction.coulomb"].value == pytest.approx(0.8, rel=0.03)
 
 
+@pytest.mark.nightly
 def test_a_constant_load_is_told_from_a_weight() -> None:
     diagnosis = of(Arm(bias=(1.5, 0.0)))
     assert named(diagnosis) == {("bias_force", "shoulder")}
     assert diagnosis.model.parameters["shoulder.bias.force"].value == pytest.approx(1.5, rel=0.03)
 
 
+@pytest.mark.nightly
 def test_two_delays_are_found_although_one_alone_makes_the_simulation_worse() -> None:
     diagnosis = of(Arm(delay=3), "search")  # a ranking takes one lag first, and beside that another one is better
     assert named(diagnosis) == {("input_delay", "first"), ("input_delay", "second")}
@@ -37,6 +39,7 @@ def test_two_delays_are_found_although_one_alone_makes_the_simulation_worse() ->
         assert diagnosis.model.parameters[name].value == pytest.approx(0.006, rel=0.05)
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("late", [(0, 6), (6, 6)])
 def test_what_is_late_by_less_than_a_sample_is_one_drive_and_not_the_clock_of_all(late: tuple[int, int]) -> None:
     """All commands may hold a little later than is said; of one drive beside another on its clock it is physics."""

@@ -85,6 +85,7 @@ def test_a_run_beside_another_shares_its_derivatives_and_is_worked_out_once(monk
     assert (turned.first, turned.second) == (told.second, told.first)
 
 
+@pytest.mark.nightly
 def test_fast_parts_of_a_run_tell_a_short_lag() -> None:
     # Below the few hertz that the balance compares, the two differ by less than the noise here.
     data, (lag, delay) = fitted_late(shared_case("axis_linear", "actuator_lag", 2004))
@@ -119,6 +120,7 @@ def test_data_that_contradict_both_models_tell_little() -> None:
     assert not Verdict(0.2, first=-1.0, second=1.2).prefers_first()
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize(
     ("hidden", "seed", "named"),
     [("actuator_lag", 5, {"actuator_lag"}), ("input_delay", 2, {"input_delay", "sensor_delay"})],
@@ -131,6 +133,7 @@ def test_a_lag_is_named_only_where_it_shows(hidden: str, seed: int, named: set[s
     assert effect.name in named
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("hidden", ["input_delay", "sensor_delay"])
 def test_a_part_of_a_sampling_interval_is_named_where_it_explains_most(hidden: str) -> None:
     case = shared_case("axis_linear", hidden, 2003)
@@ -142,6 +145,7 @@ def test_a_part_of_a_sampling_interval_is_named_where_it_explains_most(hidden: s
     assert why.verdict == "effect_found"
 
 
+@pytest.mark.nightly
 def test_a_delay_of_a_machine_that_sticks_is_timed_along_its_own_run() -> None:
     # The balance of effort says 3.2 ms instead of 1.3 ms, with which a simulation gets worse.
     case = shared_case("axis_linear", "input_delay", 22)
@@ -157,6 +161,7 @@ def test_a_delay_of_a_machine_that_sticks_is_timed_along_its_own_run() -> None:
     assert std < 0.1 * truth
 
 
+@pytest.mark.nightly
 def test_a_delay_of_a_machine_that_sticks_is_named() -> None:
     case = shared_case("axis_linear", "input_delay", 22)
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=("input_delay",), workers=1)
@@ -165,6 +170,7 @@ def test_a_delay_of_a_machine_that_sticks_is_named() -> None:
     assert why.effects[0].parameters[0].value == pytest.approx(truth, rel=0.1)
 
 
+@pytest.mark.nightly
 def test_steps_of_a_run_beside_dry_friction_do_not_blur_what_parts_a_delay_from_a_lag() -> None:
     # With three steps in the delay they are off by five times that, and speak for the lag.
     case = shared_case("axis_linear", "input_delay", 103)
@@ -183,6 +189,7 @@ def test_steps_of_a_run_beside_dry_friction_do_not_blur_what_parts_a_delay_from_
     assert np.linalg.norm(run.left - ideal[0]) < np.linalg.norm(ideal[1] - ideal[0])
 
 
+@pytest.mark.nightly
 @pytest.mark.parametrize("hidden", ["input_delay", "sensor_delay"])
 def test_little_that_is_late_beside_a_hysteresis_is_named_if_runs_ask_for_it_too(hidden: str) -> None:
     """It takes a fifth of what the hysteresis leaves: of so little, three times the usual certainty is asked else."""

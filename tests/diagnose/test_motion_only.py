@@ -14,6 +14,7 @@ from vpm.identify import InverseDynamicsProblem
 HIDDEN, SEED = ("asymmetric_friction", "input_delay"), 0
 
 
+@pytest.mark.nightly
 def test_a_delay_beside_dry_friction_is_named_and_timed() -> None:
     case = shared_case("axis_rotary", HIDDEN, SEED)
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=list(HIDDEN), workers=1)
@@ -24,6 +25,7 @@ def test_a_delay_beside_dry_friction_is_named_and_timed() -> None:
     assert delay.value == pytest.approx(true, rel=0.25)
 
 
+@pytest.mark.nightly
 def test_only_samples_in_clear_motion_count() -> None:
     case = shared_case("axis_rotary", "input_delay", SEED)
     problem = InverseDynamicsProblem(case.model(), case.train)

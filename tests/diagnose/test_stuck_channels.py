@@ -17,6 +17,7 @@ from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment
 from vpm.model import Model
 
+AXIS = "axis_linear", "spring", 1
 ARM = "arm2r", "saturation", 6001
 CYLINDER = "servo_cylinder", "none", 1
 
@@ -31,12 +32,14 @@ def stuck(record: Experiment, channel: str) -> Experiment:
 @pytest.mark.parametrize(
     ("case", "channel"),
     [
-        (ARM, "shoulder.position"),
-        (ARM, "elbow.position"),
-        (ARM, "second.command"),
-        (CYLINDER, "axis.position"),
-        (CYLINDER, "servo.pressure_a"),
-        (CYLINDER, "servo.command"),
+        (AXIS, "axis.position"),
+        (AXIS, "drive.command"),
+        pytest.param(ARM, "shoulder.position", marks=pytest.mark.nightly),
+        pytest.param(ARM, "elbow.position", marks=pytest.mark.nightly),
+        pytest.param(ARM, "second.command", marks=pytest.mark.nightly),
+        pytest.param(CYLINDER, "axis.position", marks=pytest.mark.nightly),
+        pytest.param(CYLINDER, "servo.pressure_a", marks=pytest.mark.nightly),
+        pytest.param(CYLINDER, "servo.command", marks=pytest.mark.nightly),
     ],
 )
 def test_a_stuck_channel_is_told_first(case: tuple[str, str, int], channel: str, tmp_path: Path) -> None:
@@ -55,6 +58,7 @@ def test_a_stuck_channel_is_told_first(case: tuple[str, str, int], channel: str,
     assert f"log: {channel} is" in " ".join(done.stderr.split())
 
 
+@pytest.mark.nightly
 def test_what_the_model_holds_may_stand() -> None:
     """Dry friction holds a joint whatever its motor does, and a sensor with coarse steps shows no small way."""
     made = shared_case(*ARM)
@@ -67,6 +71,7 @@ def test_what_the_model_holds_may_stand() -> None:
     )
 
 
+@pytest.mark.nightly
 def test_a_joint_that_rests_is_fitted_beside_those_that_move() -> None:
     """No sample of it counts, which divided by zero."""
     made = shared_case(*CYLINDER)

@@ -83,6 +83,7 @@ def test_the_experiment_turns_round_and_shows_many_times_the_noise(why: vpm.Diag
     assert best.channel == "axis.effort"
 
 
+@pytest.mark.nightly
 def test_a_load_and_a_friction_of_one_direction_part_at_rest(any_effect: vpm.Diagnosis) -> None:
     """While the axis moves the two are one; only a rest shows the load, and the design finds the rests."""
     best = proposed(any_effect, "bias_force", "asymmetric_friction")
@@ -105,6 +106,7 @@ def test_it_stays_within_what_was_seen(why: vpm.Diagnosis) -> None:
         assert values.max() <= position.max()
 
 
+@pytest.mark.nightly
 def test_the_experiment_when_made_names_the_true_effect(why: vpm.Diagnosis, tmp_path: Path) -> None:
     """The proposed motion, run with the constant load that is really there, leaves one name."""
     path = proposed(why, *NAMES).excitation.to_csv(tmp_path / "motion.csv")

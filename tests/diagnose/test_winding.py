@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+import pytest
+
 import vpm
 from shared_cases import shared_case
 from vpm.discrepancy.candidates import candidates
@@ -14,6 +16,7 @@ from vpm.identify import InverseDynamicsProblem, estimate
 PAIR = ("joint_compliance", "viscous_friction")
 
 
+@pytest.mark.nightly
 def test_a_spring_is_looked_for_where_it_swings() -> None:
     # A linearised step promises most of a spring that is fifty times as stiff, from where a refit finds a rigid one.
     case = shared_case("axis_linear", PAIR, 159)
@@ -25,6 +28,7 @@ def test_a_spring_is_looked_for_where_it_swings() -> None:
     assert abs(stiffness.value / true - 1.0) < 0.1
 
 
+@pytest.mark.nightly
 def test_a_start_is_as_near_as_springs_that_are_tried_and_none_where_nothing_winds_up() -> None:
     for hidden in (PAIR, ("viscous_friction",)):
         case = shared_case("axis_linear", hidden, 159)

@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 
 import vpm
 from hydraulic_reference import AREA, RATIO, SUPPLY, TANK, VALUES
+from nightly import at_night
 from vpm.errors import IdentificationError, ModelError
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.identify.counted import SETTLING
@@ -384,7 +385,7 @@ def test_a_current_is_read_before_the_effort() -> None:
     assert without["axis.effort"][1] > 0.15
 
 
-@pytest.mark.parametrize("name", ["internal_leakage", "supply_drop", "sensor_offset"])
+@pytest.mark.parametrize("name", at_night(["internal_leakage", "supply_drop", "sensor_offset"], but=["supply_drop"]))
 def test_a_diagnosis_names_it(rig: vpm.Model, name: str) -> None:
     site, values = {**EFFECTS, "sensor_offset": ("gauge", {"value": 3e5})}[name]
     nominal = sensed(rig)

@@ -120,6 +120,7 @@ def test_a_ranking_names_the_drive_that_rubs() -> None:
     assert values["driven"] == pytest.approx(0.08, rel=0.15)
 
 
+@pytest.mark.nightly
 def test_nothing_is_named_where_nothing_rubs() -> None:
     records = [stroked(bar, 30 + place, 0.0) for place, bar in enumerate((1.5, 3.0, 6.0))]
     assert not vpm.diagnose(rod(), records[:1] + records[2:], records[1:2]).effects

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy.signal import lfilter
 
 import vpm
 from model_texts import DAMPED_AXIS
+from nightly import at_night
 from vpm.catalogue import effect_type
 from vpm.catalogue.empirical import TERMS
 from vpm.discrepancy.dependence import _other_half
@@ -115,6 +117,7 @@ def record(seed: int, force: Force, duration: float = 10.0) -> vpm.Experiment:
     return vpm.Experiment.from_arrays(time, values, units=units, name=f"record {seed}")
 
 
+@cache
 def diagnosed(force: Force) -> vpm.Diagnosis:
     model = vpm.Model.from_toml(DAMPED_AXIS)
     return vpm.diagnose(model, [record(1, force), record(2, force)], record(3, force), names="search")
@@ -134,7 +137,7 @@ PLANTED: dict[str, tuple[Force, set[str]]] = {
 }
 
 
-@pytest.mark.parametrize("name", PLANTED)
+@pytest.mark.parametrize("name", at_night(PLANTED, but=("quadratic drag",)))
 def test_physics_outside_of_the_catalogue_is_described_and_the_gap_shrinks(name: str) -> None:
     force, terms = PLANTED[name]
     why = diagnosed(force)
@@ -160,6 +163,7 @@ def test_coefficients_are_those_that_were_planted() -> None:
     assert "position of axis" not in why.empirical.alike
 
 
+@pytest.mark.nightly
 def test_a_formula_beside_a_named_effect_takes_nothing_from_it() -> None:
     why = diagnosed(lambda q, v, _: (1.5 + 0.6 * np.cos(2.0 * np.pi * q / 0.35)) * np.tanh(v / 1e-3))
     assert why.verdict == "effect_found"
@@ -172,6 +176,7 @@ def test_a_formula_beside_a_named_effect_takes_nothing_from_it() -> None:
     assert {term.dotted for term in why.empirical.terms} | {"axis.friction.coulomb"} <= set(why.fit.names)
 
 
+@pytest.mark.nightly
 def test_a_rhythm_in_time_is_told_in_words_and_made_no_law() -> None:
     why = diagnosed(lambda _q, _v, t: 0.8 * np.sin(2.0 * np.pi * 3.3 * t + 0.4))
     assert why.verdict == "unexplained"
@@ -193,6 +198,7 @@ def test_a_line_whose_phase_wanders_is_no_rhythm() -> None:
         assert least < 1.0 - left / float(noisy @ noisy) < most
 
 
+@pytest.mark.nightly
 def test_a_drift_in_time_is_told_in_words_and_made_no_law() -> None:
     why = diagnosed(
         lambda _q, v, t: (2.5 - 2.0 * np.minimum(t / 6.0, 1.0)) * np.tanh(v / 1e-3) - 1.5 * np.tanh(v / 1e-3)

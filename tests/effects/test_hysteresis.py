@@ -114,6 +114,7 @@ def test_balance_has_the_derivatives_of_differences() -> None:
         np.testing.assert_allclose(exact[:, :, k] / scale, difference / scale, atol=1e-5)
 
 
+@pytest.mark.nightly
 def test_a_diagnosis_names_it() -> None:
     train, test = (record(rough(), seed) for seed in (3, 4))
     found = vpm.diagnose(

@@ -128,6 +128,7 @@ def test_contacts_that_wind_up_further_than_the_gap_are_a_spring(loose: tuple[Ex
     assert "that is a spring" in only_winds_up(soft, "axis", data)
 
 
+@pytest.mark.nightly
 def test_play_is_named_and_none_is_seen_where_there_is_none(loose: tuple[Experiment, ...]) -> None:
     model = Model.from_toml(TEXT)
     effects = ["backlash", "joint_compliance", "input_delay", "coulomb_friction"]

@@ -1,6 +1,6 @@
 """Effects on the motor side and on the link side of a joint that winds up: against equations of two masses by SciPy."""
 
-from collections.abc import Sequence
+from functools import cache
 from typing import Literal
 
 import numpy as np
@@ -8,6 +8,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
+from nightly import at_night
 from test_split_joints import ARM, SPLITS, J, K, L, commanded, slide
 from vpm import Model
 from vpm.errors import ModelError
@@ -66,7 +67,8 @@ def force(time: float) -> float:
     return float(20.0 * np.sin(13.0 * time) + 6.0 * np.cos(29.0 * time))
 
 
-def witness(on_motor: Sequence[str], on_link: Sequence[str], times: Array) -> Array:
+@cache
+def witness(on_motor: tuple[str, ...], on_link: tuple[str, ...]) -> Array:
     """Two masses in places of their own, motor and link, by an adaptive implicit solver."""
 
     def rates(time: float, y: Array) -> list[float]:
@@ -76,7 +78,7 @@ def witness(on_motor: Sequence[str], on_link: Sequence[str], times: Array) -> Ar
         link_side = sum(effort(name, link, w) for name in on_link)
         return [v, w, (force(time) - spring + motor_side) / J, (spring + link_side) / L]
 
-    found = solve_ivp(rates, (0.0, times[-1]), np.zeros(4), "Radau", times, rtol=1e-10, atol=1e-12, max_step=1e-3)
+    found = solve_ivp(rates, (0.0, TIMES[-1]), np.zeros(4), "Radau", TIMES, rtol=1e-10, atol=1e-12, max_step=1e-3)
     return np.asarray(found.y.T)
 
 
@@ -95,10 +97,10 @@ TIMES: Array = np.linspace(0.0, 0.4, 401)
 
 
 @pytest.mark.parametrize("side", SIDES)
-@pytest.mark.parametrize("name", EFFECTS)
+@pytest.mark.parametrize("name", at_night(EFFECTS, but=("coulomb_friction", "end_stop", "torque_ripple")))
 def test_each_law_acts_on_its_side(name: str, side: Side) -> None:
     model = elastic().with_effect(name, at="axis", side=side, **EFFECTS[name])
-    expected = witness([name], [], TIMES) if side == "motor" else witness([], [name], TIMES)
+    expected = witness((name,), ()) if side == "motor" else witness((), (name,))
     size = np.abs(expected).max(axis=0)
     assert np.abs(run(model, TIMES) - expected).max(axis=0) / size == pytest.approx(np.zeros(4), abs=2e-4)
     # On the other side it would be another motion.
@@ -112,7 +114,7 @@ def test_friction_on_both_sides_by_every_method(integrator: str) -> None:
     both = both.with_effect("coulomb_friction", at="axis", **EFFECTS["coulomb_friction"])
     for name in behind:
         both = both.with_effect(name, at="axis", side="link", **EFFECTS[name])
-    expected = witness(["coulomb_friction"], behind, TIMES)
+    expected = witness(("coulomb_friction",), behind)
     first_order = integrator in {"semi_implicit", "linearly_implicit"}
     error = np.abs(run(both, TIMES, integrator, 4) - expected).max(axis=0) / np.abs(expected).max(axis=0)
     assert error.max() < (1e-2 if first_order else 2e-4)

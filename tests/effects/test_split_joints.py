@@ -280,6 +280,7 @@ def wound_up(seed: int) -> Experiment:
     return Experiment.from_arrays(time, noisy, model=slide(), name=f"run {seed}")
 
 
+@pytest.mark.nightly
 def test_a_logged_deflection_shows_what_a_rigid_model_lacks() -> None:
     record = wound_up(1)
     assert record.unit("axis_deflection.position") == "m"

@@ -12,6 +12,7 @@ from scipy.linalg import expm
 
 import vpm
 from fit_machines import Arm, Axis, records
+from nightly import at_night
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
 from vpm.identify import Checks, Fit, gaps, identify, identify_inertial, ljung_box, problem
@@ -54,16 +55,16 @@ def covered(machine: Machine, found: list[Fit]) -> Array:
 # ---- warnings --------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("lacking", LACKING)
+@pytest.mark.parametrize("lacking", at_night(LACKING, but=("dry friction", "backlash", "delay of an arm")))
 def test_a_missing_effect_is_suspected(lacking: str) -> None:
     for kind in KINDS:
-        assert all(suspects(fit) for fit in fits(LACKING[lacking], kind, 3, seed=10, effort=0.02)), kind
+        assert all(suspects(fit) for fit in fits(LACKING[lacking], kind, 1, seed=10, effort=0.02)), kind
 
 
 @pytest.mark.parametrize("machine", [Axis(), Arm()], ids=["axis", "arm"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_right_model_is_not_suspected(machine: Machine, kind: str) -> None:
-    assert not any(suspects(fit) for fit in fits(machine, kind, 10, seed=20))
+    assert not any(suspects(fit) for fit in fits(machine, kind, 3, seed=20))
 
 
 @pytest.mark.nightly

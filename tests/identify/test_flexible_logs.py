@@ -98,6 +98,7 @@ def test_memory_of_the_gear_lowers_it_further() -> None:
     assert error(fitted(True, "hysteresis"), unseen) < 0.8 * error(fitted(True, "coulomb_friction"), unseen)
 
 
+@pytest.mark.nightly
 def test_a_diagnosis_of_the_rigid_hub_names_its_dry_friction() -> None:
     # Without the gauge the torque alone does not show the link.
     train, test = halves(False)
@@ -110,6 +111,7 @@ def test_a_diagnosis_of_the_rigid_hub_names_its_dry_friction() -> None:
     assert (torque.after / torque.recalibrated) ** 2 > 0.15
 
 
+@pytest.mark.nightly
 def test_with_the_gauge_a_diagnosis_names_the_flexible_link_and_then_dry_friction() -> None:
     train, test = (half.with_channel("arm_bending.position", half["link.command"], "rad") for half in halves(True))
     found = diagnose(hub(False), train, test)

@@ -76,6 +76,7 @@ def diagnosis() -> Diagnosis:
     return diagnose(damper(), [record(motion) for motion in TRAINING], [record(motion) for motion in UNSEEN])
 
 
+@pytest.mark.nightly
 def test_a_diagnosis_names_dry_friction_then_hysteresis(diagnosis: Diagnosis) -> None:
     assert [(effect.name, effect.site) for effect in diagnosis.effects] == [
         ("coulomb_friction", "axis"),
@@ -83,6 +84,7 @@ def test_a_diagnosis_names_dry_friction_then_hysteresis(diagnosis: Diagnosis) ->
     ]
 
 
+@pytest.mark.nightly
 def test_the_model_of_the_diagnosis_predicts_motions_that_were_not_fitted(diagnosis: Diagnosis) -> None:
     for motion in UNSEEN:
         assert error(diagnosis.model, motion) < 13.5  # 12.5 by a fit of the force; this one follows the positions, too

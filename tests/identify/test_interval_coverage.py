@@ -14,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
+from nightly import at_night
 from vpm.identify import Checks, Fit, InverseDynamicsProblem, identify
 from vpm.identify.own_simulation import own_residual
 from vpm.identify.problem import Block
@@ -24,7 +25,7 @@ from vpm.identify.whiteness import explained_by, heard, powers, shifted, waves
 BENCHES = Path(__file__).parents[2] / "benches"
 MACHINES = ("axis", "flexible_arm", "leg", "cart")
 #: All but the quickest are left to the night.
-EACH = [m if m == "axis" else pytest.param(m, marks=pytest.mark.nightly) for m in MACHINES]
+EACH = at_night(MACHINES, but=("axis",))
 
 
 def loaded(name: str) -> ModuleType:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 import textbook_arm
 import vpm
 from command_line import vpm as run_vpm
+from nightly import at_night
 from vpm import demo
 from vpm.errors import ExperimentError, ModelError
 from vpm.log_check import Finding, Settings
@@ -103,7 +104,7 @@ def logs() -> dict[str, Columns]:
     return {name: textbook_arm.log(arm, seed) for seed, (name, arm) in enumerate(FAULTS.items(), 1)}
 
 
-@pytest.mark.parametrize("fault", ["none", "friction"])
+@pytest.mark.parametrize("fault", at_night(["none", "friction"], but=["none"]))
 @pytest.mark.parametrize("mistake", MISTAKES)
 def test_names_the_mistake_of_a_log(logs: dict[str, Columns], fault: str, mistake: str) -> None:
     change, kind, channels, factor = MISTAKES[mistake]
@@ -281,6 +282,7 @@ def test_a_mirror_image_that_explains_nearly_everything_is_not_believed() -> Non
         assert [one.channels for one in found.mistakes] == ([] if sign > 0.0 else [tuple(columns)])
 
 
+@pytest.mark.nightly
 def test_the_same_mistake_of_two_logs_is_told_once(logs: dict[str, Columns]) -> None:
     wrong = scaled("q2", -1.0)
     records = [record(wrong(logs[name]), name) for name in ("none", "friction")]
@@ -288,6 +290,7 @@ def test_the_same_mistake_of_two_logs_is_told_once(logs: dict[str, Columns]) -> 
     assert one.records == ("none", "friction")
 
 
+@pytest.mark.nightly
 def test_a_command_that_does_nothing_has_no_scale() -> None:
     """Without the drive every small factor does as well, so that none of them is its scale."""
     columns = textbook_arm.log(PLAIN, 9)

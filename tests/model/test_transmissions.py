@@ -447,6 +447,7 @@ def test_a_ranking_names_friction_at_the_right_motor() -> None:
     assert [(one.effect, one.site) for one in told.effects] == [("coulomb_friction", "right")]
 
 
+@pytest.mark.nightly
 def test_a_ranking_tells_friction_of_a_joint_from_that_of_motors() -> None:
     log = wrist.moved(replace(wrist.Wrist(), of_joints=(0.3, 0.0)), seed=1)
     told = vpm.rank(wrist.model(), log, workers=1)
@@ -457,6 +458,7 @@ def test_a_ranking_names_nothing_where_nothing_is_missing() -> None:
     assert vpm.rank(wrist.model(), wrist.moved(), workers=1).effects == ()
 
 
+@pytest.mark.nightly
 def test_a_diagnosis_names_friction_at_the_right_motor() -> None:
     told = vpm.diagnose(wrist.model(), wrist.moved(wrist.RUBBING), workers=1)
     assert [(one.name, one.site) for one in told.effects] == [("coulomb_friction", "right")]

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import pytest
 
-from validation.table import PAGE, PARTS
+from validation import table
+
+#: Fits that `test_identify_examples` makes anyway, so that their rows are tested there.
+FITTED = "Parameters of the examples from noisy logs"
 
 
-@pytest.mark.parametrize("part", PARTS)
+@pytest.mark.parametrize("part", [part for part in table.PARTS if part != FITTED])
 def test_every_row_is_within_its_tolerance(part: str) -> None:
-    rows = PARTS[part]()
-    assert rows
-    off = [f"{row.name}: {row.error:.3g} times what is allowed" for row in rows if not row.error <= 1.0]
-    assert off == []
-    text = PAGE.read_text(encoding="utf-8")
-    assert [row.name for row in rows if f"| {row.name}" not in text] == [], "run make validation"
+    assert table.wrong(part) == []

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 import vpm
+from nightly import at_night
 from second_suite import laws, plant, slewer, sweeper
 from second_suite.blade import Blade
 from second_suite.cases import _log as log_of
@@ -37,6 +38,10 @@ HIDDEN = [
     *(("slewer", w) for w, kind in requests("slewer").items() if kind in {"single", "outside"} and w != PAD),
     *(("sweeper", w) for w in ALSO),
 ]
+
+
+#: Those that are compared outside of `make test-nightly`.
+FEW = [("slewer", "hysteresis@slew"), ("slewer", "actuator_lag@motor"), ("sweeper", "backlash@slew")]
 
 
 @lru_cache
@@ -234,7 +239,7 @@ def of_the_catalogue(name: str, values: Numbers, q: Array, v: Array, time: float
     return laws.dry(name, values, q, v, time, load)
 
 
-@pytest.mark.parametrize(("name", "word"), HIDDEN)
+@pytest.mark.parametrize(("name", "word"), at_night(HIDDEN, but=FEW))
 def test_a_hidden_effect_is_that_of_the_catalogue(name: str, word: str, monkeypatch: pytest.MonkeyPatch) -> None:
     m = short(name)
     (hidden,), step = hidden_of(m, word, 0), 1.0 / m.rate / m.substeps

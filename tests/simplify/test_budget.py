@@ -168,6 +168,7 @@ def counted(substeps: int) -> float:
     return count_instructions(nominal(), 1000.0, Setup(substeps=substeps), commands(nominal(), 1000.0), 4e-4)
 
 
+@pytest.mark.nightly
 @needs_valgrind
 def test_a_step_of_an_axis_takes_some_thousand_instructions() -> None:
     assert 1e3 < counted(1) < 2e4

@@ -42,6 +42,7 @@ def test_a_pose_without_force_is_no_divergence() -> None:
     assert np.isfinite(fit.staged_rmse)
 
 
+@pytest.mark.nightly
 def test_noise_of_the_length_at_rest_is_no_motion() -> None:
     """Noise of 1 um in 25 tests at rest would make k1 too small by several standard errors if it counted."""
     e, off = element(), []
@@ -127,6 +128,7 @@ def test_intervals_cover_the_truth() -> None:
     assert np.all(inside >= 70)
 
 
+@pytest.mark.nightly
 def test_intervals_of_the_refined_element_cover_the_truth() -> None:
     e, inside, seeds = element(), np.zeros(6), 40
     for seed in range(seeds):

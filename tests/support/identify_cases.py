@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -295,3 +296,15 @@ CASES = {
         known=AT_REST,
     ),
 }
+
+
+@cache
+def record_of(name: str) -> Experiment:
+    """The log of a case, simulated once."""
+    return CASES[name].log()
+
+
+@cache
+def fit_of(name: str) -> Fit:
+    """What comes back from it, fitted once."""
+    return CASES[name].fit(record_of(name))

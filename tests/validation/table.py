@@ -75,6 +75,16 @@ _COLUMNS = (
 )
 
 
+def wrong(part: str) -> list[str]:
+    """Rows of a part that are off by more than is allowed, or stand on no page."""
+    rows, text = PARTS[part](), PAGE.read_text(encoding="utf-8")
+    if not rows:
+        return [f"{part}: no row"]
+    off = [f"{each.name}: {each.error:.3g} times what is allowed" for each in rows if not each.error <= 1.0]
+    missing = [each.name for each in rows if f"| {each.name}" not in text]
+    return off + [f"{name} stands on no page: run make validation" for name in missing]
+
+
 def core_rows() -> list[Row]:
     """What only the core can show, from its own program."""
     command = ["cargo", "run", "--quiet", "--release", "--package", "vpm-core", "--example", "validation"]
