@@ -57,7 +57,7 @@ test: test-rust test-python ## all tests, Rust and Python
 # tests that run "for over 60 seconds" have been named before.
 test-rust: | $(VENV)/.tools-found
 	cargo test --no-run $(CARGO_ARGS)
-	ulimit -S -t $(RUST_SECONDS); $(PYTHON) tests/stalls.py cargo test $(CARGO_ARGS)
+	ulimit -S -t $(RUST_SECONDS); $(PYTHON) tests/support/stalls.py cargo test $(CARGO_ARGS)
 
 reference: | $(VENV)/.tools-found ## integrators against an adaptive solver, which takes minutes to build
 	cargo test --features reference --test reference $(CARGO_ARGS)
@@ -101,7 +101,7 @@ lint-python: $(VENV)/.installed
 	$(BIN)/lint-imports
 
 validation: $(VENV)/.installed ## compute the validation table anew, into docs/validation.md
-	cd tests && ../$(BIN)/python -m validation
+	cd tests && PYTHONPATH=support ../$(BIN)/python -m validation
 
 bench: | $(VENV)/.tools-found ## time the core: one result per line, with its spread
 	cargo bench $(CARGO_ARGS)
@@ -143,7 +143,7 @@ figures: $(VENV)/.installed ## draw the pictures of docs/ anew, from the package
 	$(BIN)/python docs/figures/view.py
 
 docs: $(VENV)/.installed docs-rust ## run every snippet of the documents; build the Rust documentation
-	$(BIN)/python -m pytest tests/test_docs.py $(PYTEST_ARGS)
+	$(BIN)/python -m pytest tests/project/test_docs.py $(PYTEST_ARGS)
 
 docs-rust: $(VENV)/.installed ## build the Rust documentation
 	RUSTDOCFLAGS='-D warnings' cargo doc --workspace --no-deps $(CARGO_ARGS)

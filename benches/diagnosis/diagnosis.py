@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-sys.path[:0] = [str(ROOT / "benches" / "peers"), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT / "benches" / "peers"), str(ROOT / "tests"), str(ROOT / "tests" / "support")]
 
 import vpm  # noqa: E402
 from blind import make_cases  # noqa: E402

@@ -22,7 +22,7 @@ from vpm.many import Case, diagnose_many
 from vpm.sending import packed
 from vpm.tasks import processes
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests"))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "tests" / "support"))
 
 #: Effects that are tried: a diagnosis takes a fifth of a second.
 QUICK = {"effects": ["coulomb_friction"], "limit": 1, "check": False, "names": "search"}

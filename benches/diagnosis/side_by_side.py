@@ -24,7 +24,7 @@ import numpy as np
 from scipy.stats import binomtest
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-sys.path[:0] = [str(ROOT / "benches" / "peers"), str(ROOT / "tests")]
+sys.path[:0] = [str(ROOT / "benches" / "peers"), str(ROOT / "tests"), str(ROOT / "tests" / "support")]
 
 from lisdd import WAYS, lisdd  # noqa: E402
 

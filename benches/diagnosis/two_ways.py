@@ -19,7 +19,12 @@ from unittest.mock import patch
 import numpy as np
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-sys.path[:0] = [str(ROOT / "benches" / "diagnosis"), str(ROOT / "benches" / "peers"), str(ROOT / "tests")]
+sys.path[:0] = [
+    str(ROOT / "benches" / "diagnosis"),
+    str(ROOT / "benches" / "peers"),
+    str(ROOT / "tests"),
+    str(ROOT / "tests" / "support"),
+]
 
 from side_by_side import counts, level, right  # noqa: E402
 

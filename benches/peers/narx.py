@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from vpm.narx import Narx
 
 ROOT = Path(__file__).resolve().parent.parent.parent
-sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "benches" / "peers")]
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "support"), str(ROOT / "benches" / "peers")]
 
 import markdown  # noqa: E402
 

@@ -146,7 +146,7 @@ def agreement(case: str, *, integrator: str = "adaptive(1e-9)", **changes: objec
 
 def witnessed() -> list[Row]:
     """Every case of the witness: all of its channels, each as a share of its largest value."""
-    source = "tests/hyl_witness.py: Kane's equations, SciPy's DOP853 at 1e-10"
+    source = "tests/support/hyl_witness.py: Kane's equations, SciPy's DOP853 at 1e-10"
     rows = []
     for case in CASES:
         pairs = [(both, np.abs(both[1]).max()) for both in agreement(case).values()]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from identify_cases import CASES
+from identify_cases import CASES, fit_of
 from validation.row import Row, row
 
 #: Standard deviations that an estimate may be off.
@@ -13,7 +13,7 @@ def recovered() -> list[Row]:
     """One row for each free parameter of each case."""
     rows = []
     for label, case in CASES.items():
-        fit, truth = case.fit(case.log()), case.truth
+        fit, truth = fit_of(label), case.truth
         for name, value, std, unit, (low, high) in zip(
             fit.names, fit.values, fit.std, fit.units, fit.intervals, strict=True
         ):

@@ -54,15 +54,15 @@ PARTS: dict[str, Callable[[], list[Row]]] = {
 _HEAD = """# Validation
 
 What vpm computes beside numbers that it did not make: closed forms, published values, converged solutions of other
-codes. Every row is a test (`tests/test_validation.py`, those of the last part `crates/vpm-core/tests/all/validation`);
-`make validation` computes all of them anew and writes this page. A row that stands for several numbers shows the one
-that comes nearest to its tolerance.
+codes. Every row is a test (`tests/project/test_validation.py`, those of the last part
+`crates/vpm-core/tests/all/validation`); `make validation` computes all of them anew and writes this page. A row that
+stands for several numbers shows the one that comes nearest to its tolerance.
 """
 
 #: Reference values that no row can stand for, each with the reason.
 _UNCOMPUTED = {
     "`tudor.merit.static_fit`, `.first_mode`, `.scale`": "of a public record that is not part of the repository; "
-    "`tests/test_merit.py` compares them where it is at hand",
+    "`tests/beams/test_merit.py` compares them where it is at hand",
     "`narx.reported.sigma`": "of a record that nobody else has",
     "`ident.table5_2.stiffness`": "measured on the leg, and 2.2 and 2.6 times as stiff at twice the gain; a "
     "controller's `P / l^2` is twice, see `ident.stiffness_from_gain`",
@@ -73,6 +73,16 @@ _UNCOMPUTED = {
 _COLUMNS = (
     "| what | vpm | reference | unit | difference | allowed | source |\n| --- | --- | --- | --- | --- | --- | --- |\n"
 )
+
+
+def wrong(part: str) -> list[str]:
+    """Rows of a part that are off by more than is allowed, or stand on no page."""
+    rows, text = PARTS[part](), PAGE.read_text(encoding="utf-8")
+    if not rows:
+        return [f"{part}: no row"]
+    off = [f"{each.name}: {each.error:.3g} times what is allowed" for each in rows if not each.error <= 1.0]
+    missing = [each.name for each in rows if f"| {each.name}" not in text]
+    return off + [f"{name} stands on no page: run make validation" for name in missing]
 
 
 def core_rows() -> list[Row]:

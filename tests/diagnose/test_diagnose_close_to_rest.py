@@ -1,0 +1,63 @@
+"""Friction close to rest, told by runs of the model itself where a balance of effort sees too little of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import vpm
+from shared_cases import shared_case
+from vpm.discrepancy.own_run import as_it_is, misfit
+from vpm.simulate import Setup
+
+CLOSE_TO_REST = "stribeck_friction"
+
+
+@pytest.mark.nightly
+def test_what_a_balance_hardly_sees_is_told_by_runs() -> None:
+    """It fades below 1.5 % of the speed: fitted to the balance, it predicts unseen efforts worse than nothing does."""
+    case = shared_case("axis_linear", "stribeck_friction", 18)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], names="search", workers=1)
+    (found,) = why.effects
+    (true,) = case.truth.hidden
+    assert (found.name, found.site) == (true.name, true.site)
+    values = {p.name: p.value for p in found.parameters}
+    assert values["stribeck"] == pytest.approx(true.parameters["stribeck"], rel=0.2)
+    assert values["stribeck_velocity"] == pytest.approx(true.parameters["stribeck_velocity"], rel=0.1)
+    assert any("runs of the model itself" in note for note in found.notes)
+
+
+@pytest.mark.nightly
+def test_what_runs_tell_need_not_close_the_balance() -> None:
+    """Of what the runs leave nine tenths go, of the balance nothing: a fit without physics finds more there."""
+    case = shared_case("axis_rotary", "stribeck_friction", 3001)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], names="search", workers=1)
+    assert [effect.name for effect in why.effects] == [CLOSE_TO_REST]
+    assert why.verdict == "effect_found"
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("machine", "hidden", "seed"),
+    [("axis_linear", "none", 3), ("axis_linear", "friction_drift", 9)],
+    ids=["nothing", "friction_that_wears_off"],
+)
+def test_runs_ask_for_nothing_that_is_not_there(machine: str, hidden: str, seed: int) -> None:
+    case = shared_case(machine, hidden, seed)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], names="search", workers=1)
+    assert not why.effects
+    (refused,) = why.refused
+    assert "runs of the model itself" in refused.reason
+
+
+@pytest.mark.nightly
+def test_known_parameters_are_no_misfit() -> None:
+    """What a run leaves is judged with the parameters that suit it best, so that near the truth all values do."""
+    case = shared_case("axis_linear", "none", 3)
+    model = case.model()
+    free = ("body.mass", "axis.friction.viscous")
+    run = as_it_is(model, free, case.train, Setup())
+    moved = model.with_parameters({name: 1.001 * model.parameters[name].value for name in free})
+    left, _ = run.problem.evaluate(moved, moved.theta)
+    assert not np.allclose(left, run.left, rtol=1e-6)
+    assert misfit(run, left) == pytest.approx(misfit(run), rel=1e-4)

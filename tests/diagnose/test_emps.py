@@ -1,0 +1,113 @@
+"""The EMPS drive, measured: the whole way to the named effects, on data that ship with nobody's package.
+
+Data: A. Janot, M. Gautier, M. Brunot, "Data Set and Reference Models of EMPS", 2019 Workshop on Nonlinear System
+Identification Benchmarks. Published values: mass 95.109 kg, viscous 203.50 N s/m, Coulomb 20.39 N, offset -3.165 N.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from command_line import vpm
+from vpm.diagnosing import diagnose
+from vpm.discrepancy import Diagnosis
+from vpm.experiment import Experiment
+from vpm.identify import identify
+from vpm.model import Model
+
+ROOT = Path(__file__).parents[2]
+DATA = Path(os.environ.get("VPM_SHARED_DATA", ROOT.parent / "shared" / "data")) / "emps"
+MODEL = ROOT / "examples" / "emps" / "model.toml"
+
+pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"the measured EMPS logs are not at {DATA}")
+
+PUBLISHED = {
+    "carriage.mass": 95.109,
+    "axis.friction.viscous": 203.50,
+    "axis.friction.coulomb": 20.39,
+    "axis.bias.force": -3.165,
+}
+
+
+#: What is found, and what is refused beside it: a diagnosis of all effects is the fixture's.
+TRIED = ("coulomb_friction", "bias_force", "asymmetric_friction", "torque_ripple")
+
+
+@pytest.fixture(scope="module")
+def diagnosis() -> Diagnosis:
+    model = Model.load(MODEL)
+    train, test = (Experiment.load(DATA / f"emps_{name}.csv", model=model) for name in ("train", "pulses_test"))
+    return diagnose(model, train, test, names="search")
+
+
+def test_names_the_effects_in_order(diagnosis: Diagnosis) -> None:
+    assert diagnosis.verdict == "effect_found"
+    assert [(e.name, e.site) for e in diagnosis.effects] == [
+        ("coulomb_friction", "axis"),
+        ("bias_force", "axis"),
+        ("asymmetric_friction", "axis"),
+    ]
+
+
+def test_refuses_with_the_right_reasons(diagnosis: Diagnosis) -> None:
+    reasons = {r.name: r.reason for r in diagnosis.refused}
+    assert "negative" in reasons["stribeck_friction"]
+    assert "lowers the training error" in reasons["torque_ripple"]
+    assert "raises the unseen error" in reasons["torque_ripple"]
+
+
+def test_force_error_by_inverse_dynamics(diagnosis: Diagnosis) -> None:
+    gap = diagnosis.gap["axis.effort"]
+    assert 0.16 < gap.recalibrated / gap.signal < 0.19  # mass and viscous friction alone
+    assert gap.after / gap.signal <= 0.054
+    assert gap.noise_floor < gap.after
+
+
+def test_closed_loop_force_error(diagnosis: Diagnosis) -> None:
+    gap = diagnosis.gap["drive.command (closed_loop)"]  # force is gain times command, so the relative error is the same
+    assert gap.after / gap.signal <= 0.080
+
+
+def test_agrees_with_published_values(diagnosis: Diagnosis) -> None:
+    step = diagnosis.steps[2]  # mass, viscous, Coulomb, offset: the published model
+    assert step.effect == "bias_force"
+    for name, value in PUBLISHED.items():
+        assert step.values[name] == pytest.approx(value, rel=0.01), name
+
+
+def test_asymmetry_and_bias_are_said_to_be_confusable(diagnosis: Diagnosis) -> None:
+    assert any(a.name == "asymmetric_friction" and "axis.bias.force" in a.others for a in diagnosis.ambiguous_with)
+
+
+def test_command_line(tmp_path: Path) -> None:
+    tried = [word for name in TRIED for word in ("--effect", name)]
+    unseen = DATA / "emps_pulses_test.csv"
+    done = vpm(
+        "diagnose", MODEL, DATA / "emps_train.csv", "--validate", unseen, *tried, "--names", "search", "--out", tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    assert "torque_ripple at axis: it lowers the training error" in done.stdout
+    report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert report["verdict"] == "effect_found"
+    assert set(report["gap"]["axis.effort"]) >= {"before", "recalibrated", "after", "noise_floor", "unit"}
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert "<svg" in page
+    assert "src=" not in page  # self-contained
+
+
+def test_no_number_of_the_data_is_in_the_package() -> None:
+    package = ROOT / "python" / "vpm"
+    sources = [p for p in package.rglob("*") if p.suffix in {".py", ".toml", ".jinja"}]
+    for number in ("35.15", "160.18", "243.45", "95.1", "203.5", "20.39", "3.16"):
+        assert not [p.name for p in sources if number in p.read_text(encoding="utf-8")], number
+
+
+def test_identify_agrees_with_published_values() -> None:
+    model = Model.load(MODEL).with_effect("coulomb_friction", at="axis").with_effect("bias_force", at="axis")
+    fit = identify(model, Experiment.load(DATA / "emps_train.csv", model=model))
+    for name, value in PUBLISHED.items():
+        assert fit[name] == pytest.approx(value, rel=0.01), name

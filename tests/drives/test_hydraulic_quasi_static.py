@@ -1,0 +1,194 @@
+"""Quasi-static pressures and tables of efforts in model files, and both as what a servo-cylinder is made simpler to."""
+
+from __future__ import annotations
+
+import copy
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vpm
+from vpm.errors import ModelError
+from vpm.simplify.reductions import reductions
+from vpm.simplify.replacement import replaced
+from vpm.simplify.tables import force_map, tables
+from vpm.simulate import Setup, simulate_arrays
+
+RIG = vpm.Model.load(Path(__file__).parents[2] / "examples" / "servo_cylinder" / "rig.toml")
+CLOCK = 1e-3 * np.arange(400)
+
+
+def content(*, static: bool = True, clearance: float | None = 1e-4) -> dict[str, Any]:
+    """The rig with quasi-static pressures."""
+    content = copy.deepcopy(RIG.to_dict())
+    servo = content["actuators"]["servo"]
+    if static:
+        servo["valve"] = {k: v for k, v in servo["valve"].items() if k not in ("frequency", "damping")}
+        servo["valve"]["spool"] = "static"
+    if clearance is not None:
+        servo["valve"]["clearance"] = clearance
+    servo["cylinder"]["pressures"] = "quasi_static"
+    return content
+
+
+def quasi_static() -> vpm.Model:
+    return vpm.Model(content())
+
+
+def moved(model: vpm.Model, size: float = 1.5e-3, integrator: str = "guarded") -> vpm.Run:
+    record = vpm.Experiment.from_arrays(
+        CLOCK, {"servo.command": size * np.sin(2.0 * np.pi * 4.0 * CLOCK)}, model=model, name="sine"
+    )
+    return vpm.simulate(model, record, integrator=integrator)
+
+
+def apart(found: vpm.Run, other: vpm.Run, channel: str) -> float:
+    return float(np.std(found[channel] - other[channel]) / np.std(other[channel]))
+
+
+def table(model: vpm.Model, reach: float = 0.3) -> dict[str, Any]:
+    sizes = ((1e-2, 61), (reach, 41))
+    commands, velocities = (size * np.sinh(np.linspace(-4.0, 4.0, count)) / np.sinh(4.0) for size, count in sizes)
+    efforts = force_map(model, "servo", commands, velocities)
+    axes = {"commands": commands.tolist(), "velocities": velocities.tolist(), "efforts": efforts.tolist()}
+    return {"type": "table", "command_unit": "A", **axes}
+
+
+def with_table(entry: dict[str, Any]) -> vpm.Model:
+    changed = copy.deepcopy(RIG.to_dict())
+    del changed["supplies"]
+    changed["actuators"]["servo"] = {"joint": "axis", **entry}
+    return vpm.Model(changed)
+
+
+@pytest.mark.parametrize(("static", "states"), [(True, ()), (False, ("servo.spool", "servo.spool_rate"))])
+def test_pressures_are_no_states_and_the_motion_stays(static: bool, states: tuple[str, ...]) -> None:
+    model = vpm.Model(content(static=static))
+    assert model.internal_names == states
+    run, full = moved(model), moved(RIG)
+    assert 1e-3 < apart(run, full, "axis.velocity") < 0.04
+    assert apart(run, full, "axis.position") < 0.04
+    # Below the pressure of the supply and above that of vapour while the piston moves, as the flows have it.
+    assert np.all(run["servo.pressure_a"] >= 2000.0)
+
+
+def test_slower_motion_comes_nearer() -> None:
+    # What oil under pressure takes up grows with the frequency, what the piston displaces does not.
+    gaps = []
+    for frequency in (64.0, 16.0):
+        runs = []
+        for model in (quasi_static(), vpm.Model(_full())):
+            time = 0.008 / frequency * np.arange(500)
+            command = 2e-3 * np.sin(2.0 * np.pi * frequency * time)
+            record = vpm.Experiment.from_arrays(time, {"servo.command": command}, model=model, name="sine")
+            runs.append(vpm.simulate(model, record, integrator="adaptive", initial_state=_start(model)))
+        found, full = (run["axis.velocity"][250:] for run in runs)
+        gaps.append(float(np.std(found - full) / np.std(full)))
+    assert 0.01 < gaps[0] < 0.5
+    assert gaps[1] < 0.5 * gaps[0]
+
+
+def _full() -> dict[str, Any]:
+    full = content()
+    full["actuators"]["servo"]["cylinder"]["pressures"] = "chambers"
+    return full
+
+
+def _start(model: vpm.Model) -> np.ndarray:
+    state = np.zeros(model.core.n_states)
+    state[2:] = model.core.internal_state(model.theta, [0.0])
+    return state
+
+
+def test_file_keeps_it(tmp_path: Path) -> None:
+    again = vpm.Model.load(quasi_static().save(tmp_path / "reduced.toml"))
+    assert again.internal_names == ()
+    assert again.parameters["servo.valve.clearance"].value == 1e-4
+    found = with_table(table(quasi_static()))
+    kept = vpm.Model.load(found.save(tmp_path / "table.toml"))
+    assert np.array_equal(moved(kept).values, moved(found).values)
+
+
+@pytest.mark.parametrize(
+    ("clearance", "message"),
+    [(None, "valve.clearance is missing; with pressures"), (0.02, "is 0.02 A, but the spool moves by 0.01 A only")],
+)
+def test_clearance_that_does_not_suit_is_refused(clearance: float | None, message: str) -> None:
+    with pytest.raises(ModelError, match=message):
+        vpm.Model(content(clearance=clearance))
+
+
+def test_sensitivities_are_those_of_differences() -> None:
+    model = quasi_static()
+    names = ["servo.valve.clearance", "servo.valve.flow_gain", "pump.pressure", "servo.cylinder.internal_leakage"]
+    columns = [model.index(name) for name in names]
+    record = vpm.Experiment.from_arrays(
+        CLOCK, {"servo.command": 1.5e-3 * np.sin(25.0 * CLOCK)}, model=model, name="sine"
+    )
+    setup = Setup("guarded")
+    place = model.output_channels.index("axis.position")
+    exact = simulate_arrays(model, record, "free_run", columns=columns, setup=setup).jacobian[:, place]
+    for number, column in enumerate(columns):
+        runs = []
+        step = 1e-4 * model.theta[column]
+        for sign in (1.0, -1.0):
+            theta = model.theta.copy()
+            theta[column] += sign * step
+            runs.append(simulate_arrays(model, record, "free_run", theta=theta, setup=setup).outputs[:, place])
+        slope = (runs[0] - runs[1]) / (2.0 * step)
+        assert np.max(np.abs(exact[:, number] - slope)) < 1e-2 * np.max(np.abs(slope))
+
+
+def test_table_does_what_it_was_read_of() -> None:
+    model = quasi_static()
+    run, found = moved(model), moved(with_table(table(model)))
+    assert apart(found, run, "axis.velocity") < 0.02
+    assert found.notes == ()
+
+
+def test_table_says_where_it_was_left() -> None:
+    narrow = with_table(table(quasi_static(), reach=0.02))
+    (note,) = moved(narrow).notes
+    assert note.startswith("axis.velocity is ")
+    assert "the table of its drive ends at -0.02 and 0.02 m/s (" in note
+    loud = moved(with_table(table(quasi_static())), size=12e-3)
+    assert loud.notes[0].startswith("servo.command is ")
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"commands": [0.0, 0.0]}, r"servo.commands has 0 after 0, but has to rise"),
+        ({"velocities": [0.0]}, r"servo.velocities has 1 number, but a table takes two or more"),
+        ({"efforts": [[1.0, 2.0]]}, r"servo.efforts has 1 rows, but there are 2 commands"),
+        ({"efforts": [[1.0, 2.0], [1.0]]}, r"servo.efforts\[1\] has 1 numbers, but there are 2 velocities"),
+    ],
+)
+def test_what_is_no_table_is_refused(change: dict[str, Any], message: str) -> None:
+    entry = {"type": "table", "commands": [0.0, 1.0], "velocities": [0.0, 1.0], "efforts": [[1.0, 2.0], [3.0, 4.0]]}
+    with pytest.raises(ModelError, match=message):
+        with_table({**entry, **change})
+
+
+def test_both_are_offered() -> None:
+    run = moved(RIG)
+    taught = {channel: run[channel] for channel in run.channels}
+    offered = reductions(RIG, tables(RIG, [taught], lambda model: [moved(model)]))["drive", "servo"]
+    words = [str(change) for change in offered]
+    assert "servo with quasi-static pressures" in words
+    assert "servo with a static spool and quasi-static pressures" in words
+    assert "servo as table" in words
+    states = {str(change): change.applied(RIG).core.n_states for change in offered}
+    assert states["servo as table"] == 2
+    assert states["servo with a static spool and quasi-static pressures"] == 2
+    assert states["servo with quasi-static pressures"] == 4
+
+
+def test_table_forgets_what_only_a_valve_has() -> None:
+    slow = RIG.with_effect("valve_dynamics", at="servo", time=1e-3)
+    model = replaced(slow, "servo", json.dumps(table(quasi_static())))
+    assert model.supplies == ()
+    assert all(effect.at != "servo" for effect in model.effects)
