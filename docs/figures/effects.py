@@ -259,10 +259,10 @@ def page() -> str:
 def _section(effect: EffectType) -> list[str]:
     signature = effect.signature
     lines = [f"## {effect.name}", "", f"At {_article(effect.site)}{_remarks(effect)}: `{effect.law}`", ""]
-    looks = f"over {', '.join(signature.lives_in)}: {_small(signature.looks)}".replace("_", " ")
     if effect.name in SHOWN:
-        lines += [f"![{looks}](figures/effects/{effect.name}.svg)", ""]
-    lines += [f"Shown best by {_small(signature.excite)}.", ""]
+        over = signature.lives_in[0].replace("_", " ")
+        lines += [f"![{effect.title} over {over}](figures/effects/{effect.name}.svg)", ""]
+    lines += [f"Shown best by {signature.excite[0].lower()}{signature.excite[1:]}.", ""]
     lines += _parameters(effect)
     if effect.confused_with:
         lines += ["", _confused(effect)]
@@ -294,10 +294,6 @@ def _confused(effect: EffectType) -> str:
     if not told:
         return f"{head}."
     return "\n".join([f"{head}, and:" if links else f"{head}:", "", *told])
-
-
-def _small(words: str) -> str:
-    return words[0].lower() + words[1:]
 
 
 def _article(site: str) -> str:
