@@ -232,9 +232,10 @@ INTRODUCTION = """# The catalogue of effects
 After this page you can write every effect in a [model file](model-file.md#effects) and recognise it in a residual. A
 [diagnosis](diagnosis.md) tries these effects.
 
-Each section has the law, a picture, the parameters (dotted suffix, unit, range) and the effects that records may
-confuse with it. *Slanted* parameters shape a law whose size another one gives. Pictures show what it adds to the
-inverse-dynamics residual (applied less required effort) of one link in gravity, or of a servo-cylinder.
+Each section has the law, a picture, the parameters (dotted suffix, unit, range, default) and effects that records may
+confuse with it; what discriminates two effects stands once, at the first. *Slanted* parameters shape a law whose size
+another one gives. Pictures show what the effect adds to the inverse-dynamics residual (applied less required effort) of
+one link in gravity, or of a servo-cylinder.
 
 tau is the effort that the effect adds, q and v coordinate and velocity of the joint, u the command, x a true value, y
 its reading. Units: C is m or rad, E is N or N m, U the unit of the command, S that of the sensor. Of two defaults the
@@ -262,7 +263,7 @@ def _section(effect: EffectType) -> list[str]:
     if effect.name in SHOWN:
         over = signature.lives_in[0].replace("_", " ")
         lines += [f"![{effect.title} over {over}](figures/effects/{effect.name}.svg)", ""]
-    lines += [f"Shown best by {signature.excite[0].lower()}{signature.excite[1:]}.", ""]
+    lines += [f"**Excite by** {signature.excite[0].lower()}{signature.excite[1:]}.", ""]
     lines += _parameters(effect)
     if effect.confused_with:
         lines += ["", _confused(effect)]
@@ -290,10 +291,8 @@ def _confused(effect: EffectType) -> str:
             links.append(link)
         else:
             told.append(f"- {link}: {how}")
-    head = f"Confused with {', '.join(links)} (see there)" if links else "Confused with"
-    if not told:
-        return f"{head}."
-    return "\n".join([f"{head}, and:" if links else f"{head}:", "", *told])
+    head = " ".join(["**Confused with**", *([", ".join(links)] if links else [])])
+    return "\n".join([f"{head}, and:" if links else f"{head}:", "", *told]) if told else f"{head}."
 
 
 def _article(site: str) -> str:
@@ -310,7 +309,7 @@ def _parameters(effect: EffectType) -> list[str]:
         if parameter.meaning.startswith("coefficient of ") and parameter.suffix == f"{effect.group}.{parameter.name}":
             terms.setdefault(parameter.unit, []).append(f"`{parameter.name}`")
         else:
-            lines.append(_line(parameter))
+            lines.append(_line(effect, parameter))
     for unit, names in terms.items():
         lines.append(
             f"- {', '.join(names)} (`{effect.group}.` and the name, {_plain(unit)}): coefficients of their terms"
@@ -322,10 +321,16 @@ def _plain(unit: str) -> str:
     return unit.replace("{", "").replace("}", "")
 
 
-def _line(parameter: EffectParameter) -> str:
+def _line(effect: EffectType, parameter: EffectParameter) -> str:
     name = f"*`{parameter.name}`*" if parameter.shape else f"`{parameter.name}`"
     words = [f"`{parameter.suffix}`", _plain(parameter.unit), *_bounds(parameter), *_default(parameter)]
-    return f"- {name} ({', '.join(words)}): {parameter.meaning}"
+    same = [
+        other.name
+        for other in EFFECTS.values()
+        if any((one.name, one.meaning) == (parameter.name, parameter.meaning) for one in other.parameters)
+    ]
+    meaning = parameter.meaning if same[0] == effect.name else f"as of [{same[0]}](#{same[0]})"
+    return f"- {name} ({', '.join(words)}): {meaning}"
 
 
 def _bounds(parameter: EffectParameter) -> list[str]:
@@ -333,7 +338,7 @@ def _bounds(parameter: EffectParameter) -> list[str]:
     if np.isinf(low) and np.isinf(high):
         return []
     if np.isinf(high):
-        return ["above 0" if low > 0.0 else f"{low:g} or more"]
+        return ["> 0" if low > 0.0 else f"≥ {low:g}"]
     return [f"{low:.3g} to {high:.3g}"]
 
 
