@@ -287,7 +287,7 @@ def _confused(effect: EffectType) -> str:
     names = list(EFFECTS)
     for other, how in effect.confused_with.items():
         link = f"[{other}](#{other})"
-        if names.index(other) < names.index(effect.name) and EFFECTS[other].confused_with[effect.name] == how:
+        if names.index(other) < names.index(effect.name) and EFFECTS[other].confused_with.get(effect.name) == how:
             links.append(link)
         else:
             told.append(f"- {link}: {how}")
