@@ -108,6 +108,9 @@ STRIP = {
 HYDRAULIC = ("cylinder", "supply")
 RIG = HERE.parent.parent / "examples" / "servo_cylinder" / "rig.toml"
 
+#: A default beyond it means that nothing comes there.
+FAR = 1e6
+
 SINES = ((0.62, 1.3, 0.0), (0.38, 2.9, 1.9), (0.22, 5.3, 0.6), (0.10, 9.1, 2.4), (0.05, 15.7, 4.0))
 
 
@@ -226,17 +229,20 @@ INTRODUCTION = """# The catalogue of effects
 
 <!-- Written by docs/figures/effects.py (make figures) from vpm.catalogue.effects, a file each: change it there. -->
 
-Every effect that a model file may contain and a diagnosis may name. Each section has the law; its parameters (bounds
-are what physics allows; *slanted* is what shapes a law whose size another parameter gives); what the effect adds to a
-residual, applied less required effort, drawn for one link on a horizontal axis that follows five sines or a chirp, or
-for a servo-cylinder; and what records may take it for, with what parts the two. Units follow the site: C is m or rad, E
-is N or N m, U the unit of the command, S that of the sensor. Keys of a model file: [model-file.md](model-file.md); what
-a diagnosis does with the entries: [diagnosis.md](diagnosis.md).
+After this page you can write every effect in a [model file](model-file.md#effects) and recognise it in a residual. A
+[diagnosis](diagnosis.md) tries these effects.
 
-A joint with [joint_compliance](#joint_compliance) or [backlash](#backlash) has two sides. On the motor side, before the
-spring or play, q and v are those of the joint, which are measured; on the link side, behind it, q + d and their rate,
-with the deflection d. Effects are on the motor side unless they say `side = "link"`; one of each may be on either.
-Without spring or play the sides are one.
+Each section has the law, a picture, the parameters (dotted suffix, unit, range, default) and effects that records may
+confuse with it; what discriminates two effects stands once, at the first. *Slanted* parameters shape a law whose size
+another one gives. Pictures show what the effect adds to the inverse-dynamics residual (applied less required effort) of
+one link in gravity, or of a servo-cylinder.
+
+tau is the effort that the effect adds, q and v coordinate and velocity of the joint, u the command, x a true value, y
+its reading. Units: C is m or rad, E is N or N m, U the unit of the command, S that of the sensor. Of two defaults the
+second is for joints that turn.
+
+Effects marked *side* may sit behind the spring of a [joint_compliance](#joint_compliance) or [backlash](#backlash) of
+their joint, by `side = "link"`. There q and v include the deflection.
 """
 
 
@@ -253,36 +259,40 @@ def page() -> str:
 
 def _section(effect: EffectType) -> list[str]:
     signature = effect.signature
-    lines = [
-        f"## {effect.name}",
-        "",
-        f"{effect.title[0].upper()}{effect.title[1:]}, at {_article(effect.site)}: `{effect.law}`",
-        "",
-    ]
-    if not effect.screened and effect.has_law:
-        lines += ["A search does not try it; a ranking does.", ""]
-    elif not effect.screened:
-        lines += ["A diagnosis does not try it, but describes by it what it cannot name.", ""]
-    if effect.has_sides:
-        lines += ['**Side:** motor, or link with `side = "link"`.', ""]
-    if effect.requires:
-        lines += [f"A correction of [{effect.requires}](#{effect.requires}), which has to be there.", ""]
+    lines = [f"## {effect.name}", "", f"At {_article(effect.site)}{_remarks(effect)}: `{effect.law}`", ""]
     if effect.name in SHOWN:
-        lines += [f"![What {effect.title} does to a residual](figures/effects/{effect.name}.svg)", ""]
-    axes = ", ".join(axis.replace("_", " ") for axis in signature.lives_in)
-    lines += [f"**Looks like**, over {axes}: {signature.looks[0].lower()}{signature.looks[1:]}.", ""]
-    lines += ["| parameter | unit | bounds | meaning |", "| --- | --- | --- | --- |"]
-    lines += [_row(parameter) for parameter in effect.parameters]
-    lines += [
-        "",
-        f"**Impossible:** {effect.impossible}.",
-        "",
-        f"**Shown best by:** {signature.excite[0].lower()}{signature.excite[1:]}.",
-    ]
+        over = signature.lives_in[0].replace("_", " ")
+        lines += [f"![{effect.title} over {over}](figures/effects/{effect.name}.svg)", ""]
+    lines += [f"**Excite by** {signature.excite[0].lower()}{signature.excite[1:]}.", ""]
+    lines += _parameters(effect)
     if effect.confused_with:
-        lines += ["", "**Taken for:**", ""]
-        lines += [f"- [{other}](#{other}): {how}." for other, how in effect.confused_with.items()]
+        lines += ["", _confused(effect)]
     return lines
+
+
+def _remarks(effect: EffectType) -> str:
+    remarks = []
+    if effect.has_sides:
+        remarks.append("*side*")
+    if effect.requires:
+        remarks.append(f"corrects [{effect.requires}](#{effect.requires}), which has to be there")
+    if not effect.screened:
+        remarks.append("tried by rankings only" if effect.has_law else "describes what no effect explains")
+    return f" ({'; '.join(remarks)})" if remarks else ""
+
+
+def _confused(effect: EffectType) -> str:
+    """Effects that look alike; where both entries say the same, what discriminates them stands at the first."""
+    told, links = [], []
+    names = list(EFFECTS)
+    for other, how in effect.confused_with.items():
+        link = f"[{other}](#{other})"
+        if names.index(other) < names.index(effect.name) and EFFECTS[other].confused_with.get(effect.name) == how:
+            links.append(link)
+        else:
+            told.append(f"- {link}: {how}")
+    head = " ".join(["**Confused with**", *([", ".join(links)] if links else [])])
+    return "\n".join([f"{head}, and:" if links else f"{head}:", "", *told]) if told else f"{head}."
 
 
 def _article(site: str) -> str:
@@ -291,17 +301,57 @@ def _article(site: str) -> str:
     return f"an {site}" if site[0] in "aeiou" else f"a {site}"
 
 
-def _row(parameter: EffectParameter) -> str:
-    unit = parameter.unit.replace("{", "").replace("}", "")
+def _parameters(effect: EffectType) -> list[str]:
+    """A line for each parameter; coefficients of terms that the law lists share one line for each unit."""
+    terms: dict[str, list[str]] = {}
+    lines = []
+    for parameter in effect.parameters:
+        if parameter.meaning.startswith("coefficient of ") and parameter.suffix == f"{effect.group}.{parameter.name}":
+            terms.setdefault(parameter.unit, []).append(f"`{parameter.name}`")
+        else:
+            lines.append(_line(effect, parameter))
+    for unit, names in terms.items():
+        lines.append(
+            f"- {', '.join(names)} (`{effect.group}.` and the name, {_plain(unit)}): coefficients of their terms"
+        )
+    return lines
+
+
+def _plain(unit: str) -> str:
+    return unit.replace("{", "").replace("}", "")
+
+
+def _line(effect: EffectType, parameter: EffectParameter) -> str:
     name = f"*`{parameter.name}`*" if parameter.shape else f"`{parameter.name}`"
+    words = [f"`{parameter.suffix}`", _plain(parameter.unit), *_bounds(parameter), *_default(parameter)]
+    same = [
+        other.name
+        for other in EFFECTS.values()
+        if any((one.name, one.meaning) == (parameter.name, parameter.meaning) for one in other.parameters)
+    ]
+    meaning = parameter.meaning if same[0] == effect.name else f"as of [{same[0]}](#{same[0]})"
+    return f"- {name} ({', '.join(words)}): {meaning}"
+
+
+def _bounds(parameter: EffectParameter) -> list[str]:
     low, high = parameter.physical
     if np.isinf(low) and np.isinf(high):
-        bounds = "any"
-    elif np.isinf(high):
-        bounds = "above 0" if low > 0.0 else f"{low:g} or more"
-    else:
-        bounds = f"{low:.3g} to {high:.3g}"
-    return f"| {name} | {unit} | {bounds} | {parameter.meaning} |"
+        return []
+    if np.isinf(high):
+        return ["> 0" if low > 0.0 else f"≥ {low:g}"]
+    return [f"{low:.3g} to {high:.3g}"]
+
+
+def _default(parameter: EffectParameter) -> list[str]:
+    """Of what shapes a law alone: of the others a file has to give one at least."""
+    if not parameter.shape or parameter.optional:
+        return []
+    shifts, turns = (parameter.default(kind) for kind in ("prismatic", "revolute"))
+    if shifts is None or turns is None:
+        return ["required"]
+    if abs(shifts) > FAR:
+        return ["by default none"]
+    return [f"default {shifts:g}" if shifts == turns else f"default {shifts:g} or {turns:g}"]
 
 
 def main(folder: Path) -> None:

@@ -221,14 +221,16 @@ def test_unknown_names_get_a_repair() -> None:
 
 
 @pytest.mark.parametrize("effect", EFFECTS.values(), ids=name_of)
-def test_the_page_about_the_model_file_lists_the_effect(effect: EffectType) -> None:
-    page = (ROOT / "docs" / "model-file.md").read_text(encoding="utf-8")
-    row = next(line for line in page.splitlines() if line.startswith(f"| `{effect.name}` | {effect.site} |"))
+def test_the_page_of_the_catalogue_has_what_a_model_file_needs(effect: EffectType) -> None:
+    page = (ROOT / "docs" / "catalogue.md").read_text(encoding="utf-8")
+    section = page.split(f"\n## {effect.name}\n", 1)[1].split("\n## ", 1)[0]
+    assert effect.site in section
+    assert effect.law in section
     for parameter in effect.parameters:
         unit = parameter.unit.replace("{", "").replace("}", "")
         name = f"*`{parameter.name}`*" if parameter.shape else f"`{parameter.name}`"
-        assert f"{name} [{unit}] `{parameter.suffix}`" in row
-    assert effect.law.replace("|", "\\|") in row
+        line = next(line for line in section.splitlines() if line.startswith("- ") and name in line.split(": ")[0])
+        assert f"`{parameter.suffix}`, {unit}" in line or f"`{effect.group}.` and the name, {unit}" in line
 
 
 def test_descriptions_name_every_effect_of_joints_and_bodies() -> None:

@@ -37,7 +37,7 @@ EFFECT = EffectType(
     confused_with={
         "bias_force": (
             "a difference of Coulomb friction and a constant load agree wherever the joint moves; only standstill and"
-            " starts from rest part them"
+            " starts from rest discriminate"
         ),
     },
     contains=("bias_force",),

@@ -28,7 +28,7 @@ EFFECT = EffectType(
             "backlash.stiffness",
             "{E}/{C}",
             "effort_per_coordinate",
-            "effort per way beyond the play",
+            "effort per way beyond the gap",
             physical=NOT_NEGATIVE,
         ),
         size(
@@ -36,7 +36,7 @@ EFFECT = EffectType(
             "backlash.damping",
             "{E} s/{C}",
             "effort_per_speed",
-            "resistance per speed, within the play and beyond",
+            "resistance per speed, within the gap and beyond",
             physical=NOT_NEGATIVE,
         ),
         size(
@@ -61,7 +61,7 @@ EFFECT = EffectType(
     ),
     impossible="a negative stiffness would pull the contacts into each other, a negative damping would feed energy in",
     confused_with={
-        "joint_compliance": "they agree where the load never changes its sign; reversals and small motion part them",
+        "joint_compliance": "they agree where the load never changes its sign; reversals and small motion discriminate",
     },
     contains=("rotor_inertia",),
     motion="deflection",
@@ -71,6 +71,6 @@ EFFECT = EffectType(
     signature=Signature(
         ("position", "effort"),
         "A flat part where nothing is passed on, with a step wherever the effort changes its sign",
-        "Reversals under a small load, with a sensor on either side of the play",
+        "Reversals under a small load, with a sensor on either side of the gap",
     ),
 )

@@ -12,15 +12,15 @@ EFFECT = EffectType(
     sentence="{at} carries a constant load of {force}, in either direction and at rest.",
     impossible="either sign is possible: it says in which direction the load pulls",
     confused_with={
-        "gravity_tilt": "they agree where gravity's lever does not change; other poses part them",
-        "coulomb_friction": "motion in one direction alone does not part them; motion in both directions does",
+        "gravity_tilt": "they agree where gravity's lever does not change; other poses discriminate",
+        "coulomb_friction": "motion in one direction alone does not discriminate; motion in both directions does",
         "asymmetric_friction": (
             "a constant load and a difference of Coulomb friction agree wherever the joint moves; only standstill and"
-            " starts from rest part them"
+            " starts from rest discriminate"
         ),
-        "payload": "they agree where gravity's lever does not change; other poses or fast motion part them",
-        "sensor_offset": "through gravity or a spring a shifted zero acts like a load; other poses part them",
-        "spring": "they agree over a short way; motion over a longer way parts them",
+        "payload": "they agree where gravity's lever does not change; other poses or fast motion discriminate",
+        "sensor_offset": "through gravity or a spring a shifted zero acts like a load; other poses discriminate",
+        "spring": "they agree over a short way; motion over a longer way discriminates",
     },
     usual="force",
     signature=Signature(

@@ -23,8 +23,8 @@ EFFECT = EffectType(
     sentence="{at} does not answer to commands below {width}, and takes as much off larger ones.",
     impossible="a negative dead zone would mean that the drive acts on no command at all",
     confused_with={
-        "coulomb_friction": "they agree wherever command and velocity have the same sign; braking parts them",
-        "stribeck_friction": "both hold the joint at rest under small commands; slow reversals under load part them",
+        "coulomb_friction": "they agree wherever command and velocity have the same sign; braking discriminates",
+        "stribeck_friction": "both hold the joint at rest under small commands; slow reversals under load discriminate",
     },
     signature=Signature(
         ("command",),

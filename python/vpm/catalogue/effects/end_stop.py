@@ -40,8 +40,8 @@ EFFECT = EffectType(
     ),
     impossible="a negative stiffness would pull the joint beyond its end",
     confused_with={
-        "spring": "they agree over a way beyond the end alone; motion on both sides of it parts them",
-        "saturation": "both stop the motion at large commands; the same command in the middle of the way parts them",
+        "spring": "they agree over a way beyond the end alone; motion on both sides of it discriminates",
+        "saturation": "both stop the motion at large commands; the same command in the middle of the way discriminates",
     },
     impacts=True,
     link_side_alone=True,

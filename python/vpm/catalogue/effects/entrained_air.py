@@ -45,8 +45,8 @@ EFFECT = EffectType(
     sentence="The oil of {at} carries {fraction} of its volume as air beyond what is described.",
     impossible="a negative fraction would be oil stiffer than its bulk modulus: correct that",
     confused_with={
-        "valve_dynamics": "both delay the force behind the command; the spool or both pressures part them",
-        "actuator_lag": "both delay the force behind the command; pressures at a loaded piston part them",
+        "valve_dynamics": "both delay the force behind the command; the spool or both pressures discriminate",
+        "actuator_lag": "both delay the force behind the command; pressures at a loaded piston discriminate",
     },
     # Data hardly show in which way air is compressed.
     fixed=("exponent", "reference_pressure"),

@@ -22,9 +22,9 @@ EFFECT = EffectType(
     sentence="The base is not level: gravity is turned by {first} and {second} about the horizontal axes of the {at}.",
     impossible="beyond 90 degrees gravity would point upwards: correct its direction in the model",
     confused_with={
-        "bias_force": "they agree where gravity's lever does not change; other poses part them",
+        "bias_force": "they agree where gravity's lever does not change; other poses discriminate",
         "payload": "both change the load of gravity; fast motion shows the payload's inertia",
-        "sensor_offset": "a shifted zero of an angle turns gravity for all that hangs on it; other poses part them",
+        "sensor_offset": "a shifted zero of an angle turns gravity for all that hangs on it; other poses discriminate",
     },
     exact=True,
     signature=Signature(

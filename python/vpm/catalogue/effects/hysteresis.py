@@ -50,9 +50,9 @@ EFFECT = EffectType(
     ),
     impossible="a negative hysteresis would give out more energy in every loop than went in",
     confused_with={
-        "coulomb_friction": "they agree but for the way after a reversal; short strokes and slow reversals part them",
-        "stribeck_friction": "both shape the start of a motion; starts at several accelerations part speed from way",
-        "spring": "they agree over ways that are too short to slide; a longer way parts them",
+        "coulomb_friction": "they agree but after a reversal; short strokes and slow reversals discriminate",
+        "stribeck_friction": "both shape the start of a motion; starts at several accelerations discriminate",
+        "spring": "they agree over ways that are too short to slide; a longer way discriminates",
     },
     sticks=True,
     tried=(

@@ -13,9 +13,9 @@ EFFECT = EffectType(
     sentence="{at} acts on a command {time} late.",
     impossible="a negative delay would mean that the drive acts before it is told to: check the time stamps of the log",
     confused_with={
-        "valve_dynamics": "they agree for slow commands; steps and fast commands part them",
-        "actuator_lag": "they agree for slow commands; steps and fast commands part them",
-        "sensor_delay": "from commands to readings only their sum shows; a second sensor or time stamps part them",
+        "valve_dynamics": "they agree for slow commands; steps and fast commands discriminate",
+        "actuator_lag": "they agree for slow commands; steps and fast commands discriminate",
+        "sensor_delay": "from commands to readings only their sum shows; a second sensor or time stamps discriminate",
     },
     late="delay",
     signature=Signature(("command_rate",), "A straight line over the rate of the command", "Steps and fast commands"),

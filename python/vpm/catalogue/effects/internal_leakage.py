@@ -22,7 +22,7 @@ EFFECT = EffectType(
     sentence="The piston of {at} leaks {coefficient} more from chamber to chamber than described.",
     impossible="less leakage than described: a negative one means that the described leakage is too large; correct it",
     confused_with={
-        "viscous_friction": "both let a loaded piston give way; the pressures of both chambers part them",
+        "viscous_friction": "both let a loaded piston give way; the pressures of both chambers discriminate",
         "supply_drop": "both lower the pressures under load; a load held at rest shows the leakage alone",
     },
     signature=Signature(

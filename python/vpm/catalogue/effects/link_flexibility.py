@@ -49,7 +49,7 @@ EFFECT = EffectType(
     sentence="{at} bends: its tip gives way like a hinge at its root with {stiffness}, damped over {time}.",
     impossible="a negative stiffness would bend the link by itself, a negative damping would feed energy in",
     confused_with={
-        "joint_compliance": "behind one motor both are a spring; a strain gauge or the motion of the tip parts them",
+        "joint_compliance": "behind one motor both are a spring; a strain gauge or the motion of the tip discriminates",
     },
     contains=("rotor_inertia",),
     motion="bending",

@@ -26,10 +26,10 @@ EFFECT = EffectType(
     confused_with={
         "gravity_tilt": "both change the load of gravity; fast motion shows the payload's inertia",
         "rotor_inertia": "both need effort to accelerate; a payload has weight and loads the joints before it too",
-        "bias_force": "they agree where gravity's lever does not change; other poses or fast motion part them",
-        "spring": "near the hanging position gravity acts like a spring; large angles or fast motion part them",
-        "torque_ripple": "gravity on a revolute joint repeats once per turn; a vertical axis or fast motion parts them",
-        "sensor_gain": "both scale the effort that an acceleration needs; a record with a known load parts them",
+        "bias_force": "they agree where gravity's lever does not change; other poses or fast motion discriminate",
+        "spring": "near the hanging position gravity acts like a spring; large angles or fast motion discriminate",
+        "torque_ripple": "gravity repeats once per turn; a vertical axis or fast motion discriminates",
+        "sensor_gain": "both scale the effort that an acceleration needs; a record with a known load discriminates",
     },
     exact=True,
     signature=Signature(

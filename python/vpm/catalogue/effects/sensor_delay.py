@@ -13,8 +13,8 @@ EFFECT = EffectType(
     sentence="{at} reads {time} late.",
     impossible="a negative delay would mean a reading ahead of the motion: check the time stamps of the log",
     confused_with={
-        "input_delay": "from commands to readings only their sum shows; a second sensor or time stamps part them",
-        "actuator_lag": "they agree for slow motion; steps and fast motion part them",
+        "input_delay": "from commands to readings only their sum shows; a second sensor or time stamps discriminate",
+        "actuator_lag": "they agree for slow motion; steps and fast motion discriminate",
     },
     late="delay",
     signature=Signature(

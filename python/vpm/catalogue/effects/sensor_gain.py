@@ -23,9 +23,9 @@ EFFECT = EffectType(
     sentence="{at} reads {value} times the true value.",
     impossible="a gain of zero or less would mean a reading that does not follow the motion, or runs against it",
     confused_with={
-        "rotor_inertia": "both scale the effort that an acceleration needs; a record with a known load parts them",
-        "payload": "both scale the effort that an acceleration needs; a record with a known load parts them",
-        "viscous_friction": "both scale the effort that a speed needs; a reference length parts them",
+        "rotor_inertia": "both scale the effort that an acceleration needs; a record with a known load discriminates",
+        "payload": "both scale the effort that an acceleration needs; a record with a known load discriminates",
+        "viscous_friction": "both scale the effort that a speed needs; a reference length discriminates",
     },
     scales=True,
     signature=Signature(

@@ -23,9 +23,9 @@ EFFECT = EffectType(
     sentence="{at} reads {value} too much, always.",
     impossible="either sign is possible: it says in which direction the zero is shifted",
     confused_with={
-        "gravity_tilt": "a shifted zero of an angle turns gravity for all that hangs on it; other poses part them",
-        "bias_force": "through gravity or a spring a shifted zero acts like a load; other poses part them",
-        "spring": "a shifted zero and a shifted rest position agree; a reference position parts them",
+        "gravity_tilt": "a shifted zero of an angle turns gravity for all that hangs on it; other poses discriminate",
+        "bias_force": "through gravity or a spring a shifted zero acts like a load; other poses discriminate",
+        "spring": "a shifted zero and a shifted rest position agree; a reference position discriminates",
     },
     signature=Signature(
         ("position", "time"),

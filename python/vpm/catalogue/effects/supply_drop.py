@@ -35,8 +35,8 @@ EFFECT = EffectType(
     impossible="a negative resistance would mean a pressure that rises as oil is drawn",
     confused_with={
         "internal_leakage": "both lower the pressures under load; a load held at rest shows the leakage alone",
-        "saturation": "both limit the speed; a log of the pressure at the valve parts them",
-        "viscous_friction": "both weaken fast motion; the pressures of both chambers part them",
+        "saturation": "both limit the speed; a log of the pressure at the valve discriminates",
+        "viscous_friction": "both weaken fast motion; the pressures of both chambers discriminate",
     },
     # Hoses and filters lose their pressure within these.
     tried=(Tried("time_constant", "one", (0.01, 0.05, 0.2), (1e-3, 5.0)),),

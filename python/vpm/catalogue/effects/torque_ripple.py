@@ -23,8 +23,8 @@ EFFECT = EffectType(
     sentence="{at} is loaded by a ripple that repeats every {period}, with {cosine} (cosine) and {sine} (sine).",
     impossible="either sign is possible: the signs say where in the period the ripple is greatest",
     confused_with={
-        "spring": "they agree over less than a quarter of a period; a longer way parts them",
-        "payload": "gravity on a revolute joint repeats once per turn; a vertical axis or fast motion parts them",
+        "spring": "they agree over less than a quarter of a period; a longer way discriminates",
+        "payload": "gravity repeats once per turn; a vertical axis or fast motion discriminates",
     },
     signature=Signature(
         ("position",),

@@ -23,9 +23,9 @@ EFFECT = EffectType(
     sentence="The spool of {at} is slower than described: {time} comes on top of the inverse of its natural frequency.",
     impossible="a negative time means a spool faster than described: correct the frequency of the valve",
     confused_with={
-        "actuator_lag": "a lag is a pole before the spool, this is the spool itself; fast commands part them",
-        "input_delay": "they agree for slow commands; steps and fast commands part them",
-        "entrained_air": "both delay the force behind the command; the spool or both pressures part them",
+        "actuator_lag": "a lag is a pole before the spool, this is the spool itself; fast commands discriminate",
+        "input_delay": "they agree for slow commands; steps and fast commands discriminate",
+        "entrained_air": "both delay the force behind the command; the spool or both pressures discriminate",
     },
     late="spool",
     signature=Signature(
