@@ -11,23 +11,23 @@ from itertools import chain
 from typing import TypedDict, get_args
 
 from vpm.discrepancy.ambiguity import Rivals, listed
-from vpm.discrepancy.apart import only_where_closed
 from vpm.discrepancy.assembled import accepted_effect, classes, examined, gaps_of, of_search, step
-from vpm.discrepancy.begun import Records, data_of, nominal_of, recalibrated_of, records_of
 from vpm.discrepancy.by_ranking import observed_gaps
 from vpm.discrepancy.candidates import asked_for
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis, Empirical
+from vpm.discrepancy.discriminating_experiment import experiments as experiments_for
 from vpm.discrepancy.empirical import beside
 from vpm.discrepancy.evidence import gather
-from vpm.discrepancy.overheard import overheard
+from vpm.discrepancy.plot_samples import pictures, traces, where
+from vpm.discrepancy.preparation import Records, data_of, nominal_of, recalibrated_of, records_of
 from vpm.discrepancy.provenance import own_settings, provenance
+from vpm.discrepancy.recorded_calls import overheard
 from vpm.discrepancy.remainder import Remainder, remainder
+from vpm.discrepancy.residual_by_joint import only_where_closed
 from vpm.discrepancy.search import Search, ambiguities
-from vpm.discrepancy.shown import pictures, traces, where
 from vpm.discrepancy.side_by_side import Progress, SideBySide
-from vpm.discrepancy.telling_apart import experiments as experiments_for
 from vpm.discrepancy.verdict import is_negligible, verdict
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records

@@ -15,7 +15,7 @@ from vpm.experiment import Experiment, Motion, joints_from_shafts, motion
 from vpm.model import Model
 from vpm.model.commanded import commanded_states
 from vpm.model.loop_states import kept, measured
-from vpm.model.settled import follow, rest
+from vpm.model.steady_state import follow, rest
 
 Array = NDArray[np.float64]
 

@@ -12,11 +12,11 @@ from vpm.discrepancy.by_ranking import free_joints, searched, why_not_ranked
 from vpm.discrepancy.by_ranking import notes as notes_of
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.contacts import with_told_contacts
-from vpm.discrepancy.overlooked import overlooked
+from vpm.discrepancy.forward_step import overlooked
+from vpm.discrepancy.rival_discrimination import told_apart
+from vpm.discrepancy.rival_exchange import in_order, replaced, timed_again
 from vpm.discrepancy.search import Search, further, search
 from vpm.discrepancy.side_by_side import SideBySide
-from vpm.discrepancy.standing import in_order, replaced, timed_again
-from vpm.discrepancy.told_apart import told_apart
 from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model

@@ -15,7 +15,7 @@ import vpm
 from vpm.demo import MODEL, TRAIN, VALIDATION
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.numbers import percent, short
-from vpm.report.words import estimate, took
+from vpm.report.messages import estimate, took
 
 HTML, SVG = "{http://www.w3.org/1999/xhtml}", "{http://www.w3.org/2000/svg}"
 #: Most bytes of a page.

@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from shared_cases import shared_case
-from vpm.discrepancy.coloured import noise_shapes, noise_spectrum
 from vpm.discrepancy.floor import noise_floor
+from vpm.discrepancy.noise_spectrum import noise_shapes, noise_spectrum
 from vpm.discrepancy.structure import structure
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.identify.along import Response

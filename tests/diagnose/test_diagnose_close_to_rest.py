@@ -7,7 +7,7 @@ import pytest
 
 import vpm
 from shared_cases import shared_case
-from vpm.discrepancy.own_run import as_it_is, misfit
+from vpm.discrepancy.closed_loop_prediction import as_it_is, misfit
 from vpm.simulate import Setup
 
 CLOSE_TO_REST = "stribeck_friction"

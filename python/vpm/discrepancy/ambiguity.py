@@ -10,7 +10,7 @@ from vpm.discrepancy.candidates import Candidate, Key, candidates
 from vpm.discrepancy.choice import Accepted, alike
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity
-from vpm.discrepancy.finer import seen_beside
+from vpm.discrepancy.nested_model import seen_beside
 from vpm.discrepancy.refusal import LEAST_GAIN
 from vpm.discrepancy.screening import Probe, impossible_values, probe, refit_effort, screening_effort
 from vpm.discrepancy.search import Tried

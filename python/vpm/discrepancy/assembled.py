@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from vpm.discrepancy.ambiguity import Rivals
-from vpm.discrepancy.begun import Records
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, is_clear, weaker
 from vpm.discrepancy.diagnosis import (
@@ -19,6 +18,7 @@ from vpm.discrepancy.diagnosis import (
 )
 from vpm.discrepancy.elimination import Stage
 from vpm.discrepancy.floor import noise_floor
+from vpm.discrepancy.preparation import Records
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.structure import Structure, structure
 from vpm.discrepancy.timing import in_time

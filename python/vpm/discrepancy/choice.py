@@ -12,9 +12,9 @@ from vpm.catalogue.kinds import Side
 from vpm.catalogue.traits import Late
 from vpm.discrepancy.candidates import Candidate, Key
 from vpm.discrepancy.confirmation import Data, Trial
-from vpm.discrepancy.driven import ODDS, Runs, compare_driven
-from vpm.discrepancy.own_reading import read_by_itself
+from vpm.discrepancy.reference_response import ODDS, Runs, compare_driven
 from vpm.discrepancy.refusal import LEAST_GAIN
+from vpm.discrepancy.sensor_prediction import read_by_itself
 from vpm.discrepancy.structural import coupled
 from vpm.identify import Gain
 

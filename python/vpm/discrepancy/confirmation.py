@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.discrepancy.candidates import joint_at
-from vpm.discrepancy.late import gain_alone, timed_alone
+from vpm.discrepancy.closed_loop_delay import gain_alone, timed_alone
+from vpm.discrepancy.closed_loop_prediction import OwnRun
+from vpm.discrepancy.low_frequency import has_impacts, slow
 from vpm.discrepancy.motion_only import CREEPING, Timed, is_dry, is_late
-from vpm.discrepancy.own_run import OwnRun
 from vpm.discrepancy.screening import Alias, Baseline, Probe, size_is_clear
-from vpm.discrepancy.slow import has_impacts, slow
 from vpm.discrepancy.starting import nearer_start
 from vpm.discrepancy.structural import ends_apart
 from vpm.errors import DivergedError

@@ -1,9 +1,9 @@
-"""How hard the contacts of a play are, and what is between them: asked of runs of the model itself.
+"""Stiffness and damping of the contacts of a backlash, from closed-loop predictions of the model.
 
-Along a measured motion the flights of a link add up their errors, so that a balance of effort wants contacts that
-swallow impacts, and takes their damping for softness and for less inertia before them. In closed loop the controller
-leads a run of the model itself back to its reference after every impact: it tells hard contacts from soft ones. How
-wide the play is, and how much the contacts have to swallow, stays with the balance.
+Along a measured motion the errors of simulated flights accumulate. The inverse-dynamics residual therefore prefers
+contacts that absorb impacts, and confuses their damping with softness and with a smaller inertia before them. In closed
+loop the controller brings the model back to its reference after every impact, so hard and soft contacts differ. The
+width of the backlash and the damping of the contacts still come from the residual.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from vpm.discrepancy.backlash import is_read_off
 from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.choice import Accepted
+from vpm.discrepancy.closed_loop_prediction import OwnRun, own_run
 from vpm.discrepancy.confirmation import Data, Judged, judge
-from vpm.discrepancy.own_run import OwnRun, own_run
-from vpm.discrepancy.play import is_read_off
 from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, WORTH_A_NAME
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.side_by_side import Failure, SideBySide

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from vpm.discrepancy.backlash import is_read_off, only_winds_up
 from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, judge
-from vpm.discrepancy.play import is_read_off, only_winds_up
 from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED
 from vpm.errors import DivergedError, ModelError
 from vpm.identify import gain, segments

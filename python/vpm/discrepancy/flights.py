@@ -1,8 +1,8 @@
-"""Flights of a link through a play along the measured motion, from one soft contact to the other.
+"""Flights of a link through a backlash along the measured motion, from one soft contact to the other.
 
-Along a motion that is measured with noise and within a band, nothing can be said of every bounce between hard contacts:
-each enlarges the error of the one before. Soft, well damped contacts forget the flight before, pass on what is slow as
-hard ones do, and so show how wide the play is, however hard it is in truth.
+Along a noisy motion within a band, single bounces between hard contacts are not predictable: each enlarges the error of
+the one before. Soft, well damped contacts forget the flight before and pass on low frequencies as hard ones do. They
+therefore show the width of the backlash, whatever the true stiffness of its contacts.
 """
 
 from __future__ import annotations

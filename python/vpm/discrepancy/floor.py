@@ -1,4 +1,4 @@
-"""How small the gap could be at best: noise, and the error of the comparison itself, in the same balance."""
+"""Noise floor of the residual: noise, and the error of the comparison itself."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.discrepancy.coloured import noise_shapes, noise_spectrum, with_noise
+from vpm.discrepancy.noise_spectrum import noise_shapes, noise_spectrum, with_noise
 from vpm.errors import VpmError
 from vpm.experiment import Experiment, noise_std
 from vpm.experiment.signal import RETAINED_BAND

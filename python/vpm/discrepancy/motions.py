@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.discrepancy.seen import Seen
+from vpm.discrepancy.excitation_range import Seen
 from vpm.excitation import Excitation, JointLimits, chirp, multisine, trapezoid
 
 Array = NDArray[np.float64]

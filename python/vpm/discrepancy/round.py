@@ -9,13 +9,15 @@ from functools import cached_property, partial
 import numpy as np
 
 from vpm.catalogue import EFFECTS
+from vpm.discrepancy.backlash import is_read_off, only_winds_up
 from vpm.discrepancy.candidates import Candidate, Key, candidates, joint_at, left_out
 from vpm.discrepancy.choice import Accepted, choose
+from vpm.discrepancy.closed_loop_prediction import OwnRun
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, finished
 from vpm.discrepancy.diagnosis import RankedCandidate
+from vpm.discrepancy.friction_near_rest import asks_for, asks_runs, run_without, told_by_runs
+from vpm.discrepancy.low_frequency import slow
 from vpm.discrepancy.motion_only import in_motion, is_late
-from vpm.discrepancy.own_run import OwnRun
-from vpm.discrepancy.play import is_read_off, only_winds_up
 from vpm.discrepancy.refusal import (
     CLEAR_GAIN,
     Thresholds,
@@ -30,8 +32,6 @@ from vpm.discrepancy.ringing import NOISE_ONLY, noise_alone, only_ringing
 from vpm.discrepancy.screening import Probe, prepare, probe, refit_effort, screening_effort
 from vpm.discrepancy.short_list import SHORT_LIST, most_promising, same_models
 from vpm.discrepancy.side_by_side import Failure, SideBySide
-from vpm.discrepancy.slow import slow
-from vpm.discrepancy.sticking import asks_for, asks_runs, run_without, told_by_runs
 from vpm.discrepancy.structure import structure
 from vpm.discrepancy.timing import InTime, in_time
 from vpm.identify import gain, segments

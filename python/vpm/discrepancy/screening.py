@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from vpm.discrepancy.backlash import believed, is_read_off, read_off
 from vpm.discrepancy.candidates import Candidate
 from vpm.discrepancy.first_step import is_outside, linear_step, softened, step_without
-from vpm.discrepancy.place import free_place
-from vpm.discrepancy.play import believed, is_read_off, read_off
+from vpm.discrepancy.joint_compliance import best_start, is_looked_for
+from vpm.discrepancy.location_parameter import free_place
 from vpm.discrepancy.structural import LOSSES, in_series
-from vpm.discrepancy.winding import best_start, is_looked_for
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import bends
 from vpm.identify.identifiability import closest_column, is_alias

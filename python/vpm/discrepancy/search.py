@@ -9,11 +9,11 @@ from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, Trial
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
+from vpm.discrepancy.effect_pair import Pair, together
 from vpm.discrepancy.elimination import Stage, drop_replaced, drop_springs, settled, without_tight_bounds
 from vpm.discrepancy.round import Round, Tell
 from vpm.discrepancy.screening import Probe
 from vpm.discrepancy.side_by_side import SideBySide
-from vpm.discrepancy.together import Pair, together
 from vpm.identify.tangent import has_tangent
 from vpm.model import Model
 

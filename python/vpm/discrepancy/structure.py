@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.discrepancy.coloured import noise_shapes, noise_spectrum
 from vpm.discrepancy.floor import QUIET_SHARE, white_level
+from vpm.discrepancy.noise_spectrum import noise_shapes, noise_spectrum
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.model import Model
 

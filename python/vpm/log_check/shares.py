@@ -15,7 +15,7 @@ from vpm.catalogue.effects import BUILT_IN
 from vpm.experiment import Experiment
 from vpm.initial import initial_state
 from vpm.log_check.correction import Correction
-from vpm.log_check.late import Late, with_delay, without_delay
+from vpm.log_check.delay import Late, with_delay, without_delay
 from vpm.log_check.settings import Settings
 from vpm.model import Model
 from vpm.observer import measured_outputs

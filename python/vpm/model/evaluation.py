@@ -13,7 +13,7 @@ from vpm.model.loop_rest import resting
 from vpm.model.loop_states import close, reduced
 from vpm.model.loops import Loops
 from vpm.model.motions import Motions
-from vpm.model.settled import follow, rest
+from vpm.model.steady_state import follow, rest
 from vpm.numbers import array_of, number_of
 
 Array = NDArray[np.float64]

@@ -12,8 +12,8 @@ from vpm.discrepancy import Diagnosis
 from vpm.errors import MissingExtraError
 from vpm.files import write_text
 from vpm.numbers import percent, short
+from vpm.report.messages import VERDICT_WORDS, estimate, last_stage, probability, refitted, step_name, took
 from vpm.report.pictures import Drawn, drawn, finding, pictures, within
-from vpm.report.words import VERDICT_WORDS, estimate, last_stage, probability, refitted, step_name, took
 from vpm.simplify import Ladder
 
 #: Characters of a page beside the words of its pictures, so that it stays below a megabyte.

@@ -26,7 +26,7 @@ from vpm.plot.findings import (
     plot_traces,
 )
 from vpm.plot.signals import amplitude_density
-from vpm.report.words import last_stage
+from vpm.report.messages import last_stage
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

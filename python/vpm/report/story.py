@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from vpm.discrepancy import ChannelGap, Diagnosis
 from vpm.numbers import percent, short
-from vpm.report.words import VERDICT_WORDS, estimate, probability, step_name, took
+from vpm.report.messages import VERDICT_WORDS, estimate, probability, step_name, took
 
 if TYPE_CHECKING:
     from rich.console import Console

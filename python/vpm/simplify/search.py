@@ -18,7 +18,7 @@ from vpm.errors import SimulationError
 from vpm.experiment import Experiment, as_records
 from vpm.model import Model
 from vpm.simplify.judge import FITTING, Judge, by_the_model, reference_mode, shown
-from vpm.simplify.ladder import Ladder, Rung, pareto
+from vpm.simplify.pareto_front import Ladder, Rung, pareto
 from vpm.simplify.reductions import COUPLING_TERMS, OFFERED, VELOCITY_TERMS, Reduction, reduced, reductions
 from vpm.simplify.shares import ROUNDING, deformation_share, effort_share, motions, ranked
 from vpm.simplify.surrogates import surrogates

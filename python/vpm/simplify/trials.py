@@ -14,7 +14,7 @@ from vpm.errors import ExecutorError, SimulationError, VpmError
 from vpm.model import Model
 from vpm.simplify.course import Courses
 from vpm.simplify.judge import Judge
-from vpm.simplify.ladder import Rung
+from vpm.simplify.pareto_front import Rung
 from vpm.simplify.reductions import Reduction, reduced
 from vpm.simulate import FIXED_STEP, Setup
 from vpm.tasks import outcomes

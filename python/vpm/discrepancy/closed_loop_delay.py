@@ -1,0 +1,76 @@
+"""Delays of drives and instruments on a machine that sticks, estimated from closed-loop predictions.
+
+Where a joint sticks, the inverse-dynamics residual along the measured motion shows a late break-away, with or without a
+delay. The estimated delay comes out too long, and the transition of friction too wide. In closed loop a machine sticks
+when its model sticks, so a closed-loop prediction (`vpm.discrepancy.closed_loop_prediction`) separates both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from vpm.discrepancy.closed_loop_prediction import OwnRun, own_run
+from vpm.discrepancy.motion_only import WITHIN, Timed, timed_in_motion
+from vpm.errors import VpmError
+from vpm.identify import Gain, InverseDynamicsProblem, OutputErrorProblem, gain, segments
+from vpm.model import Model
+
+#: Drop of the unseen mean square in motion from which on a late effect gets a run of its own, which takes seconds.
+WORTH_A_RUN = 0.1
+
+
+def timed_alone(
+    current: tuple[Model, Sequence[str]],
+    late: tuple[Model, Sequence[str]],
+    training: InverseDynamicsProblem,
+    unseen: InverseDynamicsProblem,
+    simulation: OutputErrorProblem | None,
+    bounds: Mapping[str, tuple[float, float]],
+) -> tuple[Timed | None, OwnRun | None]:
+    """A late effect timed on samples in motion, within what a run along the training records says where there is one.
+
+    Parameters
+    ----------
+    current, late : (Model, sequence of str)
+        Without the effect and with it, each with its free parameters; those that only ``late`` has are the effect's.
+    training, unseen : InverseDynamicsProblem
+    simulation : OutputErrorProblem or None
+        How the unseen records are simulated; only a closed loop is run alone.
+    bounds : mapping
+        Bounds of free parameters that replace those of the models.
+
+    Returns
+    -------
+    timed : Timed or None
+        None where too few samples are in motion.
+    run : OwnRun or None
+        None where the effect promises nothing in motion, or the model cannot run by itself.
+    """
+    timed = timed_in_motion(current, late, training, unseen, bounds)
+    if timed is None or timed.unseen.relative < WORTH_A_RUN:
+        return timed, None
+    if simulation is None or simulation.mode != "closed_loop":
+        return timed, None
+    try:
+        run = own_run(*late, training.experiments, simulation.setup)
+    except VpmError:
+        return timed, None
+    near = dict(bounds)
+    for name in (name for name in late[1] if name not in current[1]):
+        value, std = run.estimated(name)
+        near[name] = max(late[0].parameters[name].minimum, value - WITHIN * std), value + WITHIN * std
+    return timed_in_motion(current, late, training, unseen, near), run
+
+
+def gain_alone(model: Model, free: Sequence[str], late: OwnRun, simulation: OutputErrorProblem) -> Gain | None:
+    """Gain of a late effect in simulation of unseen records, with each model as it suits its own run along the others.
+
+    Without the effect, a transition of friction that is too wide may pass for it in a simulation, and with it make it
+    late twice. None where the model without it cannot run by itself.
+    """
+    try:
+        before = own_run(model, free, late.problem.experiments, simulation.setup)
+        left = [simulation.evaluate(run.model, run.model.theta)[0] for run in (before, late)]
+    except VpmError:
+        return None
+    return gain(left[0], left[1], segments(simulation))

@@ -1,0 +1,175 @@
+"""A forward step: one effect more, of which the inverse-dynamics residual shows too little.
+
+Candidates are those that the last round of the search refused: they explain a modest part of the residual, or help
+everywhere except at one dominant reversal. Each gets a closed-loop prediction beside that of the model found so far.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from vpm.catalogue import EFFECTS
+from vpm.discrepancy.choice import Accepted, choose
+from vpm.discrepancy.closed_loop_prediction import OwnRun, misfit
+from vpm.discrepancy.confirmation import Data, Trial, confirm, judge
+from vpm.discrepancy.elimination import Stage
+from vpm.discrepancy.motion_only import WITHIN
+from vpm.discrepancy.prediction_comparison import WORTH_A_FIT, Told, compared, criterion, first_run, fitted_run
+from vpm.discrepancy.refusal import WORTH_A_NAME, Thresholds, impossible_trial
+from vpm.discrepancy.screening import Probe, impossible_values
+from vpm.discrepancy.search import Search
+from vpm.discrepancy.short_list import same_models
+from vpm.discrepancy.side_by_side import SideBySide
+from vpm.errors import VpmError
+
+#: Effects that are asked for, of those that take most of the training residual.
+ASKED = 3
+#: So many of those that promise most in their runs are fitted.
+FITTED = 2
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """An effect with its run, and its trial where it was fitted to the balance."""
+
+    probe: Probe
+    trial: Trial | None
+    run: OwnRun
+
+
+def overlooked(found: Search, data: Data, each: SideBySide) -> Search:
+    """The search with the one effect more that runs ask for most, if training and unseen records are sure of it."""
+    promising = _promising(found)
+    before = first_run(found.final, data) if promising else None
+    if before is None:
+        return found
+    asked = each("one effect more: running", partial(_run, found, data, before), promising, lambda p: p.candidate.label)
+    least = criterion(before) - WORTH_A_FIT
+    worth = [one for one in asked if isinstance(one, _Asked) and criterion(one.run) < least]
+    first = fitted_run(before, data) if worth else None
+    if first is None:
+        return found
+    thresholds = Thresholds(max(1, len(found.ranking)), min(m.dt for m in data.training.motions))
+    told = []
+    for one in sorted(worth, key=lambda one: criterion(one.run))[:FITTED]:
+        second = fitted_run(one.run, data)
+        said = None if second is None else compared(first, second, data)
+        if said is not None and said.sure(thresholds):
+            told.append((one, said))
+    told.sort(key=lambda one: criterion(one[1].run))
+    more = [entry for one, said in told if (entry := _accepted(found, data, one, said)) is not None]
+    return _added(found, _best(more, data)) if more else found
+
+
+def _best(more: Sequence[Accepted], data: Data) -> Accepted:
+    """The first, or the one of those that come late or slow as it does that is chosen among such."""
+    late = [entry for entry in more if entry.effect.late]
+    if len(late) < 2 or more[0] is not late[0]:
+        return more[0]
+    return choose([entry.trial for entry in late], data)
+
+
+def _promising(found: Search) -> list[Probe]:
+    """What takes most of the training residual of that which was refused in the last round, and springs in series.
+
+    A spring swings above the band of a balance, which may hardly show it.
+    """
+    present = {entry.key for entry in found.accepted} | found.gone
+    refused = [p for p in found.over.probes if p.candidate.key not in present]
+    springs = [p for p in refused if p.candidate.effect.elastic]
+    springs.sort(key=lambda p: list(EFFECTS).index(p.candidate.effect.name))
+    twins = same_models(springs)
+    springs = [p for p in springs if p.candidate.key not in twins]
+    shares = {p.candidate.key: _taken(p, found.over.trials) for p in refused}
+    rest = [p for p in refused if _possible(p) and shares[p.candidate.key] >= WORTH_A_NAME]
+    return [*sorted(rest, key=lambda p: -shares[p.candidate.key])[:ASKED], *springs]
+
+
+def _possible(probe: Probe) -> bool:
+    # Springs are asked for with all others of their kind, and a play falls into chaos in runs.
+    return bool(probe.free) and not impossible_values(probe) and not probe.candidate.effect.motion
+
+
+def _taken(probe: Probe, tried: Sequence[Trial]) -> float:
+    """Share of the training residual that an effect takes, as fitted or as screened."""
+    mine = [
+        1.0 - (t.training.after / t.training.before) ** 2
+        for t in tried
+        if t.probe.candidate.key == probe.candidate.key and t.training.before > 0.0
+    ]
+    return max([probe.drop, *mine])
+
+
+def _run(found: Search, data: Data, before: OwnRun, probe: Probe) -> _Asked | str:
+    """The run of a model with one effect more, as it was fitted to the balance; or why there is none."""
+    if probe.candidate.effect.elastic:
+        run = _sprung(found, data, before, probe)
+        return "no run with it does better" if run is None else _Asked(probe, None, run)
+    known = (trial for trial in found.over.trials if trial.probe is probe)
+    trial = next(known, None) or confirm(found.final, data, probe)
+    if reason := impossible_trial(trial, min(m.dt for m in data.training.motions)):
+        return reason
+    run = first_run(trial.judged, data)
+    return "it cannot follow the references" if run is None else _Asked(probe, trial, run)
+
+
+def _sprung(found: Search, data: Data, before: OwnRun, probe: Probe) -> OwnRun | None:
+    """The run of a model with a spring in series from the start that suits the records best; None if none does."""
+    candidate, starts = probe.candidate, []
+    for start in candidate.starts:
+        model = before.model.with_effect(candidate.effect.name, at=candidate.site, **start)
+        try:
+            left, _ = before.problem.evaluate(model, model.theta)
+        except VpmError:
+            continue
+        starts.append((misfit(before, left), model))
+    cost, model = min(starts, key=lambda one: one[0], default=(np.inf, before.model))
+    if cost >= misfit(before):
+        return None
+    names = model.effect(*candidate.key).parameter_names
+    free = (*before.free, *(dotted for short, dotted in names.items() if short not in candidate.fixed))
+    return first_run(replace(found.final, model=model, free=free), data)
+
+
+def _accepted(found: Search, data: Data, asked: _Asked, told: Told) -> Accepted | None:
+    """The effect with the balance fitted near what the runs say of it, and with what these gain."""
+    final, run = found.final, told.run
+    own = tuple(name for name in run.free if name not in final.free)
+    bounds, values = dict(final.bounds if asked.trial is None else asked.trial.judged.bounds), {}
+    for name in own:
+        value, std = run.estimated(name)
+        if not np.isfinite(std):  # a dead zone that swallows every command, for instance: nothing says how wide it is
+            return None
+        parameter = run.model.parameters[name]
+        bounds[name] = max(parameter.minimum, value - WITHIN * std), min(parameter.maximum, value + WITHIN * std)
+        values[name] = float(np.clip(value, *bounds[name]))
+    known = {name: final.model.parameters[name].value for name in final.free}
+    model = run.model.with_parameters(known) if asked.trial is None else asked.trial.judged.model
+    try:
+        trial = asked.trial or confirm(final, data, asked.probe)
+        judged = judge(model.with_parameters(values), (*final.free, *own), data, bounds)
+    except VpmError:
+        return None
+    told_by_runs = replace(trial, judged=judged, training=told.training, unseen=told.unseen, simulated=None, away=None)
+    return Accepted(replace(told_by_runs, parameters=own, held=(), clear=True, alone=True, diverged=""), ())
+
+
+def _added(found: Search, more: Accepted) -> Search:
+    """A search with one effect more."""
+    name, site = more.key
+    ranking = [*found.ranking]
+    last = max((n for n, c in enumerate(ranking) if (c.name, c.site) == more.key), default=None)
+    if last is not None:
+        ranking[last] = replace(ranking[last], accepted=True, unseen=more.trial.unseen.relative)
+    return replace(
+        found,
+        stages=(*found.stages, Stage("added", name, site, more.trial.judged)),
+        accepted=(*found.accepted, more),
+        refused=tuple(r for r in found.refused if (r.name, r.site) != more.key),
+        ranking=tuple(ranking),
+        last=None,
+    )

@@ -1,0 +1,101 @@
+"""Closed-loop predictions of two models, compared where the inverse-dynamics residual leaves two answers open.
+
+The residual covers a few hertz along a filtered, noisy motion. Where a joint sticks, one reversal may outweigh all
+else. A closed-loop prediction is compared at every frequency with the noise that is left there
+(`vpm.discrepancy.closed_loop_prediction`). Two models with nearly the same residual may differ by tens of standard
+deviations in their predictions. Training and validation records give the share of that difference that they support:
+zero if the first model is right, one if its rival is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from vpm.discrepancy.closed_loop_prediction import OwnRun, as_it_is, misfit, own_run
+from vpm.discrepancy.confirmation import Data, Judged
+from vpm.discrepancy.friction_near_rest import LEAST_ASKED, gain_of_runs
+from vpm.discrepancy.low_frequency import has_impacts
+from vpm.discrepancy.refusal import MODEST_FACTOR, Thresholds
+from vpm.errors import VpmError
+from vpm.identify import Gain
+from vpm.identify.along import bends, has_own_drives
+from vpm.model import Model
+
+#: Logarithm of how many times as likely the training records have to be with another model, as both are fitted to the
+#: balance, before both are fitted to the records in runs.
+WORTH_A_FIT = 10.0
+
+
+@dataclass(frozen=True)
+class Told:
+    """What records say of the change from one run of a model to another.
+
+    Attributes
+    ----------
+    training, unseen : Gain
+        Of what the first run leaves, relative to the noise at each frequency.
+    run : OwnRun
+        The second one, along the training records.
+    better : float
+        Logarithm of how many times as likely the unseen records are with the second one.
+    """
+
+    training: Gain
+    unseen: Gain
+    run: OwnRun
+    better: float
+
+    def sure(self, thresholds: Thresholds) -> bool:
+        """Whether both sets of records ask for all of the change, beyond chance and what models leave out."""
+        return self.better > 0.0 and all(
+            LEAST_ASKED <= told.weight <= 1.0 / LEAST_ASKED
+            and told.score >= MODEST_FACTOR * thresholds.score(told.pieces)
+            for told in (self.training, self.unseen)
+        )
+
+
+def can_run(model: Model, data: Data) -> bool:
+    """Whether a model can be asked: in closed loop, with nothing in it that takes long or falls into chaos."""
+    closed = data.simulation is not None and data.simulation.mode == "closed_loop"
+    return closed and not bends(model) and not has_own_drives(model) and not has_impacts(model)
+
+
+def first_run(judged: Judged, data: Data) -> OwnRun | None:
+    """A fitted model as it is, run along the training records; None if it cannot follow its references."""
+    if data.simulation is None or not can_run(judged.model, data):
+        return None
+    try:
+        return as_it_is(judged.model, judged.free, data.training.experiments, data.simulation.setup)
+    except VpmError:
+        return None
+
+
+def fitted_run(run: OwnRun, data: Data) -> OwnRun | None:
+    """A run with the parameters that suit the training records best."""
+    if data.simulation is None:
+        return None
+    try:
+        return own_run(run.model, run.free, data.training.experiments, data.simulation.setup)
+    except VpmError:
+        return None
+
+
+def compared(first: OwnRun, second: OwnRun, data: Data) -> Told | None:
+    """Ask all records for the change from one run to another; None where one cannot follow the unseen references."""
+    if data.simulation is None:
+        return None
+    try:
+        unseen = [
+            as_it_is(run.model, run.free, data.unseen.experiments, data.simulation.setup) for run in (first, second)
+        ]
+    except VpmError:
+        return None
+    better = misfit(unseen[0]) - misfit(unseen[1])
+    return Told(gain_of_runs(first, second), gain_of_runs(*unseen), second, better)
+
+
+def criterion(run: OwnRun) -> float:
+    """Information criterion of a run: minus the logarithm of its likelihood, and what each fitted number costs."""
+    return misfit(run) + 0.5 * len(run.free) * float(np.log(max(run.left.size, 2)))

@@ -1,0 +1,66 @@
+"""Rivals of an accepted effect, discriminated by closed-loop predictions of the model.
+
+Examples are a constant force and a tilted world, or a delay and direction-dependent friction. Beside other missing
+effects, or in a record of few reversals, the inverse-dynamics residual hardly separates them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from vpm.discrepancy.ambiguity import Rivals
+from vpm.discrepancy.closed_loop_prediction import OwnRun
+from vpm.discrepancy.confirmation import Data, Trial
+from vpm.discrepancy.prediction_comparison import WORTH_A_FIT, compared, criterion, first_run, fitted_run
+from vpm.discrepancy.refusal import Thresholds, impossible_trial
+from vpm.discrepancy.rival_exchange import exchanged
+from vpm.discrepancy.search import Search
+from vpm.discrepancy.side_by_side import SideBySide
+
+
+def told_apart(
+    found: Search, known: Sequence[Rivals], data: Data, each: SideBySide
+) -> tuple[Search, tuple[Rivals, ...]]:
+    """Let the rival that runs ask for most take the place of its effect, if training and unseen records are sure of it.
+
+    Returns
+    -------
+    found : Search
+        The same one if every effect stays.
+    known : tuple of Rivals
+    """
+    tried = [(place, trial) for place, rivals in enumerate(known) for trial in rivals.tried]
+    interval = min(m.dt for m in data.training.motions)
+    asked = [
+        (place, trial)
+        for place, trial in tried
+        if trial.probe.candidate.key not in found.gone and _possible(trial, interval)
+    ]
+    before = first_run(found.final, data) if asked else None
+    if before is None:
+        return found, tuple(known)
+    runs = each(
+        "telling apart: running",
+        lambda one: first_run(one[1].judged, data) or "",
+        asked,
+        lambda one: one[1].probe.candidate.label,
+    )
+    better = [
+        (criterion(run), place, trial, run)
+        for (place, trial), run in zip(asked, runs, strict=True)
+        if isinstance(run, OwnRun) and criterion(run) < criterion(before) - WORTH_A_FIT
+    ]
+    if not better:
+        return found, tuple(known)
+    first = fitted_run(before, data)
+    thresholds = Thresholds(len(asked), interval)
+    for _, place, trial, run in sorted(better, key=lambda one: one[0]):
+        second = fitted_run(run, data)
+        told = None if first is None or second is None else compared(first, second, data)
+        if told is not None and told.sure(thresholds):
+            return exchanged(found, known, data, place, trial, "in its place is what runs of the model itself ask for")
+    return found, tuple(known)
+
+
+def _possible(trial: Trial, interval: float) -> bool:
+    return not trial.diverged and bool(trial.parameters) and not impossible_trial(trial, interval)

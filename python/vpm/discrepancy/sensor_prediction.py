@@ -1,0 +1,54 @@
+"""Sensor errors, judged by the predicted reading of the sensor itself.
+
+Along a measured motion no load changes the output of a drive. A constant force and the offset of a pressure gauge may
+therefore leave the same torque residual. The reading of the gauge itself follows from the commands and discriminates
+the two.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.discrepancy.confirmation import Data, Trial
+from vpm.discrepancy.refusal import NORMAL_95_ONE_SIDED, WORTH_A_NAME
+from vpm.identify import InverseDynamicsProblem, gain, segments
+
+Array = NDArray[np.float64]
+
+
+def read_by_itself(chosen: Trial, equals: Sequence[Trial], data: Data) -> Trial:
+    """Of what explains the data as well as ``chosen``, the instrument whose own reading asks for it; else ``chosen``.
+
+    It has to predict its channel better than ``chosen`` does by as much as is worth a name, surely, on the training
+    records and on the unseen ones, and to leave no more of all channels together on either.
+    """
+    if chosen.probe.candidate.effect.site == "sensor":
+        return chosen
+    asked = [t for t in equals if t.probe.candidate.effect.site == "sensor" and _asks(t, chosen, data)]
+    return min(asked, key=lambda t: _power(t.judged.unseen), default=chosen)
+
+
+def _asks(trial: Trial, chosen: Trial, data: Data) -> bool:
+    site, model = trial.probe.candidate.site, trial.judged.model
+    channels = [channel for channel in data.unseen.shown if model.sensor_of(channel) == site]
+    pairs = (
+        (data.training, chosen.judged.fit.residual, trial.judged.fit.residual),
+        (data.unseen, chosen.judged.unseen, trial.judged.unseen),
+    )
+    return bool(channels) and all(_better(problem, channels, before, after) for problem, before, after in pairs)
+
+
+def _better(problem: InverseDynamicsProblem, channels: Sequence[str], before: Array, after: Array) -> bool:
+    own = np.zeros(before.size)
+    for block in problem.blocks:
+        own[block.samples] = block.channel in channels
+    told = gain(before * own, after * own, segments(problem))
+    sure = told.relative >= WORTH_A_NAME and told.score >= NORMAL_95_ONE_SIDED
+    return sure and _power(after) <= _power(before)
+
+
+def _power(residual: Array) -> float:
+    return float(residual @ residual)
