@@ -83,10 +83,10 @@ def diagnose(
 
     Logs with a wrong unit, sign, name or clock are refused, see `vpm.check_log`. The parameters that the model file
     calls uncertain are fitted first, for a wrong parameter is not a missing effect. Where links are rigid and up to
-    three joints move, a ranking of the training records names what is missing, see `vpm.rank`, and unseen records
+    three joints move, a ranking of the training records names what is missing, see `vpm.rank`, and validation records
     decide no name. Elsewhere every effect is screened at every site by its regressor; the promising ones are refitted
-    together with the model and have to predict unseen records, both as a balance of effort and in simulation. One is
-    accepted at a time, the one with the largest unseen gain per number.
+    together with the model and have to predict validation records, both as a balance of effort and in simulation. One
+    is accepted at a time, the one with the largest validation gain per number.
 
     Parameters
     ----------
@@ -236,15 +236,15 @@ def _diagnosis(
     """See `diagnose`."""
     began = time.perf_counter()
     say = tell or (lambda _: None)
-    training, unseen, notes = records
+    training, validation, notes = records
     # A record cut off in the middle of a motion does not say what its controller remembers.
-    mode = "restarts" if notes else judging_mode(model, unseen)
+    mode = "restarts" if notes else judging_mode(model, validation)
     by = (names, effects, limit)
-    ranking = ranking_of(model, (training, unseen), by, setup, say, each, notes)
+    ranking = ranking_of(model, (training, validation), by, setup, say, each, notes)
     if ranking is not None and ranking.hold != setup.course:
         notes.append(FOUND_HOLD.format(hold=ranking.hold))
         setup = replace(setup, hold=ranking.hold)
-    data = data_of(model, training, unseen, mode, cutoff, setup, notes)
+    data = data_of(model, training, validation, mode, cutoff, setup, notes)
     say("comparing the nominal model with the data")
     nominal = nominal_of(model, data, notes)
     say("recalibrating the nominal parameters")
@@ -341,7 +341,7 @@ def _whole(
     known: _Known, found: Search, concluded: _Concluded, floor: dict[str, float], *, interrupted: bool
 ) -> Diagnosis:
     """The diagnosis with its evidence and pictures."""
-    data, nominal, (training, unseen, notes) = known.data, known.nominal, known.records
+    data, nominal, (training, validation, notes) = known.data, known.nominal, known.records
     final, accepted, summary = concluded.final, concluded.accepted, concluded.summary
     ambiguous = known.ambiguous if accepted else ()
     return Diagnosis(
@@ -352,17 +352,17 @@ def _whole(
         found.refused,
         found.ranking,
         listed(ambiguities(accepted), ambiguous),
-        where(known.recalibrated.model, data.unseen),
+        where(known.recalibrated.model, data.validation),
         tuple(step(data, stage) for stage in found.stages),
         tuple(e.name for e in training),
-        tuple(e.name for e in unseen),
+        tuple(e.name for e in validation),
         tuple(notes),
         final.model,
         fit_of(final.model, data.training, final.fit, nominal.fit.residual, [e.name for e in training]),
         pictures(data, nominal, known.recalibrated, final),
         time.perf_counter() - known.began,
         interrupted,
-        gather(found.final.model, [entry.key for entry in accepted if entry.side == "motor"], data.unseen, floor),
+        gather(found.final.model, [entry.key for entry in accepted if entry.side == "motor"], data.validation, floor),
         concluded.empirical,
         experiments_for(found.final, ambiguous, data.training, floor),
         classes(accepted, ambiguous),

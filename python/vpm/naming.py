@@ -53,12 +53,12 @@ def ranking_of(
 ) -> Ranking | None:
     """A ranking of the training records where names are to come from one and it covers the machine.
 
-    Unseen records only say, at the end, how much of their error what was found leaves.
+    Validation records only say, at the end, how much of their error what was found leaves.
 
     ``by`` says where names come from, of which effects, and how many at most. What keeps it from that is noted.
     """
     names, effects, limit = by
-    training, unseen = records
+    training, validation = records
     if names != "ranking":
         notes.extend(_not_searched(effects, f'names="{names}" was asked for'))
         return None
@@ -69,7 +69,7 @@ def ranking_of(
             return rank(
                 model,
                 training,
-                unseen,
+                validation,
                 effects=effects,
                 settings=Settings(effects=limit),
                 setup=setup,
@@ -100,7 +100,7 @@ def named(
     _, effects, limit = by
     screened = _searchable(effects)
     if ranking is not None:
-        tell("measuring what was named on unseen records")
+        tell("measuring what was named on validation records")
         found, ambiguous = searched(ranking, recalibrated, data, Settings(effects=limit), effects)
         told = {one.key for one in ranking.effects}
         lost = [one for one in found.refused if (one.name, one.site) in told]

@@ -59,7 +59,7 @@ def test_one_core_and_four_find_the_same(diagnosis: vpm.Diagnosis) -> None:
     assert len({each[1] for each in screened[:count]}) > 1
 
 
-def test_each_finding_has_its_evidence_on_unseen_data(diagnosis: vpm.Diagnosis) -> None:
+def test_each_finding_has_its_evidence_on_validation_data(diagnosis: vpm.Diagnosis) -> None:
     """Dry friction: two levels over the velocity, of the size that was hidden; what is left is far smaller."""
     (evidence,) = diagnosis.evidence
     assert (evidence.effect, evidence.site) == ("coulomb_friction", "shoulder")
@@ -217,8 +217,8 @@ def test_a_value_within_its_deviation_is_called_undetermined() -> None:
 
 def test_an_effect_that_made_it_worse_is_not_said_to_take(diagnosis: vpm.Diagnosis) -> None:
     (effect,) = diagnosis.effects
-    assert took(replace(effect, gain=0.25)).startswith("took 25.00 % of the unseen mean square")
-    assert took(replace(effect, gain=-0.25)).startswith("added 25.00 % to the unseen mean square")
+    assert took(replace(effect, gain=0.25)).startswith("took 25.00 % of the validation mean square")
+    assert took(replace(effect, gain=-0.25)).startswith("added 25.00 % to the validation mean square")
 
 
 def test_page_says_where_it_comes_from(page: str, diagnosis: vpm.Diagnosis, tmp_path: Path) -> None:

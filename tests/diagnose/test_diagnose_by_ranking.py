@@ -135,9 +135,11 @@ def test_a_ranking_learns_from_the_training_records_alone(
 ) -> None:
     seen: list[list[str]] = []
 
-    def asked(_: Model, given: list[Experiment], unseen: list[Experiment], *, settings: Asked, **__: object) -> Ranking:
+    def asked(
+        _: Model, given: list[Experiment], validation: list[Experiment], *, settings: Asked, **__: object
+    ) -> Ranking:
         assert settings.effects == 3
-        seen.append([record.name for record in (*given, *unseen)])
+        seen.append([record.name for record in (*given, *validation)])
         return ranking()
 
     monkeypatch.setattr(naming, "rank", asked)
@@ -146,7 +148,7 @@ def test_a_ranking_learns_from_the_training_records_alone(
 
 
 @pytest.mark.parametrize(("after", "word"), [(0.2, "effect_found"), (1.1, "unexplained")])
-def test_names_that_leave_more_of_unseen_records_are_no_explanation(
+def test_names_that_leave_more_of_validation_records_are_no_explanation(
     after: float, word: str, monkeypatch: pytest.MonkeyPatch, records: list[Experiment]
 ) -> None:
     told = {"axis.position": seen_by_observer(1.0, after), "tip.position": seen_by_observer(0.0, 0.0)}
@@ -156,7 +158,7 @@ def test_names_that_leave_more_of_unseen_records_are_no_explanation(
     assert diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict == word
 
 
-def test_names_that_explain_unseen_records_stand_whatever_the_balance_leaves(
+def test_names_that_explain_validation_records_stand_whatever_the_balance_leaves(
     monkeypatch: pytest.MonkeyPatch, records: list[Experiment]
 ) -> None:
     """A play is hardly seen in a balance. Here only a trifle is named, and half of the gap is left there."""

@@ -15,7 +15,7 @@ CLOSE_TO_REST = "stribeck_friction"
 
 @pytest.mark.nightly
 def test_what_a_balance_hardly_sees_is_told_by_runs() -> None:
-    """It fades below 1.5 % of the speed: fitted to the balance, it predicts unseen efforts worse than nothing does."""
+    """It fades below 1.5 % of the speed: fitted to the residual, it predicts validation efforts worse than none."""
     case = shared_case("axis_linear", "stribeck_friction", 18)
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], names="search", workers=1)
     (found,) = why.effects

@@ -10,7 +10,7 @@ from shared_cases import shared_case
 
 @pytest.mark.nightly
 def test_a_late_drive_and_friction_that_is_missing_are_named_for_the_law_that_imitates_both() -> None:
-    """Alone the lag takes four fifths of the training residual and predicts the unseen record worse than nothing."""
+    """Alone the lag takes four fifths of the training residual and predicts the validation record worse than none."""
     case = shared_case("axis_linear", ("actuator_lag", "viscous_friction"), 5004)
     tried = ["actuator_lag", "input_delay", "viscous_friction", "hysteresis"]
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, names="search", workers=1)

@@ -63,8 +63,8 @@ def test_noise_is_no_structure_and_what_follows_the_effort_is() -> None:
 
 
 def test_ranking_puts_what_was_confirmed_first() -> None:
-    def entry(name: str, screened: float, unseen: float, *, accepted: bool = False) -> RankedCandidate:
-        return RankedCandidate(name, "axis", 1, screened, unseen, accepted)
+    def entry(name: str, screened: float, validation: float, *, accepted: bool = False) -> RankedCandidate:
+        return RankedCandidate(name, "axis", 1, screened, validation, accepted)
 
     ranked = [
         entry("screened", 0.9, float("nan")),

@@ -30,7 +30,7 @@ from vpm.model import Model
 
 
 def gained() -> Gain:
-    """A gain on unseen data that nobody would doubt."""
+    """A gain on validation data that nobody would doubt."""
     return Gain(before=1.0, after=0.1, weight=1.0, score=50.0, pieces=40)
 
 
@@ -45,7 +45,7 @@ def trial(value: float) -> Trial:
             probe=SimpleNamespace(candidate=candidate),
             judged=judged,
             parameters=("encoder.gain.value",),
-            unseen=gained(),
+            validation=gained(),
             there=gained(),
             training=gained(),
             simulated=None,
@@ -72,14 +72,14 @@ def test_a_gain_beyond_that_is_one(error: float) -> None:
 
 @pytest.mark.parametrize(("gap", "after", "believed"), [(0.08, 0.3, True), (0.08, 0.9, False), (0.01, 0.3, False)])
 def test_a_gain_that_shows_magnified_in_a_balance_is_one(gap: float, after: float, believed: bool) -> None:
-    told = {"gap": gap, "unseen": Gain(before=1.0, after=after, weight=1.0, score=50.0, pieces=40)}
+    told = {"gap": gap, "validation": Gain(before=1.0, after=after, weight=1.0, score=50.0, pieces=40)}
     one = cast("Trial", SimpleNamespace(**{**vars(trial(1.0 + 0.8 * NEGLIGIBLE)), **told}))
     assert (refuse_trial(one, Thresholds(30, 1e-3)) == "") == believed
 
 
 def test_a_gain_that_explains_as_little_as_an_imitation_blames_no_instrument() -> None:
     little = Gain(before=1.0, after=0.88, weight=1.0, score=50.0, pieces=40)
-    one = cast("Trial", SimpleNamespace(**{**vars(trial(1.02)), "unseen": little, "there": little}))
+    one = cast("Trial", SimpleNamespace(**{**vars(trial(1.02)), "validation": little, "there": little}))
     assert "an instrument is blamed" in refuse_trial(one, Thresholds(30, 1e-3))
 
 
@@ -115,10 +115,10 @@ def test_a_hysteresis_within_two_samples_is_dry_friction_unless_that_is_fitted_b
 
 
 def beside_play(whole: Gain, slow: Gain) -> str:
-    """What is said of a trial beside a play, with these gains of the whole unseen residual and of its slow part."""
+    """What is said of a trial beside a play, with these gains of the whole validation residual and of its slow part."""
     one = trial(1.1)
     return refuse_trial(
-        cast("Trial", SimpleNamespace(**{**vars(one), "unseen": whole, "there": whole, "slow": slow})),
+        cast("Trial", SimpleNamespace(**{**vars(one), "validation": whole, "there": whole, "slow": slow})),
         Thresholds(30, 1e-3),
     )
 
@@ -188,23 +188,26 @@ sizes = st.floats(1e-9, 1e9)
 
 @given(sizes, sizes, sizes, sizes)
 def test_what_is_said_of_two_numbers_goes_in_their_direction(a: float, b: float, c: float, d: float) -> None:
-    """A candidate that makes the unseen error larger: it lowers the training error only where that becomes smaller."""
+    """A candidate that raises the validation error: it lowers the training error only where that becomes smaller."""
     c, d = min(c, d), max(c, d)
     assume(1.0 - (d / c) ** 2 < 0.0)
     worse = trial(1.5)
-    vars(worse).update(training=changed(a, b), unseen=changed(c, d), there=changed(c, d))
+    vars(worse).update(training=changed(a, b), validation=changed(c, d), there=changed(c, d))
     reason = refuse_trial(worse, Thresholds(30, 1e-3))
     said = re.findall(
-        r"(lowers|raises) the (training|unseen) error by [\d.e+]+ % of its mean square \((\S+) to (\S+)\)", reason
+        r"(lowers|raises) the (training|validation) error by [\d.e+]+ % of its mean square \((\S+) to (\S+)\)", reason
     )
-    assert [where for _, where, _, _ in said] == ["training", "unseen"]
+    assert [where for _, where, _, _ in said] == ["training", "validation"]
     for word, _, before, after in said:
         assert word == "raises" or float(after) <= float(before)
         assert word == "lowers" or float(after) >= float(before)
 
 
-def test_a_little_of_the_unseen_error_is_told_with_its_direction() -> None:
-    for after, words in ((0.98, "lowers the unseen error by only 3.96 %"), (1.02, "raises the unseen error by 4.04 %")):
+def test_a_little_of_the_validation_error_is_told_with_its_direction() -> None:
+    for after, words in (
+        (0.98, "lowers the validation error by only 3.96 %"),
+        (1.02, "raises the validation error by 4.04 %"),
+    ):
         little = trial(1.5)
         vars(little).update(there=changed(1.0, after))
         assert words in refuse_trial(little, Thresholds(30, 1e-3))
@@ -214,9 +217,9 @@ def test_a_simulation_that_becomes_worse_is_told_beside_what_the_balance_says() 
     for after, word, joined in ((0.9, "lowers", "but"), (1.1, "raises", "and")):
         told = trial(1.5)
         vars(told).update(
-            unseen=changed(1.0, after), simulated=SimpleNamespace(relative=-3.0, harm=9.0, before=1.0, after=2.0)
+            validation=changed(1.0, after), simulated=SimpleNamespace(relative=-3.0, harm=9.0, before=1.0, after=2.0)
         )
         vars(told.judged).update(model=Model.load(MODEL))
         said = worse_in_simulation(told)
-        assert said.startswith(f"it {word} the unseen error of the balance of effort")
+        assert said.startswith(f"it {word} the validation error of the balance of effort")
         assert f", {joined} raises that of the simulation by 300.00 % of its mean square (1 to 2)" in said

@@ -38,7 +38,7 @@ def test_a_spring_takes_the_place_of_the_constant_force_that_was_the_plainer_nam
     assert [(effect.name, effect.site) for effect in why.effects] == [("spring", "axis")]
     assert [c.name for c in why.candidates if c.accepted] == ["spring"]
     reasons = {refused.name: refused.reason for refused in why.refused}
-    assert "spring at axis in its place predicts the unseen data better" in reasons["bias_force"]
+    assert "spring at axis in its place predicts the validation data better" in reasons["bias_force"]
     (stiffness, _) = why.effects[0].parameters
     assert stiffness.value == pytest.approx(hidden.parameters["stiffness"], abs=3.0 * stiffness.std)
 
@@ -186,7 +186,7 @@ class _Entry:
 
 @dataclass
 class _Judged:
-    unseen: np.ndarray = field(default_factory=lambda: np.ones(4))
+    validation: np.ndarray = field(default_factory=lambda: np.ones(4))
 
 
 @dataclass(frozen=True)
@@ -201,7 +201,7 @@ def _known(power: float | None) -> Rivals:
 
 
 def _ordered(entries: dict[str, tuple[_Entry, float | None]]) -> list[str]:
-    """Names in the order they stand in, of effects with what is left of the unseen data without each."""
+    """Names in the order they stand in, of effects with what is left of the validation data without each."""
     accepted = tuple(entry for entry, _ in entries.values())
     found = cast("Search", _Found(accepted, _Judged()))
     changed, known = in_order(found, [_known(power) for _, power in entries.values()])

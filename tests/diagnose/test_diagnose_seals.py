@@ -45,7 +45,7 @@ def test_pressures_tell_the_friction_of_seals(pressed: tuple[Data, Judged, Judge
     told_of = seals(without, data)
     assert told_of is not None
     assert np.isclose(told_of.share * PISTON, area, rtol=0.1)
-    assert told_of.unseen @ told_of.unseen < 0.7 * (found.unseen @ found.unseen)
+    assert told_of.validation @ told_of.validation < 0.7 * (found.validation @ found.validation)
 
 
 @pytest.mark.nightly

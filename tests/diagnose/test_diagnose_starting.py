@@ -51,4 +51,4 @@ def test_a_wide_dead_zone_of_a_valve_is_found_from_there(case: Case) -> None:
     )
     width = trial.judged.model.parameters["servo.dead_zone.width"].value
     assert np.isclose(width, case.truth.hidden[0].parameters["width"], rtol=0.03)
-    assert trial.unseen.relative > 0.9
+    assert trial.validation.relative > 0.9

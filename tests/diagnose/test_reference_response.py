@@ -31,8 +31,8 @@ def fitted_late(case: Case) -> tuple[Data, list[vpm.discrepancy.confirmation.Jud
     """A lag and a delay, each fitted beside the parameters that may be calibrated."""
     model = case.model()
     training = InverseDynamicsProblem(model, case.train)
-    unseen = InverseDynamicsProblem(model, case.validate, cutoff=min(m.cutoff for m in training.motions))
-    data = Data(training, unseen, OutputErrorProblem(model, case.validate, "closed_loop"))
+    validation = InverseDynamicsProblem(model, case.validate, cutoff=min(m.cutoff for m in training.motions))
+    data = Data(training, validation, OutputErrorProblem(model, case.validate, "closed_loop"))
     free = tuple(p.name for p in model.parameters.values() if p.adjustable)
     found = []
     for name, time in (("actuator_lag", "time_constant"), ("input_delay", "time")):

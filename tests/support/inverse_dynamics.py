@@ -11,8 +11,8 @@ from vpm.model import Model
 def inverse_dynamics_data(case: Case) -> tuple[Model, tuple[str, ...], Data]:
     """Nominal model, its adjustable parameters, and the inverse-dynamics problems of its records."""
     model = case.model()
-    training, unseen = (InverseDynamicsProblem(model, records) for records in (case.train, case.validate))
-    for problem in (training, unseen):
+    training, validation = (InverseDynamicsProblem(model, records) for records in (case.train, case.validate))
+    for problem in (training, validation):
         problem.take_long_steps()
     free = tuple(p.name for p in model.parameters.values() if p.adjustable)
-    return model, free, Data(training, unseen, None)
+    return model, free, Data(training, validation, None)

@@ -1,4 +1,4 @@
-"""What a climb found: each level with its fit and its error on unseen data, and where more detail stops to pay."""
+"""What a climb found: each level with its fit and its error on validation data, and where more detail stops to pay."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ class Level(Storable):
     values, std : dict of str to float
         All fitted parameters, SI, with standard deviations that hold for residuals whose neighbours are alike.
     errors : dict of str to float
-        Share of each measured channel that is left on unseen data.
+        Share of each measured channel that is left on validation data.
     score : float
-        By how many standard deviations it predicts the unseen data better than the best level below; infinite for the
-        first.
+        By how many standard deviations it predicts the validation data better than the best level below; infinite for
+        the first.
     pays : bool
         Whether that is sure and more than a trifle.
     """
@@ -107,13 +107,13 @@ class Climb(Result):
         if self.levels[-1].name == self.top:
             end = f"the finest level that the model has; it leaves {100 * self.chosen.error:.2f} %"
         else:
-            end = f"which leaves {100 * self.chosen.error:.2f} %; more detail buys nothing that unseen data show"
+            end = f"which leaves {100 * self.chosen.error:.2f} %; more detail buys nothing that validation data show"
         return f"detail pays up to {self.top}, {end}"
 
     def __str__(self) -> str:
         """The levels and the verdict."""
         lines = [
-            f"levels on unseen data, {self.mode} (* pays):",
+            f"levels on validation data, {self.mode} (* pays):",
             *(f"  {level}" for level in self.levels),
             self.verdict,
         ]

@@ -23,7 +23,7 @@ from vpm.model import Model
 SHORT_LIST, FINER = 3, 2
 #: A rival that takes less than this share of what the effect takes from the training residual is none.
 LEAST_SHARE = 0.8
-#: A rival that leaves up to this share more of the unseen mean square predicts as well.
+#: A rival that leaves up to this share more of the validation mean square predicts as well.
 AS_GOOD = 0.05
 
 
@@ -35,7 +35,7 @@ class Rivals:
     ----------
     effect, site : str
     trials : tuple of Trial
-        Those that predict the unseen data as well.
+        Those that predict the validation data as well.
     tried : tuple of Trial
         All that were refitted in its place.
     without : Judged or None
@@ -62,7 +62,7 @@ def listed(known: Sequence[Ambiguity], found: Sequence[Rivals]) -> tuple[Ambigui
         labels = (trial.probe.candidate.label for trial in entry.trials)
         names = tuple(label for label in labels if (entry.effect, entry.site, label) not in said)
         if names:
-            reason = "put in its place and fitted, it predicts the unseen data as well"
+            reason = "put in its place and fitted, it predicts the validation data as well"
             more.append(Ambiguity(entry.effect, entry.site, names, reason))
     return (*known, *more)
 
@@ -77,9 +77,9 @@ def rivals(
 ) -> tuple[Rivals, ...]:
     """Replace each accepted effect in turn by every other that could do its work, and keep those that do it as well.
 
-    All rivals are screened on the model without the effect; the few that take nearly as much from the training
-    residual are refitted, and have to predict the unseen records as the effect does. What the ``last`` effect competed
-    with when it came in is not worked out again.
+    All rivals are screened on the model without the effect; the few that take nearly as much from the training residual
+    are refitted, and have to predict the validation records as the effect does. What the ``last`` effect competed with
+    when it came in is not worked out again.
     """
     each = each or SideBySide(1)
     known = {last.key: last} if last is not None else {}
@@ -194,10 +194,10 @@ def _near(candidate: Candidate, entry: Accepted) -> bool:
 
 
 def as_good(final: Judged, trial: Trial, data: Data) -> bool:
-    """Whether something in the place of an effect predicts the unseen data as the effect does."""
+    """Whether something in the place of an effect predicts the validation data as the effect does."""
     if not trial.clear:
         return False
-    change = gain(final.unseen, trial.judged.unseen, segments(data.unseen)).relative
+    change = gain(final.validation, trial.judged.validation, segments(data.validation)).relative
     return change > -max(AS_GOOD, LEAST_GAIN)
 
 

@@ -1,4 +1,4 @@
-"""Names from a ranking, as a diagnosis goes on with them: refitted on balances of effort, measured on unseen records.
+"""Effects that a ranking names: refitted to the inverse-dynamics residual, and measured on validation records.
 
 A ranking says what is missing and in which order. Nothing here takes a name away or adds one, but for a machine whose
 efforts cannot be balanced with it. The values that are reported are those of a balance wherever it shows them.
@@ -86,7 +86,7 @@ def free_joints(model: Model) -> tuple[str, ...]:
 
 
 def observed_gaps(ranking: Ranking, balanced: Sequence[str]) -> dict[str, ChannelGap]:
-    """Errors of an observer on unseen records, of channels of joints that a balance of effort does not see."""
+    """Errors of an observer on validation records, of channels of joints that a balance of effort does not see."""
     joints = set(ranking.recalibrated.joints) - set(balanced)
     return {
         f"{channel} ({OBSERVED})": ChannelGap(
@@ -135,7 +135,7 @@ def searched(
         known = _rivals(ranking, stages[-1].judged, accepted, data)
     except KeyboardInterrupt:
         interrupted = True
-    gains = {entry.key: entry.trial.unseen.relative for entry in accepted}
+    gains = {entry.key: entry.trial.validation.relative for entry in accepted}
     if ranking.rounds:
         outside |= _unpromising(ranking, stages[-1].judged, data, effects)
     refused, tried = _refused(ranking, outside, settings), _candidates(ranking, gains, settings)
@@ -163,7 +163,7 @@ def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
     """An effect in a model at the values of a ranking, refitted as far as a balance of effort shows them.
 
     A parameter moves if the balance tells it from all others at these values, and stays where it is if not. The refit
-    counts if the training records are left no more and the unseen ones are simulated no worse than by those values.
+    counts if the training records are left no more and the validation ones are simulated no worse than by those values.
 
     Raises
     ------
@@ -369,10 +369,10 @@ def _candidates(ranking: Ranking, gains: Mapping[Key, float], settings: RankingS
     for number, several in enumerate(ranking.rounds):
         for place, one in enumerate(several):
             accepted = place == 0 and _accepts(several, settings) and one.key in gains
-            unseen = gains[one.key] if accepted else np.nan
+            validation = gains[one.key] if accepted else np.nan
             found.append(
                 RankedCandidate(
-                    *one.key, number + 1, one.judgement.removed, unseen, accepted, one.evidence, one.probability
+                    *one.key, number + 1, one.judgement.removed, validation, accepted, one.evidence, one.probability
                 )
             )
     return tuple(found)

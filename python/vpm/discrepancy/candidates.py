@@ -141,7 +141,7 @@ def candidates(
     effects : sequence of str, optional
         Restrict the search to these; to those that a diagnosis tries if not given.
     simulated : bool
-        Whether what moves unseen is simulated with the memories of effects, and not balanced.
+        Whether what moves validation is simulated with the memories of effects, and not balanced.
     """
     return tuple(
         _candidate(effect, site, model, data, residual)

@@ -114,8 +114,8 @@ def _first_named(equals: Sequence[Trial]) -> Trial:
 
 
 def _left(trial: Trial) -> float:
-    """Share of the unseen mean square that a trial leaves."""
-    return _share(trial.unseen)
+    """Share of the validation mean square that a trial leaves."""
+    return _share(trial.validation)
 
 
 def _share(told: Gain) -> float:
@@ -123,8 +123,8 @@ def _share(told: Gain) -> float:
 
 
 def cost(trial: Trial) -> float:
-    """Information criterion of the unseen data, see `schwarz`."""
-    return schwarz(trial.unseen, len(trial.parameters))
+    """Information criterion of the validation data, see `schwarz`."""
+    return schwarz(trial.validation, len(trial.parameters))
 
 
 def schwarz(told: Gain, numbers: int) -> float:
@@ -154,14 +154,14 @@ def alike(one: Candidate, other: Candidate) -> bool:
 
 
 def _as_good(trial: Trial, first: Trial) -> bool:
-    """Whether a trial explains the unseen data as the first one does, with no more numbers."""
-    close = trial.unseen.relative >= first.unseen.relative - LEAST_GAIN and _left(trial) <= SAME * _left(first)
+    """Whether a trial explains the validation data as the first one does, with no more numbers."""
+    close = trial.validation.relative >= first.validation.relative - LEAST_GAIN and _left(trial) <= SAME * _left(first)
     return close and len(trial.parameters) <= len(first.parameters)
 
 
 def _evidence(trial: Trial) -> float:
     """Logarithm of what is left of the gap in both views; the machine is blamed before its instruments."""
-    left = np.log(max(trial.unseen.after, 1e-300) / trial.unseen.before)
+    left = np.log(max(trial.validation.after, 1e-300) / trial.validation.before)
     if trial.probe.candidate.effect.site == "sensor":
         left -= np.log(SENSOR_SHARE)
     # Errors of coupled joints cancel; see refusal.CLEAR_GAIN.

@@ -15,7 +15,7 @@ from vpm.errors import VpmError
 from vpm.identify import Gain, InverseDynamicsProblem, OutputErrorProblem, gain, segments
 from vpm.model import Model
 
-#: Drop of the unseen mean square in motion from which on a late effect gets a run of its own, which takes seconds.
+#: Drop of the validation mean square in motion from which on a late effect gets a run of its own, which takes seconds.
 WORTH_A_RUN = 0.1
 
 
@@ -23,7 +23,7 @@ def timed_alone(
     current: tuple[Model, Sequence[str]],
     late: tuple[Model, Sequence[str]],
     training: InverseDynamicsProblem,
-    unseen: InverseDynamicsProblem,
+    validation: InverseDynamicsProblem,
     simulation: OutputErrorProblem | None,
     bounds: Mapping[str, tuple[float, float]],
 ) -> tuple[Timed | None, OwnRun | None]:
@@ -33,9 +33,9 @@ def timed_alone(
     ----------
     current, late : (Model, sequence of str)
         Without the effect and with it, each with its free parameters; those that only ``late`` has are the effect's.
-    training, unseen : InverseDynamicsProblem
+    training, validation : InverseDynamicsProblem
     simulation : OutputErrorProblem or None
-        How the unseen records are simulated; only a closed loop is run alone.
+        How the validation records are simulated; only a closed loop is run alone.
     bounds : mapping
         Bounds of free parameters that replace those of the models.
 
@@ -46,8 +46,8 @@ def timed_alone(
     run : OwnRun or None
         None where the effect promises nothing in motion, or the model cannot run by itself.
     """
-    timed = timed_in_motion(current, late, training, unseen, bounds)
-    if timed is None or timed.unseen.relative < WORTH_A_RUN:
+    timed = timed_in_motion(current, late, training, validation, bounds)
+    if timed is None or timed.validation.relative < WORTH_A_RUN:
         return timed, None
     if simulation is None or simulation.mode != "closed_loop":
         return timed, None
@@ -59,11 +59,11 @@ def timed_alone(
     for name in (name for name in late[1] if name not in current[1]):
         value, std = run.estimated(name)
         near[name] = max(late[0].parameters[name].minimum, value - WITHIN * std), value + WITHIN * std
-    return timed_in_motion(current, late, training, unseen, near), run
+    return timed_in_motion(current, late, training, validation, near), run
 
 
 def gain_alone(model: Model, free: Sequence[str], late: OwnRun, simulation: OutputErrorProblem) -> Gain | None:
-    """Gain of a late effect in simulation of unseen records, with each model as it suits its own run along the others.
+    """Gain of a delay in simulations of validation records, each model with the parameters of its own prediction.
 
     Without the effect, a transition of friction that is too wide may pass for it in a simulation, and with it make it
     late twice. None where the model without it cannot run by itself.

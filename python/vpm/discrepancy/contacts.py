@@ -50,8 +50,8 @@ TOLD = ("stiffness", "inertia")
 def with_told_contacts(found: Search, data: Data, each: SideBySide) -> Search:
     """The search with contacts of its plays as hard as runs of the model along the training records say.
 
-    The numbers of the runs stand if with them the training records are simulated better, beyond chance, and the unseen
-    ones are neither simulated nor balanced worse.
+    The numbers of the runs stand if with them the training records are simulated better, beyond chance, and the
+    validation ones are neither simulated nor balanced worse.
     """
     final = found.final
     for entry in found.accepted:
@@ -152,8 +152,8 @@ def _runs_better(before: Array, one: Judged, runs: OutputErrorProblem) -> bool:
 
 
 def _better(final: Judged, one: Judged, data: Data) -> bool:
-    """Whether a model predicts the unseen records at least as well, in both views."""
+    """Whether a model predicts the validation records at least as well, in both views."""
     if data.simulation is None or final.simulated is None or one.simulated is None:
         return False
-    views = ((final.unseen, one.unseen, data.unseen), (final.simulated, one.simulated, data.simulation))
+    views = ((final.validation, one.validation, data.validation), (final.simulated, one.simulated, data.simulation))
     return all(gain(before, after, segments(view)).harm <= NORMAL_95_ONE_SIDED for before, after, view in views)

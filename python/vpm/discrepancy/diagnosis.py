@@ -54,7 +54,7 @@ class AcceptedEffect(Storable):
     parameters : tuple of EffectParameterEstimate
         In the final model, after all effects were fitted together.
     gain : float
-        Share of the unseen residual's mean square that went when it was accepted.
+        Share of the validation residual's mean square that went when it was accepted.
     score : float
         That gain in standard deviations between independent blocks.
     notes : tuple of str
@@ -100,7 +100,7 @@ class RankedCandidate(Storable):
     screened : float
         Share of the training mean square that its regressor would take away; NaN in a ranking.
     unseen : float
-        Share of the unseen mean square that it took away after refitting; NaN if it was not refitted.
+        Share of the validation mean square that it took away after refitting; NaN if it was not refitted.
     accepted : bool
     evidence_nats, probability : float
         What it added to the evidence, and that it is what is missing; NaN if no ranking tried it.
@@ -147,20 +147,20 @@ class Empirical(Storable):
     channel : str
         The effort whose residual was examined.
     states : dict of str to float
-        Share of its mean square on unseen data that each state predicts, the largest first.
+        Share of its mean square on validation data that each state predicts, the largest first.
     remark : str
         What runs with the time and not with the machine, in words, or "".
     formula : str
         With numbers and units, or "".
     terms : tuple of EmpiricalTerm
     before, after : float
-        Root mean square of the weighted residual on unseen data without and with the formula.
+        Root mean square of the weighted residual on validation data without and with the formula.
     sentence : str
     alike : tuple of str
         States whose share these data cannot tell from the largest, the largest itself among them; none if they cannot
         tell the largest from zero.
     predicted : float
-        Share of the mean square on unseen data that the formula, or what the remark says, predicts.
+        Share of the mean square on validation data that the formula, or what the remark says, predicts.
     """
 
     channel: str
@@ -177,7 +177,7 @@ class Empirical(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class ChannelGap(Storable):
-    """Root mean square gap of one channel on unseen data, at each stage.
+    """Root mean square gap of one channel on validation data, at each stage.
 
     Attributes
     ----------
@@ -274,7 +274,7 @@ class Step(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Picture(Storable):
-    """Samples for the plots: one joint of the first unseen record, at the retained samples.
+    """Samples for the plots: one joint of the first validation record, at the retained samples.
 
     Attributes
     ----------
@@ -300,7 +300,7 @@ class Picture(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Trace(Storable):
-    """One channel of the first unseen record, measured and simulated.
+    """One channel of the first validation record, measured and simulated.
 
     Attributes
     ----------
@@ -331,10 +331,10 @@ class Diagnosis(Result):
     summary : str
         The verdict in a sentence or two.
     effects : tuple of AcceptedEffect
-        By what each adds to the prediction of unseen data given all the others, the most first; in the order in which
-        they were found where a ranking named them.
+        By what each adds to the prediction of validation data given all the others, the most first; in the order in
+        which they were found where a ranking named them.
     gap : dict of str to ChannelGap
-        On unseen data.
+        On validation data.
     refused : tuple of RefusedEffect
     candidates : tuple of RankedCandidate
     ambiguous_with : tuple of Ambiguity
@@ -364,7 +364,7 @@ class Diagnosis(Result):
     classes : tuple of tuple of str
         Each accepted effect that has rivals, with these, as ``effect at site``: the records do not tell them apart.
     traces : tuple of Trace
-        What was measured and what is simulated; none where no unseen record could be simulated.
+        What was measured and what is simulated; none where no validation record could be simulated.
     stated : dict of str to float
         Values of all parameters as the model file states them, SI.
     provenance : Provenance or None

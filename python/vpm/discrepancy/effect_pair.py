@@ -81,7 +81,7 @@ def together(
 
 def _lead(outcome: Round, best: Accepted | None) -> Trial | None:
     """What was refused and takes most of the training residual, clearly more than what would come in."""
-    if best is not None and best.trial.unseen.relative >= CLEAR_GAIN:
+    if best is not None and best.trial.validation.relative >= CLEAR_GAIN:
         return None
     least = 1.0 - CLEARLY_LESS * (1.0 if best is None else 1.0 - best.trial.training.relative)
     refused = [t for t in outcome.trials if t.probe.candidate.key in outcome.refused and not t.diverged]
@@ -99,10 +99,14 @@ def _do_more(outcome: Round, best: Accepted | None, first: Trial, second: Trial,
         second,
         parameters=(*first.parameters, *second.parameters),
         training=gain(current.fit.residual, judged.fit.residual, segments(data.training)),
-        unseen=gain(current.unseen, judged.unseen * shrinkage(data.unseen, current, judged), segments(data.unseen)),
+        validation=gain(
+            current.validation,
+            judged.validation * shrinkage(data.validation, current, judged),
+            segments(data.validation),
+        ),
         simulated=simulated,
     )
-    if both.unseen.relative < CLEAR_GAIN or refuse_trial(both, outcome.thresholds()):
+    if both.validation.relative < CLEAR_GAIN or refuse_trial(both, outcome.thresholds()):
         return False
     return best is None or cost(both) < cost(best.trial)
 

@@ -28,7 +28,7 @@ class Stage:
 
 
 def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
-    """Backward elimination: drop every earlier effect without which the model predicts the unseen data as well.
+    """Backward elimination: drop every earlier effect without which the model predicts the validation data as well.
 
     Where a parameter of a later effect was held because the data show it only together with one of the earlier effect,
     it is set free for the trial: a spring whose rest was held beside a constant force needs that force no more if it
@@ -50,8 +50,8 @@ def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dro
             bounds = {name: pair for name, pair in current.bounds.items() if name in free}
             reduced = judge(model, free, data, bounds)
         except (DivergedError, ModelError):
-            continue  # without it the model cannot follow the unseen data at all, or another effect cannot stand
-        loss = gain(reduced.unseen, current.unseen, segments(data.unseen))
+            continue  # without it the model cannot follow the validation data at all, or another effect cannot stand
+        loss = gain(reduced.validation, current.validation, segments(data.validation))
         if loss.relative < LEAST_GAIN and (not renamed or _renamed(current, reduced, model, known, data)):
             accepted.remove(entry)
             accepted[:] = [_released(other, freed) for other in accepted]
@@ -62,8 +62,9 @@ def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dro
 def _renamed(current: Judged, reduced: Judged, model: Model, free: tuple[str, ...], data: Data) -> bool:
     """Whether the numbers that were set free do the work of the effect that went, and there is such work.
 
-    Without them, and without the effect, the unseen data are predicted worse, in ``model`` with ``free`` fitted; with
-    them the unseen records are simulated as well. Where there is none, as many numbers as before would tell nothing.
+    Without them, and without the effect, the validation data are predicted worse, in ``model`` with ``free`` fitted;
+    with them the validation records are simulated as well. Where there is none, as many numbers as before would tell
+    nothing.
     """
     if current.simulated is not None and reduced.simulated is not None and data.simulation is not None:
         simulated = gain(current.simulated, reduced.simulated, segments(data.simulation))
@@ -71,7 +72,7 @@ def _renamed(current: Judged, reduced: Judged, model: Model, free: tuple[str, ..
             return False
     bounds = {name: pair for name, pair in current.bounds.items() if name in free}
     bare = judge(model, free, replace(data, simulation=None), bounds)
-    work = gain(bare.unseen, reduced.unseen, segments(data.unseen))
+    work = gain(bare.validation, reduced.validation, segments(data.validation))
     return work.relative >= LEAST_GAIN and work.score >= NORMAL_95_ONE_SIDED
 
 
@@ -79,7 +80,7 @@ def without_tight_bounds(final: Judged, data: Data) -> Judged:
     """The same model fitted with more room where a transition velocity stands at its upper bound.
 
     The bound keeps dry friction apart from viscous friction while candidates compete; once the names stand, it need not
-    cut the fit short. The training records decide, and the unseen ones may not be predicted worse for it.
+    cut the fit short. The training records decide, and the validation ones may not be predicted worse for it.
     """
     bounds = dict(final.bounds)
     for name, (low, high) in final.bounds.items():
@@ -93,7 +94,7 @@ def without_tight_bounds(final: Judged, data: Data) -> Judged:
     except DivergedError:
         return final
     better = gain(final.fit.residual, refitted.fit.residual, segments(data.training)).relative > LEAST_GAIN
-    kept = gain(final.unseen, refitted.unseen, segments(data.unseen)).harm <= NORMAL_95_ONE_SIDED
+    kept = gain(final.validation, refitted.validation, segments(data.validation)).harm <= NORMAL_95_ONE_SIDED
     return refitted if better and kept else final
 
 

@@ -18,7 +18,7 @@ from vpm.errors import DivergedError
 from vpm.identify import gain, segments
 from vpm.model import Model
 
-#: Share of the unseen mean square that a formula has to take away to be put into the model.
+#: Share of the validation mean square that a formula has to take away to be put into the model.
 LEAST_GAIN = 0.1
 #: Time has to predict this much more of the residual than any state of the machine before it is named in its place.
 TIME_AHEAD = 0.1
@@ -32,7 +32,7 @@ PERIOD_RANGE = 1.15
 
 
 def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
-    """Describe what a model leaves, and add a formula for it to the model where one predicts the unseen data.
+    """Describe what a model leaves, and add a formula for it to the model where one predicts the validation data.
 
     What runs with the time of the record, a drift or a rhythm, is told in words: as a force of the machine's state it
     would be wrong in the next record.
@@ -44,7 +44,7 @@ def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
         With the formula in the model, or ``final`` as it was.
     """
     joint = busiest_joint(data, final)
-    channel = data.unseen.efforts(0)[joint].channel
+    channel = data.validation.efforts(0)[joint].channel
     states, beat = shares(data, final, joint), rhythm(data, final, joint)
     formula = select(final, data)
     fitted = None
@@ -52,7 +52,7 @@ def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
         fitted = _fit(formula, final, data)
         if (shorter := _without_small(formula, fitted)) != formula:
             formula, fitted = shorter, _fit(shorter, final, data)
-    told = gain(final.unseen, final.unseen if fitted is None else fitted.unseen, segments(data.unseen))
+    told = gain(final.validation, final.validation if fitted is None else fitted.validation, segments(data.validation))
     remark, share = _in_time(states.of, beat, told.relative)
     if remark or formula is None or fitted is None or told.relative < LEAST_GAIN:
         sentence = _say_without(channel, states, remark)
@@ -96,7 +96,7 @@ def beside(base: Judged, told: Empirical, joint_fit: Judged, data: Data) -> tupl
     own = tuple(term.dotted for term in told.terms)
     start = joint_fit.model.with_parameters({name: base.model.parameters[name].value for name in base.free})
     fitted = _judge(start, own, data, {})
-    better = gain(base.unseen, fitted.unseen, segments(data.unseen))
+    better = gain(base.validation, fitted.validation, segments(data.validation))
     states = Shares(told.states, told.alike)
     if better.relative < LEAST_GAIN:
         sentence = _say_without(told.channel, states, "")
@@ -253,11 +253,11 @@ def _depends(states: Shares) -> str:
 def _say(channel: str, states: Shares, text: str, ratio: float) -> str:
     return (
         f"Of the residual of {channel}: {_depends(states)}. A fit, which is no physics, brings it down to "
-        f"{100 * ratio:.0f} % on unseen data and stands in the repaired model as {without_law().name}: {text}."
+        f"{100 * ratio:.0f} % on validation data and stands in the repaired model as {without_law().name}: {text}."
     )
 
 
 def _say_without(channel: str, states: Shares, remark: str) -> str:
     if remark:
         return f"Of the residual of {channel}: {remark}; no force law was made of it."
-    return f"Of the residual of {channel}: {_depends(states)}, and no short formula predicts it on unseen data."
+    return f"Of the residual of {channel}: {_depends(states)}, and no short formula predicts it on validation data."

@@ -26,7 +26,7 @@ QUIET_SHARE = 0.4
 
 
 def noise_floor(
-    model: Model, unseen: InverseDynamicsProblem, residual: Array, mode: str, setup: Setup | None = None
+    model: Model, validation: InverseDynamicsProblem, residual: Array, mode: str, setup: Setup | None = None
 ) -> dict[str, float]:
     """Root mean square that would remain in the balance of the right model, by channel.
 
@@ -41,7 +41,7 @@ def noise_floor(
     ----------
     model : Model
         The best model found.
-    unseen : InverseDynamicsProblem
+    validation : InverseDynamicsProblem
         The records it is judged on.
     residual : ndarray
         Its residual there.
@@ -51,7 +51,7 @@ def noise_floor(
     """
     generator = np.random.default_rng(SEED)
     expected: dict[str, list[tuple[float, int]]] = {}
-    for experiment, m, steps in zip(unseen.experiments, unseen.motions, unseen.integrators, strict=True):
+    for experiment, m, steps in zip(validation.experiments, validation.motions, validation.integrators, strict=True):
         balance = partial(InverseDynamicsProblem, model, cutoff=m.cutoff, band=m.band, integrator=steps)
         own = own_log(model, experiment, setup, generator) if mode == "closed_loop" else None
         change = _balance(model, balance, own) if own is not None else None
@@ -60,7 +60,7 @@ def noise_floor(
             change = clean, noisy.evaluate(model, model.theta)[0] - clean.evaluate(model, model.theta)[0]
         for channel, (rms, _, _) in gaps(*change).items():
             expected.setdefault(channel, []).append((rms**2, change[1].size))
-    white = _white(unseen, residual, noise_shapes(model, unseen))
+    white = _white(validation, residual, noise_shapes(model, validation))
     return {
         channel: max(float(np.sqrt(np.average([p for p, _ in v], weights=[n for _, n in v]))), white.get(channel, 0.0))
         for channel, v in expected.items()

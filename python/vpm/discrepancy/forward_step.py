@@ -42,7 +42,7 @@ class _Asked:
 
 
 def overlooked(found: Search, data: Data, each: SideBySide) -> Search:
-    """The search with the one effect more that runs ask for most, if training and unseen records are sure of it."""
+    """The search with the one effect more that runs ask for most, if training and validation records are sure of it."""
     promising = _promising(found)
     before = first_run(found.final, data) if promising else None
     if before is None:
@@ -154,7 +154,9 @@ def _accepted(found: Search, data: Data, asked: _Asked, told: Told) -> Accepted 
         judged = judge(model.with_parameters(values), (*final.free, *own), data, bounds)
     except VpmError:
         return None
-    told_by_runs = replace(trial, judged=judged, training=told.training, unseen=told.unseen, simulated=None, away=None)
+    told_by_runs = replace(
+        trial, judged=judged, training=told.training, validation=told.validation, simulated=None, away=None
+    )
     return Accepted(replace(told_by_runs, parameters=own, held=(), clear=True, alone=True, diverged=""), ())
 
 
@@ -164,7 +166,7 @@ def _added(found: Search, more: Accepted) -> Search:
     ranking = [*found.ranking]
     last = max((n for n, c in enumerate(ranking) if (c.name, c.site) == more.key), default=None)
     if last is not None:
-        ranking[last] = replace(ranking[last], accepted=True, unseen=more.trial.unseen.relative)
+        ranking[last] = replace(ranking[last], accepted=True, unseen=more.trial.validation.relative)
     return replace(
         found,
         stages=(*found.stages, Stage("added", name, site, more.trial.judged)),

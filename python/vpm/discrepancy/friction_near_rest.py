@@ -42,7 +42,7 @@ class Asked:
 
     Attributes
     ----------
-    training, unseen : Gain
+    training, validation : Gain
         Of what the run without the effect leaves, relative to the noise at each frequency; the weight is the share of
         the change that the records ask for beside all parameters that are known without it.
     run : OwnRun
@@ -50,7 +50,7 @@ class Asked:
     """
 
     training: Gain
-    unseen: Gain
+    validation: Gain
     run: OwnRun
 
 
@@ -105,7 +105,7 @@ def _refused(answer: Asked, probe: Probe, thresholds: Thresholds) -> str:
     speed, (_, highest) = answer.run.model.parameters[fades].value, probe.candidate.bounds["stribeck_velocity"]
     if speed > highest:
         return f"{fades} comes out as {speed:.3g} in runs of the model itself: no excess close to rest any more"
-    for name, told in (("training", answer.training), ("unseen", answer.unseen)):
+    for name, told in (("training", answer.training), ("validation", answer.validation)):
         needed = MODEST_FACTOR * thresholds.score(told.pieces)
         if not LEAST_ASKED <= told.weight <= 1.0 / LEAST_ASKED or told.score < needed:
             return (
@@ -133,14 +133,14 @@ def asked(before: OwnRun, trial: Trial, data: Data) -> Asked | None:
     if best is None or misfit(best) >= misfit(before):
         return None
     try:
-        pair = [as_it_is(run.model, run.free, data.unseen.experiments, setup) for run in (before, best)]
+        pair = [as_it_is(run.model, run.free, data.validation.experiments, setup) for run in (before, best)]
     except VpmError:
         return None
     return Asked(gain_of_runs(before, best), gain_of_runs(*pair), best)
 
 
 def asks_for(before: OwnRun, trial: Trial, data: Data, thresholds: Thresholds) -> bool:
-    """Whether unseen records, which models run by themselves, ask for an effect of the size that a balance says.
+    """Whether validation records, which models run by themselves, ask for an effect of the size that a balance says.
 
     The run along the training records is no witness of it: a friction that is not quite that of the machine has been
     fitted to these, and may have taken a part of what is late.
@@ -159,7 +159,7 @@ def asks_for(before: OwnRun, trial: Trial, data: Data, thresholds: Thresholds) -
     candidate, fitted = trial.probe.candidate, trial.judged.model.parameters
     after = before.model.with_effect(candidate.effect.name, at=candidate.site, **candidate.starts[0])
     after = after.with_parameters({name: fitted[name].value for name in trial.parameters})
-    records, setup = data.unseen.experiments, data.simulation.setup
+    records, setup = data.validation.experiments, data.simulation.setup
     try:
         free = (*before.free, *trial.parameters)
         told = gain_of_runs(as_it_is(before.model, before.free, records, setup), as_it_is(after, free, records, setup))
@@ -169,7 +169,7 @@ def asks_for(before: OwnRun, trial: Trial, data: Data, thresholds: Thresholds) -
 
 
 def _told(current: Judged, trial: Trial, answer: Asked, data: Data) -> Trial:
-    """The trial with the balance fitted near what the runs say, and with what they gain on the unseen records."""
+    """The trial with the balance fitted near what the runs say, and with what they gain on the validation records."""
     own = [name for name in answer.run.free if name not in current.free]
     values = {name: answer.run.estimated(name) for name in own}
     model = current.model
@@ -185,7 +185,7 @@ def _told(current: Judged, trial: Trial, answer: Asked, data: Data) -> Trial:
         judged=judged,
         parameters=tuple(own),
         held=(),
-        unseen=answer.unseen,
+        validation=answer.validation,
         training=answer.training,
         clear=True,
         alone=True,

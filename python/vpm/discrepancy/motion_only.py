@@ -57,12 +57,12 @@ class Timed:
     ----------
     bounds : dict
         Of its own parameters, by dotted name.
-    unseen : Gain
-        On unseen samples in motion, against the model without it that was fitted to the same samples.
+    validation : Gain
+        On validation samples in motion, against the model without it that was fitted to the same samples.
     """
 
     bounds: Mapping[str, tuple[float, float]]
-    unseen: Gain
+    validation: Gain
 
 
 def is_dry(model: Model) -> bool:
@@ -93,7 +93,7 @@ def timed_in_motion(
     current: tuple[Model, Sequence[str]],
     late: tuple[Model, Sequence[str]],
     training: InverseDynamicsProblem,
-    unseen: InverseDynamicsProblem,
+    validation: InverseDynamicsProblem,
     bounds: Mapping[str, tuple[float, float]],
 ) -> Timed | None:
     """Fit a model without a late effect and with it to the samples in motion; None where those are too few.
@@ -102,11 +102,11 @@ def timed_in_motion(
     ----------
     current, late : (Model, sequence of str)
         Without the effect and with it, each with its free parameters; those that only ``late`` has are the effect's.
-    training, unseen : InverseDynamicsProblem
+    training, validation : InverseDynamicsProblem
     bounds : mapping
         Bounds of free parameters that replace those of the models.
     """
-    fitted, predicted = InMotion(training), InMotion(unseen)
+    fitted, predicted = InMotion(training), InMotion(validation)
     own = [name for name in late[1] if name not in current[1]]
     if np.count_nonzero(fitted.counted) < FEWEST * (len(late[1]) + 1) or not np.any(predicted.counted):
         return None
@@ -121,7 +121,7 @@ def timed_in_motion(
     if not np.all(np.isfinite([s for _, s in spread.values()])):
         return None
     near = {name: _near(late[0], name, *spread[name], bounds) for name in own}
-    return Timed(near, gain(left[0], left[1], segments(unseen)))
+    return Timed(near, gain(left[0], left[1], segments(validation)))
 
 
 def _near(

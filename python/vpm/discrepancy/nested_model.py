@@ -76,7 +76,7 @@ def contains(rival: Judged, parameters: tuple[str, ...], final: Judged, own: tup
     """Whether a rival can do all that an accepted effect does, and something more.
 
     Then the effect is the rival with a number that is zero, and how far from zero the training records show it is as
-    good a witness as what it predicts: unseen records, which are fewer, have to gain by it and need not be sure. Of
+    good a witness as what it predicts: validation records, which are fewer, have to gain by it and need not be sure. Of
     laws that are different, and of friction whose fit makes up for reversals that filters smooth, neither holds.
 
     Parameters

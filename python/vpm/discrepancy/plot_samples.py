@@ -14,7 +14,7 @@ from vpm.simulate import Run
 
 
 def traces(data: Data, nominal: Judged, final: Judged) -> tuple[Trace, ...]:
-    """Channels of the first unseen record as they were simulated to judge by."""
+    """Channels of the first validation record as they were simulated to judge by."""
     problem = data.simulation
     if problem is None or final.simulated is None:
         return ()
@@ -34,14 +34,14 @@ def traces(data: Data, nominal: Judged, final: Judged) -> tuple[Trace, ...]:
 
 
 def pictures(data: Data, nominal: Judged, recalibrated: Judged, final: Judged) -> tuple[Picture, ...]:
-    """One for each joint of the first unseen record."""
+    """One for each joint of the first validation record."""
     found = []
-    problem = data.unseen
+    problem = data.validation
     position, velocity, _ = problem.state(0)
     _, applied, _ = problem.effort(final.model, final.model.theta, 0)
     for joint, block in enumerate(problem.efforts(0)):
         counts = np.where(block.moving > 0.0, 1.0, np.nan)
-        residuals = [counts * j.unseen[block.samples] / block.weight for j in (nominal, recalibrated, final)]
+        residuals = [counts * j.validation[block.samples] / block.weight for j in (nominal, recalibrated, final)]
         unit = final.model.channel_unit(block.channel.replace(".effort", ".position"))
         found.append(
             Picture(
@@ -58,11 +58,11 @@ def pictures(data: Data, nominal: Judged, recalibrated: Judged, final: Judged) -
     return tuple(found)
 
 
-def where(model: Model, unseen: InverseDynamicsProblem) -> dict[str, tuple[str, ...]]:
-    """Where the efforts of the first unseen record part, in words, by channel: over the samples that count."""
-    time, applied, required = unseen.effort(model, model.theta, 0)
-    record, told = unseen.experiments[0], {}
-    for joint, block in enumerate(unseen.efforts(0)):
+def where(model: Model, validation: InverseDynamicsProblem) -> dict[str, tuple[str, ...]]:
+    """Where the efforts of the first validation record part, in words, by channel: over the samples that count."""
+    time, applied, required = validation.effort(model, model.theta, 0)
+    record, told = validation.experiments[0], {}
+    for joint, block in enumerate(validation.efforts(0)):
         parts = [part for part in stretches(block.moving > 0.0) if part.stop - part.start > 1]
         if not parts:
             continue

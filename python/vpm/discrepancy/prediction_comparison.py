@@ -34,16 +34,16 @@ class Told:
 
     Attributes
     ----------
-    training, unseen : Gain
+    training, validation : Gain
         Of what the first run leaves, relative to the noise at each frequency.
     run : OwnRun
         The second one, along the training records.
     better : float
-        Logarithm of how many times as likely the unseen records are with the second one.
+        Logarithm of how many times as likely the validation records are with the second one.
     """
 
     training: Gain
-    unseen: Gain
+    validation: Gain
     run: OwnRun
     better: float
 
@@ -52,7 +52,7 @@ class Told:
         return self.better > 0.0 and all(
             LEAST_ASKED <= told.weight <= 1.0 / LEAST_ASKED
             and told.score >= MODEST_FACTOR * thresholds.score(told.pieces)
-            for told in (self.training, self.unseen)
+            for told in (self.training, self.validation)
         )
 
 
@@ -83,17 +83,17 @@ def fitted_run(run: OwnRun, data: Data) -> OwnRun | None:
 
 
 def compared(first: OwnRun, second: OwnRun, data: Data) -> Told | None:
-    """Ask all records for the change from one run to another; None where one cannot follow the unseen references."""
+    """Support of all records for the change from one run to another; None where one of them diverges."""
     if data.simulation is None:
         return None
     try:
-        unseen = [
-            as_it_is(run.model, run.free, data.unseen.experiments, data.simulation.setup) for run in (first, second)
+        validation = [
+            as_it_is(run.model, run.free, data.validation.experiments, data.simulation.setup) for run in (first, second)
         ]
     except VpmError:
         return None
-    better = misfit(unseen[0]) - misfit(unseen[1])
-    return Told(gain_of_runs(first, second), gain_of_runs(*unseen), second, better)
+    better = misfit(validation[0]) - misfit(validation[1])
+    return Told(gain_of_runs(first, second), gain_of_runs(*validation), second, better)
 
 
 def criterion(run: OwnRun) -> float:

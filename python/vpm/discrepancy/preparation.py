@@ -36,10 +36,10 @@ def records_of(model: Model, experiments: Sequence[Experiment], validate: Sequen
     if not training:
         raise DiagnosisError("no record was given; pass at least one experiment")
     check_moving(model, training)
-    unseen = tuple(joints_from_shafts(record, model) for record in validate)
-    if unseen:
-        check_stuck(model, unseen)
-        return training, unseen, []
+    validation = tuple(joints_from_shafts(record, model) for record in validate)
+    if validation:
+        check_stuck(model, validation)
+        return training, validation, []
     pairs = [e.split(1.0 - HELD_OUT) for e in training]
     note = f"no validation record was given: the last {100 * HELD_OUT:.0f} % of each record was kept out of the fit"
     return tuple(p[0] for p in pairs), tuple(p[1] for p in pairs), [note]
@@ -48,7 +48,7 @@ def records_of(model: Model, experiments: Sequence[Experiment], validate: Sequen
 def data_of(
     model: Model,
     training: Sequence[Experiment],
-    unseen: Sequence[Experiment],
+    validation: Sequence[Experiment],
     mode: str,
     cutoff: float | None,
     setup: Setup,
@@ -60,16 +60,16 @@ def data_of(
     states, bands = filters(model, fitted, cutoff)
     if states != tuple(m.cutoff for m in fitted.motions):
         fitted = balance(training, cutoff=states, band=bands)
-    # One filter for all unseen records: a gap that is measured in another band is another gap.
-    predicted = balance(unseen, cutoff=min(states), band=min(bands))
+    # One filter for all validation records: a gap that is measured in another band is another gap.
+    predicted = balance(validation, cutoff=min(states), band=min(bands))
     for problem in (fitted, predicted):
         problem.take_long_steps()
         for number, (record, m) in enumerate(zip(problem.experiments, problem.motions, strict=True)):
             still = problem.standstill(number)
             rest = f"; {100 * still:.0f} % at standstill left out of the balance" if still > 0.0 else ""
             notes.append(f"{record.name}: motion filtered at {m.cutoff:.4g} Hz, compared up to {m.band:.3g} Hz{rest}")
-    notes.append(f"unseen records simulated in mode {mode}")
-    return Data(fitted, predicted, OutputErrorProblem(model, unseen, mode, setup=setup))
+    notes.append(f"validation records simulated in mode {mode}")
+    return Data(fitted, predicted, OutputErrorProblem(model, validation, mode, setup=setup))
 
 
 def nominal_of(model: Model, data: Data, notes: list[str]) -> Judged:
@@ -77,7 +77,7 @@ def nominal_of(model: Model, data: Data, notes: list[str]) -> Judged:
     try:
         return judge(model, (), data, {})
     except DivergedError as error:
-        notes.append(f"the nominal model could not simulate the unseen records: {error}")
+        notes.append(f"the nominal model could not simulate the validation records: {error}")
         return judge(model, (), replace(data, simulation=None), {})
 
 
@@ -92,7 +92,7 @@ def recalibrated_of(model: Model, data: Data, notes: list[str], each: SideBySide
     alone = replace(data, training=data.training.side_by_side(worker_count(each.workers)))
     recalibrated, stopped = judged_anyhow(model, (*free, *transitions), alone, bounds)
     if stopped:
-        notes.append(f"the recalibrated model could not simulate the unseen records: {stopped}")
+        notes.append(f"the recalibrated model could not simulate the validation records: {stopped}")
     notes.extend(moved_far(model, recalibrated))
     return recalibrated
 

@@ -79,7 +79,7 @@ class Runs:
         simulation = self.data.simulation
         if simulation is None or simulation.mode != "closed_loop":
             return None
-        records = (*self.data.training.experiments, *self.data.unseen.experiments)
+        records = (*self.data.training.experiments, *self.data.validation.experiments)
         beside = next((run for _, run in reversed(self._known) if run is not None), None)
         try:
             return own_run(judged.model, judged.free, records, simulation.setup, beside)

@@ -17,7 +17,7 @@ from vpm.numbers import percent, short
 
 #: Probability of accepting any effect by chance, shared among all candidates that are tried.
 FALSE_ALARM_LEVEL = 0.01
-#: Drop of the unseen mean square below which an effect is not worth its name.
+#: Drop of the validation mean square below which an effect is not worth its name.
 LEAST_GAIN = 0.02
 #: The same for an effect that is to be believed: what sticks and creeps leaves more than that to imitate.
 WORTH_A_NAME = 0.1
@@ -61,17 +61,17 @@ class Thresholds:
     interval: float
 
     def score(self, pieces: int) -> float:
-        """Least standard deviations of unseen gain, by Student's t with one degree of freedom less than pieces."""
+        """Least standard deviations of validation gain, by Student's t with one degree of freedom less than pieces."""
         return float(stdtrit(max(1, pieces - 1), 1.0 - FALSE_ALARM_LEVEL / max(1, self.candidates)))
 
-    def needed(self, unseen: Gain, *, asked: bool = False) -> float:
+    def needed(self, validation: Gain, *, asked: bool = False) -> float:
         """Standard deviations that a gain has to have: more where most of the residual stays and no run asks for it."""
-        modest = unseen.relative < MODEST_GAIN and not asked
-        return self.score(unseen.pieces) * (MODEST_FACTOR if modest else 1.0)
+        modest = validation.relative < MODEST_GAIN and not asked
+        return self.score(validation.pieces) * (MODEST_FACTOR if modest else 1.0)
 
-    def met(self, unseen: Gain) -> bool:
+    def met(self, validation: Gain) -> bool:
         """Whether a gain is worth a name, and sure."""
-        return unseen.relative >= WORTH_A_NAME and unseen.score >= self.needed(unseen)
+        return validation.relative >= WORTH_A_NAME and validation.score >= self.needed(validation)
 
 
 def refuse_probe(probe: Probe) -> str:
@@ -118,13 +118,13 @@ def refuse_ringing(share: float, trial: Trial) -> str:
 
     ``share`` of the mean square of noise alone goes with that, by simulation.
     """
-    rest = trial.unseen.relative - max(share, 0.0)
+    rest = trial.validation.relative - max(share, 0.0)
     if rest >= WORTH_A_NAME:
         return ""
     noise = "lower" if share >= 0.0 else "raise"
     return (
-        f"it {_moves('the unseen error', trial.unseen)}; it would {noise} noise of the measured motion alone, which "
-        f"rings in the links, by {percent(abs(share))} of its mean square"
+        f"it {_moves('the validation error', trial.validation)}; it would {noise} noise of the measured motion alone, "
+        f"which rings in the links, by {percent(abs(share))} of its mean square"
     )
 
 
@@ -135,7 +135,7 @@ def explains_most(trial: Trial) -> bool:
     """
     candidate = trial.probe.candidate
     late = bool(candidate.effect.late) and not has_peers(trial.judged.model, candidate.site)
-    return late and trial.unseen.relative >= MOST_OF_IT
+    return late and trial.validation.relative >= MOST_OF_IT
 
 
 def refuse_timing(timed: Gain, shift: float, thresholds: Thresholds, *, beside: float) -> str:
@@ -157,7 +157,7 @@ def refuse_timing(timed: Gain, shift: float, thresholds: Thresholds, *, beside: 
         return ""
     return (
         f"beside a shift of the commands by {1e3 * shift * thresholds.interval:.2g} ms, within the sampling interval, "
-        f"it {_moves('the unseen error', timed, 'only ')}"
+        f"it {_moves('the validation error', timed, 'only ')}"
     )
 
 
@@ -178,7 +178,7 @@ def _too_short(trial: Trial, interval: float) -> str:
     """
     model = trial.judged.model
     site = trial.probe.candidate.effect.site
-    peers = has_peers(model, trial.probe.candidate.site) and trial.unseen.relative >= MODEST_GAIN
+    peers = has_peers(model, trial.probe.candidate.site) and trial.validation.relative >= MODEST_GAIN
     if site in {"link", "body", "beam"} or peers or explains_most(trial):
         return ""
     for name in trial.parameters:
@@ -186,7 +186,7 @@ def _too_short(trial: Trial, interval: float) -> str:
         if parameter.unit == "s" and parameter.value < interval:
             return (
                 f"{name} comes out as {1e3 * parameter.value:.3g} ms, less than the sampling interval of "
-                f"{1e3 * interval:.3g} ms, and {_moves('the unseen error', trial.unseen)}: "
+                f"{1e3 * interval:.3g} ms, and {_moves('the validation error', trial.validation)}: "
                 "so little cannot be told from the sampling itself"
             )
     return ""
@@ -215,7 +215,7 @@ def _no_way(trial: Trial) -> str:
     fit = trial.judged.fit
     std = float(fit.std[fit.names.index(name)]) if name in fit.names else 0.0
     clear = parameter.value - NORMAL_95_ONE_SIDED * std > 1.001 * least
-    beside_dry = f"{candidate.site}.friction.coulomb" in trial.judged.free and trial.unseen.relative >= CLEAR_GAIN
+    beside_dry = f"{candidate.site}.friction.coulomb" in trial.judged.free and trial.validation.relative >= CLEAR_GAIN
     if clear or parameter.value > (1.001 if beside_dry else SAMPLED) * least:
         return ""
     return (
@@ -247,13 +247,13 @@ def _trifling_gain(trial: Trial) -> str:
     """
     if not trial.probe.candidate.effect.scales:
         return ""
-    name, drop = trial.parameters[0], trial.unseen.relative
+    name, drop = trial.parameters[0], trial.validation.relative
     value = trial.judged.model.parameters[name].value
     if reason := _trifling_size(trial):
         return reason
     if trial.slow is None and 0.0 <= drop < MODEST_GAIN:
         return (
-            f"{name} comes out as {value:.4g} and {_moves('the unseen error', trial.unseen, 'only ')}: "
+            f"{name} comes out as {value:.4g} and {_moves('the validation error', trial.validation, 'only ')}: "
             "an instrument is blamed where it explains more than an imitation would"
         )
     return ""
@@ -269,7 +269,7 @@ def _trifling_size(trial: Trial) -> str:
         return ""
     name = trial.parameters[0]
     value = trial.judged.model.parameters[name].value
-    magnified = trial.unseen.relative >= CLEAR_GAIN and trial.gap > MAGNIFIED * abs(value - 1.0)
+    magnified = trial.validation.relative >= CLEAR_GAIN and trial.gap > MAGNIFIED * abs(value - 1.0)
     if abs(value - 1.0) >= NEGLIGIBLE or magnified:
         return ""
     return (
@@ -279,11 +279,11 @@ def _trifling_size(trial: Trial) -> str:
 
 
 def _only_training(trial: Trial) -> str:
-    seen, unseen = trial.training, trial.unseen
-    if unseen.relative >= 0.0:
+    seen, validation = trial.training, trial.validation
+    if validation.relative >= 0.0:
         return ""
     joined = "and" if seen.relative < 0.0 else "but"
-    return f"it {_moves('the training error', seen)}, {joined} {_moves('the unseen error', unseen)}"
+    return f"it {_moves('the training error', seen)}, {joined} {_moves('the validation error', validation)}"
 
 
 def _not_clear(trial: Trial) -> str:
@@ -302,30 +302,30 @@ def _only_impacts(trial: Trial) -> str:
     if trial.slow is None or trial.slow.relative >= -LEAST_GAIN:
         return ""
     return (
-        f"it {_moves('the unseen error', trial.unseen)} and {_moves('its slow part', trial.slow)}: "
+        f"it {_moves('the validation error', trial.validation)} and {_moves('its slow part', trial.slow)}: "
         "it makes up for single impacts of the play"
     )
 
 
 def slow_shows_it(trial: Trial, thresholds: Thresholds) -> bool:
     """Whether what is slow shows an effect that single impacts of a play cover, and does not speak alone."""
-    unseen, sure = trial.unseen, NORMAL_95_ONE_SIDED
-    whole = unseen.relative >= LEAST_GAIN and unseen.score >= sure
+    validation, sure = trial.validation, NORMAL_95_ONE_SIDED
+    whole = validation.relative >= LEAST_GAIN and validation.score >= sure
     return trial.slow is not None and whole and thresholds.met(trial.slow)
 
 
 def _too_little(trial: Trial, thresholds: Thresholds) -> str:
-    unseen = trial.there
+    validation = trial.there
     if slow_shows_it(trial, thresholds):
         return ""
-    if unseen.relative < WORTH_A_NAME:
-        return f"it {_moves('the unseen error', unseen, 'only ')}"
-    needed = thresholds.needed(unseen, asked=trial.asked)
-    if unseen.score < needed:
+    if validation.relative < WORTH_A_NAME:
+        return f"it {_moves('the validation error', validation, 'only ')}"
+    needed = thresholds.needed(validation, asked=trial.asked)
+    if validation.score < needed:
         return (
-            f"its gain of {percent(unseen.relative)} on unseen data is {unseen.score:.1f} standard deviations over "
-            f"{unseen.pieces} independent pieces, and {needed:.1f} are needed when {thresholds.candidates} candidates "
-            "are tried"
+            f"its gain of {percent(validation.relative)} on validation data is {validation.score:.1f} standard "
+            f"deviations over {validation.pieces} independent pieces, and {needed:.1f} are needed "
+            f"when {thresholds.candidates} candidates are tried"
         )
     return ""
 
@@ -334,23 +334,23 @@ def _only_reversals(trial: Trial) -> str:
     if trial.away is None or trial.away.relative >= LEAST_GAIN:
         return ""
     return (
-        "it lowers the unseen error only where a joint with dry friction turns round and sticks for a while; elsewhere "
-        f"it {_moves('that', trial.away, 'only ')}"
+        "it lowers the validation error only where a joint with dry friction turns round and sticks for a while; "
+        f"elsewhere it {_moves('that', trial.away, 'only ')}"
     )
 
 
 def worse_in_simulation(trial: Trial) -> str:
     """Why the second witness speaks against a trial, or ""."""
     if trial.diverged:
-        return f"with it the simulation of the unseen record fails: {trial.diverged}"
+        return f"with it the simulation of the validation record fails: {trial.diverged}"
     simulated = trial.simulated
-    decided = coupled(trial.judged.model) and trial.unseen.relative >= CLEAR_GAIN
+    decided = coupled(trial.judged.model) and trial.validation.relative >= CLEAR_GAIN
     if simulated is None or decided or simulated.harm <= NORMAL_95_ONE_SIDED:
         return ""
     if simulated.relative < -LEAST_GAIN:
-        joined = "and" if trial.unseen.relative < 0.0 else "but"
+        joined = "and" if trial.validation.relative < 0.0 else "but"
         return (
-            f"it {_moves('the unseen error of the balance of effort', trial.unseen)}, {joined} "
+            f"it {_moves('the validation error of the balance of effort', trial.validation)}, {joined} "
             f"{_moves('that of the simulation', simulated)}, {simulated.harm:.1f} standard deviations"
         )
     return ""
@@ -363,7 +363,7 @@ def parameter_text(model: Model, name: str, std: float) -> str:
 
 
 def _moves(what: str, change: Gain, little: str = "") -> str:
-    """``lowers the unseen error by 3.00 % of its mean square (0.2 to 0.197)``, or raises it, as its numbers say."""
+    """``lowers the validation error by 3.00 % of its mean square (0.2 to 0.197)``, or raises it, as its numbers say."""
     numbers = f"of its mean square ({short(change.before)} to {short(change.after)})"
     if change.relative < 0.0:
         return f"raises {what} by {percent(-change.relative)} {numbers}"

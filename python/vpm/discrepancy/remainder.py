@@ -1,4 +1,4 @@
-"""What effects leave: whether it repeats on unseen records, and how much of the gap they are the explanation of.
+"""What effects leave: whether it repeats on validation records, and how much of the gap they are the explanation of.
 
 The floor of the noise is an estimate, and a residual need not stand far above it to be no noise. So a fit without
 physics is put beside the effects: what it predicts of records that it never saw, physics would predict too. Effects
@@ -44,7 +44,7 @@ class Described:
 
 @dataclass(frozen=True)
 class Remainder:
-    """What the model with all accepted effects leaves of the unseen records.
+    """What the model with all accepted effects leaves of the validation records.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float, 
     pressed = None if recalibrated is final else view.pressed(recalibrated, left)
     if not any(clear):
         return Remainder(choices, repeats=pressed is not None, open=0.0, instead=pressed is not None, seals=pressed)
-    power, whole = _power(in_time(final, data).unseen), _power(_before(recalibrated, final, data))
+    power, whole = _power(in_time(final, data).validation), _power(_before(recalibrated, final, data))
     least = min(view.leaves(choice) for choice, better in zip(choices, clear, strict=True) if better)
     share = np.clip((power - least) / max(whole - least, 1e-300), 0.0, 1.0)
     plain = len(choices[0].judged.free) <= len(final.free)
@@ -114,7 +114,7 @@ def _before(recalibrated: Judged, final: Judged, data: Data) -> Array:
     """What the recalibrated model leaves, less a shift within the sampling interval unless that is what was named."""
     known = {effect.key for effect in recalibrated.model.effects}
     late = any(effect.type.shifts and effect.key not in known for effect in final.model.effects)
-    return recalibrated.unseen if late else in_time(recalibrated, data).unseen
+    return recalibrated.validation if late else in_time(recalibrated, data).validation
 
 
 def _power(values: Array) -> float:
@@ -123,7 +123,7 @@ def _power(values: Array) -> float:
 
 @dataclass(frozen=True)
 class _View:
-    """Unseen residuals in the band of the motion, with what the times of samples leave open."""
+    """Validation residuals in the band of the motion, with what the times of samples leave open."""
 
     data: Data
     frequency: float
@@ -131,29 +131,29 @@ class _View:
 
     def __call__(self, judged: Judged) -> Array:
         """Residual of a model."""
-        return below(self.data.unseen, in_time(judged, self.data).unseen, self.frequency)
+        return below(self.data.validation, in_time(judged, self.data).validation, self.frequency)
 
     def clearly_better(self, choice: Described, left: Array) -> bool:
         """Whether a description predicts more than the effects do, as surely as an effect has to."""
         if choice.told.remark:
             own = self(choice.base)
             return _power(own) - self._said(choice, own) < (1.0 - WORTH_A_NAME) * _power(left)
-        return self.thresholds.met(gain(left, self(choice.judged), segments(self.data.unseen)))
+        return self.thresholds.met(gain(left, self(choice.judged), segments(self.data.validation)))
 
     def pressed(self, recalibrated: Judged, left: Array) -> Seals | None:
         """Friction of seals that predicts more in the place of the effects than they do, as surely as one has to."""
         found = seals(recalibrated, self.data)
         if found is None:
             return None
-        alone = below(self.data.unseen, found.unseen, self.frequency)
-        return found if self.thresholds.met(gain(left, alone, segments(self.data.unseen))) else None
+        alone = below(self.data.validation, found.validation, self.frequency)
+        return found if self.thresholds.met(gain(left, alone, segments(self.data.validation))) else None
 
     def leaves(self, choice: Described) -> float:
         """Sum of squares over all frequencies that a description leaves."""
-        own = in_time(choice.judged, self.data).unseen
+        own = in_time(choice.judged, self.data).validation
         return _power(own) - self._said(choice, own) if choice.told.remark else _power(own)
 
     def _said(self, choice: Described, own: Array) -> float:
         """What a remark predicts of a residual: of the effort that it speaks of, and of nothing else."""
-        blocks = (block for block in self.data.unseen.blocks if block.channel == choice.told.channel)
+        blocks = (block for block in self.data.validation.blocks if block.channel == choice.told.channel)
         return choice.told.predicted * sum(_power(own[block.samples]) for block in blocks)

@@ -21,7 +21,7 @@ from vpm.discrepancy.side_by_side import SideBySide
 def told_apart(
     found: Search, known: Sequence[Rivals], data: Data, each: SideBySide
 ) -> tuple[Search, tuple[Rivals, ...]]:
-    """Let the rival that runs ask for most take the place of its effect, if training and unseen records are sure of it.
+    """Exchange an effect for the rival that predictions support most, if training and validation records are clear.
 
     Returns
     -------

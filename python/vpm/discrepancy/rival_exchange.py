@@ -25,10 +25,10 @@ from vpm.identify import Gain, gain, segments
 
 
 def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search, tuple[Rivals, ...]]:
-    """Let the rival that the unseen data prefer most take the place of the effect it was put for, if there is one.
+    """Let the rival that the validation data prefer most take the place of the effect it was put for, if there is one.
 
     A rival counts that acts at the same site and is confused with the effect. No new name is claimed but one of two,
-    so that it need not halve what is left: it has to know something of the unseen data that the effect does not.
+    so that it need not halve what is left: it has to know something of the validation data that the effect does not.
 
     Returns
     -------
@@ -49,32 +49,34 @@ def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search
         without = known[place].without
         whole = trial if without is None else finished(without, data, trial)
         if _preferred(found.final, found.accepted[place], whole, data, thresholds) > 0.0:
-            reason = "in its place predicts the unseen data better"
+            reason = "in its place predicts the validation data better"
             return exchanged(found, known, data, place, whole, reason)
     return found, tuple(known)
 
 
 def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresholds: Thresholds) -> float:
-    """Standard deviations by which the unseen data prefer a rival, 0 if not beyond chance or not in every view."""
+    """Standard deviations by which the validation data prefer a rival, 0 if not beyond chance or not in every view."""
     if trial.probe.candidate.effect.late and entry.effect.late:
         return 0.0  # their runs along the reference said which, and the balance knows less of it
     if not alike(trial.probe.candidate, entry.trial.probe.candidate) or refuse_trial(trial, thresholds):
         return 0.0
     judged = trial.judged
     fitted = gain(final.fit.residual, judged.fit.residual, segments(data.training))
-    unseen = gain(final.unseen, judged.unseen * shrinkage(data.unseen, final, judged), segments(data.unseen))
+    validation = gain(
+        final.validation, judged.validation * shrinkage(data.validation, final, judged), segments(data.validation)
+    )
     more = len(trial.parameters) - len(entry.trial.parameters)
-    if not earned(fitted, more) or unseen.score < thresholds.score(unseen.pieces):
+    if not earned(fitted, more) or validation.score < thresholds.score(validation.pieces):
         return 0.0
     finer = contains(judged, trial.parameters, final, entry.trial.parameters)
     shown = finer and fitted.score >= thresholds.score(fitted.pieces)
-    if unseen.harm > (0.0 if shown else -NORMAL_95_ONE_SIDED):
+    if validation.harm > (0.0 if shown else -NORMAL_95_ONE_SIDED):
         return 0.0
     if data.simulation is not None and final.simulated is not None and judged.simulated is not None:
         simulated = gain(final.simulated, judged.simulated, segments(data.simulation))
         if simulated.harm > NORMAL_95_ONE_SIDED and simulated.relative < -LEAST_GAIN:
             return 0.0
-    return unseen.score
+    return validation.score
 
 
 def timed_again(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search, tuple[Rivals, ...]]:
@@ -161,13 +163,13 @@ def exchanged(
 
 
 def in_order(found: Search, known: Sequence[Rivals]) -> tuple[Search, tuple[Rivals, ...]]:
-    """Accepted effects by what each adds to the prediction of unseen data given all the others, the most first.
+    """Accepted effects by what each adds to the prediction of validation data given all the others, the most first.
 
     One of which a number was held, because the data show it only together with another effect, stands after that other
     one: taken out alone, the two would share their work in a way that the held number decides.
     """
-    power = float(found.final.unseen @ found.final.unseen)
-    adds = [np.inf if r.without is None else float(r.without.unseen @ r.without.unseen) - power for r in known]
+    power = float(found.final.validation @ found.final.validation)
+    adds = [np.inf if r.without is None else float(r.without.validation @ r.without.validation) - power for r in known]
     left, order = list(range(len(found.accepted))), list[int]()
     while left:
         ready = [n for n in left if not any(_refines(found.accepted[n], found.accepted[m]) for m in left if m != n)]

@@ -61,7 +61,7 @@ class Round:
 
     def done(self) -> bool:
         """Whether what is left is noise alone, as far as links that bend make it ring."""
-        return noise_alone(self.current.model, self.data, self.timed.unseen)
+        return noise_alone(self.current.model, self.data, self.timed.validation)
 
     def light(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
         """The best of the candidates whose regressor follows from the measured motion alone."""
@@ -81,7 +81,7 @@ class Round:
         much of the residual is refitted all the same.
         """
         model = self.current.model
-        left = structure(model, self.data.training, self.data.unseen, self.timed.fitted, self.timed.unseen)
+        left = structure(model, self.data.training, self.data.validation, self.timed.fitted, self.timed.validation)
         quiet = not left.present and left.coloured <= NOISE_ONLY
         if (quiet and self._takes_long()) or self.done():
             return None
@@ -106,9 +106,9 @@ class Round:
         believed = [answer for answer in answers if isinstance(answer, Trial)]
         if not believed:
             return None
-        best = Accepted(max(believed, key=lambda trial: trial.unseen.score), ())
+        best = Accepted(max(believed, key=lambda trial: trial.validation.score), ())
         self.refused.pop(best.key, None)
-        self._ranking[best.key] = replace(self._ranking[best.key], unseen=best.trial.unseen.relative)
+        self._ranking[best.key] = replace(self._ranking[best.key], unseen=best.trial.validation.relative)
         self.mark(best.key)
         return best
 
@@ -132,7 +132,7 @@ class Round:
         return {one.key for one in light if here and joint_at(model, one.site) != here}
 
     def weak(self, best: Accepted) -> bool:
-        """Whether what would come in leaves most of the unseen gap, so that it may only imitate what moves by itself.
+        """Whether the best candidate leaves most of the validation error, so that it may only imitate a hidden motion.
 
         A motion that nobody measures shows in the efforts of all joints, in part as any of several lighter effects
         would: what explains little has to compete with it. Where links bend already, or drives have states, its probes
@@ -196,7 +196,7 @@ class Round:
         return bool(motion) and not logged & set(self.data.training.shown)
 
     def confirm(self) -> None:
-        """Refit with the most promising ones and judge them on unseen data."""
+        """Refit with the most promising ones and judge them on validation data."""
         short_list = most_promising(self._promising)
         if short_list:
             self.tell(f"round {self.number}: refitting with {', '.join(p.candidate.label for p in short_list)}")
@@ -246,7 +246,7 @@ class Round:
             if isinstance(trial, Failure):
                 self.refused[key] = trial.reason
                 continue
-            self._ranking[key] = replace(self._ranking[key], unseen=trial.unseen.relative)
+            self._ranking[key] = replace(self._ranking[key], unseen=trial.validation.relative)
             self.trials.append(trial)
             if reason := self._refused(trial, thresholds):
                 self.refused[key] = reason
@@ -285,7 +285,7 @@ class Round:
         return reason or only_ringing(self.current, self.data, trial)
 
     def _run_asks(self, trial: Trial, thresholds: Thresholds) -> bool:
-        """Whether something late gains little and surely, and runs of the model itself along unseen records ask for it.
+        """Whether a delay gains little and surely, and closed-loop predictions of validation records support it.
 
         What sticks is late in a balance of effort, and so imitates it, but not in a run; nor does a run know or mind to
         which of two samples a command was logged.
@@ -305,13 +305,13 @@ class Round:
         if self.timed.shift == 0.0 or explains_most(trial):
             return ""
         told = in_time(trial.judged, self.data)
-        before, unseen = self.timed.unseen, told.unseen
+        before, validation = self.timed.validation, told.validation
         if slow_shows_it(trial, thresholds):
-            before, unseen = (slow(self.data.unseen, each) for each in (before, unseen))
+            before, validation = (slow(self.data.validation, each) for each in (before, validation))
         if is_late(trial.probe.candidate.effect, trial.judged.model):
             # What sticks is late by itself, with a shift as without: what is late is judged where nothing sticks.
-            before, unseen = (in_motion(self.data.unseen) * each for each in (before, unseen))
-        timed = gain(before, unseen, segments(self.data.unseen))
+            before, validation = (in_motion(self.data.validation) * each for each in (before, validation))
+        timed = gain(before, validation, segments(self.data.validation))
         return refuse_timing(timed, self.timed.shift, thresholds, beside=told.shift)
 
     def best(self) -> Accepted | None:
@@ -340,7 +340,7 @@ class Round:
         return Round(judged, self.data, self.number + 1, self.tell, self.each)
 
     def ranked(self) -> list[RankedCandidate]:
-        """Candidates of this round: what was accepted, what helped on unseen data, then by what screening promises."""
+        """Candidates of this round: what was accepted, what helped on validation data, then by predicted gain."""
         return sorted(self._ranking.values(), key=_promise)
 
 

@@ -51,8 +51,8 @@ class Search:
     """Outcome of the whole search, or of what was done of it when Ctrl-C was pressed.
 
     ``last`` is given if nothing has changed since the last effect came in; ``over`` is the last round, if it accepted
-    nothing. ``left`` is told by a ranking: by joint the share of the error power of unseen records that effects leave;
-    ``ranked`` is its model, and ``within_laws`` whether it leaves less than laws are wrong by.
+    nothing. ``left`` is told by a ranking: by joint the share of the error power of validation records that effects
+    leave; ``ranked`` is its model, and ``within_laws`` whether it leaves less than laws are wrong by.
     """
 
     stages: tuple[Stage, ...]
@@ -182,7 +182,7 @@ def ambiguities(accepted: Sequence[Accepted]) -> tuple[Ambiguity, ...]:
     for entry in accepted:
         candidate = entry.trial.probe.candidate
         if entry.rivals:
-            reason = "they predict the unseen data equally well"
+            reason = "they predict the validation data equally well"
             reason = "the records do not tell them apart" if entry.ranked else reason
             found.append(Ambiguity(candidate.effect.name, candidate.site, entry.rivals, reason))
         for alias in entry.trial.held:

@@ -23,20 +23,20 @@ def read_by_itself(chosen: Trial, equals: Sequence[Trial], data: Data) -> Trial:
     """Of what explains the data as well as ``chosen``, the instrument whose own reading asks for it; else ``chosen``.
 
     It has to predict its channel better than ``chosen`` does by as much as is worth a name, surely, on the training
-    records and on the unseen ones, and to leave no more of all channels together on either.
+    records and on the validation ones, and to leave no more of all channels together on either.
     """
     if chosen.probe.candidate.effect.site == "sensor":
         return chosen
     asked = [t for t in equals if t.probe.candidate.effect.site == "sensor" and _asks(t, chosen, data)]
-    return min(asked, key=lambda t: _power(t.judged.unseen), default=chosen)
+    return min(asked, key=lambda t: _power(t.judged.validation), default=chosen)
 
 
 def _asks(trial: Trial, chosen: Trial, data: Data) -> bool:
     site, model = trial.probe.candidate.site, trial.judged.model
-    channels = [channel for channel in data.unseen.shown if model.sensor_of(channel) == site]
+    channels = [channel for channel in data.validation.shown if model.sensor_of(channel) == site]
     pairs = (
         (data.training, chosen.judged.fit.residual, trial.judged.fit.residual),
-        (data.unseen, chosen.judged.unseen, trial.judged.unseen),
+        (data.validation, chosen.judged.validation, trial.judged.validation),
     )
     return bool(channels) and all(_better(problem, channels, before, after) for problem, before, after in pairs)
 

@@ -86,11 +86,11 @@ def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str],
     lone = alone and not has_own_drives(model) and not any(entry.type.rotor for entry in model.effects)
     known = simulated or lone
     if effect.memory and tuple(model.joints) != tuple(measured) and not known:
-        return "its memory cannot be balanced beside what moves unseen in this model"
+        return "its memory cannot be balanced beside joints in this model that no channel measures"
     if not effect.motion:
         return ""
     if remembering and not (known and effect.splits):
-        return f"what moves unseen cannot be balanced beside the memory of the {remembering[0]}"
+        return f"a joint that no channel measures cannot be balanced beside the memory of the {remembering[0]}"
     split = [(entry.name, entry.at) for entry in model.effects if entry.type.motion]
     whole = model
     for key in split:

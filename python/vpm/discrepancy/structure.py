@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 BINS = 8
 #: One sample in so many is taken for independent of the others.
 THINNED = 2
-#: Share of the unseen residual that a state map must predict, and share of its power in the lowest tenth of the
+#: Share of the validation residual that a state map must predict, and share of its power in the lowest tenth of the
 #: band (a tenth for white noise), before it counts as structured.
 PREDICTED_SHARE = 0.1
 SLOW_SHARE = 0.5
@@ -26,7 +26,8 @@ SLOW_SHARE = 0.5
 COLOURED = 1.6
 #: Strains and what else shows of hidden motion sum up the noise of what feeds them, which colours them about so much.
 DRIFTING = 1.5
-#: So many times the relative gap of the training records, that of the unseen ones holds something they never showed.
+#: So many times the relative gap of the training records, that of the validation ones holds something they never
+#: showed.
 NEW = 4.0
 #: From so many standard deviations of the rank correlation between the two on, its size grows with that of the effort.
 GROWING = 4.0
@@ -39,8 +40,8 @@ class Structure:
     Attributes
     ----------
     predicted : float
-        Share of the unseen residual's mean square that a map of position, velocity, acceleration and effort, drawn from
-        the training residual, predicts.
+        Share of the validation residual's mean square that a map of position, velocity, acceleration and effort, drawn
+        from the training residual, predicts.
     slow : float
         Share of its power in the lowest tenth of the retained band.
     coloured : float
@@ -49,7 +50,7 @@ class Structure:
         Rank correlation of its size with that of the effort, in standard deviations: noise of sensors and drives does
         not know how hard the drive works.
     new : float
-        Relative gap on unseen records over that on training records.
+        Relative gap on validation records over that on training records.
     """
 
     predicted: float
@@ -68,19 +69,19 @@ class Structure:
 def structure(
     model: Model,
     training: InverseDynamicsProblem,
-    unseen: InverseDynamicsProblem,
+    validation: InverseDynamicsProblem,
     fitted: Array,
     residual: Array,
 ) -> Structure:
-    """Examine the residuals of a fitted model on training and unseen data."""
-    seen_shapes, unseen_shapes = noise_shapes(model, training), noise_shapes(model, unseen)
+    """Examine the residuals of a fitted model on training and validation data."""
+    training_shapes, validation_shapes = noise_shapes(model, training), noise_shapes(model, validation)
     joints = range(len(training.joints))
-    predicted = max(_predicted(model, training, unseen, fitted, residual, joint) for joint in joints)
-    blocks = zip(unseen.blocks, unseen_shapes, strict=True)
+    predicted = max(_predicted(model, training, validation, fitted, residual, joint) for joint in joints)
+    blocks = zip(validation.blocks, validation_shapes, strict=True)
     slow = float(np.mean([_slow_share(residual[block.samples], shape) for block, shape in blocks]))
-    coloured = min(_coloured(training, fitted, seen_shapes), _coloured(unseen, residual, unseen_shapes))
-    growing = min(_growing(model, training, fitted), _growing(model, unseen, residual))
-    seen, fresh = gaps(training, fitted), gaps(unseen, residual)
+    coloured = min(_coloured(training, fitted, training_shapes), _coloured(validation, residual, validation_shapes))
+    growing = min(_growing(model, training, fitted), _growing(model, validation, residual))
+    seen, fresh = gaps(training, fitted), gaps(validation, residual)
     new = max(fresh[c][1] / seen[c][1] if seen[c][1] > 0.0 else 0.0 for c in fresh)
     return Structure(predicted, slow, coloured, growing, new)
 
@@ -119,18 +120,19 @@ def _growing(model: Model, problem: InverseDynamicsProblem, residual: Array) -> 
 def _predicted(
     model: Model,
     training: InverseDynamicsProblem,
-    unseen: InverseDynamicsProblem,
+    validation: InverseDynamicsProblem,
     fitted: Array,
     residual: Array,
     j: int,
 ) -> float:
     """Cross-validated share of one joint's residual that bins of its state explain."""
     states = [
-        np.vstack([_state(model, problem, r, j) for r in range(len(problem.motions))]) for problem in (training, unseen)
+        np.vstack([_state(model, problem, r, j) for r in range(len(problem.motions))])
+        for problem in (training, validation)
     ]
     targets = [
         np.concatenate([values[problem.efforts(r)[j].samples] for r in range(len(problem.motions))])
-        for problem, values in ((training, fitted), (unseen, residual))
+        for problem, values in ((training, fitted), (validation, residual))
     ]
     edges = [np.quantile(column, np.linspace(0, 1, BINS + 1)[1:-1]) for column in states[0].T]
     features = [_features(state, edges, states[0]) for state in states]

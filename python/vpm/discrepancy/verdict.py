@@ -75,7 +75,7 @@ def verdict(
     structured = left.present and _above([g for g in main if not _is_nothing(g)]) > FLOOR_FACTOR
     remaining = structured or (rest is not None and rest.repeats and not small) or bool(still)
     remaining = remaining and not found.within_laws
-    worst = max(beside if beside and _is_unseen(found, data) else main + beside, key=_clear_of_noise)
+    worst = max(beside if beside and _is_unmeasured(found, data) else main + beside, key=_clear_of_noise)
     numbers = _stages(worst)
     names = ", then ".join(e.trial.probe.candidate.label for e in found.accepted)
     share_left = (worst.after / worst.recalibrated) ** 2 if worst.recalibrated > 0.0 else 0.0
@@ -84,7 +84,7 @@ def verdict(
         return (
             "unexplained",
             "Only together with values that the model file rules out do effects of the catalogue explain the gap: with "
-            f"{names}, {_farthest(away)}. Error on unseen data: {numbers}, {_percent(worst.after, worst)} after.",
+            f"{names}, {_farthest(away)}. Error on validation data: {numbers}, {_percent(worst.after, worst)} after.",
             True,
         )
     observed = min(found.left.values(), default=np.nan)
@@ -99,13 +99,13 @@ def verdict(
             "unexplained",
             f"The residual is structured and {above:.2g} times the noise floor. The effects of the catalogue that come "
             f"closest, {names}, {leave}: they are not the explanation. "
-            f"Error on unseen data: {numbers}, {_percent(worst.after, worst)} after.",
+            f"Error on validation data: {numbers}, {_percent(worst.after, worst)} after.",
             True,
         )
     if found.accepted:
         return (
             "effect_found",
-            f"Missing: {names}. Error on unseen data: {numbers}, {_percent(worst.after, worst)} after."
+            f"Missing: {names}. Error on validation data: {numbers}, {_percent(worst.after, worst)} after."
             + (_OPEN.format(joints=", ".join(joints.open)) if apart else _REST if remaining else ""),
             remaining,
         )
@@ -113,7 +113,7 @@ def verdict(
         return (
             "unexplained",
             f"The residual is structured and {above:.2g} times the noise floor, and no effect of the catalogue "
-            f"explains it. Error on unseen data: {numbers}.",
+            f"explains it. Error on validation data: {numbers}.",
             True,
         )
     return (*_nothing_missing(data, nominal, recalibrated, (main, beside), worst), False)
@@ -137,7 +137,7 @@ def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], observed: float) -
     return most or any(map(_is_worse_than_none, main_gaps(gap)))
 
 
-def _is_unseen(found: Search, data: Data) -> bool:
+def _is_unmeasured(found: Search, data: Data) -> bool:
     """Whether all that was named acts at joints that a balance does not see."""
     at = _joints(found)
     return bool(at) and not at & {*data.training.joints, ""}
@@ -162,8 +162,8 @@ def _is_described_better(rest: Remainder | None) -> bool:
 def _is_explanation(found: Search, observed: float, mostly_open: bool) -> bool:
     """Whether what was found explains the gap, where a balance of effort is said to leave it mostly open or not.
 
-    A machine that an observer keeps beside unseen records tells it where it is clear: effects that leave little in the
-    channel ``observed`` best are the explanation of what is missing there, those that leave more than all none.
+    A machine that an observer keeps beside validation records tells it where it is clear: effects that leave little in
+    the channel ``observed`` best are the explanation of what is missing there, those that leave more than all none.
     """
     if found.within_laws:
         return True
@@ -183,7 +183,7 @@ def _told_by_runs(found: Search) -> bool:
 
     What a balance of effort hardly sees may leave as much of it as there was, and be the explanation.
     """
-    return all(entry.trial.alone and entry.trial.unseen.relative >= MOST_OF_IT for entry in found.accepted)
+    return all(entry.trial.alone and entry.trial.validation.relative >= MOST_OF_IT for entry in found.accepted)
 
 
 def _nothing_missing(
@@ -197,7 +197,7 @@ def _nothing_missing(
     (main, beside), numbers = told, _stages(worst)
     small = max(g.before / g.signal if g.signal > 0.0 else 0.0 for g in main) <= NEGLIGIBLE
     agrees = small or max((g.before / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main) <= FLOOR_FACTOR
-    better = gain(nominal.unseen, recalibrated.unseen, segments(data.unseen))
+    better = gain(nominal.validation, recalibrated.validation, segments(data.validation))
     balanced = not agrees and better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL))
     if balanced or any(_was_closed(g) for g in beside):
         closed = max(main + beside, key=_closed)
@@ -205,9 +205,10 @@ def _nothing_missing(
             numbers = f"{_stages(closed)}; in another channel it grew, {numbers}"
         return (
             "parameters_only",
-            f"Nothing is missing: other values of the known parameters close the gap. Error on unseen data: {numbers}.",
+            "Nothing is missing: other values of the known parameters close the gap. "
+            f"Error on validation data: {numbers}.",
         )
-    return "no_disagreement", f"The nominal model agrees with the data. Error on unseen data: {numbers}."
+    return "no_disagreement", f"The nominal model agrees with the data. Error on validation data: {numbers}."
 
 
 def _was_closed(gap: ChannelGap) -> bool:

@@ -45,9 +45,9 @@ def undetermined(value: float, std: float, stated: float | None = None) -> str:
 
 
 def took(effect: AcceptedEffect) -> str:
-    """What an effect did to the unseen error when it came in."""
+    """What an effect did to the validation error when it came in."""
     did = "took" if effect.gain >= 0.0 else "added"
-    ending = "of the unseen mean square" if effect.gain >= 0.0 else "to the unseen mean square"
+    ending = "of the validation mean square" if effect.gain >= 0.0 else "to the validation mean square"
     return f"{did} {percent(abs(effect.gain))} {ending} ({effect.score:.1f} standard deviations)"
 
 

@@ -104,7 +104,7 @@ def finding(evidence: Evidence, number: int) -> Drawn:
 def _gaps(d: Diagnosis) -> Iterator[Drawn]:
     if not d.gap:
         return
-    title = "Error on unseen data at each stage"
+    title = "Error on validation data at each stage"
     parts = []
     for channel, gap in d.gap.items():
         floor = "" if isnan(gap.noise_floor) else f", noise floor {percent(gap.share(gap.noise_floor))}"
@@ -158,7 +158,7 @@ def _joint(p: Picture, number: int, last: str) -> Iterator[Drawn]:
     yield drawn(
         f"picture-{number}-time",
         f"{name}: over time",
-        f"First unseen record: effort as measured and as the model needs it, {' and '.join(stages)}; below, the "
+        f"First validation record: effort as measured and as the model needs it, {' and '.join(stages)}; below, the "
         f"residual.{masked}",
         f"Effort and residual of {p.channel} over {short(float(p.time[0]))} to {short(float(p.time[-1]))} s. Residual, "
         f"root mean square: {sizes}; largest at the end {short(float(p.after[worst]))} {p.unit} at "
@@ -219,7 +219,7 @@ def _candidates(d: Diagnosis) -> Iterator[Drawn]:
     for c in drawn_candidates(d.candidates):
         what = "accepted" if c.accepted else "not refitted" if isnan(c.unseen) else "refused"
         shares = [f"{percent(c.screened)} screened"] * (not isnan(c.screened))
-        shares += [f"{percent(c.unseen)} on unseen data"] * (not isnan(c.unseen))
+        shares += [f"{percent(c.unseen)} on validation data"] * (not isnan(c.unseen))
         parts.append(f"{c.name} at {c.site}, {what}: {', '.join(shares) or 'no share known'}.")
     words = f"Bars of the share of the mean square that each candidate takes away. {' '.join(parts)}"
     caption = "Share of the residual's mean square that goes with each candidate; a bar to the left: it grows."

@@ -47,12 +47,12 @@ def _effects(d: Diagnosis) -> list[str]:
 
 def _steps(d: Diagnosis) -> list[str]:
     rows = [f"  {step_name(step):44s} {percent(step.unseen_error):>10s}" for step in d.steps]
-    return ["error on unseen data, in the order in which the model changed (share of the measured effort):", *rows]
+    return ["error on validation data, in the order in which the model changed (share of the measured effort):", *rows]
 
 
 def _gaps(d: Diagnosis) -> list[str]:
     head = f"  {'channel':34s} {'before':>11s} {'recalibrated':>13s} {'after':>11s} {'noise floor':>12s}"
-    lines = ["gap on unseen data (root mean square):", head]
+    lines = ["gap on validation data (root mean square):", head]
     for channel, gap in d.gap.items():
         numbers = f"{_cell(gap.before)} {_cell(gap.recalibrated, 13)} {_cell(gap.after)} {_floor(gap)}"
         shares = f"{_share(gap.before, gap)} {_share(gap.recalibrated, gap, 13)} {_share(gap.after, gap)}"

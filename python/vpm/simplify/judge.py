@@ -31,7 +31,7 @@ class Judge:
     ----------
     model : Model
         The full one.
-    records, unseen : sequence of Experiment
+    records, validation : sequence of Experiment
         To fit on, and to judge on.
     rate : float
         Steps per second, Hz.
@@ -45,21 +45,21 @@ class Judge:
         self,
         model: Model,
         records: Sequence[Experiment],
-        unseen: Sequence[Experiment],
+        validation: Sequence[Experiment],
         rate: float,
         mode: str,
         channels: Sequence[str] | None = None,
     ) -> None:
         self.model = model
-        self.records, self.unseen, self.mode, self.rate = tuple(records), tuple(unseen), mode, rate
+        self.records, self.validation, self.mode, self.rate = tuple(records), tuple(validation), mode, rate
         self.channels = tuple(channels) if channels is not None else None
-        self.per_sample = steps_per_sample((*self.records, *self.unseen), rate)
+        self.per_sample = steps_per_sample((*self.records, *self.validation), rate)
         self._balances = mode != "prescribed_motion" and not model.beams and _is_ideal(model)
 
     @property
     def driven(self) -> Experiment:
         """Record whose commands drive a model that is timed."""
-        return self.unseen[0]
+        return self.validation[0]
 
     @in_one_thread
     def fitted(self, model: Model) -> Model:
@@ -102,7 +102,7 @@ class Judge:
             The simulation fails in these steps.
         """
         stepped = replace(setup, substeps=setup.substeps * self.per_sample)
-        data = self._outputs(model, self.unseen, stepped)
+        data = self._outputs(model, self.validation, stepped)
         residual, _ = data.evaluate(model, model.theta)
         return {channel: share for channel, (_, share, _) in gaps(data, residual).items()}
 

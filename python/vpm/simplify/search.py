@@ -108,14 +108,14 @@ def simplify(
         raise SimulationError(f"a rate of {rate:g} Hz is not possible; give a positive number")
     say = tell or (lambda _: None)
     records = as_records(experiments)
-    unseen = records if validate is None else as_records(validate)
+    validation = records if validate is None else as_records(validate)
     mode = reference_mode(model, records, against, mode)
     if against == "model":
         say("the full model as the reference")
         channels = shown(model) if channels is None else channels
-        known = {id(each): by_the_model(model, each, mode, rate, channels) for each in (*records, *unseen)}
-        records, unseen = ([known[id(each)] for each in group] for group in (records, unseen))
-    judge = Judge(model, records, unseen, rate, mode, channels)
+        known = {id(each): by_the_model(model, each, mode, rate, channels) for each in (*records, *validation)}
+        records, validation = ([known[id(each)] for each in group] for group in (records, validation))
+    judge = Judge(model, records, validation, rate, mode, channels)
     trials = Trials(model, judge, lambda changes: bool(changes) or against == "data", say, tolerance, executor)
     sites = reductions(model, surrogates(model, judge.records, mode, rate, judge.channels))
     try:
@@ -155,7 +155,7 @@ def _weigh_terms(trials: Trials, sites: Sites) -> None:
     if not terms or judge.mode not in ("free_run", "closed_loop"):
         return
     try:
-        along = motions(model, judge.unseen, judge.mode, Setup(FITTING, judge.per_sample))
+        along = motions(model, judge.validation, judge.mode, Setup(FITTING, judge.per_sample))
     except SimulationError:
         return
     for site in terms:
