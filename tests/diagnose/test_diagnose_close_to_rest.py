@@ -7,7 +7,7 @@ import pytest
 
 import vpm
 from shared_cases import shared_case
-from vpm.discrepancy.closed_loop_prediction import as_it_is, misfit
+from vpm.discrepancy.closed_loop_prediction import misfit, predict
 from vpm.simulate import Setup
 
 CLOSE_TO_REST = "stribeck_friction"
@@ -56,7 +56,7 @@ def test_known_parameters_are_no_misfit() -> None:
     case = shared_case("axis_linear", "none", 3)
     model = case.model()
     free = ("body.mass", "axis.friction.viscous")
-    run = as_it_is(model, free, case.train, Setup())
+    run = predict(model, free, case.train, Setup())
     moved = model.with_parameters({name: 1.001 * model.parameters[name].value for name in free})
     left, _ = run.problem.evaluate(moved, moved.theta)
     assert not np.allclose(left, run.left, rtol=1e-6)

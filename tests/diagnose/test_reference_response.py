@@ -13,7 +13,7 @@ from scipy.stats import t as student_t
 import vpm
 from blind import Case
 from shared_cases import shared_case
-from vpm.discrepancy.closed_loop_prediction import as_it_is, own_run, spectra, weighted
+from vpm.discrepancy.closed_loop_prediction import fit_prediction, predict, spectra, weighted
 from vpm.discrepancy.confirmation import Data, judge
 from vpm.discrepancy.reference_response import Runs, Verdict, compare_driven, inexact, part
 from vpm.discrepancy.refusal import NEGLIGIBLE
@@ -155,7 +155,7 @@ def test_a_delay_of_a_machine_that_sticks_is_timed_along_its_own_run() -> None:
     assert delay.model.parameters[name].value > 1.5 * truth
     assert data.simulation is not None
     free = (*delay.free, "axis.friction.transition_velocity")
-    run = own_run(delay.model, free, data.training.experiments, data.simulation.setup)
+    run = fit_prediction(delay.model, free, data.training.experiments, data.simulation.setup)
     value, std = run.estimated(name)
     assert value == pytest.approx(truth, abs=3.0 * std)
     assert std < 0.1 * truth
@@ -185,7 +185,7 @@ def test_steps_of_a_run_beside_dry_friction_do_not_blur_what_parts_a_delay_from_
         for model in (delay, lag)
     ]
     name = delay.effect("input_delay", "drive").parameter_names["time"]
-    run = as_it_is(delay, (name,), [record], Setup())
+    run = predict(delay, (name,), [record], Setup())
     assert np.linalg.norm(run.left - ideal[0]) < np.linalg.norm(ideal[1] - ideal[0])
 
 
@@ -249,7 +249,7 @@ def test_what_no_model_of_oil_is_exact_to_does_not_tell_late_from_slow() -> None
 def test_readings_of_a_cylinder_are_what_a_model_of_oil_is_not_exact_to() -> None:
     case = shared_case("servo_cylinder", "none", 1)
     record = case.train[0].split(0.1)[0]
-    run = as_it_is(case.model(), ("servo.valve.flow_gain",), [record], Setup())
+    run = predict(case.model(), ("servo.valve.flow_gain",), [record], Setup())
     floor = inexact(run)
     assert floor is not None
     read = np.stack([NEGLIGIBLE * block.weight * record[block.channel] for block in run.problem.blocks], axis=1)

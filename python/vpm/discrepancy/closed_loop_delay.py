@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from vpm.discrepancy.closed_loop_prediction import OwnRun, own_run
+from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction, fit_prediction
 from vpm.discrepancy.motion_only import WITHIN, Timed, timed_in_motion
 from vpm.errors import VpmError
 from vpm.identify import Gain, InverseDynamicsProblem, OutputErrorProblem, gain, segments
@@ -19,14 +19,14 @@ from vpm.model import Model
 WORTH_A_RUN = 0.1
 
 
-def timed_alone(
+def timed_in_closed_loop(
     current: tuple[Model, Sequence[str]],
     late: tuple[Model, Sequence[str]],
     training: InverseDynamicsProblem,
     validation: InverseDynamicsProblem,
     simulation: OutputErrorProblem | None,
     bounds: Mapping[str, tuple[float, float]],
-) -> tuple[Timed | None, OwnRun | None]:
+) -> tuple[Timed | None, ClosedLoopPrediction | None]:
     """A late effect timed on samples in motion, within what a run along the training records says where there is one.
 
     Parameters
@@ -43,7 +43,7 @@ def timed_alone(
     -------
     timed : Timed or None
         None where too few samples are in motion.
-    run : OwnRun or None
+    run : ClosedLoopPrediction or None
         None where the effect promises nothing in motion, or the model cannot run by itself.
     """
     timed = timed_in_motion(current, late, training, validation, bounds)
@@ -52,7 +52,7 @@ def timed_alone(
     if simulation is None or simulation.mode != "closed_loop":
         return timed, None
     try:
-        run = own_run(*late, training.experiments, simulation.setup)
+        run = fit_prediction(*late, training.experiments, simulation.setup)
     except VpmError:
         return timed, None
     near = dict(bounds)
@@ -62,14 +62,16 @@ def timed_alone(
     return timed_in_motion(current, late, training, validation, near), run
 
 
-def gain_alone(model: Model, free: Sequence[str], late: OwnRun, simulation: OutputErrorProblem) -> Gain | None:
+def gain_in_closed_loop(
+    model: Model, free: Sequence[str], late: ClosedLoopPrediction, simulation: OutputErrorProblem
+) -> Gain | None:
     """Gain of a delay in simulations of validation records, each model with the parameters of its own prediction.
 
     Without the effect, a transition of friction that is too wide may pass for it in a simulation, and with it make it
     late twice. None where the model without it cannot run by itself.
     """
     try:
-        before = own_run(model, free, late.problem.experiments, simulation.setup)
+        before = fit_prediction(model, free, late.problem.experiments, simulation.setup)
         left = [simulation.evaluate(run.model, run.model.theta)[0] for run in (before, late)]
     except VpmError:
         return None

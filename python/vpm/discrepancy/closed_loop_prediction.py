@@ -51,7 +51,7 @@ LEAP, TRIES, SHORTER = 3.0, 3, 0.4
 
 
 @dataclass(frozen=True)
-class OwnRun:
+class ClosedLoopPrediction:
     """A model that runs the records by itself.
 
     Attributes
@@ -88,9 +88,13 @@ class OwnRun:
         return self.model.parameters[name].value, spread
 
 
-def own_run(
-    model: Model, free: Sequence[str], records: Sequence[Experiment], setup: Setup, beside: OwnRun | None = None
-) -> OwnRun:
+def fit_prediction(
+    model: Model,
+    free: Sequence[str],
+    records: Sequence[Experiment],
+    setup: Setup,
+    beside: ClosedLoopPrediction | None = None,
+) -> ClosedLoopPrediction:
     """The run of a model, its free parameters fitted to records; they begin at those of a run ``beside`` it.
 
     Where links bend, which takes a hundred times as long, they stay those of the balance. Derivatives by what both have
@@ -102,7 +106,7 @@ def own_run(
         The model cannot follow the references.
     """
     start = model if beside is None else _like(model, free, beside)
-    found = as_it_is(start, tuple(free), records, setup, beside)
+    found = predict(start, tuple(free), records, setup, beside)
     for _ in range(0 if bends(model) else MOST_FITS):
         better = _step(found, setup)
         if better is None:
@@ -151,7 +155,7 @@ def weighted(
     return np.asarray(np.vstack([rows.real, rows.imag]))
 
 
-def misfit(run: OwnRun, left: Array | None = None) -> float:
+def misfit(run: ClosedLoopPrediction, left: Array | None = None) -> float:
     """Minus the logarithm of the likelihood of what a run leaves, but for a constant, if that is noise.
 
     With what another run of these records would leave instead, as if that model were as linear in the known parameters
@@ -201,7 +205,7 @@ def least(transforms: Spectra, inexact: Spectra | None = None) -> tuple[Array, S
     return step, noise, rows
 
 
-def _like(model: Model, free: Sequence[str], beside: OwnRun) -> Model:
+def _like(model: Model, free: Sequence[str], beside: ClosedLoopPrediction) -> Model:
     """A model with the parameters of another one's run; a time that only one of them has is that of the other."""
     theirs = beside.model.parameters
     values = {name: theirs[name].value for name in free if name in beside.free}
@@ -212,10 +216,14 @@ def _like(model: Model, free: Sequence[str], beside: OwnRun) -> Model:
     return model.with_parameters(values)
 
 
-def as_it_is(
-    model: Model, free: tuple[str, ...], records: Sequence[Experiment], setup: Setup, beside: OwnRun | None = None
-) -> OwnRun:
-    """The run of a model with the parameters that it has; see `own_run` for what is ``beside`` it.
+def predict(
+    model: Model,
+    free: tuple[str, ...],
+    records: Sequence[Experiment],
+    setup: Setup,
+    beside: ClosedLoopPrediction | None = None,
+) -> ClosedLoopPrediction:
+    """The run of a model with the parameters that it has; see `fit_prediction` for what is ``beside`` it.
 
     Raises
     ------
@@ -233,8 +241,8 @@ def _with_slopes(
     problem: OutputErrorProblem,
     left: Array,
     setup: Setup,
-    beside: OwnRun | None = None,
-) -> OwnRun:
+    beside: ClosedLoopPrediction | None = None,
+) -> ClosedLoopPrediction:
     """A run with its derivatives, which are worth few digits: no finer steps, and those that are known ``beside`` it.
 
     Each takes as long as the run itself, and models of which one is a little later or slower share all but their own.
@@ -247,7 +255,7 @@ def _with_slopes(
     for place, name in enumerate(free):
         if beside is not None and name in known:
             slopes[:, place] = beside.slopes[:, beside.free.index(name)]
-    return OwnRun(model, free, problem, left, slopes)
+    return ClosedLoopPrediction(model, free, problem, left, slopes)
 
 
 def _fine(model: Model, free: Sequence[str], records: Sequence[Experiment], setup: Setup) -> Setup:
@@ -258,7 +266,7 @@ def _fine(model: Model, free: Sequence[str], records: Sequence[Experiment], setu
     return replace(setup, substeps=max(setup.substeps, min(MOST_STEPS, ceil(steps * interval / shortest))))
 
 
-def _step(run: OwnRun, setup: Setup) -> OwnRun | None:
+def _step(run: ClosedLoopPrediction, setup: Setup) -> ClosedLoopPrediction | None:
     """A better run, or None where none is near."""
     step, noise, rows = least(run.spectra())
     cost = float(rows[:, 0] @ rows[:, 0])
@@ -279,7 +287,7 @@ def _step(run: OwnRun, setup: Setup) -> OwnRun | None:
     return None
 
 
-def _moved(run: OwnRun, step: Array) -> dict[str, float]:
+def _moved(run: ClosedLoopPrediction, step: Array) -> dict[str, float]:
     """Values after a step, within their bounds and within a leap of what they were if they cannot be negative."""
     values = {}
     for name, change in zip(run.free, map(float, step), strict=True):

@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.discrepancy.candidates import joint_at
-from vpm.discrepancy.closed_loop_delay import gain_alone, timed_alone
-from vpm.discrepancy.closed_loop_prediction import OwnRun
+from vpm.discrepancy.closed_loop_delay import gain_in_closed_loop, timed_in_closed_loop
+from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction
 from vpm.discrepancy.low_frequency import has_impacts, slow
 from vpm.discrepancy.motion_only import CREEPING, Timed, is_dry, is_late
 from vpm.discrepancy.screening import Alias, Baseline, Probe, size_is_clear
@@ -385,19 +385,21 @@ def _slow_gain(current: Judged, validation: Array, data: InverseDynamicsProblem)
     return gain(slow(data, current.validation), slow(data, validation), segments(data))
 
 
-def _timed(current: Judged, judged: Judged, data: Data, probe: Probe) -> tuple[Timed | None, OwnRun | None]:
+def _timed(
+    current: Judged, judged: Judged, data: Data, probe: Probe
+) -> tuple[Timed | None, ClosedLoopPrediction | None]:
     """A late drive or instrument on a machine with dry friction, timed in motion, and the run that timed it if any."""
     if not is_late(probe.candidate.effect, current.model) or has_tangent(probe.model, data.training):
         return None, None
     before, late = (current.model, current.free), (judged.model, judged.free)
-    return timed_alone(before, late, data.training, data.validation, data.simulation, judged.bounds)
+    return timed_in_closed_loop(before, late, data.training, data.validation, data.simulation, judged.bounds)
 
 
-def _witnessed(trial: Trial, current: Judged, alone: OwnRun | None, data: Data) -> Trial:
+def _witnessed(trial: Trial, current: Judged, alone: ClosedLoopPrediction | None, data: Data) -> Trial:
     """A trial; of something late that makes simulations worse those count in which each model suits its own run."""
     if alone is None or data.simulation is None or trial.simulated is None or trial.simulated.relative >= 0.0:
         return trial
-    told = gain_alone(current.model, current.free, alone, data.simulation)
+    told = gain_in_closed_loop(current.model, current.free, alone, data.simulation)
     return trial if told is None else replace(trial, simulated=told)
 
 

@@ -19,7 +19,7 @@ from scipy.linalg import block_diag
 from vpm.discrepancy.backlash import is_read_off
 from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.choice import Accepted
-from vpm.discrepancy.closed_loop_prediction import OwnRun, own_run
+from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction, fit_prediction
 from vpm.discrepancy.confirmation import Data, Judged, judge
 from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, WORTH_A_NAME
 from vpm.discrepancy.search import Search
@@ -79,14 +79,14 @@ def _harder(final: Judged, entry: Accepted, data: Data, each: SideBySide) -> Jud
         return final
     fitted = each(
         what,
-        lambda model: own_run(model, final.free, records, setup),
+        lambda model: fit_prediction(model, final.free, records, setup),
         [tried[place] for place in best if place],
         lambda _: label,
     )
     better = [run for run in fitted if not isinstance(run, Failure)]
     balanced = [_balanced(final, run, names, key, ratio, data) for run in better for ratio in SWALLOWING]
     believed = [
-        one for one in balanced if one is not None and _better(final, one, data) and _runs_better(before, one, runs)
+        one for one in balanced if one is not None and _better(final, one, data) and _predicts_better(before, one, runs)
     ]
     return min(believed, key=lambda one: float(one.fit.residual @ one.fit.residual), default=final)
 
@@ -121,7 +121,9 @@ def _damped(model: Model, key: Key, ratio: float) -> Model:
     return model.with_parameters({names["contact_damping"]: resistance})
 
 
-def _balanced(final: Judged, run: OwnRun, names: Sequence[str], key: Key, ratio: float, data: Data) -> Judged | None:
+def _balanced(
+    final: Judged, run: ClosedLoopPrediction, names: Sequence[str], key: Key, ratio: float, data: Data
+) -> Judged | None:
     """The balance fitted with what the run tells; None where that cannot be computed."""
     rest = tuple(name for name in final.free if name not in names)
     bounds = {name: pair for name, pair in final.bounds.items() if name in rest}
@@ -141,7 +143,7 @@ def _balanced(final: Judged, run: OwnRun, names: Sequence[str], key: Key, ratio:
     return replace(told, free=fit.names, fit=fit, bounds=dict(final.bounds))
 
 
-def _runs_better(before: Array, one: Judged, runs: OutputErrorProblem) -> bool:
+def _predicts_better(before: Array, one: Judged, runs: OutputErrorProblem) -> bool:
     """Whether a model simulates the training records better than what was left ``before``, beyond chance."""
     try:
         after, _ = runs.evaluate(one.model, one.model.theta)

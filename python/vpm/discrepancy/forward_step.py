@@ -14,11 +14,11 @@ import numpy as np
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.choice import Accepted, choose
-from vpm.discrepancy.closed_loop_prediction import OwnRun, misfit
+from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction, misfit
 from vpm.discrepancy.confirmation import Data, Trial, confirm, judge
 from vpm.discrepancy.elimination import Stage
 from vpm.discrepancy.motion_only import WITHIN
-from vpm.discrepancy.prediction_comparison import WORTH_A_FIT, Told, compared, criterion, first_run, fitted_run
+from vpm.discrepancy.prediction_comparison import WORTH_A_FIT, Told, compared, criterion, fitted_prediction, predicted
 from vpm.discrepancy.refusal import WORTH_A_NAME, Thresholds, impossible_trial
 from vpm.discrepancy.screening import Probe, impossible_values
 from vpm.discrepancy.search import Search
@@ -38,25 +38,25 @@ class _Asked:
 
     probe: Probe
     trial: Trial | None
-    run: OwnRun
+    run: ClosedLoopPrediction
 
 
 def overlooked(found: Search, data: Data, each: SideBySide) -> Search:
     """The search with the one effect more that runs ask for most, if training and validation records are sure of it."""
     promising = _promising(found)
-    before = first_run(found.final, data) if promising else None
+    before = predicted(found.final, data) if promising else None
     if before is None:
         return found
     asked = each("one effect more: running", partial(_run, found, data, before), promising, lambda p: p.candidate.label)
     least = criterion(before) - WORTH_A_FIT
     worth = [one for one in asked if isinstance(one, _Asked) and criterion(one.run) < least]
-    first = fitted_run(before, data) if worth else None
+    first = fitted_prediction(before, data) if worth else None
     if first is None:
         return found
     thresholds = Thresholds(max(1, len(found.ranking)), min(m.dt for m in data.training.motions))
     told = []
     for one in sorted(worth, key=lambda one: criterion(one.run))[:FITTED]:
-        second = fitted_run(one.run, data)
+        second = fitted_prediction(one.run, data)
         said = None if second is None else compared(first, second, data)
         if said is not None and said.sure(thresholds):
             told.append((one, said))
@@ -104,7 +104,7 @@ def _taken(probe: Probe, tried: Sequence[Trial]) -> float:
     return max([probe.drop, *mine])
 
 
-def _run(found: Search, data: Data, before: OwnRun, probe: Probe) -> _Asked | str:
+def _run(found: Search, data: Data, before: ClosedLoopPrediction, probe: Probe) -> _Asked | str:
     """The run of a model with one effect more, as it was fitted to the balance; or why there is none."""
     if probe.candidate.effect.elastic:
         run = _sprung(found, data, before, probe)
@@ -113,11 +113,11 @@ def _run(found: Search, data: Data, before: OwnRun, probe: Probe) -> _Asked | st
     trial = next(known, None) or confirm(found.final, data, probe)
     if reason := impossible_trial(trial, min(m.dt for m in data.training.motions)):
         return reason
-    run = first_run(trial.judged, data)
+    run = predicted(trial.judged, data)
     return "it cannot follow the references" if run is None else _Asked(probe, trial, run)
 
 
-def _sprung(found: Search, data: Data, before: OwnRun, probe: Probe) -> OwnRun | None:
+def _sprung(found: Search, data: Data, before: ClosedLoopPrediction, probe: Probe) -> ClosedLoopPrediction | None:
     """The run of a model with a spring in series from the start that suits the records best; None if none does."""
     candidate, starts = probe.candidate, []
     for start in candidate.starts:
@@ -132,7 +132,7 @@ def _sprung(found: Search, data: Data, before: OwnRun, probe: Probe) -> OwnRun |
         return None
     names = model.effect(*candidate.key).parameter_names
     free = (*before.free, *(dotted for short, dotted in names.items() if short not in candidate.fixed))
-    return first_run(replace(found.final, model=model, free=free), data)
+    return predicted(replace(found.final, model=model, free=free), data)
 
 
 def _accepted(found: Search, data: Data, asked: _Asked, told: Told) -> Accepted | None:
@@ -154,10 +154,10 @@ def _accepted(found: Search, data: Data, asked: _Asked, told: Told) -> Accepted 
         judged = judge(model.with_parameters(values), (*final.free, *own), data, bounds)
     except VpmError:
         return None
-    told_by_runs = replace(
+    judged_by_prediction = replace(
         trial, judged=judged, training=told.training, validation=told.validation, simulated=None, away=None
     )
-    return Accepted(replace(told_by_runs, parameters=own, held=(), clear=True, alone=True, diverged=""), ())
+    return Accepted(replace(judged_by_prediction, parameters=own, held=(), clear=True, alone=True, diverged=""), ())
 
 
 def _added(found: Search, more: Accepted) -> Search:

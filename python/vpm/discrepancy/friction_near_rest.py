@@ -15,7 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.discrepancy.candidates import Candidate
-from vpm.discrepancy.closed_loop_prediction import SMOOTHED, OwnRun, as_it_is, least, misfit, own_run, spectra, weighted
+from vpm.discrepancy.closed_loop_prediction import (
+    SMOOTHED,
+    ClosedLoopPrediction,
+    fit_prediction,
+    least,
+    misfit,
+    predict,
+    spectra,
+    weighted,
+)
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.motion_only import WITHIN
 from vpm.discrepancy.reference_response import against, part
@@ -45,16 +54,16 @@ class Asked:
     training, validation : Gain
         Of what the run without the effect leaves, relative to the noise at each frequency; the weight is the share of
         the change that the records ask for beside all parameters that are known without it.
-    run : OwnRun
+    run : ClosedLoopPrediction
         With the effect, fitted to the training records.
     """
 
     training: Gain
     validation: Gain
-    run: OwnRun
+    run: ClosedLoopPrediction
 
 
-def asks_runs(current: Judged, data: Data, probe: Probe) -> bool:
+def needs_prediction(current: Judged, data: Data, probe: Probe) -> bool:
     """Whether a candidate acts close to rest, is possible, and the model can say by itself what it does there.
 
     Links that bend and drives with states take too long for that.
@@ -65,17 +74,19 @@ def asks_runs(current: Judged, data: Data, probe: Probe) -> bool:
     return closed and not bends(current.model) and not has_own_drives(current.model)
 
 
-def run_without(current: Judged, data: Data) -> OwnRun | None:
+def prediction_without(current: Judged, data: Data) -> ClosedLoopPrediction | None:
     """The model at hand, run along the training records; None if it cannot follow its references."""
     if data.simulation is None:
         return None
     try:
-        return own_run(current.model, current.free, data.training.experiments, data.simulation.setup)
+        return fit_prediction(current.model, current.free, data.training.experiments, data.simulation.setup)
     except VpmError:
         return None
 
 
-def told_by_runs(current: Judged, data: Data, before: OwnRun, thresholds: Thresholds, probe: Probe) -> Trial | str:
+def judged_by_prediction(
+    current: Judged, data: Data, before: ClosedLoopPrediction, thresholds: Thresholds, probe: Probe
+) -> Trial | str:
     """A trial of friction close to rest that runs of the model itself show, or why they do not.
 
     Parameters
@@ -83,8 +94,8 @@ def told_by_runs(current: Judged, data: Data, before: OwnRun, thresholds: Thresh
     current : Judged
         The model without it.
     data : Data
-    before : OwnRun
-        The run of that model along the training records, see `run_without`.
+    before : ClosedLoopPrediction
+        The run of that model along the training records, see `prediction_without`.
     thresholds : Thresholds
     probe : Probe
         Of the candidate.
@@ -115,31 +126,31 @@ def _refused(answer: Asked, probe: Probe, thresholds: Thresholds) -> str:
     return ""
 
 
-def asked(before: OwnRun, trial: Trial, data: Data) -> Asked | None:
+def asked(before: ClosedLoopPrediction, trial: Trial, data: Data) -> Asked | None:
     """Run a model with the effect of a trial, and ask all records for the change from the run ``before`` to that.
 
     None if there is no such run that fits the training records better.
     """
     if data.simulation is None:
         return None
-    setup, found = data.simulation.setup, list[OwnRun]()
+    setup, found = data.simulation.setup, list[ClosedLoopPrediction]()
     free = (*before.free, *_own_names(trial.probe.candidate.site))
     for _, start in _starts(before, trial)[:FITTED]:
         try:
-            found.append(own_run(start, free, data.training.experiments, setup))
+            found.append(fit_prediction(start, free, data.training.experiments, setup))
         except VpmError:
             continue
     best = min(found, key=misfit, default=None)
     if best is None or misfit(best) >= misfit(before):
         return None
     try:
-        pair = [as_it_is(run.model, run.free, data.validation.experiments, setup) for run in (before, best)]
+        pair = [predict(run.model, run.free, data.validation.experiments, setup) for run in (before, best)]
     except VpmError:
         return None
-    return Asked(gain_of_runs(before, best), gain_of_runs(*pair), best)
+    return Asked(gain_of_predictions(before, best), gain_of_predictions(*pair), best)
 
 
-def asks_for(before: OwnRun, trial: Trial, data: Data, thresholds: Thresholds) -> bool:
+def asks_for(before: ClosedLoopPrediction, trial: Trial, data: Data, thresholds: Thresholds) -> bool:
     """Whether validation records, which models run by themselves, ask for an effect of the size that a balance says.
 
     The run along the training records is no witness of it: a friction that is not quite that of the machine has been
@@ -147,7 +158,7 @@ def asks_for(before: OwnRun, trial: Trial, data: Data, thresholds: Thresholds) -
 
     Parameters
     ----------
-    before : OwnRun
+    before : ClosedLoopPrediction
         The model without the effect, run along the training records.
     trial : Trial
         Of the effect, in a balance of effort.
@@ -162,7 +173,9 @@ def asks_for(before: OwnRun, trial: Trial, data: Data, thresholds: Thresholds) -
     records, setup = data.validation.experiments, data.simulation.setup
     try:
         free = (*before.free, *trial.parameters)
-        told = gain_of_runs(as_it_is(before.model, before.free, records, setup), as_it_is(after, free, records, setup))
+        told = gain_of_predictions(
+            predict(before.model, before.free, records, setup), predict(after, free, records, setup)
+        )
     except VpmError:
         return False
     return LEAST_ASKED <= told.weight <= 1.0 / LEAST_ASKED and told.score >= thresholds.score(told.pieces)
@@ -198,7 +211,7 @@ def _with_effect(model: Model, candidate: Candidate, values: dict[str, float]) -
     return model.with_effect(*candidate.key, transition_velocity=transition).with_parameters(values)
 
 
-def _starts(before: OwnRun, trial: Trial) -> list[tuple[float, Model]]:
+def _starts(before: ClosedLoopPrediction, trial: Trial) -> list[tuple[float, Model]]:
     """Models with which a fit may begin and how ill they fit, the best first, of those that fit better than without."""
     candidate, model = trial.probe.candidate, before.model
     size, fades = _own_names(candidate.site)
@@ -221,7 +234,7 @@ def _own_names(site: str) -> tuple[str, str]:
     return f"{site}.friction.stribeck", f"{site}.friction.stribeck_velocity"
 
 
-def gain_of_runs(before: OwnRun, after: OwnRun) -> Gain:
+def gain_of_predictions(before: ClosedLoopPrediction, after: ClosedLoopPrediction) -> Gain:
     """How much of the change between two runs of the same records what the first one leaves asks for."""
     apart, score = part(against(before, after))
     _, noise, _ = least(after.spectra())

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vpm.discrepancy.closed_loop_prediction import OwnRun, as_it_is, misfit, own_run
+from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction, fit_prediction, misfit, predict
 from vpm.discrepancy.confirmation import Data, Judged
-from vpm.discrepancy.friction_near_rest import LEAST_ASKED, gain_of_runs
+from vpm.discrepancy.friction_near_rest import LEAST_ASKED, gain_of_predictions
 from vpm.discrepancy.low_frequency import has_impacts
 from vpm.discrepancy.refusal import MODEST_FACTOR, Thresholds
 from vpm.errors import VpmError
@@ -36,7 +36,7 @@ class Told:
     ----------
     training, validation : Gain
         Of what the first run leaves, relative to the noise at each frequency.
-    run : OwnRun
+    run : ClosedLoopPrediction
         The second one, along the training records.
     better : float
         Logarithm of how many times as likely the validation records are with the second one.
@@ -44,7 +44,7 @@ class Told:
 
     training: Gain
     validation: Gain
-    run: OwnRun
+    run: ClosedLoopPrediction
     better: float
 
     def sure(self, thresholds: Thresholds) -> bool:
@@ -56,46 +56,46 @@ class Told:
         )
 
 
-def can_run(model: Model, data: Data) -> bool:
+def can_predict(model: Model, data: Data) -> bool:
     """Whether a model can be asked: in closed loop, with nothing in it that takes long or falls into chaos."""
     closed = data.simulation is not None and data.simulation.mode == "closed_loop"
     return closed and not bends(model) and not has_own_drives(model) and not has_impacts(model)
 
 
-def first_run(judged: Judged, data: Data) -> OwnRun | None:
+def predicted(judged: Judged, data: Data) -> ClosedLoopPrediction | None:
     """A fitted model as it is, run along the training records; None if it cannot follow its references."""
-    if data.simulation is None or not can_run(judged.model, data):
+    if data.simulation is None or not can_predict(judged.model, data):
         return None
     try:
-        return as_it_is(judged.model, judged.free, data.training.experiments, data.simulation.setup)
+        return predict(judged.model, judged.free, data.training.experiments, data.simulation.setup)
     except VpmError:
         return None
 
 
-def fitted_run(run: OwnRun, data: Data) -> OwnRun | None:
+def fitted_prediction(run: ClosedLoopPrediction, data: Data) -> ClosedLoopPrediction | None:
     """A run with the parameters that suit the training records best."""
     if data.simulation is None:
         return None
     try:
-        return own_run(run.model, run.free, data.training.experiments, data.simulation.setup)
+        return fit_prediction(run.model, run.free, data.training.experiments, data.simulation.setup)
     except VpmError:
         return None
 
 
-def compared(first: OwnRun, second: OwnRun, data: Data) -> Told | None:
+def compared(first: ClosedLoopPrediction, second: ClosedLoopPrediction, data: Data) -> Told | None:
     """Support of all records for the change from one run to another; None where one of them diverges."""
     if data.simulation is None:
         return None
     try:
         validation = [
-            as_it_is(run.model, run.free, data.validation.experiments, data.simulation.setup) for run in (first, second)
+            predict(run.model, run.free, data.validation.experiments, data.simulation.setup) for run in (first, second)
         ]
     except VpmError:
         return None
     better = misfit(validation[0]) - misfit(validation[1])
-    return Told(gain_of_runs(first, second), gain_of_runs(*validation), second, better)
+    return Told(gain_of_predictions(first, second), gain_of_predictions(*validation), second, better)
 
 
-def criterion(run: OwnRun) -> float:
+def criterion(run: ClosedLoopPrediction) -> float:
     """Information criterion of a run: minus the logarithm of its likelihood, and what each fitted number costs."""
     return misfit(run) + 0.5 * len(run.free) * float(np.log(max(run.left.size, 2)))

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vpm.discrepancy.closed_loop_prediction import RANK, OwnRun, Spectra, least, own_run, spectra
+from vpm.discrepancy.closed_loop_prediction import RANK, ClosedLoopPrediction, Spectra, fit_prediction, least, spectra
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.refusal import NEGLIGIBLE
 from vpm.errors import VpmError
@@ -64,9 +64,9 @@ class Runs:
 
     def __init__(self, data: Data) -> None:
         self.data = data
-        self._known: list[tuple[Judged, OwnRun | None]] = []
+        self._known: list[tuple[Judged, ClosedLoopPrediction | None]] = []
 
-    def __call__(self, judged: Judged) -> OwnRun | None:
+    def __call__(self, judged: Judged) -> ClosedLoopPrediction | None:
         """The run of a model; None where it cannot follow its references."""
         for known, run in self._known:
             if known is judged:
@@ -75,14 +75,14 @@ class Runs:
         self._known.append((judged, run))
         return run
 
-    def _worked_out(self, judged: Judged) -> OwnRun | None:
+    def _worked_out(self, judged: Judged) -> ClosedLoopPrediction | None:
         simulation = self.data.simulation
         if simulation is None or simulation.mode != "closed_loop":
             return None
         records = (*self.data.training.experiments, *self.data.validation.experiments)
         beside = next((run for _, run in reversed(self._known) if run is not None), None)
         try:
-            return own_run(judged.model, judged.free, records, simulation.setup, beside)
+            return fit_prediction(judged.model, judged.free, records, simulation.setup, beside)
         except VpmError:
             return None
 
@@ -103,12 +103,12 @@ def compare_driven(first: Judged, second: Judged, data: Data, runs: Runs | None 
     return Verdict(min(views[0][0], views[1][0]), views[0][1], views[1][1])
 
 
-def against(mine: OwnRun, rival: OwnRun) -> Spectra:
+def against(mine: ClosedLoopPrediction, rival: ClosedLoopPrediction) -> Spectra:
     """Transforms of what one run leaves, of the gap to its rival, and of its slopes."""
     return spectra(mine.model, mine.problem, np.column_stack([mine.left, mine.left - rival.left, mine.slopes]))
 
 
-def inexact(run: OwnRun) -> Spectra | None:
+def inexact(run: ClosedLoopPrediction) -> Spectra | None:
     """Transforms of the share of each reading that no model of oil is exact to; None of drives without states.
 
     A motion of a few hertz towers above noise, and pressures answer to how a held command changes within a sample, to

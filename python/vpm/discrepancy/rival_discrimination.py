@@ -9,9 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from vpm.discrepancy.ambiguity import Rivals
-from vpm.discrepancy.closed_loop_prediction import OwnRun
+from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction
 from vpm.discrepancy.confirmation import Data, Trial
-from vpm.discrepancy.prediction_comparison import WORTH_A_FIT, compared, criterion, first_run, fitted_run
+from vpm.discrepancy.prediction_comparison import WORTH_A_FIT, compared, criterion, fitted_prediction, predicted
 from vpm.discrepancy.refusal import Thresholds, impossible_trial
 from vpm.discrepancy.rival_exchange import exchanged
 from vpm.discrepancy.search import Search
@@ -36,26 +36,26 @@ def told_apart(
         for place, trial in tried
         if trial.probe.candidate.key not in found.gone and _possible(trial, interval)
     ]
-    before = first_run(found.final, data) if asked else None
+    before = predicted(found.final, data) if asked else None
     if before is None:
         return found, tuple(known)
     runs = each(
         "telling apart: running",
-        lambda one: first_run(one[1].judged, data) or "",
+        lambda one: predicted(one[1].judged, data) or "",
         asked,
         lambda one: one[1].probe.candidate.label,
     )
     better = [
         (criterion(run), place, trial, run)
         for (place, trial), run in zip(asked, runs, strict=True)
-        if isinstance(run, OwnRun) and criterion(run) < criterion(before) - WORTH_A_FIT
+        if isinstance(run, ClosedLoopPrediction) and criterion(run) < criterion(before) - WORTH_A_FIT
     ]
     if not better:
         return found, tuple(known)
-    first = fitted_run(before, data)
+    first = fitted_prediction(before, data)
     thresholds = Thresholds(len(asked), interval)
     for _, place, trial, run in sorted(better, key=lambda one: one[0]):
-        second = fitted_run(run, data)
+        second = fitted_prediction(run, data)
         told = None if first is None or second is None else compared(first, second, data)
         if told is not None and told.sure(thresholds):
             return exchanged(found, known, data, place, trial, "in its place is what runs of the model itself ask for")

@@ -12,10 +12,10 @@ from vpm.catalogue import EFFECTS
 from vpm.discrepancy.backlash import is_read_off, only_winds_up
 from vpm.discrepancy.candidates import Candidate, Key, candidates, joint_at, left_out
 from vpm.discrepancy.choice import Accepted, choose
-from vpm.discrepancy.closed_loop_prediction import OwnRun
+from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, finished
 from vpm.discrepancy.diagnosis import RankedCandidate
-from vpm.discrepancy.friction_near_rest import asks_for, asks_runs, run_without, told_by_runs
+from vpm.discrepancy.friction_near_rest import asks_for, judged_by_prediction, needs_prediction, prediction_without
 from vpm.discrepancy.low_frequency import slow
 from vpm.discrepancy.motion_only import in_motion, is_late
 from vpm.discrepancy.refusal import (
@@ -93,12 +93,14 @@ class Round:
 
     def alone(self, without: set[Key]) -> Accepted | None:
         """The best of what acts close to rest, which runs of the model itself show where the balance shows nothing."""
-        asked = [p for p in self.probes if p.candidate.key not in without and asks_runs(self.current, self.data, p)]
+        asked = [
+            p for p in self.probes if p.candidate.key not in without and needs_prediction(self.current, self.data, p)
+        ]
         before = self.alone_run if asked else None
         if before is None:
             return None
         self.tell(f"round {self.number}: running with {', '.join(p.candidate.label for p in asked)}")
-        ask = partial(told_by_runs, self.current, self.data, before, self.thresholds())
+        ask = partial(judged_by_prediction, self.current, self.data, before, self.thresholds())
         answers = self.each(f"round {self.number}: running", ask, asked, lambda p: p.candidate.label, refit_effort)
         for one, answer in zip(asked, answers, strict=True):
             if not isinstance(answer, Trial):
@@ -296,9 +298,9 @@ class Round:
         return asks_for(self.alone_run, trial, self.data, thresholds)
 
     @cached_property
-    def alone_run(self) -> OwnRun | None:
+    def alone_run(self) -> ClosedLoopPrediction | None:
         """The model at hand, run along the training records by itself."""
-        return run_without(self.current, self.data)
+        return prediction_without(self.current, self.data)
 
     def _only_timing(self, trial: Trial, thresholds: Thresholds) -> str:
         """Why a trial that would be believed does no more than a shift of the commands does, or ""."""

@@ -40,7 +40,7 @@ class InTime:
 
 def in_time(judged: Judged, data: Data) -> InTime:
     """Residuals with the best shift of the commands, to first order; free parameters move with it."""
-    as_it_is = InTime(judged.fit.residual, judged.validation, 0.0)
+    predict = InTime(judged.fit.residual, judged.validation, 0.0)
     model = judged.model
     later, _ = data.training.later().evaluate(model, model.theta)
     own = judged.fit.residual
@@ -50,17 +50,17 @@ def in_time(judged: Judged, data: Data) -> InTime:
     rest = change + known @ step
     power = float(rest @ rest)
     if power <= 1e-20 * float(change @ change):
-        return as_it_is
+        return predict
     shift = float(np.clip(-(rest @ own) / power, -1.0, 1.0))
     fitted = own + shift * rest
     if gain(own, fitted, segments(data.training)).relative < MATTERS:
-        return as_it_is
+        return predict
     columns = [model.index(name) for name in judged.free]
     own_validation, slopes = data.validation.evaluate(model, model.theta, columns)
     later_validation, _ = data.validation.later().evaluate(model, model.theta)
     validation = own_validation + shift * (later_validation - own_validation + slopes @ step)
     if gain(own_validation, validation, segments(data.validation)).relative < MATTERS:
-        return as_it_is
+        return predict
     return InTime(fitted, validation, shift)
 
 
