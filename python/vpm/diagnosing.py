@@ -23,7 +23,7 @@ from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.plot_samples import pictures, traces, where
 from vpm.discrepancy.preparation import Records, data_of, nominal_of, recalibrated_of, records_of
 from vpm.discrepancy.provenance import own_settings, provenance
-from vpm.discrepancy.recorded_calls import overheard
+from vpm.discrepancy.recorded_calls import recorded
 from vpm.discrepancy.remainder import Remainder, remainder
 from vpm.discrepancy.residual_by_joint import only_where_closed
 from vpm.discrepancy.search import Search, ambiguities
@@ -141,7 +141,7 @@ def diagnose(
     if executor is None:
         diagnosis = diagnosed(model, *given, asked, workers, tell, progress)
     else:
-        told = done_by(executor, partial(overheard, diagnosed, model, *given, asked, workers or 1), tell)
+        told = done_by(executor, partial(recorded, diagnosed, model, *given, asked, workers or 1), tell)
         diagnosis = told.repeat(tell, progress)
     return with_provenance(diagnosis, model, *given, asked, workers)
 
@@ -327,9 +327,9 @@ def _concluded(
     word, summary, described = said
     if not described or rest is None:
         return _Concluded(word, summary, gap, found.final, None, found.accepted)
-    told = rest.best if word == "unexplained" else rest.choices[-1]
-    final, empirical = told.judged, told.told
-    accepted = found.accepted if told.base is found.final else ()
+    chosen = rest.best if word == "unexplained" else rest.choices[-1]
+    final, empirical = chosen.judged, chosen.empirical
+    accepted = found.accepted if chosen.base is found.final else ()
     if accepted:
         empirical, final = beside(found.final, empirical, final, known.data)
     gap = gaps_of(known.data, known.nominal, known.recalibrated, final, floor)

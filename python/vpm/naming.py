@@ -11,9 +11,9 @@ from vpm.discrepancy.ambiguity import Rivals, rivals
 from vpm.discrepancy.by_ranking import free_joints, searched, why_not_ranked
 from vpm.discrepancy.by_ranking import notes as notes_of
 from vpm.discrepancy.confirmation import Data, Judged
-from vpm.discrepancy.contacts import with_told_contacts
-from vpm.discrepancy.forward_step import overlooked
-from vpm.discrepancy.rival_discrimination import told_apart
+from vpm.discrepancy.contacts import with_predicted_contacts
+from vpm.discrepancy.forward_step import forward_step
+from vpm.discrepancy.rival_discrimination import discriminated
 from vpm.discrepancy.rival_exchange import in_order, replaced, timed_again
 from vpm.discrepancy.search import Search, further, search
 from vpm.discrepancy.side_by_side import SideBySide
@@ -135,16 +135,16 @@ def _settled(
         if changed is found:
             changed, known = timed_again(found, known, data)
         if changed is found and not found.interrupted:
-            changed, known = told_apart(found, known, data, each)
+            changed, known = discriminated(found, known, data, each)
         if changed is found and not found.interrupted:
-            changed = overlooked(found, data, each)
+            changed = forward_step(found, data, each)
         if changed is found:
             break
         found = changed if found.interrupted else further(changed, data, effects, limit, tell, each)
         if len(found.accepted) != 1 or len(known) != 1 or found.final is not changed.final:
             known = rivals(found.final, data, found.accepted, effects, each, found.last)
     found, known = in_order(found, known)
-    return with_told_contacts(found, data, each), known
+    return with_predicted_contacts(found, data, each), known
 
 
 def until_stopped(work: Callable[[], Found], nothing: Found) -> tuple[Found, bool]:

@@ -211,7 +211,7 @@ def test_where_a_ranking_fails_a_search_names(monkeypatch: pytest.MonkeyPatch, r
     assert "runs away" in note
 
 
-def test_a_name_that_no_balance_can_carry_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_name_that_no_balance_can_carry_is_has_derivatives(monkeypatch: pytest.MonkeyPatch) -> None:
     """A load that nobody measures hangs on a lift: no balance follows the memory of a friction that warms up."""
     case = make_case("hoist", "none", 3)
     model = case.model()
@@ -284,7 +284,7 @@ def test_names_come_from_one_of_two_places(records: list[Experiment]) -> None:
 def test_a_parameter_without_a_derivative_along_the_motion_is_not_told_by_a_balance() -> None:
     """Behind a play two motions part ever faster, and squares of derivatives overflow."""
     columns = np.array([[1.0, 1e200, np.inf], [0.0, 1e200, 0.0]])
-    assert by_ranking._told(columns).tolist() == [True, False, False]
+    assert by_ranking._has_derivatives(columns).tolist() == [True, False, False]
 
 
 def test_what_commands_do_between_samples_is_found_and_holds_for_balances_and_runs() -> None:

@@ -9,7 +9,7 @@ import pytest
 import vpm
 from shared_cases import shared_case
 from vpm.discrepancy.candidates import candidates
-from vpm.discrepancy.joint_compliance import best_start, is_looked_for
+from vpm.discrepancy.joint_compliance import best_start, is_searched
 from vpm.discrepancy.structural import moved
 from vpm.identify import InverseDynamicsProblem, estimate
 
@@ -39,7 +39,7 @@ def test_a_start_is_as_near_as_springs_that_are_tried_and_none_where_nothing_win
         )
         fitted = model.with_parameters(dict(zip(fit.names, map(float, fit.values), strict=True)))
         (spring,) = candidates(fitted, data, fit.residual, ["joint_compliance"])
-        assert is_looked_for(fitted, data, spring)
+        assert is_searched(fitted, data, spring)
         start = best_start(fitted, fit.jacobian, data, spring)
         if len(hidden) == 1:
             assert start is None

@@ -48,8 +48,8 @@ def write_mcap(comparison: Comparison, path: str | PathLike[str]) -> tuple[Path,
     with replacing(path) as beside, beside.open("wb") as stream:
         writer = Writer(stream)
         writer.start(library="vpm")
-        told = {"model": comparison.model_name, "experiment": comparison.experiment_name, "mode": comparison.mode}
-        writer.add_metadata("vpm", told)
+        metadata = {"model": comparison.model_name, "experiment": comparison.experiment_name, "mode": comparison.mode}
+        writer.add_metadata("vpm", metadata)
         for each in comparison.channels:
             schema = writer.register_schema(each.channel, "jsonschema", json.dumps(_schema(each)).encode())
             topic = writer.register_channel(topic_of(each.channel), "json", schema)

@@ -10,7 +10,7 @@ from vpm.discrepancy.candidates import Candidate, Key, candidates
 from vpm.discrepancy.choice import Accepted, alike
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity
-from vpm.discrepancy.nested_model import seen_beside
+from vpm.discrepancy.nested_model import probe_beside
 from vpm.discrepancy.refusal import LEAST_GAIN
 from vpm.discrepancy.screening import Probe, impossible_values, probe, refit_effort, screening_effort
 from vpm.discrepancy.search import Tried
@@ -102,7 +102,7 @@ def rivals(
     if last is not None:
         seen += [(e, p) for e in accepted if e.key == last.key for p in _beside(last, e)]
     places = {entry.key: without for entry, without in zip(accepted, bases, strict=True) if without is not None}
-    seen = [(e, seen_beside(final, places[e.key], data.training, e, p)) for e, p in seen if e.key in places]
+    seen = [(e, probe_beside(final, places[e.key], data.training, e, p)) for e, p in seen if e.key in places]
     refits, tried = [], list[tuple[Accepted, Trial]]()
     for entry, without in zip(accepted, bases, strict=True):
         done = {t.probe.candidate.key: t for t in known[entry.key].trials} if entry.key in known else {}

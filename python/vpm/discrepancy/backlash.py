@@ -81,7 +81,7 @@ def believed(model: Model, nominal: Model, free: Sequence[str]) -> Model:
     return model
 
 
-def only_winds_up(model: Model, site: str, data: InverseDynamicsProblem) -> str:
+def only_compliant(model: Model, site: str, data: InverseDynamicsProblem) -> str:
     """Why a fitted play is none, or "": under the effort its contacts give way further than the link flies."""
     play = next(effect.parameter_names for effect in model.effects if effect.type.has_play and effect.at == site)
     gap, stiffness = (model.parameters[play[name]] for name in ("gap", "stiffness"))

@@ -175,9 +175,9 @@ def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
     known = tuple(_renamed(current.model, model).get(name, name) for name in current.free)
     known = tuple(name for name in known if name in model.parameters)
     residual, columns = data.training.evaluate(model, model.theta, [model.index(name) for name in (*known, *own)])
-    told = _told(columns)
-    beside, fresh = columns[:, : len(known)][:, told[: len(known)]], np.where(told, columns, 0.0)[:, len(known) :]
-    known = tuple(compress(known, told))
+    visible = _has_derivatives(columns)
+    beside, fresh = columns[:, : len(known)][:, visible[: len(known)]], np.where(visible, columns, 0.0)[:, len(known) :]
+    known = tuple(compress(known, visible))
     split = len(known)
     sizes = np.array([abs(model.parameters[name].value) or 1.0 for name in (*known, *own)])
     keep, held, blind = sort_columns(own, fresh, beside, known, residual, (sizes[:split], sizes[split:]))
@@ -189,7 +189,7 @@ def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
     return measured(current, data, probe, judged, moving, held, None, diverged)
 
 
-def _told(columns: Array) -> NDArray[np.bool_]:
+def _has_derivatives(columns: Array) -> NDArray[np.bool_]:
     """Whether a balance has derivatives by each parameter: what is behind a play may part from its way ever faster."""
     with np.errstate(over="ignore", invalid="ignore"):
         return np.asarray(np.isfinite(np.sum(columns**2, axis=0)))
@@ -207,8 +207,8 @@ def _refitted(
     if _power(judged) > _power(still):
         return still, stopped
     if data.simulation is not None and judged.simulated is not None and still.simulated is not None:
-        told = gain(still.simulated, judged.simulated, segments(data.simulation))
-        if told.relative < -SETTINGS.worse and told.harm > SETTINGS.sure:
+        gained = gain(still.simulated, judged.simulated, segments(data.simulation))
+        if gained.relative < -SETTINGS.worse and gained.harm > SETTINGS.sure:
             return still, stopped
     return judged, diverged
 
@@ -326,7 +326,7 @@ def _refused(ranking: Ranking, outside: Mapping[Key, str], settings: RankingSett
             winner = several[0] if _accepts(several, settings) else None
             last[one.key] = _Last(one, winner, winner is one)
     kept = {one.key for one in ranking.effects}
-    reasons = {**{key: _reason(told, settings) for key, told in last.items() if key not in kept}, **outside}
+    reasons = {**{key: _reason(entry, settings) for key, entry in last.items() if key not in kept}, **outside}
     return tuple(RefusedEffect(*key, reason) for key, reason in reasons.items())
 
 
@@ -347,9 +347,9 @@ def _removes(one: Ranked) -> str:
     return one.judgement.words
 
 
-def _reason(told: _Last, settings: RankingSettings) -> str:
-    one, winner = told.one, told.winner
-    if told.came_in:
+def _reason(entry: _Last, settings: RankingSettings) -> str:
+    one, winner = entry.one, entry.winner
+    if entry.came_in:
         return "it is not needed any more beside what came in after it"
     if lacks := one.judgement.lacks(settings):
         return lacks

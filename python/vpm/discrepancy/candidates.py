@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vpm.catalogue import EFFECTS, EffectType
 from vpm.catalogue.shared import SLOW
 from vpm.catalogue.traits import Seen
-from vpm.discrepancy.limit import seen_limit
+from vpm.discrepancy.limit import limit_start
 from vpm.discrepancy.structural import (
     beyond,
     logged_swing,
@@ -141,7 +141,7 @@ def candidates(
     effects : sequence of str, optional
         Restrict the search to these; to those that a diagnosis tries if not given.
     simulated : bool
-        Whether what moves validation is simulated with the memories of effects, and not balanced.
+        Whether motion that no channel measures is simulated with the memories of effects.
     """
     return tuple(
         _candidate(effect, site, model, data, residual)
@@ -185,7 +185,7 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
         return _periodic(effect, site, data, model, residual)
     if effect.site == "body":
         return Candidate(effect, site, _payload_places(model, site))
-    return _tried(effect, site, model, seen, partial(seen_limit, data, residual=residual))
+    return _tried(effect, site, model, seen, partial(limit_start, data, residual=residual))
 
 
 def _tried(

@@ -14,7 +14,7 @@ from vpm.discrepancy.candidates import Candidate, Key
 from vpm.discrepancy.confirmation import Data, Trial
 from vpm.discrepancy.reference_response import ODDS, Runs, compare_driven
 from vpm.discrepancy.refusal import LEAST_GAIN
-from vpm.discrepancy.sensor_prediction import read_by_itself
+from vpm.discrepancy.sensor_prediction import preferred_sensor
 from vpm.discrepancy.structural import coupled
 from vpm.identify import Gain
 
@@ -74,7 +74,7 @@ def choose(believed: Sequence[Trial], data: Data) -> Accepted:
     plain = [t for t in believed if _plainer(t, first)]
     first = min(plain, key=cost) if plain else first
     equals = [t for t in believed if _as_good(t, first)]
-    chosen = _late_or_slow(read_by_itself(_first_named(equals), equals, data), believed, data)
+    chosen = _late_or_slow(preferred_sensor(_first_named(equals), equals, data), believed, data)
     return Accepted(chosen, tuple(t.probe.candidate.label for t in equals if t is not chosen))
 
 
@@ -90,10 +90,10 @@ def _late_or_slow(chosen: Trial, believed: Sequence[Trial], data: Data) -> Trial
     rest = [min(kind, key=_evidence) for kind in kinds if kind]
     best, runs = rest.pop(0), Runs(data)
     for rival in rest:
-        told = compare_driven(rival.judged, best.judged, data, runs)
-        if told is None:
+        response = compare_driven(rival.judged, best.judged, data, runs)
+        if response is None:
             return chosen
-        if told.prefers_first(ODDS if _late(best) == "delay" else 1.0):
+        if response.prefers_first(ODDS if _late(best) == "delay" else 1.0):
             best = rival
     return best
 
@@ -118,8 +118,8 @@ def _left(trial: Trial) -> float:
     return _share(trial.validation)
 
 
-def _share(told: Gain) -> float:
-    return max(1.0 - told.relative, 1e-12)
+def _share(gained: Gain) -> float:
+    return max(1.0 - gained.relative, 1e-12)
 
 
 def cost(trial: Trial) -> float:
@@ -127,18 +127,18 @@ def cost(trial: Trial) -> float:
     return schwarz(trial.validation, len(trial.parameters))
 
 
-def schwarz(told: Gain, numbers: int) -> float:
+def schwarz(gained: Gain, numbers: int) -> float:
     """Information criterion of G. Schwarz (*Annals of Statistics* 6, 1978) per independent piece; 0 says no change.
 
     Parameters
     ----------
-    told : Gain
+    gained : Gain
         What the numbers gain.
     numbers : int
         How many are fitted.
     """
-    pieces = max(told.pieces, 3)
-    return float(np.log(_share(told)) + numbers * np.log(pieces) / pieces)
+    pieces = max(gained.pieces, 3)
+    return float(np.log(_share(gained)) + numbers * np.log(pieces) / pieces)
 
 
 def _plainer(trial: Trial, first: Trial) -> bool:

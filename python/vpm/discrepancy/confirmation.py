@@ -224,7 +224,7 @@ def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) ->
     worth = Worth(min((1.0 - SLOW_GAIN) * cost, HOPELESS * rival), SLOW_EVALUATIONS)
     judged, diverged = judged_anyhow(start, free, data, bounds, origin, worth)
     doubtful = probe.held
-    if seen := _seen_by_now(judged, data, probe):
+    if seen := _visible_now(judged, data, probe):
         free, doubtful = (*free, *seen), tuple(alias for alias in doubtful if alias.parameter not in seen)
         origin = None if origin is None else judged.model.theta
         judged, diverged = judged_anyhow(judged.model, free, data, bounds, origin, worth)
@@ -297,7 +297,7 @@ def judged_anyhow(
     return judged, reason
 
 
-def _seen_by_now(judged: Judged, data: Data, probe: Probe) -> tuple[str, ...]:
+def _visible_now(judged: Judged, data: Data, probe: Probe) -> tuple[str, ...]:
     """Parameters that looked like others where the fit began and do not where it ended.
 
     A stiffness looks like the inertia behind it as long as neither is near its value. Of an effect that does nothing at
@@ -399,8 +399,8 @@ def _witnessed(trial: Trial, current: Judged, alone: ClosedLoopPrediction | None
     """A trial; of something late that makes simulations worse those count in which each model suits its own run."""
     if alone is None or data.simulation is None or trial.simulated is None or trial.simulated.relative >= 0.0:
         return trial
-    told = gain_in_closed_loop(current.model, current.free, alone, data.simulation)
-    return trial if told is None else replace(trial, simulated=told)
+    gained = gain_in_closed_loop(current.model, current.free, alone, data.simulation)
+    return trial if gained is None else replace(trial, simulated=gained)
 
 
 def _away_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem, probe: Probe) -> Gain | None:

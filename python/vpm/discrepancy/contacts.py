@@ -47,7 +47,7 @@ ALL = 0.9
 TOLD = ("stiffness", "inertia")
 
 
-def with_told_contacts(found: Search, data: Data, each: SideBySide) -> Search:
+def with_predicted_contacts(found: Search, data: Data, each: SideBySide) -> Search:
     """The search with contacts of its plays as hard as runs of the model along the training records say.
 
     The numbers of the runs stand if with them the training records are simulated better, beyond chance, and the
@@ -69,7 +69,7 @@ def _harder(final: Judged, entry: Accepted, data: Data, each: SideBySide) -> Jud
     records, setup = beginnings(data.training.experiments), data.simulation.setup
     runs = OutputErrorProblem(final.model, records, data.simulation.mode, setup=setup)
     key, label = entry.key, entry.trial.probe.candidate.label
-    names = tuple(name for name in _told(final.model, key) if name in final.free)
+    names = tuple(name for name in _predicted_values(final.model, key) if name in final.free)
     tried = [final.model, *(with_contact(final.model, key, f, z) for f in CONTACTS for z in DAMPINGS)]
     what = "how hard contacts are: runs along the records"
     left = each(what, lambda model: runs.evaluate(model, model.theta)[0], tried, lambda _: label)
@@ -99,7 +99,7 @@ def beginnings(records: Sequence[Experiment]) -> list[Experiment]:
     return [r if share > ALL else r.split(share)[0] for r, share in zip(records, shares, strict=True)]
 
 
-def _told(model: Model, key: Key) -> tuple[str, ...]:
+def _predicted_values(model: Model, key: Key) -> tuple[str, ...]:
     """Parameters of a play that a run tells, by dotted name."""
     effect = model.effect(*key)
     return tuple(effect.parameter_names[short] for short in TOLD)
@@ -128,19 +128,19 @@ def _balanced(
     rest = tuple(name for name in final.free if name not in names)
     bounds = {name: pair for name, pair in final.bounds.items() if name in rest}
     try:
-        told = judge(_damped(run.model, key, ratio), rest, data, bounds)
-        columns = [told.model.index(name) for name in names]
-        _, slopes = data.training.evaluate(told.model, told.model.theta, columns)
+        judged = judge(_damped(run.model, key, ratio), rest, data, bounds)
+        columns = [judged.model.index(name) for name in names]
+        _, slopes = data.training.evaluate(judged.model, judged.model.theta, columns)
     except VpmError:
         return None
     fit = replace(
-        told.fit,
+        judged.fit,
         names=(*rest, *names),
-        values=np.concatenate([told.fit.values, told.model.theta[columns]]),
-        jacobian=np.column_stack([told.fit.jacobian, slopes]),
-        covariance=block_diag(told.fit.covariance, np.diag([run.estimated(name)[1] ** 2 for name in names])),
+        values=np.concatenate([judged.fit.values, judged.model.theta[columns]]),
+        jacobian=np.column_stack([judged.fit.jacobian, slopes]),
+        covariance=block_diag(judged.fit.covariance, np.diag([run.estimated(name)[1] ** 2 for name in names])),
     )
-    return replace(told, free=fit.names, fit=fit, bounds=dict(final.bounds))
+    return replace(judged, free=fit.names, fit=fit, bounds=dict(final.bounds))
 
 
 def _predicts_better(before: Array, one: Judged, runs: OutputErrorProblem) -> bool:
@@ -149,8 +149,8 @@ def _predicts_better(before: Array, one: Judged, runs: OutputErrorProblem) -> bo
         after, _ = runs.evaluate(one.model, one.model.theta)
     except VpmError:
         return False
-    told = gain(before, after, segments(runs))
-    return told.relative >= LEAST_GAIN and told.score >= NORMAL_95_ONE_SIDED
+    gained = gain(before, after, segments(runs))
+    return gained.relative >= LEAST_GAIN and gained.score >= NORMAL_95_ONE_SIDED
 
 
 def _better(final: Judged, one: Judged, data: Data) -> bool:

@@ -92,8 +92,8 @@ def shares(data: Data, final: Judged, joint: int) -> Shares:
     best = min(found, key=lambda name: float(found[name] @ found[name]))
     ends = np.cumsum([0, *(data.validation.efforts(r)[joint].time.size for r in range(len(data.validation.motions)))])
     records = [slice(int(a), int(b)) for a, b in pairwise(ends)]
-    told = not _as_good(found[best], left, records)
-    alike = {name for name in found if told and _as_good(found[best], found[name], records)}
+    clear = not _as_good(found[best], left, records)
+    alike = {name for name in found if clear and _as_good(found[best], found[name], records)}
     ranked = dict(sorted(((name, _share(rest, left)) for name, rest in found.items()), key=lambda item: -item[1]))
     return Shares(ranked, tuple(name for name in ranked if name in alike))
 

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from vpm.discrepancy.ambiguity import Rivals
 from vpm.discrepancy.confirmation import Judged
 from vpm.discrepancy.diagnosis import ProposedExperiment
-from vpm.discrepancy.excitation_range import Seen, seen_range
+from vpm.discrepancy.excitation_range import ExcitationRange, excitation_range
 from vpm.discrepancy.motions import Motion, designs
 from vpm.errors import ExcitationError
 from vpm.identify import InverseDynamicsProblem
@@ -68,14 +68,14 @@ def experiments(
                 continue  # its balance needs a motion that nobody measures
             rival = trial.probe.candidate.label
             joint = _joint_of(final.model, rivals.site, data.joints)
-            best = propose(final, trial.judged, (rivals.label, rival), seen_range(data, joint), noise)
+            best = propose(final, trial.judged, (rivals.label, rival), excitation_range(data, joint), noise)
             if best is not None:
                 found.append(best)
     return tuple(found)
 
 
 def propose(
-    first: Judged, second: Judged, labels: tuple[str, str], seen: Seen, noise: Mapping[str, float]
+    first: Judged, second: Judged, labels: tuple[str, str], seen: ExcitationRange, noise: Mapping[str, float]
 ) -> ProposedExperiment | None:
     """The best motion for one pair of models, or None if no motion can be made."""
     best: ProposedExperiment | None = None
@@ -97,7 +97,7 @@ def propose(
     return None if best is None else _with_sentence(best, seen)
 
 
-def _possible(seen: Seen) -> Iterator[Motion]:
+def _possible(seen: ExcitationRange) -> Iterator[Motion]:
     for design in designs(seen):
         try:
             yield design()
@@ -105,7 +105,7 @@ def _possible(seen: Seen) -> Iterator[Motion]:
             continue  # this one does not fit into the limits
 
 
-def _difference(first: Judged, second: Judged, motion: Motion, seen: Seen) -> tuple[float, str]:
+def _difference(first: Judged, second: Judged, motion: Motion, seen: ExcitationRange) -> tuple[float, str]:
     """Root mean square difference that the second model cannot imitate, and the joint where it is largest."""
     model = first.model
     inputs = _commands(model, motion, seen)
@@ -144,7 +144,7 @@ def _balance(model: Model, free: Sequence[str], motion: Motion, inputs: Array) -
     return _Balance(applied - required, -jacobian)
 
 
-def _commands(model: Model, motion: Motion, seen: Seen) -> Array:
+def _commands(model: Model, motion: Motion, seen: ExcitationRange) -> Array:
     """Commands that a controller would have to give: their effort is the required one, at the drives' mean gain."""
     count = len(model.inputs)
     rest = np.zeros((len(motion.position), count))
@@ -172,7 +172,7 @@ def _joint_of(model: Model, site: str, joints: Sequence[str]) -> str:
     return next((joint for joint in joints if joint in site), joints[0])
 
 
-def _with_sentence(found: ProposedExperiment, seen: Seen) -> ProposedExperiment:
+def _with_sentence(found: ProposedExperiment, seen: ExcitationRange) -> ProposedExperiment:
     numbers = ", ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in found.parameters.items())
     what = f"move {seen.joint} on a {found.excitation.name} ({numbers})"
     size = f"{found.difference:.3g} {found.unit} of {found.channel}, {found.ratio:.3g} times the noise"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from vpm.discrepancy.backlash import is_read_off, only_winds_up
+from vpm.discrepancy.backlash import is_read_off, only_compliant
 from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, judge
@@ -125,7 +125,7 @@ def drop_springs(stages: list[Stage], accepted: list[Accepted], data: Data, drop
         name, site = entry.key
         if not is_read_off(current.model, data.training, entry.trial.probe.candidate):
             continue
-        if reason := only_winds_up(current.model, site, data.training):
+        if reason := only_compliant(current.model, site, data.training):
             model = current.model.without_effect(name, site)
             free = tuple(each for each in current.free if each in model.parameters)
             bounds = {each: pair for each, pair in current.bounds.items() if each in free}

@@ -10,7 +10,7 @@ from vpm.identify import InverseDynamicsProblem
 
 
 @dataclass(frozen=True)
-class Seen:
+class ExcitationRange:
     """Range of the motion of one joint; the others stay at ``hold``.
 
     Attributes
@@ -43,7 +43,7 @@ class Seen:
     effort: float
 
 
-def seen_range(data: InverseDynamicsProblem, joint: str) -> Seen:
+def excitation_range(data: InverseDynamicsProblem, joint: str) -> ExcitationRange:
     """Range in which records moved ``joint``."""
     motions = data.motions
     column = motions[0].joints.index(joint)
@@ -53,7 +53,7 @@ def seen_range(data: InverseDynamicsProblem, joint: str) -> Seen:
     )
     commands = [float(np.abs(m.inputs).max()) for m in motions if m.inputs.size]
     block = data.efforts(0)[data.joints.index(joint)]
-    return Seen(
+    return ExcitationRange(
         joint,
         "m" if block.unit == "N" else "rad",
         float(position.min()),

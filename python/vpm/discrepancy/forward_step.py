@@ -18,7 +18,14 @@ from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction, misfit
 from vpm.discrepancy.confirmation import Data, Trial, confirm, judge
 from vpm.discrepancy.elimination import Stage
 from vpm.discrepancy.motion_only import WITHIN
-from vpm.discrepancy.prediction_comparison import WORTH_A_FIT, Told, compared, criterion, fitted_prediction, predicted
+from vpm.discrepancy.prediction_comparison import (
+    WORTH_A_FIT,
+    Comparison,
+    compared,
+    criterion,
+    fitted_prediction,
+    predicted,
+)
 from vpm.discrepancy.refusal import WORTH_A_NAME, Thresholds, impossible_trial
 from vpm.discrepancy.screening import Probe, impossible_values
 from vpm.discrepancy.search import Search
@@ -33,7 +40,7 @@ FITTED = 2
 
 
 @dataclass(frozen=True)
-class _Asked:
+class _Predicted:
     """An effect with its run, and its trial where it was fitted to the balance."""
 
     probe: Probe
@@ -41,7 +48,7 @@ class _Asked:
     run: ClosedLoopPrediction
 
 
-def overlooked(found: Search, data: Data, each: SideBySide) -> Search:
+def forward_step(found: Search, data: Data, each: SideBySide) -> Search:
     """The search with the one effect more that runs ask for most, if training and validation records are sure of it."""
     promising = _promising(found)
     before = predicted(found.final, data) if promising else None
@@ -49,19 +56,19 @@ def overlooked(found: Search, data: Data, each: SideBySide) -> Search:
         return found
     asked = each("one effect more: running", partial(_run, found, data, before), promising, lambda p: p.candidate.label)
     least = criterion(before) - WORTH_A_FIT
-    worth = [one for one in asked if isinstance(one, _Asked) and criterion(one.run) < least]
+    worth = [one for one in asked if isinstance(one, _Predicted) and criterion(one.run) < least]
     first = fitted_prediction(before, data) if worth else None
     if first is None:
         return found
     thresholds = Thresholds(max(1, len(found.ranking)), min(m.dt for m in data.training.motions))
-    told = []
+    supported = []
     for one in sorted(worth, key=lambda one: criterion(one.run))[:FITTED]:
         second = fitted_prediction(one.run, data)
         said = None if second is None else compared(first, second, data)
         if said is not None and said.sure(thresholds):
-            told.append((one, said))
-    told.sort(key=lambda one: criterion(one[1].run))
-    more = [entry for one, said in told if (entry := _accepted(found, data, one, said)) is not None]
+            supported.append((one, said))
+    supported.sort(key=lambda one: criterion(one[1].run))
+    more = [entry for one, said in supported if (entry := _accepted(found, data, one, said)) is not None]
     return _added(found, _best(more, data)) if more else found
 
 
@@ -104,17 +111,17 @@ def _taken(probe: Probe, tried: Sequence[Trial]) -> float:
     return max([probe.drop, *mine])
 
 
-def _run(found: Search, data: Data, before: ClosedLoopPrediction, probe: Probe) -> _Asked | str:
+def _run(found: Search, data: Data, before: ClosedLoopPrediction, probe: Probe) -> _Predicted | str:
     """The run of a model with one effect more, as it was fitted to the balance; or why there is none."""
     if probe.candidate.effect.elastic:
         run = _sprung(found, data, before, probe)
-        return "no run with it does better" if run is None else _Asked(probe, None, run)
+        return "no run with it does better" if run is None else _Predicted(probe, None, run)
     known = (trial for trial in found.over.trials if trial.probe is probe)
     trial = next(known, None) or confirm(found.final, data, probe)
     if reason := impossible_trial(trial, min(m.dt for m in data.training.motions)):
         return reason
     run = predicted(trial.judged, data)
-    return "it cannot follow the references" if run is None else _Asked(probe, trial, run)
+    return "it cannot follow the references" if run is None else _Predicted(probe, trial, run)
 
 
 def _sprung(found: Search, data: Data, before: ClosedLoopPrediction, probe: Probe) -> ClosedLoopPrediction | None:
@@ -135,9 +142,9 @@ def _sprung(found: Search, data: Data, before: ClosedLoopPrediction, probe: Prob
     return predicted(replace(found.final, model=model, free=free), data)
 
 
-def _accepted(found: Search, data: Data, asked: _Asked, told: Told) -> Accepted | None:
+def _accepted(found: Search, data: Data, asked: _Predicted, comparison: Comparison) -> Accepted | None:
     """The effect with the balance fitted near what the runs say of it, and with what these gain."""
-    final, run = found.final, told.run
+    final, run = found.final, comparison.run
     own = tuple(name for name in run.free if name not in final.free)
     bounds, values = dict(final.bounds if asked.trial is None else asked.trial.judged.bounds), {}
     for name in own:
@@ -155,7 +162,7 @@ def _accepted(found: Search, data: Data, asked: _Asked, told: Told) -> Accepted 
     except VpmError:
         return None
     judged_by_prediction = replace(
-        trial, judged=judged, training=told.training, validation=told.validation, simulated=None, away=None
+        trial, judged=judged, training=comparison.training, validation=comparison.validation, simulated=None, away=None
     )
     return Accepted(replace(judged_by_prediction, parameters=own, held=(), clear=True, alone=True, diverged=""), ())
 

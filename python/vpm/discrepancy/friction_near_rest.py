@@ -38,7 +38,7 @@ from vpm.model import Model
 Array = NDArray[np.float64]
 
 #: Share of the change from one run to another from which on records ask for it rather than for none.
-LEAST_ASKED = 0.5
+LEAST_SUPPORT = 0.5
 #: Starts that are fitted to the end, of those that fit best as they are.
 FITTED = 2
 #: Sizes with which a fit may begin, as shares of the Coulomb friction.
@@ -104,7 +104,7 @@ def judged_by_prediction(
     answer = asked(before, trial, data)
     if answer is None:
         return "in runs of the model itself it does not fit the training records better"
-    return _refused(answer, probe, thresholds) or _told(current, trial, answer, data)
+    return _refused(answer, probe, thresholds) or _fitted_trial(current, trial, answer, data)
 
 
 def _refused(answer: Asked, probe: Probe, thresholds: Thresholds) -> str:
@@ -115,13 +115,13 @@ def _refused(answer: Asked, probe: Probe, thresholds: Thresholds) -> str:
     fades = _own_names(probe.candidate.site)[1]
     speed, (_, highest) = answer.run.model.parameters[fades].value, probe.candidate.bounds["stribeck_velocity"]
     if speed > highest:
-        return f"{fades} comes out as {speed:.3g} in runs of the model itself: no excess close to rest any more"
-    for name, told in (("training", answer.training), ("validation", answer.validation)):
-        needed = MODEST_FACTOR * thresholds.score(told.pieces)
-        if not LEAST_ASKED <= told.weight <= 1.0 / LEAST_ASKED or told.score < needed:
+        return f"{fades} comes out as {speed:.3g} in closed-loop predictions: no excess close to rest any more"
+    for name, gained in (("training", answer.training), ("validation", answer.validation)):
+        needed = MODEST_FACTOR * thresholds.score(gained.pieces)
+        if not LEAST_SUPPORT <= gained.weight <= 1.0 / LEAST_SUPPORT or gained.score < needed:
             return (
-                f"of what it changes in runs of the model itself the {name} records ask for {100.0 * told.weight:.0f} "
-                f"%, {told.score:.1f} standard deviations of their noise, and {needed:.1f} are needed"
+                f"of its change of closed-loop predictions the {name} records support {100.0 * gained.weight:.0f} %, "
+                f"{gained.score:.1f} standard deviations of their noise, and {needed:.1f} are needed"
             )
     return ""
 
@@ -150,7 +150,7 @@ def asked(before: ClosedLoopPrediction, trial: Trial, data: Data) -> Asked | Non
     return Asked(gain_of_predictions(before, best), gain_of_predictions(*pair), best)
 
 
-def asks_for(before: ClosedLoopPrediction, trial: Trial, data: Data, thresholds: Thresholds) -> bool:
+def is_supported(before: ClosedLoopPrediction, trial: Trial, data: Data, thresholds: Thresholds) -> bool:
     """Whether validation records, which models run by themselves, ask for an effect of the size that a balance says.
 
     The run along the training records is no witness of it: a friction that is not quite that of the machine has been
@@ -173,15 +173,15 @@ def asks_for(before: ClosedLoopPrediction, trial: Trial, data: Data, thresholds:
     records, setup = data.validation.experiments, data.simulation.setup
     try:
         free = (*before.free, *trial.parameters)
-        told = gain_of_predictions(
+        gained = gain_of_predictions(
             predict(before.model, before.free, records, setup), predict(after, free, records, setup)
         )
     except VpmError:
         return False
-    return LEAST_ASKED <= told.weight <= 1.0 / LEAST_ASKED and told.score >= thresholds.score(told.pieces)
+    return LEAST_SUPPORT <= gained.weight <= 1.0 / LEAST_SUPPORT and gained.score >= thresholds.score(gained.pieces)
 
 
-def _told(current: Judged, trial: Trial, answer: Asked, data: Data) -> Trial:
+def _fitted_trial(current: Judged, trial: Trial, answer: Asked, data: Data) -> Trial:
     """The trial with the balance fitted near what the runs say, and with what they gain on the validation records."""
     own = [name for name in answer.run.free if name not in current.free]
     values = {name: answer.run.estimated(name) for name in own}

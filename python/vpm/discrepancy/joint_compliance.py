@@ -28,7 +28,7 @@ FREQUENCIES = np.geomspace(4.0, 64.0, 16)
 DAMPINGS = (0.1, 0.3)
 
 
-def is_looked_for(model: Model, data: InverseDynamicsProblem, candidate: Candidate) -> bool:
+def is_searched(model: Model, data: InverseDynamicsProblem, candidate: Candidate) -> bool:
     """Whether a candidate winds up between an ideal drive and links that do not bend, where a look takes little."""
     measured = candidate.site in data.motions[0].joints
     return candidate.effect.winds_up and measured and not (bends(model) or has_own_drives(model))

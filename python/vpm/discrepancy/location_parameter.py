@@ -34,7 +34,7 @@ class Place:
     column: Array
 
 
-def free_place(
+def free_location(
     data: InverseDynamicsProblem, model: Model, candidate: Candidate, added: Sequence[str], fresh: Array
 ) -> Place | None:
     """The place of a candidate that has a size and a place, or None.

@@ -70,7 +70,7 @@ def _check_record(model: Model, record: Experiment) -> None:
             held = "describe its joint as fixed" if channel.endswith(".position") else "leave that channel out"
             raise DiagnosisError(
                 f"{record.name}: {_standing(record, channel)}, and the model moves it by "
-                f"{_told(record, channel, way, 3)}; check that its column is the right one, or {held}"
+                f"{_sentence(record, channel, way, 3)}; check that its column is the right one, or {held}"
             )
 
 
@@ -82,10 +82,10 @@ def _step(record: Experiment, channel: str) -> float:
 
 
 def _standing(record: Experiment, channel: str) -> str:
-    return f"{channel} is {_told(record, channel, float(record[channel][0]), 6)} all the time"
+    return f"{channel} is {_sentence(record, channel, float(record[channel][0]), 6)} all the time"
 
 
-def _told(record: Experiment, channel: str, value: float, digits: int) -> str:
+def _sentence(record: Experiment, channel: str, value: float, digits: int) -> str:
     unit = record.unit(channel)
     return f"{value + 0.0:.{digits}g}" + ("" if unit == "1" else f" {unit}")
 

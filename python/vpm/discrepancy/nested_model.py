@@ -21,7 +21,7 @@ from vpm.identify.identifiability import COPY_SHARE, explained_share
 from vpm.identify.statistics import NORMAL_95
 
 
-def seen_beside(final: Judged, without: Judged, data: InverseDynamicsProblem, entry: Accepted, probe: Probe) -> Probe:
+def probe_beside(final: Judged, without: Judged, data: InverseDynamicsProblem, entry: Accepted, probe: Probe) -> Probe:
     """A rival that looked like known parameters, with what the data show of it beside the effect that was accepted.
 
     Parameters

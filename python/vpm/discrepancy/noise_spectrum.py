@@ -119,8 +119,8 @@ def _of_record(
     blocks = problem.blocks[first : first + len(problem.shown)]
     counted = np.column_stack([block.moving for block in blocks])
     for _ in range(TIMES):
-        told = whole.inputs + sizes * generator.standard_normal(whole.inputs.shape)
-        change = _shown(model, problem, record, replace(whole, inputs=told)) - clean
+        noisy = whole.inputs + sizes * generator.standard_normal(whole.inputs.shape)
+        change = _shown(model, problem, record, replace(whole, inputs=noisy)) - clean
         drives += _powers(change * counted) / TIMES
     own = _of_instruments(model, problem, record, generator)
     shapes: list[Array | None] = [None] * len(problem.joints)

@@ -61,7 +61,7 @@ def pictures(data: Data, nominal: Judged, recalibrated: Judged, final: Judged) -
 def where(model: Model, validation: InverseDynamicsProblem) -> dict[str, tuple[str, ...]]:
     """Where the efforts of the first validation record part, in words, by channel: over the samples that count."""
     time, applied, required = validation.effort(model, model.theta, 0)
-    record, told = validation.experiments[0], {}
+    record, sentences = validation.experiments[0], {}
     for joint, block in enumerate(validation.efforts(0)):
         parts = [part for part in stretches(block.moving > 0.0) if part.stop - part.start > 1]
         if not parts:
@@ -74,5 +74,5 @@ def where(model: Model, validation: InverseDynamicsProblem) -> dict[str, tuple[s
         )
         (found,) = compare(run, record, [block.channel]).channels
         # The machine is not set anew where a stretch begins, as in restarts: only what counts begins there.
-        told[block.channel] = tuple(r.sentence for r in found.where.regions if r.quantity != "time since restart")
-    return told
+        sentences[block.channel] = tuple(r.sentence for r in found.where.regions if r.quantity != "time since restart")
+    return sentences

@@ -15,7 +15,7 @@ import numpy as np
 
 from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction, fit_prediction, misfit, predict
 from vpm.discrepancy.confirmation import Data, Judged
-from vpm.discrepancy.friction_near_rest import LEAST_ASKED, gain_of_predictions
+from vpm.discrepancy.friction_near_rest import LEAST_SUPPORT, gain_of_predictions
 from vpm.discrepancy.low_frequency import has_impacts
 from vpm.discrepancy.refusal import MODEST_FACTOR, Thresholds
 from vpm.errors import VpmError
@@ -29,7 +29,7 @@ WORTH_A_FIT = 10.0
 
 
 @dataclass(frozen=True)
-class Told:
+class Comparison:
     """What records say of the change from one run of a model to another.
 
     Attributes
@@ -50,9 +50,9 @@ class Told:
     def sure(self, thresholds: Thresholds) -> bool:
         """Whether both sets of records ask for all of the change, beyond chance and what models leave out."""
         return self.better > 0.0 and all(
-            LEAST_ASKED <= told.weight <= 1.0 / LEAST_ASKED
-            and told.score >= MODEST_FACTOR * thresholds.score(told.pieces)
-            for told in (self.training, self.validation)
+            LEAST_SUPPORT <= gained.weight <= 1.0 / LEAST_SUPPORT
+            and gained.score >= MODEST_FACTOR * thresholds.score(gained.pieces)
+            for gained in (self.training, self.validation)
         )
 
 
@@ -82,7 +82,7 @@ def fitted_prediction(run: ClosedLoopPrediction, data: Data) -> ClosedLoopPredic
         return None
 
 
-def compared(first: ClosedLoopPrediction, second: ClosedLoopPrediction, data: Data) -> Told | None:
+def compared(first: ClosedLoopPrediction, second: ClosedLoopPrediction, data: Data) -> Comparison | None:
     """Support of all records for the change from one run to another; None where one of them diverges."""
     if data.simulation is None:
         return None
@@ -93,7 +93,7 @@ def compared(first: ClosedLoopPrediction, second: ClosedLoopPrediction, data: Da
     except VpmError:
         return None
     better = misfit(validation[0]) - misfit(validation[1])
-    return Told(gain_of_predictions(first, second), gain_of_predictions(*validation), second, better)
+    return Comparison(gain_of_predictions(first, second), gain_of_predictions(*validation), second, better)
 
 
 def criterion(run: ClosedLoopPrediction) -> float:

@@ -53,15 +53,15 @@ def driven_away(nominal: Model, recalibrated: Judged, final: Judged, ranked: Mod
     for name, std in zip(final.free, final.fit.std, strict=True):
         if name not in nominal.parameters or name not in recalibrated.model.parameters:
             continue
-        told = nominal.parameters[name]
-        spread = _stated(told)
+        parameter = nominal.parameters[name]
+        spread = _stated(parameter)
         after = final.model.parameters[name].value
-        away = abs(after - told.value) - NORMAL_95 * float(std)
+        away = abs(after - parameter.value) - NORMAL_95 * float(std)
         moved = abs(after - recalibrated.model.parameters[name].value)
-        if ranked is not None and abs(ranked.parameters[name].value - told.value) <= FAR * spread:
+        if ranked is not None and abs(ranked.parameters[name].value - parameter.value) <= FAR * spread:
             continue
         if min(away, moved) > FAR * spread:
-            found[name] = abs(after - told.value) / spread
+            found[name] = abs(after - parameter.value) / spread
     return dict(sorted(found.items(), key=lambda item: -item[1]))
 
 

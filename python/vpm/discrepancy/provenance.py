@@ -78,8 +78,8 @@ def provenance(
     sources = [Source("model", model.name, model.path or "", _checksum(model.path, text))]
     for role, records in (("fitted", fitted), ("unseen", validation)):
         sources += [Source(role, e.name, e.path or "", _checksum(e.path, _numbers(e))) for e in records]
-    told = {name: repr(value) for name, (value, default) in settings.items() if value != default}
-    return Provenance(vpm_version(), f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC", command, tuple(sources), told)
+    changed = {name: repr(value) for name, (value, default) in settings.items() if value != default}
+    return Provenance(vpm_version(), f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC", command, tuple(sources), changed)
 
 
 def own_settings(given: object, name: str) -> dict[str, tuple[object, object]]:

@@ -10,7 +10,7 @@ from vpm.discrepancy.side_by_side import Progress
 
 
 @dataclass(frozen=True)
-class Overheard:
+class RecordedDiagnosis:
     """A diagnosis and the calls of ``tell`` and ``progress`` that it made, each in their order."""
 
     diagnosis: Diagnosis
@@ -33,7 +33,7 @@ class Overheard:
         return self.diagnosis
 
 
-def overheard(diagnosed: Callable[..., Diagnosis], *given: object) -> Overheard:
+def recorded(diagnosed: Callable[..., Diagnosis], *given: object) -> RecordedDiagnosis:
     """Diagnose, and keep what is said.
 
     Parameters
@@ -46,4 +46,4 @@ def overheard(diagnosed: Callable[..., Diagnosis], *given: object) -> Overheard:
     sentences: list[str] = []
     steps: list[tuple[str, str, int, int]] = []
     diagnosis = diagnosed(*given, tell=sentences.append, progress=lambda *step: steps.append(step))
-    return Overheard(diagnosis, tuple(sentences), tuple(steps))
+    return RecordedDiagnosis(diagnosis, tuple(sentences), tuple(steps))

@@ -38,7 +38,7 @@ class Described:
     """A model, what is said of its residual, and the model with the formula for it."""
 
     base: Judged
-    told: Empirical
+    empirical: Empirical
     judged: Judged
 
 
@@ -72,7 +72,7 @@ class Remainder:
     def best(self) -> Described:
         """The description that leaves least, the one with fewer effects if it is hardly worse."""
         *first, last = self.choices
-        return first[0] if first and last.told.after >= CLEARLY * first[0].told.after else last
+        return first[0] if first and last.empirical.after >= CLEARLY * first[0].empirical.after else last
 
 
 def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float, workers: int = 1) -> Remainder:
@@ -100,7 +100,7 @@ def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float, 
     least = min(view.leaves(choice) for choice, better in zip(choices, clear, strict=True) if better)
     share = np.clip((power - least) / max(whole - least, 1e-300), 0.0, 1.0)
     plain = len(choices[0].judged.free) <= len(final.free)
-    instead = recalibrated is not final and clear[0] and plain and not choices[0].told.remark
+    instead = recalibrated is not final and clear[0] and plain and not choices[0].empirical.remark
     instead = instead and _power(view(choices[0].judged)) < HALF * _power(left)
     instead = instead or pressed is not None
     return Remainder(choices, repeats=True, open=float(share), instead=instead, seals=pressed)
@@ -135,7 +135,7 @@ class _View:
 
     def clearly_better(self, choice: Described, left: Array) -> bool:
         """Whether a description predicts more than the effects do, as surely as an effect has to."""
-        if choice.told.remark:
+        if choice.empirical.remark:
             own = self(choice.base)
             return _power(own) - self._said(choice, own) < (1.0 - WORTH_A_NAME) * _power(left)
         return self.thresholds.met(gain(left, self(choice.judged), segments(self.data.validation)))
@@ -151,9 +151,9 @@ class _View:
     def leaves(self, choice: Described) -> float:
         """Sum of squares over all frequencies that a description leaves."""
         own = in_time(choice.judged, self.data).validation
-        return _power(own) - self._said(choice, own) if choice.told.remark else _power(own)
+        return _power(own) - self._said(choice, own) if choice.empirical.remark else _power(own)
 
     def _said(self, choice: Described, own: Array) -> float:
         """What a remark predicts of a residual: of the effort that it speaks of, and of nothing else."""
-        blocks = (block for block in self.data.validation.blocks if block.channel == choice.told.channel)
-        return choice.told.predicted * sum(_power(own[block.samples]) for block in blocks)
+        blocks = (block for block in self.data.validation.blocks if block.channel == choice.empirical.channel)
+        return choice.empirical.predicted * sum(_power(own[block.samples]) for block in blocks)

@@ -47,14 +47,20 @@ class Joints:
     @classmethod
     def of(cls, gap: Mapping[str, ChannelGap], left: Structure, observed: Mapping[str, float]) -> Joints:
         """Of a balance of effort, with what is left there, and what an observer says of a joint, see `Search.left`."""
-        told = {channel.rpartition(".")[0]: g for channel, g in gap.items() if _is_effort(channel, g)}
-        told = {joint: g for joint, g in told.items() if _is_clear(g.recalibrated, g)}
-        shares = {joint: min((g.after / g.recalibrated) ** 2, observed.get(joint, np.inf)) for joint, g in told.items()}
+        efforts = {channel.rpartition(".")[0]: g for channel, g in gap.items() if _is_effort(channel, g)}
+        efforts = {joint: g for joint, g in efforts.items() if _is_clear(g.recalibrated, g)}
+        shares = {
+            joint: min((g.after / g.recalibrated) ** 2, observed.get(joint, np.inf)) for joint, g in efforts.items()
+        }
         most = {joint: share for joint, share in shares.items() if share > MOSTLY_OPEN}
         still = {
-            joint: share for joint, share in most.items() if left.present and _is_clear(told[joint].after, told[joint])
+            joint: share
+            for joint, share in most.items()
+            if left.present and _is_clear(efforts[joint].after, efforts[joint])
         }
-        worst = max(told, key=lambda joint: told[joint].recalibrated / max(told[joint].signal, TINY), default="")
+        worst = max(
+            efforts, key=lambda joint: efforts[joint].recalibrated / max(efforts[joint].signal, TINY), default=""
+        )
         return cls(still, tuple(joint for joint in shares if joint not in most), worst)
 
     @property

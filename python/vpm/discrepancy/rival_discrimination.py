@@ -18,7 +18,7 @@ from vpm.discrepancy.search import Search
 from vpm.discrepancy.side_by_side import SideBySide
 
 
-def told_apart(
+def discriminated(
     found: Search, known: Sequence[Rivals], data: Data, each: SideBySide
 ) -> tuple[Search, tuple[Rivals, ...]]:
     """Exchange an effect for the rival that predictions support most, if training and validation records are clear.
@@ -56,8 +56,8 @@ def told_apart(
     thresholds = Thresholds(len(asked), interval)
     for _, place, trial, run in sorted(better, key=lambda one: one[0]):
         second = fitted_prediction(run, data)
-        told = None if first is None or second is None else compared(first, second, data)
-        if told is not None and told.sure(thresholds):
+        comparison = None if first is None or second is None else compared(first, second, data)
+        if comparison is not None and comparison.sure(thresholds):
             return exchanged(found, known, data, place, trial, "in its place is what runs of the model itself ask for")
     return found, tuple(known)
 

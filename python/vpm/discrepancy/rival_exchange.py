@@ -158,8 +158,8 @@ def exchanged(
     outgoing = replace(entry.trial, judged=found.final)
     tried = tuple(t for t in (*mine.tried, outgoing) if t.probe is not trial.probe)
     rest = tuple(t for t in tried if as_good(trial.judged, t, data))
-    told = Rivals(*new.key, rest, tried, mine.without)
-    return changed, tuple(told if n == place else one for n, one in enumerate(known))
+    entry_of_new = Rivals(*new.key, rest, tried, mine.without)
+    return changed, tuple(entry_of_new if n == place else one for n, one in enumerate(known))
 
 
 def in_order(found: Search, known: Sequence[Rivals]) -> tuple[Search, tuple[Rivals, ...]]:

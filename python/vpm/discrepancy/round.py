@@ -9,13 +9,13 @@ from functools import cached_property, partial
 import numpy as np
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.backlash import is_read_off, only_winds_up
+from vpm.discrepancy.backlash import is_read_off, only_compliant
 from vpm.discrepancy.candidates import Candidate, Key, candidates, joint_at, left_out
 from vpm.discrepancy.choice import Accepted, choose
 from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, finished
 from vpm.discrepancy.diagnosis import RankedCandidate
-from vpm.discrepancy.friction_near_rest import asks_for, judged_by_prediction, needs_prediction, prediction_without
+from vpm.discrepancy.friction_near_rest import is_supported, judged_by_prediction, needs_prediction, prediction_without
 from vpm.discrepancy.low_frequency import slow
 from vpm.discrepancy.motion_only import in_motion, is_late
 from vpm.discrepancy.refusal import (
@@ -280,13 +280,13 @@ class Round:
         """Why a trial is not believed, or ""."""
         candidate = trial.probe.candidate
         reason = refuse_trial(trial, thresholds) or self._only_timing(trial, thresholds)
-        if reason and self._run_asks(trial, thresholds):
+        if reason and self._is_predicted(trial, thresholds):
             reason = ""
         if not reason and is_read_off(self.current.model, self.data.training, candidate):
-            reason = only_winds_up(trial.judged.model, candidate.site, self.data.training)
+            reason = only_compliant(trial.judged.model, candidate.site, self.data.training)
         return reason or only_ringing(self.current, self.data, trial)
 
-    def _run_asks(self, trial: Trial, thresholds: Thresholds) -> bool:
+    def _is_predicted(self, trial: Trial, thresholds: Thresholds) -> bool:
         """Whether a delay gains little and surely, and closed-loop predictions of validation records support it.
 
         What sticks is late in a balance of effort, and so imitates it, but not in a run; nor does a run know or mind to
@@ -295,7 +295,7 @@ class Round:
         late = is_late(trial.probe.candidate.effect, trial.judged.model) and not self._takes_long()
         if not late or refuse_trial(replace(trial, asked=True), thresholds) or self.alone_run is None:
             return False
-        return asks_for(self.alone_run, trial, self.data, thresholds)
+        return is_supported(self.alone_run, trial, self.data, thresholds)
 
     @cached_property
     def alone_run(self) -> ClosedLoopPrediction | None:
@@ -306,15 +306,15 @@ class Round:
         """Why a trial that would be believed does no more than a shift of the commands does, or ""."""
         if self.timed.shift == 0.0 or explains_most(trial):
             return ""
-        told = in_time(trial.judged, self.data)
-        before, validation = self.timed.validation, told.validation
+        shifted = in_time(trial.judged, self.data)
+        before, validation = self.timed.validation, shifted.validation
         if slow_shows_it(trial, thresholds):
             before, validation = (slow(self.data.validation, each) for each in (before, validation))
         if is_late(trial.probe.candidate.effect, trial.judged.model):
             # What sticks is late by itself, with a shift as without: what is late is judged where nothing sticks.
             before, validation = (in_motion(self.data.validation) * each for each in (before, validation))
         timed = gain(before, validation, segments(self.data.validation))
-        return refuse_timing(timed, self.timed.shift, thresholds, beside=told.shift)
+        return refuse_timing(timed, self.timed.shift, thresholds, beside=shifted.shift)
 
     def best(self) -> Accepted | None:
         """The one that comes in, if any is believed; fitted to the end it has to stand as it did before."""
@@ -334,8 +334,8 @@ class Round:
 
     def mark(self, accepted: Key) -> None:
         """Note in the ranking what comes in."""
-        for key, told in self._ranking.items():
-            self._ranking[key] = replace(told, accepted=key == accepted)
+        for key, entry in self._ranking.items():
+            self._ranking[key] = replace(entry, accepted=key == accepted)
 
     def after(self, judged: Judged) -> Round:
         """The round that follows if ``judged`` is the model at hand."""

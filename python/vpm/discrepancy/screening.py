@@ -16,8 +16,8 @@ from scipy.special import chdtri
 from vpm.discrepancy.backlash import believed, is_read_off, read_off
 from vpm.discrepancy.candidates import Candidate
 from vpm.discrepancy.first_step import is_outside, linear_step, softened, step_without
-from vpm.discrepancy.joint_compliance import best_start, is_looked_for
-from vpm.discrepancy.location_parameter import free_place
+from vpm.discrepancy.joint_compliance import best_start, is_searched
+from vpm.discrepancy.location_parameter import free_location
 from vpm.discrepancy.structural import LOSSES, in_series
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import bends
@@ -129,7 +129,7 @@ def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *,
         base = replace(base, model=believed(base.model, data.nominal, base.free))
         start = read_off(base.model, base.free, data, candidate, hard=hard)
         return _probe_start(base, data, start, still=True)
-    if (found := _looked_for(base, data, candidate)) is not None:
+    if (found := _searched(base, data, candidate)) is not None:
         return found
     probes = [_probe_start(base, data, candidate, start) for start in candidate.starts]
     best = max(probes, key=lambda p: p.drop)
@@ -141,9 +141,9 @@ def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *,
     return best
 
 
-def _looked_for(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe | None:
+def _searched(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe | None:
     """A drive that winds up, as it stands at the best of its starts; None where none of them leaves less."""
-    if not is_looked_for(base.model, data, candidate):
+    if not is_searched(base.model, data, candidate):
         return None
     start = best_start(base.model, base.jacobian, data, candidate)
     found = None if start is None else _probe_start(base, data, candidate, start, still=True)
@@ -201,7 +201,7 @@ def _probe_start(
         all_columns = [model.index(name) for name in base.free] + columns
         residual, jacobian = data.evaluate(model, model.theta, all_columns)
         known, fresh = jacobian[:, : len(base.free)], jacobian[:, len(base.free) :]
-    place = free_place(data, model, candidate, added, fresh)
+    place = free_location(data, model, candidate, added, fresh)
     if place is not None:
         fresh[:, place.where] = place.column
     keep, held, invisible = sort_columns(

@@ -19,7 +19,7 @@ from vpm.identify import InverseDynamicsProblem, gain, segments
 Array = NDArray[np.float64]
 
 
-def read_by_itself(chosen: Trial, equals: Sequence[Trial], data: Data) -> Trial:
+def preferred_sensor(chosen: Trial, equals: Sequence[Trial], data: Data) -> Trial:
     """Of what explains the data as well as ``chosen``, the instrument whose own reading asks for it; else ``chosen``.
 
     It has to predict its channel better than ``chosen`` does by as much as is worth a name, surely, on the training
@@ -27,11 +27,11 @@ def read_by_itself(chosen: Trial, equals: Sequence[Trial], data: Data) -> Trial:
     """
     if chosen.probe.candidate.effect.site == "sensor":
         return chosen
-    asked = [t for t in equals if t.probe.candidate.effect.site == "sensor" and _asks(t, chosen, data)]
+    asked = [t for t in equals if t.probe.candidate.effect.site == "sensor" and _is_supported(t, chosen, data)]
     return min(asked, key=lambda t: _power(t.judged.validation), default=chosen)
 
 
-def _asks(trial: Trial, chosen: Trial, data: Data) -> bool:
+def _is_supported(trial: Trial, chosen: Trial, data: Data) -> bool:
     site, model = trial.probe.candidate.site, trial.judged.model
     channels = [channel for channel in data.validation.shown if model.sensor_of(channel) == site]
     pairs = (
@@ -45,8 +45,8 @@ def _better(problem: InverseDynamicsProblem, channels: Sequence[str], before: Ar
     own = np.zeros(before.size)
     for block in problem.blocks:
         own[block.samples] = block.channel in channels
-    told = gain(before * own, after * own, segments(problem))
-    sure = told.relative >= WORTH_A_NAME and told.score >= NORMAL_95_ONE_SIDED
+    gained = gain(before * own, after * own, segments(problem))
+    sure = gained.relative >= WORTH_A_NAME and gained.score >= NORMAL_95_ONE_SIDED
     return sure and _power(after) <= _power(before)
 
 

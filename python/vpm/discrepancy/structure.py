@@ -79,14 +79,14 @@ def structure(
     predicted = max(_predicted(model, training, validation, fitted, residual, joint) for joint in joints)
     blocks = zip(validation.blocks, validation_shapes, strict=True)
     slow = float(np.mean([_slow_share(residual[block.samples], shape) for block, shape in blocks]))
-    coloured = min(_coloured(training, fitted, training_shapes), _coloured(validation, residual, validation_shapes))
+    coloured = min(_drift(training, fitted, training_shapes), _drift(validation, residual, validation_shapes))
     growing = min(_growing(model, training, fitted), _growing(model, validation, residual))
     seen, fresh = gaps(training, fitted), gaps(validation, residual)
     new = max(fresh[c][1] / seen[c][1] if seen[c][1] > 0.0 else 0.0 for c in fresh)
     return Structure(predicted, slow, coloured, growing, new)
 
 
-def _coloured(problem: InverseDynamicsProblem, residual: Array, shapes: tuple[Array | None, ...]) -> float:
+def _drift(problem: InverseDynamicsProblem, residual: Array, shapes: tuple[Array | None, ...]) -> float:
     """Largest ratio of any channel between its residual and the noise in it."""
     ratios = []
     for channel in dict.fromkeys(block.channel for block in problem.blocks):

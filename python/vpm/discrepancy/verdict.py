@@ -132,8 +132,8 @@ def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], observed: float) -
     """
     if observed <= MOSTLY_OPEN and any(effect.type.has_play for effect in found.final.model.effects):
         return False
-    told = [gap[channel] for joint in _joints(found) if (channel := f"{joint}.effort") in gap]
-    most = any(g.after**2 > MOST_OF_IT * g.signal**2 for g in told)
+    efforts = [gap[channel] for joint in _joints(found) if (channel := f"{joint}.effort") in gap]
+    most = any(g.after**2 > MOST_OF_IT * g.signal**2 for g in efforts)
     return most or any(map(_is_worse_than_none, main_gaps(gap)))
 
 
@@ -168,7 +168,7 @@ def _is_explanation(found: Search, observed: float, mostly_open: bool) -> bool:
     if found.within_laws:
         return True
     if np.isnan(observed):
-        return _told_by_runs(found) or not mostly_open
+        return _shown_by_predictions(found) or not mostly_open
     return observed <= MOSTLY_OPEN or (observed < 1.0 and not mostly_open)
 
 
@@ -178,7 +178,7 @@ def _farthest(away: Mapping[str, float]) -> str:
     return f"{name} would be off by {times:.1f} times its stated uncertainty"
 
 
-def _told_by_runs(found: Search) -> bool:
+def _shown_by_predictions(found: Search) -> bool:
     """Whether runs of the model itself told all that was accepted, and it explains most of what they had left.
 
     What a balance of effort hardly sees may leave as much of it as there was, and be the explanation.
@@ -190,11 +190,11 @@ def _nothing_missing(
     data: Data,
     nominal: Judged,
     recalibrated: Judged,
-    told: tuple[list[ChannelGap], list[ChannelGap]],
+    both: tuple[list[ChannelGap], list[ChannelGap]],
     worst: ChannelGap,
 ) -> tuple[str, str]:
     """Of gaps of the balance, and of an observer of joints that it does not see."""
-    (main, beside), numbers = told, _stages(worst)
+    (main, beside), numbers = both, _stages(worst)
     small = max(g.before / g.signal if g.signal > 0.0 else 0.0 for g in main) <= NEGLIGIBLE
     agrees = small or max((g.before / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main) <= FLOOR_FACTOR
     better = gain(nominal.validation, recalibrated.validation, segments(data.validation))

@@ -76,8 +76,8 @@ def check_log(
     findings: list[Finding] = []
     shares: dict[str, float] = {}
     for record in as_records(experiments):
-        told, left = check.of(record, model.channel_table if table is None else table)
-        findings += told
+        odd, left = check.of(record, model.channel_table if table is None else table)
+        findings += odd
         for name, share in left.by_channel.items():
             shares[name] = max(share, shares.get(name, 0.0))
     return LogCheck(tuple(sorted(_together(findings), key=lambda one: not one.mistake)), shares)
@@ -105,8 +105,10 @@ def refuse_mistakes(
     except (VpmError, ArithmeticError):
         return ()
     if found.mistakes:
-        told = ". ".join(str(one) for one in found.mistakes)
-        raise ExperimentError(f"{told}. Nothing is concluded from such a log; to do it anyway, leave out its check")
+        sentences = ". ".join(str(one) for one in found.mistakes)
+        raise ExperimentError(
+            f"{sentences}. Nothing is concluded from such a log; to do it anyway, leave out its check"
+        )
     return found.findings
 
 

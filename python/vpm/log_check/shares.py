@@ -228,8 +228,8 @@ class Judge:
 
     def unseen(self, tangent: Tangent) -> list[str]:
         """Uncertain parameters of the model of which a record says next to nothing."""
-        told = zip(tangent.structure.priors, tangent.deviations.tolist(), strict=True)
-        return [name for name, left in told if left > self.settings.unseen and not self._is_added(name)]
+        deviations = zip(tangent.structure.priors, tangent.deviations.tolist(), strict=True)
+        return [name for name, left in deviations if left > self.settings.unseen and not self._is_added(name)]
 
     def of_sensor(self, correction: Correction, record: Experiment, before: Shares) -> Shares | None:
         """What a correction of sensors that do not draw the model leaves; None where it takes another run."""
@@ -304,8 +304,8 @@ class Judge:
         drawn, seen = observed.drawn(observer.band), _seen(observed)
         free = np.sum(np.where(np.any(drawn != 0.0, axis=0), drawn, observed.motion)[seen] ** 2, axis=0)
         with np.errstate(all="ignore"):
-            told = map(_share, np.sum(residual[seen] ** 2, axis=0).tolist(), free.tolist())
-        shares = dict(zip(observed.records[0].channels, told, strict=True))
+            errors = map(_share, np.sum(residual[seen] ** 2, axis=0).tolist(), free.tolist())
+        shares = dict(zip(observed.records[0].channels, errors, strict=True))
         return Shares(shares, values, residual, free, seen, floor=self.settings.negligible)
 
     def _lost(self, record: Experiment, values: Array) -> Shares:
@@ -363,8 +363,8 @@ class Tangent:
         move = -np.linalg.solve(normal, pull)
         left = (before.ravel() + columns @ move).reshape(before.shape) * sizes
         scale = self.shares.free * len(kept) / len(self.shares.seen)
-        told = map(_share, np.sum(left**2, axis=0).tolist(), scale.tolist())
-        return replace(self.shares, by_channel=dict(zip(self.shares.by_channel, told, strict=True))), float(move[-1])
+        errors = map(_share, np.sum(left**2, axis=0).tolist(), scale.tolist())
+        return replace(self.shares, by_channel=dict(zip(self.shares.by_channel, errors, strict=True))), float(move[-1])
 
     def _weighed(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
         """Slopes in sizes of what is left of each channel, sample by sample and channel by channel, and these sizes."""

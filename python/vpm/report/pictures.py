@@ -252,8 +252,8 @@ def _pairs(names: Sequence[str], correlation: Array) -> str:
     first, second = np.triu_indices(len(names), 1)
     values = correlation[first, second]
     order = [k for k in np.argsort(-np.abs(np.nan_to_num(values))) if np.isfinite(values[k])][:5]
-    told = "; ".join(f"{names[first[k]]} and {names[second[k]]} {values[k]:.2f}" for k in order)
-    return f"Matrix of {len(names)} parameters. The largest correlations: {told or 'none is known'}."
+    listed = "; ".join(f"{names[first[k]]} and {names[second[k]]} {values[k]:.2f}" for k in order)
+    return f"Matrix of {len(names)} parameters. The largest correlations: {listed or 'none is known'}."
 
 
 def _rms(values: Array) -> float:

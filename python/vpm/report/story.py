@@ -67,9 +67,9 @@ def _refused(d: Diagnosis) -> list[str]:
 
 def _ambiguous(d: Diagnosis) -> list[str]:
     lines = [f"  {a.name} at {a.site} and {', '.join(a.others)}: {a.reason}" for a in d.ambiguous_with]
-    told = [f"  {experiment.sentence}" for experiment in d.experiments]
+    listed = [f"  {experiment.sentence}" for experiment in d.experiments]
     head = ["these data cannot tell apart:", *lines] if lines else []
-    return [*head, *(["experiments that would:", *told] if told else [])]
+    return [*head, *(["experiments that would:", *listed] if listed else [])]
 
 
 def _where(d: Diagnosis) -> list[str]:

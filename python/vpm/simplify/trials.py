@@ -296,8 +296,10 @@ class Trials:
         except SimulationError as reason:
             self.reason = str(reason)
             return None
-        labels, states, told = tuple(map(str, changes)), model.core.n_states, tuple(errors.items())
-        rung = Rung(labels, setup.integrator, setup.substeps, states, error, loudest, error, seconds, slowest, told)
+        labels, states, by_channel = tuple(map(str, changes)), model.core.n_states, tuple(errors.items())
+        rung = Rung(
+            labels, setup.integrator, setup.substeps, states, error, loudest, error, seconds, slowest, by_channel
+        )
         self._rungs[key].append(rung)
         return rung
 
