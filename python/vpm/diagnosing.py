@@ -85,8 +85,8 @@ def diagnose(
     calls uncertain are fitted first, for a wrong parameter is not a missing effect. Where links are rigid and up to
     three joints move, a ranking of the training records names what is missing, see `vpm.rank`, and validation records
     decide no name. Elsewhere every effect is screened at every site by its regressor; the promising ones are refitted
-    together with the model and have to predict validation records, both as a balance of effort and in simulation. One
-    is accepted at a time, the one with the largest validation gain per number.
+    together with the model and have to predict validation records, by the inverse-dynamics residual and in simulation.
+    One is accepted at a time, the one with the largest validation gain per number.
 
     Parameters
     ----------
@@ -106,8 +106,9 @@ def diagnose(
     limit : int, optional
         Most effects to accept; two for each joint, but at least six, if not given.
     names : {"ranking", "search"}
-        Where names come from: from `vpm.rank` where that covers the machine and from rounds of screening on balances of
-        effort elsewhere, or from these in any case.
+        Where names come from: from `vpm.rank` where that covers the machine and from rounds of screening on
+        inverse-dynamics residuals
+         elsewhere, or from these in any case.
     check : bool
         Refuse logs with a mistake that no machine makes by itself.
     workers : int, optional
@@ -131,7 +132,7 @@ def diagnose(
     DiagnosisError
         No record was given, or an effect name or the source of names is unknown.
     ExperimentError
-        A channel is missing, or a log cannot be believed.
+        A channel is missing, or a log cannot be trusted.
     ExecutorError
         The executor does not take the diagnosis, or its worker died with it again and again.
     """

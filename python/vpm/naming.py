@@ -1,4 +1,4 @@
-"""Names of what a model is missing: from a ranking of the training records, or from a search on balances of effort."""
+"""Names of missing effects: from a ranking of the training records, or from a search on inverse-dynamics residuals."""
 
 from __future__ import annotations
 
@@ -27,10 +27,10 @@ from vpm.simulate import Setup
 STOPPED = "stopped by Ctrl-C before every candidate was tried: this is what was known until then"
 #: Which way the names came.
 RANKED = "names come from a ranking of the training records"
-SEARCHED = "names come from a search on balances of effort, for {reason}"
-NOT_SEARCHED = "a search on balances of effort does not try {effects}"
+SEARCHED = "names come from a search on inverse-dynamics residuals, for {reason}"
+NOT_SEARCHED = "a search on inverse-dynamics residuals does not try {effects}"
 #: Said where names come from a search.
-UNSEEN = "the joint {joint} has no drive, so that no balance of effort sees what acts there, and nothing is said of it"
+UNSEEN = "the joint {joint} has no drive: no inverse-dynamics residual shows what acts there, and nothing is said of it"
 #: Said where an error follows a search, and what such an error is.
 FAILED = "{what} could not be computed: {error}"
 BROKEN = (ValueError, ArithmeticError, LookupError)
@@ -126,7 +126,7 @@ def _settled(
 ) -> tuple[Search, tuple[Rivals, ...]]:
     """Names and their order when each effect has been taken out again, with what would do in its place.
 
-    Where something takes the place of an effect, or comes in beside it as runs of the model ask for it, the search goes
+    Where something takes the place of an effect, or comes in beside it as runs of the model support it, the search goes
     on beside that.
     """
     known = rivals(found.final, data, found.accepted, effects, each, found.last)
@@ -171,10 +171,10 @@ def _not_searched(effects: Sequence[str] | None, reason: str) -> list[str]:
     left_out = [name for name in effects or () if not EFFECTS[name].screened]
     if not left_out:
         return []
-    told = ", ".join(left_out)
+    names = ", ".join(left_out)
     if not _searchable(effects):
         raise DiagnosisError(
-            f"a search on balances of effort does not try {told}, and a ranking, which does, is no way here: {reason}; "
-            "ask for other effects"
+            f"a search on inverse-dynamics residuals does not try {names}, and a ranking, which does, is no way here: "
+            f"{reason}; ask for other effects"
         )
-    return [NOT_SEARCHED.format(effects=told)]
+    return [NOT_SEARCHED.format(effects=names)]

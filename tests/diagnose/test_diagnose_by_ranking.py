@@ -223,7 +223,7 @@ def test_a_name_that_no_balance_can_carry_is_has_derivatives(monkeypatch: pytest
     monkeypatch.setattr(naming, "rank", lambda *_, **__: Ranking((one,), ((one,),), warm, model))
     why = diagnose(model, case.train, case.holdout, names="ranking", workers=1)
     (told,) = [note for note in why.notes if note.startswith("the ranking names warming_friction at lift")]
-    assert "no balance of effort can be computed" in told
+    assert "no inverse-dynamics residual can be computed" in told
 
 
 def test_machines_that_a_ranking_does_not_cover_say_why() -> None:
@@ -264,7 +264,7 @@ def test_effects_that_no_search_tries_are_asked_of_a_ranking(
     why = diagnose(
         nominal(), records[0], records[1], effects=["quadratic_drag", "coulomb_friction"], limit=1, workers=1
     )
-    assert "a search on balances of effort does not try quadratic_drag" in why.notes
+    assert "a search on inverse-dynamics residuals does not try quadratic_drag" in why.notes
     assert [effect.name for effect in why.effects] == ["coulomb_friction"]
 
 

@@ -1,4 +1,4 @@
-"""Friction close to rest, told by runs of the model itself where a balance of effort sees too little of it."""
+"""Friction close to rest, judged by closed-loop predictions where the inverse-dynamics residual shows too little."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_what_a_balance_hardly_sees_is_told_by_runs() -> None:
     values = {p.name: p.value for p in found.parameters}
     assert values["stribeck"] == pytest.approx(true.parameters["stribeck"], rel=0.2)
     assert values["stribeck_velocity"] == pytest.approx(true.parameters["stribeck_velocity"], rel=0.1)
-    assert any("runs of the model itself" in note for note in found.notes)
+    assert any("closed-loop predictions" in note for note in found.notes)
 
 
 @pytest.mark.nightly
@@ -47,7 +47,7 @@ def test_runs_ask_for_nothing_that_is_not_there(machine: str, hidden: str, seed:
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], names="search", workers=1)
     assert not why.effects
     (refused,) = why.refused
-    assert "runs of the model itself" in refused.reason
+    assert "closed-loop predictions" in refused.reason
 
 
 @pytest.mark.nightly

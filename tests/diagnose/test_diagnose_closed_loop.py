@@ -1,4 +1,4 @@
-"""Two missing effects of which the balance of effort leaves one open, and runs of the model itself do not."""
+"""Two missing effects: the inverse-dynamics residual leaves one open, closed-loop predictions do not."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def test_a_force_and_a_tilt_that_a_balance_takes_for_each_other_are_told_apart()
     tried = ["bias_force", "gravity_tilt", "stribeck_friction"]
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, names="search", workers=1)
     assert {effect.name for effect in why.effects} == {"gravity_tilt", "stribeck_friction"}
-    assert any("runs of the model itself ask for" in r.reason for r in why.refused if r.name == "bias_force")
+    assert any("closed-loop predictions support" in r.reason for r in why.refused if r.name == "bias_force")
 
 
 @pytest.mark.nightly

@@ -124,7 +124,7 @@ def beside_play(whole: Gain, slow: Gain) -> str:
 
 
 def test_what_helps_impacts_and_hurts_what_is_slow_is_refused_beside_a_play() -> None:
-    assert "single impacts of the play" in beside_play(gained(), Gain(1.0, 1.5, 0.3, 2.0, 20))
+    assert "single impacts of the backlash" in beside_play(gained(), Gain(1.0, 1.5, 0.3, 2.0, 20))
 
 
 def test_what_is_slow_shows_an_effect_that_impacts_cover_unless_it_speaks_alone() -> None:
@@ -221,5 +221,5 @@ def test_a_simulation_that_becomes_worse_is_told_beside_what_the_balance_says() 
         )
         vars(told.judged).update(model=Model.load(MODEL))
         said = worse_in_simulation(told)
-        assert said.startswith(f"it {word} the validation error of the balance of effort")
+        assert said.startswith(f"it {word} the validation error of the inverse-dynamics residual")
         assert f", {joined} raises that of the simulation by 300.00 % of its mean square (1 to 2)" in said

@@ -1,4 +1,4 @@
-"""The offset of a pressure gauge and a constant force: one balance of effort, two different readings."""
+"""The offset of a pressure gauge and a constant force: one inverse-dynamics residual, two different readings."""
 
 from __future__ import annotations
 

@@ -147,7 +147,7 @@ def test_a_part_of_a_sampling_interval_is_named_where_it_explains_most(hidden: s
 
 @pytest.mark.nightly
 def test_a_delay_of_a_machine_that_sticks_is_timed_along_its_own_run() -> None:
-    # The balance of effort says 3.2 ms instead of 1.3 ms, with which a simulation gets worse.
+    # The inverse-dynamics residual says 3.2 ms instead of 1.3 ms, with which a simulation gets worse.
     case = shared_case("axis_linear", "input_delay", 22)
     truth = case.truth.hidden[0].parameters["time"]
     data, (_, delay) = fitted_late(case)

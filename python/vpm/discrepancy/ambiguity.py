@@ -171,7 +171,7 @@ def _could_do(model: Model, entry: Accepted, candidate: Candidate) -> bool:
 
 
 def _short_list(final: Judged, without: Judged | None, entry: Accepted, probes: Sequence[Probe]) -> list[Probe]:
-    """Rivals worth a refit: those that promise most for their numbers, and what might refine the effect most."""
+    """Rivals worth a refit: the largest predicted gains per number, and what might refine the effect most."""
     if without is None:
         return []
     taken = _power(without) - _power(final)

@@ -67,7 +67,7 @@ def of_search(
 def gaps_of(
     data: Data, nominal: Judged, recalibrated: Judged, final: Judged, floor: dict[str, float]
 ) -> dict[str, ChannelGap]:
-    """Gap of each channel of the balance, and of the simulation, at three stages, and its noise floor."""
+    """Gap of each channel of the residual, and of the simulation, at three stages, and its noise floor."""
     judged = (nominal, recalibrated, final)
     stages = [gaps(data.validation, stage.validation) for stage in judged]
     # Of efforts as the drives of the nominal model give them: no drive may shrink them together with its error.
@@ -119,7 +119,7 @@ def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
     texts = {e.name: f"{e.value:.4g} {e.unit}" for e in estimates}
     notes = [f"{alias.parameter} held: not told from {alias.partner}" for alias in entry.trial.held]
     if entry.trial.alone:
-        notes.append("told by runs of the model itself in closed loop; a balance of effort hardly shows it")
+        notes.append("shown by closed-loop predictions; the inverse-dynamics residual hardly shows it")
     elif not entry.ranked and not is_clear(final, tuple(e.dotted for e in estimates if e.std > 0.0)):
         notes.append("beside the effects that came later, its interval covers zero: one of them may be enough")
     return AcceptedEffect(

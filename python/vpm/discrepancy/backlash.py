@@ -30,7 +30,7 @@ Array = NDArray[np.float64]
 SHARES = np.geomspace(5e-5, 5e-2, 34)
 #: Contacts between which widths are looked for: frequencies, Hz, and damping ratio.
 SURVEYED, SURVEYED_DAMPING = (8.0, 14.0, 22.0), 0.5
-#: So many of the plays are looked at along the motion as the model has it.
+#: So many of the backlashes are looked at along the motion as the model has it.
 MOST = 3
 #: Frequencies of contacts tried at the best width, Hz, with what the survey took for them, and damping ratios.
 CONTACTS = (7.0, 10.0, 14.0, 20.0, 30.0, 45.0, 65.0, 90.0)
@@ -53,7 +53,7 @@ HOPELESS = 0.95
 
 @dataclass(frozen=True)
 class _Look:
-    """A play and what it leaves, beside the best values of what else is free."""
+    """A backlash and what it leaves, beside the best values of what else is free."""
 
     gap: float
     frequency: float
@@ -62,15 +62,16 @@ class _Look:
 
 
 def is_read_off(model: Model, data: InverseDynamicsProblem, candidate: Candidate) -> bool:
-    """Whether a candidate is a play that the measured motion shows: between ideal drives and links that do not bend."""
+    """Whether a candidate is a backlash that the measured motion shows: between ideal drives and rigid links."""
     measured = candidate.site in data.motions[0].joints
     return candidate.effect.has_play and measured and not (bends(model) or has_own_drives(model))
 
 
 def believed(model: Model, nominal: Model, free: Sequence[str]) -> Model:
-    """The model with the parameters of the nominal one, if the recalibration moved any of these beyond belief.
+    """The model with the parameters of the nominal one, if the recalibration moved any of these beyond its prior.
 
-    Play looks like a load that comes and goes; a fit without it may make a body weightless, along which nothing flies.
+    A backlash looks like a load that comes and goes; a fit without it may make a body weightless, along which nothing
+    flies.
     """
     shared = [name for name in free if name in nominal.parameters]
     for name in shared:
@@ -92,7 +93,7 @@ def only_compliant(model: Model, site: str, data: InverseDynamicsProblem) -> str
     if gap.value >= way:
         return ""
     return (
-        f"its contacts wind up by {way:.3g} {gap.unit} under the effort of these data, more than its gap of "
+        f"its contacts deflect by {way:.3g} {gap.unit} under the effort of these data, more than its gap of "
         f"{gap.value:.3g} {gap.unit}: that is a spring"
     )
 
@@ -105,12 +106,12 @@ def read_off(
     Parameters
     ----------
     model : Model
-        Without the play.
+        Without the backlash.
     free : sequence of str
         Its parameters that a fit may change; every width is judged with the best change of these.
     data : InverseDynamicsProblem
     candidate : Candidate
-        A play.
+        A backlash.
     hard : bool
         Between hard contacts. Soft ones show the width best; what swings in them may still not simulate.
     """
@@ -125,7 +126,7 @@ def read_off(
 
 
 class _Search:
-    """Judges plays by the balance along the measured motion."""
+    """Judges backlashes by the residual along the measured motion."""
 
     def __init__(self, model: Model, free: Sequence[str], data: InverseDynamicsProblem, candidate: Candidate) -> None:
         self.model, self.data, self.candidate = model, data, candidate
@@ -180,7 +181,7 @@ class _Search:
         return {"gap": gap, "stiffness": stiffness, "contact_damping": resistance, "width": ROUNDING * gap}
 
     def survey(self) -> list[_Look]:
-        """The plays between soft contacts that leave least, the least first."""
+        """The backlashes between soft contacts that leave least, the least first."""
         contacts = sorted({self.slowed(frequency) for frequency in SURVEYED})
         widths, frequencies = (each.ravel() for each in np.meshgrid(SHARES * self.travel, contacts))
         start = self.values(float(widths[0]), contacts[0], SURVEYED_DAMPING)

@@ -21,7 +21,7 @@ WHOLE = 0.9
 def motion_band(problem: InverseDynamicsProblem, model: Model) -> float:
     """Frequency in Hz below which the efforts of all records and joints have nearly all of their power.
 
-    The noise of a balance is that of twice differentiated positions and grows with the square of the frequency; what
+    The noise of the residual is that of twice differentiated positions and grows with the square of the frequency; what
     follows the motion is hidden by it in a mean over all frequencies, and may stand clear of it in this band.
     """
     found = []

@@ -1,7 +1,7 @@
 """Effects that a ranking names: refitted to the inverse-dynamics residual, and measured on validation records.
 
 A ranking says what is missing and in which order. Nothing here takes a name away or adds one, but for a machine whose
-efforts cannot be balanced with it. The values that are reported are those of a balance wherever it shows them.
+efforts cannot be balanced with it. The values that are reported are those of the residual wherever it shows them.
 """
 
 from __future__ import annotations
@@ -81,12 +81,12 @@ def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
 
 
 def free_joints(model: Model) -> tuple[str, ...]:
-    """Joints without a drive, so that no balance of effort sees what acts there."""
+    """Joints without a drive, so that no inverse-dynamics residual shows what acts there."""
     return tuple(name for name in model.joints if name not in {*model.driven_joints, *model.added_joints})
 
 
 def observed_gaps(ranking: Ranking, balanced: Sequence[str]) -> dict[str, ChannelGap]:
-    """Errors of an observer on validation records, of channels of joints that a balance of effort does not see."""
+    """Errors of an observer on validation records, of joints that the inverse-dynamics residual does not show."""
     joints = set(ranking.recalibrated.joints) - set(balanced)
     return {
         f"{channel} ({OBSERVED})": ChannelGap(
@@ -128,7 +128,7 @@ def searched(
             try:
                 trial = _beside(stages[-1].judged, _without(ranking.model, gone), one, data)
             except VpmError as error:
-                outside[one.key] = f"it {_removes(one)}, but no balance of effort can be computed: {error}"
+                outside[one.key] = f"it {_removes(one)}, but no inverse-dynamics residual can be computed: {error}"
                 continue
             accepted.append(Accepted(trial, one.rivals, one.evidence, one.probability, one.side, one.class_probability))
             stages.append(Stage("added", *one.key, trial.judged))
@@ -160,9 +160,9 @@ def _without(model: Model, gone: Sequence[Ranked]) -> Model:
 
 
 def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
-    """An effect in a model at the values of a ranking, refitted as far as a balance of effort shows them.
+    """An effect in a model at the values of a ranking, refitted as far as an inverse-dynamics residual shows them.
 
-    A parameter moves if the balance tells it from all others at these values, and stays where it is if not. The refit
+    A parameter moves if the residual tells it from all others at these values, and stays where it is if not. The refit
     counts if the training records are left no more and the validation ones are simulated no worse than by those values.
 
     Raises
@@ -190,7 +190,7 @@ def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
 
 
 def _has_derivatives(columns: Array) -> NDArray[np.bool_]:
-    """Whether a balance has derivatives by each parameter: what is behind a play may part from its way ever faster."""
+    """Whether the residual has derivatives by each parameter; behind a backlash a motion may diverge."""
     with np.errstate(over="ignore", invalid="ignore"):
         return np.asarray(np.isfinite(np.sum(columns**2, axis=0)))
 
@@ -276,7 +276,7 @@ def _rivals(ranking: Ranking, final: Judged, accepted: Sequence[Accepted], data:
             try:
                 trials.append(_placed(_tried(ranking, entry.key, label), final, entry, data))
             except (VpmError, StopIteration):
-                continue  # it is said, but there is no balance to plan an experiment by
+                continue  # it is said, but there is no residual to plan an experiment by
         if trials:
             found.append(Rivals(*entry.key, tuple(trials)))
     return tuple(found)
@@ -381,4 +381,4 @@ def _candidates(ranking: Ranking, gains: Mapping[Key, float], settings: RankingS
 def notes(accepted: Sequence[Accepted]) -> list[str]:
     """Parameters that the ranking alone knows."""
     blind = [", ".join(entry.trial.probe.invisible) for entry in accepted if entry.trial.probe.invisible]
-    return [f"{names}: as the ranking fitted it, for a balance of effort does not show it" for names in blind]
+    return [f"{names}: as the ranking fitted it, for the inverse-dynamics residual does not show it" for names in blind]

@@ -1,4 +1,4 @@
-"""Which of several believed candidates comes in: little left, few numbers, the machine before its instruments."""
+"""Which of several accepted candidates comes in: little left, few numbers, the machine before its instruments."""
 
 from __future__ import annotations
 
@@ -105,8 +105,8 @@ def _late(trial: Trial) -> Late:
 def _first_named(equals: Sequence[Trial]) -> Trial:
     """The trial with the best evidence; of several that no digit of the data parts, the first in the catalogue.
 
-    On a single link a drive that winds up and a link that bends at its root are one and the same model, and rounding
-    would decide.
+    On a single link a drive with joint compliance and a link that bends at its root are one and the same model, and
+    rounding would decide.
     """
     best = min(map(_evidence, equals))
     tied = [t for t in equals if _evidence(t) <= best + TIE]

@@ -15,7 +15,7 @@ from vpm.errors import VpmError
 from vpm.identify import Gain, InverseDynamicsProblem, OutputErrorProblem, gain, segments
 from vpm.model import Model
 
-#: Drop of the validation mean square in motion from which on a late effect gets a run of its own, which takes seconds.
+#: Drop of the validation mean square in motion from which on a delay gets a prediction, which takes seconds.
 WORTH_A_RUN = 0.1
 
 
@@ -44,7 +44,7 @@ def timed_in_closed_loop(
     timed : Timed or None
         None where too few samples are in motion.
     run : ClosedLoopPrediction or None
-        None where the effect promises nothing in motion, or the model cannot run by itself.
+        None where the effect has no predicted gain in motion, or there is no prediction.
     """
     timed = timed_in_motion(current, late, training, validation, bounds)
     if timed is None or timed.validation.relative < WORTH_A_RUN:
@@ -68,7 +68,7 @@ def gain_in_closed_loop(
     """Gain of a delay in simulations of validation records, each model with the parameters of its own prediction.
 
     Without the effect, a transition of friction that is too wide may pass for it in a simulation, and with it make it
-    late twice. None where the model without it cannot run by itself.
+    late twice. None where the model without it has no prediction.
     """
     try:
         before = fit_prediction(model, free, late.problem.experiments, simulation.setup)

@@ -52,7 +52,7 @@ LEAP, TRIES, SHORTER = 3.0, 3, 0.4
 
 @dataclass(frozen=True)
 class ClosedLoopPrediction:
-    """A model that runs the records by itself.
+    """Closed-loop prediction of records by a model.
 
     Attributes
     ----------
@@ -95,10 +95,10 @@ def fit_prediction(
     setup: Setup,
     beside: ClosedLoopPrediction | None = None,
 ) -> ClosedLoopPrediction:
-    """The run of a model, its free parameters fitted to records; they begin at those of a run ``beside`` it.
+    """Prediction of a model, its free parameters fitted to records; they begin at those of one ``beside`` it.
 
-    Where links bend, which takes a hundred times as long, they stay those of the balance. Derivatives by what both have
-    are those of the run ``beside`` until a step is made.
+    Where links bend, which takes a hundred times as long, they stay those of the residual. Derivatives by what both
+    have are those of the run ``beside`` until a step is made.
 
     Raises
     ------
@@ -223,7 +223,7 @@ def predict(
     setup: Setup,
     beside: ClosedLoopPrediction | None = None,
 ) -> ClosedLoopPrediction:
-    """The run of a model with the parameters that it has; see `fit_prediction` for what is ``beside`` it.
+    """Prediction of a model with the parameters that it has; see `fit_prediction` for what is ``beside`` it.
 
     Raises
     ------
@@ -259,7 +259,7 @@ def _with_slopes(
 
 
 def _fine(model: Model, free: Sequence[str], records: Sequence[Experiment], setup: Setup) -> Setup:
-    """Steps that are as short as the times of a model ask for."""
+    """Steps as short as the time constants of a model need."""
     times = [model.parameters[name] for name in free]
     shortest = min((time.value for time in times if time.unit == "s" and time.value > 0.0), default=np.inf)
     interval, steps = max(record.dt for record in records), DRY_STEPS if is_dry(model) else STEPS

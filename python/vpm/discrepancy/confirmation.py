@@ -58,7 +58,7 @@ class Data:
     Attributes
     ----------
     training, validation : InverseDynamicsProblem
-        Effort balance on the records that are fitted and on those that are not.
+        Inverse-dynamics residual on the records that are fitted and on those that are not.
     simulation : OutputErrorProblem or None
         Simulation of the validation records, the second witness.
     """
@@ -107,20 +107,20 @@ class Trial:
     simulated : Gain or None
         The same by simulation of the validation records, if there is one.
     away : Gain or None
-        The validation gain away from reversals, for an effect of a drive or an instrument, or a joint that winds up, on
+        The validation gain away from reversals, for an effect of a drive or an instrument, or a compliant joint, on
         a machine with dry friction.
     slow : Gain or None
-        The validation gain of the slow part, where a play is in the model already; None elsewhere.
+        The validation gain of the slow part, where a backlash is in the model already; None elsewhere.
     diverged : str
         Why the simulation of the validation records stopped, or "".
     clear : bool
         Whether the effect's size differs from zero on the training data.
     alone : bool
-        Whether the gains are those of runs of the model itself, where a balance hardly sees them.
+        Whether the gains are those of closed-loop predictions, where the residual hardly shows them.
     gap : float
         Largest share of its signal that the model without the effect leaves of a validation channel.
     asked : bool
-        Whether runs of the model itself ask for it too, so that little that is sure is enough.
+        Whether closed-loop predictions support it too, so that little that is sure is enough.
     here : Gain or None
         The validation gain of the effort on the joint where the effect acts, if nothing is lost elsewhere.
     """
@@ -283,7 +283,7 @@ def judged_anyhow(
     origin: Array | None = None,
     worth: Worth | None = None,
 ) -> tuple[Judged, str]:
-    """A fit, judged by the balance alone where it cannot simulate the validation records, with the reason.
+    """A fit, judged by the residual alone where it cannot simulate the validation records, with the reason.
 
     One that Ctrl-C ended says nothing of a candidate.
     """
@@ -407,7 +407,7 @@ def _away_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem, pr
     """Gain on samples at which every joint is clearly in motion.
 
     Where a joint with dry friction turns round it sticks for a while, which no smooth law follows, and a late drive or
-    sensor imitates that, or a spring in the joint that winds up meanwhile; elsewhere they cannot.
+    sensor imitates that, or a spring in the joint that deflects meanwhile; elsewhere they cannot.
     """
     imitates = probe.candidate.effect.site in {"actuator", "sensor"} or probe.candidate.effect.winds_up
     if not is_dry(current.model) or not imitates:
@@ -482,7 +482,7 @@ def is_clear(judged: Judged, own: tuple[str, ...]) -> bool:
     """Whether an effect's linear parameters (its size) differ from zero together, for the shape that was found.
 
     Size and shape of a law often make up for each other (a friction close to rest that is higher and fades sooner), and
-    where there is no size, there is no shape to be uncertain of. The size of a play is its width, however hard its
+    where there is no size, there is no shape to be uncertain of. The size of a backlash is its width, however hard its
     contacts are: what is as hard as rigid has a stiffness that no data bound from above.
     """
     widths = {effect.parameter_names["gap"] for effect in judged.model.effects if effect.type.has_play}

@@ -36,19 +36,19 @@ Array = NDArray[np.float64]
 CONTACTS, DAMPINGS = (10.0, 14.0, 20.0, 30.0, 45.0, 65.0), (0.03, 0.1, 0.3)
 #: So many of these are fitted to the records.
 FITTED = 2
-#: Damping ratios from which the balance is fitted again.
+#: Damping ratios from which the residual is fitted again.
 SWALLOWING = (0.3, 0.7)
 #: The beginnings of the training records that models run along last so long together, s: dozens of impacts, for a run
 #: with its derivatives takes long.
 LASTING = 6.0
 #: Records that are hardly longer are taken as they are.
 ALL = 0.9
-#: What only a run tells of a play, by short name.
+#: What only a run tells of a backlash, by short name.
 TOLD = ("stiffness", "inertia")
 
 
 def with_predicted_contacts(found: Search, data: Data, each: SideBySide) -> Search:
-    """The search with contacts of its plays as hard as runs of the model along the training records say.
+    """The search with contacts of its backlashes as hard as runs of the model along the training records say.
 
     The numbers of the runs stand if with them the training records are simulated better, beyond chance, and the
     validation ones are neither simulated nor balanced worse.
@@ -63,7 +63,7 @@ def with_predicted_contacts(found: Search, data: Data, each: SideBySide) -> Sear
 
 
 def _harder(final: Judged, entry: Accepted, data: Data, each: SideBySide) -> Judged:
-    """The model with the contacts of one play as runs say, or as it is."""
+    """The model with the contacts of one backlash as runs say, or as it is."""
     if data.simulation is None or data.simulation.mode != "closed_loop":
         return final
     records, setup = beginnings(data.training.experiments), data.simulation.setup
@@ -100,7 +100,7 @@ def beginnings(records: Sequence[Experiment]) -> list[Experiment]:
 
 
 def _predicted_values(model: Model, key: Key) -> tuple[str, ...]:
-    """Parameters of a play that a run tells, by dotted name."""
+    """Parameters of a backlash that a run tells, by dotted name."""
     effect = model.effect(*key)
     return tuple(effect.parameter_names[short] for short in TOLD)
 
@@ -124,7 +124,7 @@ def _damped(model: Model, key: Key, ratio: float) -> Model:
 def _balanced(
     final: Judged, run: ClosedLoopPrediction, names: Sequence[str], key: Key, ratio: float, data: Data
 ) -> Judged | None:
-    """The balance fitted with what the run tells; None where that cannot be computed."""
+    """The residual fitted with what the run tells; None where that cannot be computed."""
     rest = tuple(name for name in final.free if name not in names)
     bounds = {name: pair for name, pair in final.bounds.items() if name in rest}
     try:

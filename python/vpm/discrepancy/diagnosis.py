@@ -81,7 +81,7 @@ class AcceptedEffect(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class RefusedEffect(Storable):
-    """A candidate that was tried and not believed, with the reason."""
+    """A candidate that was tried and not accepted, with the reason."""
 
     name: str
     site: str
@@ -90,7 +90,7 @@ class RefusedEffect(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class RankedCandidate(Storable):
-    """A candidate in the order of promise.
+    """A candidate in the order of predicted gain.
 
     Attributes
     ----------

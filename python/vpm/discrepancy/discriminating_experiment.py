@@ -52,7 +52,7 @@ def experiments(
     data : InverseDynamicsProblem
         Gives the range within which a motion is proposed: positions, speeds and accelerations that were seen.
     noise : mapping of str to float
-        Root mean square noise of each channel of the balance.
+        Root mean square noise of each channel of the residual.
 
     Returns
     -------

@@ -67,7 +67,7 @@ def together(
         return None
     name, site = lead.probe.candidate.key
     judged = _without(partner.trial.judged, (name, site), data)
-    # What comes late or slow is told from others of its kind again, with the partner in its place.
+    # What comes with a delay or a lag is told from others of its kind again, with the partner in its place.
     kin = [one for one, entry in EFFECTS.items() if entry.late] if lead.probe.candidate.effect.late else [name]
     names = [one for one in kin if effects is None or one in effects]
     beside = outcome.after(judged)
@@ -90,7 +90,7 @@ def _lead(outcome: Round, best: Accepted | None) -> Trial | None:
 
 
 def _do_more(outcome: Round, best: Accepted | None, first: Trial, second: Trial, data: Data) -> bool:
-    """Whether two effects are believed as one would have to be, and leave less for their numbers than the best one."""
+    """Whether two effects are accepted as one would have to be, and leave less for their numbers than the best one."""
     current, judged = outcome.current, second.judged
     simulated = None
     if data.simulation is not None and current.simulated is not None and judged.simulated is not None:
@@ -112,7 +112,7 @@ def _do_more(outcome: Round, best: Accepted | None, first: Trial, second: Trial,
 
 
 def _without(judged: Judged, key: Key, data: Data) -> Judged:
-    """The model without one of its effects, fitted again; judged by the balance alone where it cannot simulate."""
+    """The model without one of its effects, fitted again; judged by the residual alone where it cannot simulate."""
     model = judged.model.without_effect(*key)
     free = tuple(name for name in judged.free if name in model.parameters)
     bounds = {name: pair for name, pair in judged.bounds.items() if name in free}

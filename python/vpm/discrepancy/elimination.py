@@ -35,7 +35,7 @@ def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dro
     may rest elsewhere. One name for what two would say is the shorter answer. So is it where a size was held, as that
     of a difference of dry friction beside a constant force, which are one in motion: with the later effect sure, its
     own size does that work. Where neither size has work to do beside it, these data do not tell, and both names stay.
-    What runs of the model itself told is not judged by a balance that hardly sees it.
+    What closed-loop predictions show is not judged by the residual, which hardly shows it.
     """
     newest = accepted[-1]
     for entry in (one for one in accepted[:-1] if not one.trial.alone):
@@ -119,7 +119,7 @@ def settled(best: Accepted, data: Data) -> Accepted:
 
 
 def drop_springs(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
-    """Drop plays of which a later effect has left no more than a spring."""
+    """Drop backlashes of which a later effect has left no more than a spring."""
     for entry in accepted[:]:
         current = stages[-1].judged
         name, site = entry.key

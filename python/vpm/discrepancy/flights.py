@@ -43,7 +43,7 @@ class _Course:
 def flights(
     model: Model, site: str, data: InverseDynamicsProblem, gaps: Array, frequencies: Array, dampings: Array
 ) -> Array:
-    """What plays would add to the residual of the balance, shape (n, plays).
+    """What backlashes would add to the residual, shape (n, backlashes).
 
     Law: within the gap the link feels none of the effort that the motion passes on; beyond it a spring and a damper
     hold it, ``y'' = pull - w^2 (y -+ gap/2) - 2 z w y'`` with ``w = 2 pi frequency`` and the damping ratio z, stepped
@@ -53,11 +53,11 @@ def flights(
     Parameters
     ----------
     model : Model
-        With the play, of any width.
+        With the backlash, of any width.
     site : str
         Its joint.
     data : InverseDynamicsProblem
-    gaps, frequencies, dampings : ndarray, shape (plays,)
+    gaps, frequencies, dampings : ndarray, shape (backlashes,)
         Widths, m or rad; Hz at which the link swings on a contact while the motor stands; damping ratios there.
     """
     added = []
@@ -69,7 +69,7 @@ def flights(
 
 
 def _course(model: Model, site: str, m: Motion) -> _Course:
-    """The measured motion with the link at rest in the play, and once more with one unit of acceleration there."""
+    """The measured motion with the link at rest in the backlash, and once more with one unit of acceleration there."""
     behind = model.joints.index(name_behind(site))
     before = [model.joints.index(joint) for joint in m.joints]
     motion = np.zeros((3, len(m.time), len(model.joints)))

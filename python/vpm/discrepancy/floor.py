@@ -28,7 +28,7 @@ QUIET_SHARE = 0.4
 def noise_floor(
     model: Model, validation: InverseDynamicsProblem, residual: Array, mode: str, setup: Setup | None = None
 ) -> dict[str, float]:
-    """Root mean square that would remain in the balance of the right model, by channel.
+    """Root mean square that would remain in the residual of the right model, by channel.
 
     The larger of two. The first is known beforehand: the model runs the records by itself, in closed loop where that is
     possible, and its own log, with noise of the size estimated from the measured one, is balanced like that one; what

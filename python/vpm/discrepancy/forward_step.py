@@ -35,13 +35,13 @@ from vpm.errors import VpmError
 
 #: Effects that are asked for, of those that take most of the training residual.
 ASKED = 3
-#: So many of those that promise most in their runs are fitted.
+#: So many of those with the largest predicted gain are fitted.
 FITTED = 2
 
 
 @dataclass(frozen=True)
 class _Predicted:
-    """An effect with its run, and its trial where it was fitted to the balance."""
+    """An effect with its run, and its trial where it was fitted to the residual."""
 
     probe: Probe
     trial: Trial | None
@@ -49,7 +49,7 @@ class _Predicted:
 
 
 def forward_step(found: Search, data: Data, each: SideBySide) -> Search:
-    """The search with the one effect more that runs ask for most, if training and validation records are sure of it."""
+    """The search with the one effect more that predictions support most, if both sets of records are clear."""
     promising = _promising(found)
     before = predicted(found.final, data) if promising else None
     if before is None:
@@ -73,7 +73,7 @@ def forward_step(found: Search, data: Data, each: SideBySide) -> Search:
 
 
 def _best(more: Sequence[Accepted], data: Data) -> Accepted:
-    """The first, or the one of those that come late or slow as it does that is chosen among such."""
+    """The first; if it is a delay or a lag, the one that is chosen among these."""
     late = [entry for entry in more if entry.effect.late]
     if len(late) < 2 or more[0] is not late[0]:
         return more[0]
@@ -83,7 +83,7 @@ def _best(more: Sequence[Accepted], data: Data) -> Accepted:
 def _promising(found: Search) -> list[Probe]:
     """What takes most of the training residual of that which was refused in the last round, and springs in series.
 
-    A spring swings above the band of a balance, which may hardly show it.
+    A spring swings above the band of the residual, which may hardly show it.
     """
     present = {entry.key for entry in found.accepted} | found.gone
     refused = [p for p in found.over.probes if p.candidate.key not in present]
@@ -97,7 +97,7 @@ def _promising(found: Search) -> list[Probe]:
 
 
 def _possible(probe: Probe) -> bool:
-    # Springs are asked for with all others of their kind, and a play falls into chaos in runs.
+    # Springs are tried with all others of their kind, and predictions of a backlash are chaotic.
     return bool(probe.free) and not impossible_values(probe) and not probe.candidate.effect.motion
 
 
@@ -112,7 +112,7 @@ def _taken(probe: Probe, tried: Sequence[Trial]) -> float:
 
 
 def _run(found: Search, data: Data, before: ClosedLoopPrediction, probe: Probe) -> _Predicted | str:
-    """The run of a model with one effect more, as it was fitted to the balance; or why there is none."""
+    """The prediction of a model with one effect more, as fitted to the residual; or why there is none."""
     if probe.candidate.effect.elastic:
         run = _sprung(found, data, before, probe)
         return "no run with it does better" if run is None else _Predicted(probe, None, run)
@@ -143,7 +143,7 @@ def _sprung(found: Search, data: Data, before: ClosedLoopPrediction, probe: Prob
 
 
 def _accepted(found: Search, data: Data, asked: _Predicted, comparison: Comparison) -> Accepted | None:
-    """The effect with the balance fitted near what the runs say of it, and with what these gain."""
+    """The effect with its refit near the values of the predictions, and with the gain of these."""
     final, run = found.final, comparison.run
     own = tuple(name for name in run.free if name not in final.free)
     bounds, values = dict(final.bounds if asked.trial is None else asked.trial.judged.bounds), {}

@@ -37,7 +37,7 @@ from vpm.model import Model
 
 Array = NDArray[np.float64]
 
-#: Share of the change from one run to another from which on records ask for it rather than for none.
+#: Share of the change from one prediction to another from which on records support it rather than no change.
 LEAST_SUPPORT = 0.5
 #: Starts that are fitted to the end, of those that fit best as they are.
 FITTED = 2
@@ -53,7 +53,7 @@ class Asked:
     ----------
     training, validation : Gain
         Of what the run without the effect leaves, relative to the noise at each frequency; the weight is the share of
-        the change that the records ask for beside all parameters that are known without it.
+        the change that the records support beside all parameters that are known without it.
     run : ClosedLoopPrediction
         With the effect, fitted to the training records.
     """
@@ -87,7 +87,7 @@ def prediction_without(current: Judged, data: Data) -> ClosedLoopPrediction | No
 def judged_by_prediction(
     current: Judged, data: Data, before: ClosedLoopPrediction, thresholds: Thresholds, probe: Probe
 ) -> Trial | str:
-    """A trial of friction close to rest that runs of the model itself show, or why they do not.
+    """A trial of friction close to rest that closed-loop predictions show, or why they do not.
 
     Parameters
     ----------
@@ -103,12 +103,12 @@ def judged_by_prediction(
     trial = confirm(current, data, probe)
     answer = asked(before, trial, data)
     if answer is None:
-        return "in runs of the model itself it does not fit the training records better"
+        return "in closed-loop predictions it does not fit the training records better"
     return _refused(answer, probe, thresholds) or _fitted_trial(current, trial, answer, data)
 
 
 def _refused(answer: Asked, probe: Probe, thresholds: Thresholds) -> str:
-    """Why a run with friction close to rest is not believed, or "".
+    """Why friction close to rest is not accepted by its prediction, or "".
 
     The model creeps where a machine sticks, so that as much is asked of a run as of what explains a modest part only.
     """
@@ -151,7 +151,7 @@ def asked(before: ClosedLoopPrediction, trial: Trial, data: Data) -> Asked | Non
 
 
 def is_supported(before: ClosedLoopPrediction, trial: Trial, data: Data, thresholds: Thresholds) -> bool:
-    """Whether validation records, which models run by themselves, ask for an effect of the size that a balance says.
+    """Whether closed-loop predictions of validation records support an effect of the size that the residual says.
 
     The run along the training records is no witness of it: a friction that is not quite that of the machine has been
     fitted to these, and may have taken a part of what is late.
@@ -161,7 +161,7 @@ def is_supported(before: ClosedLoopPrediction, trial: Trial, data: Data, thresho
     before : ClosedLoopPrediction
         The model without the effect, run along the training records.
     trial : Trial
-        Of the effect, in a balance of effort.
+        Of the effect, in an inverse-dynamics residual.
     data : Data
     thresholds : Thresholds
     """
@@ -182,7 +182,7 @@ def is_supported(before: ClosedLoopPrediction, trial: Trial, data: Data, thresho
 
 
 def _fitted_trial(current: Judged, trial: Trial, answer: Asked, data: Data) -> Trial:
-    """The trial with the balance fitted near what the runs say, and with what they gain on the validation records."""
+    """The trial with its refit near the values of the predictions, and with their gain on the validation records."""
     own = [name for name in answer.run.free if name not in current.free]
     values = {name: answer.run.estimated(name) for name in own}
     model = current.model
@@ -235,7 +235,7 @@ def _own_names(site: str) -> tuple[str, str]:
 
 
 def gain_of_predictions(before: ClosedLoopPrediction, after: ClosedLoopPrediction) -> Gain:
-    """How much of the change between two runs of the same records what the first one leaves asks for."""
+    """Share of the change between two predictions of the same records that the error of the first one supports."""
     apart, score = part(against(before, after))
     _, noise, _ = least(after.spectra())
     left = [

@@ -29,7 +29,7 @@ DAMPINGS = (0.1, 0.3)
 
 
 def is_searched(model: Model, data: InverseDynamicsProblem, candidate: Candidate) -> bool:
-    """Whether a candidate winds up between an ideal drive and links that do not bend, where a look takes little."""
+    """Whether a candidate is a joint compliance between an ideal drive and rigid links, where a search is cheap."""
     measured = candidate.site in data.motions[0].joints
     return candidate.effect.winds_up and measured and not (bends(model) or has_own_drives(model))
 

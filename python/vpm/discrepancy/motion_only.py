@@ -1,7 +1,7 @@
 """Late drives and instruments, timed on samples at which every joint is clearly in motion.
 
 Where a joint with dry friction turns round it sticks for a while, and filtered samples do not say when it lets go: what
-is left of the balance there is several times what is left elsewhere, and it is late by itself. A time fitted to all
+is left of the residual there is several times what is left elsewhere, and it is late by itself. A time fitted to all
 samples comes out too long for it (twice the true delay of a stiff axis is usual), long enough to make its simulation
 worse. In clear motion friction is as smooth as the rest, so a time is fitted there, and kept within what that says when
 all the other parameters are fitted to all samples.
@@ -36,7 +36,7 @@ TOLERANCE = 1e-6
 
 
 class InMotion:
-    """A balance of effort of which only samples count at which every joint is clearly in motion."""
+    """An inverse-dynamics residual of which only samples count at which every joint is clearly in motion."""
 
     mode = InverseDynamicsProblem.mode
 

@@ -24,7 +24,7 @@ from vpm.identify.along import bends, has_own_drives
 from vpm.model import Model
 
 #: Logarithm of how many times as likely the training records have to be with another model, as both are fitted to the
-#: balance, before both are fitted to the records in runs.
+#: balance, before both are fitted to the records in closed loop.
 WORTH_A_FIT = 10.0
 
 
@@ -48,7 +48,7 @@ class Comparison:
     better: float
 
     def sure(self, thresholds: Thresholds) -> bool:
-        """Whether both sets of records ask for all of the change, beyond chance and what models leave out."""
+        """Whether both sets of records support all of the change, beyond chance and what models leave out."""
         return self.better > 0.0 and all(
             LEAST_SUPPORT <= gained.weight <= 1.0 / LEAST_SUPPORT
             and gained.score >= MODEST_FACTOR * thresholds.score(gained.pieces)

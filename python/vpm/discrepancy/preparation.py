@@ -66,7 +66,7 @@ def data_of(
         problem.take_long_steps()
         for number, (record, m) in enumerate(zip(problem.experiments, problem.motions, strict=True)):
             still = problem.standstill(number)
-            rest = f"; {100 * still:.0f} % at standstill left out of the balance" if still > 0.0 else ""
+            rest = f"; {100 * still:.0f} % at standstill left out of the residual" if still > 0.0 else ""
             notes.append(f"{record.name}: motion filtered at {m.cutoff:.4g} Hz, compared up to {m.band:.3g} Hz{rest}")
     notes.append(f"validation records simulated in mode {mode}")
     return Data(fitted, predicted, OutputErrorProblem(model, validation, mode, setup=setup))

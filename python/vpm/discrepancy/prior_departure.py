@@ -12,7 +12,7 @@ from vpm.identify.statistics import NORMAL_95
 from vpm.model import Model, Parameter
 from vpm.numbers import short
 
-#: Parameters that move by more of their stated uncertainties than this are reported, and no effect is believed that
+#: Parameters that move by more of their stated uncertainties than this are reported, and no effect is accepted that
 #: drives one so far.
 FAR = 3.0
 
@@ -41,7 +41,7 @@ def driven_away(nominal: Model, recalibrated: Judged, final: Judged, ranked: Mod
     recalibrated, final : Judged
         Without the effects, and with them.
     ranked : Model, optional
-        With the effects, as an observer of all joints knows it: a balance may see some of them alone.
+        With the effects, as an observer of all joints knows it: the residual may see some of them alone.
 
     Returns
     -------

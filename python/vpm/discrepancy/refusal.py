@@ -1,4 +1,4 @@
-"""Why a candidate is not believed, in words with numbers."""
+"""Why a candidate is not accepted, in words with numbers."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ from vpm.numbers import percent, short
 FALSE_ALARM_LEVEL = 0.01
 #: Drop of the validation mean square below which an effect is not worth its name.
 LEAST_GAIN = 0.02
-#: The same for an effect that is to be believed: what sticks and creeps leaves more than that to imitate.
+#: The same for an effect that is to be accepted: what sticks and creeps leaves more than that to imitate.
 WORTH_A_NAME = 0.1
 #: Below this drop most of the residual is something else, which the effect might merely imitate: the evidence then has
 #: to be this many times as strong.
 MODEST_GAIN, MODEST_FACTOR = 0.3, 3.0
-#: From this drop on, the balance of effort decides alone on a machine of several joints: with two effects missing, the
-#: simulation of a machine that has one of them may well be worse, because errors of coupled joints had cancelled.
+#: From this drop on, the inverse-dynamics residual decides alone on a machine of several joints: with two effects
+#: missing, the simulation of a machine that has one of them may well be worse, because errors of coupled joints had
+#: cancelled.
 CLEAR_GAIN = 0.5
 #: A delay or lag that the times of samples leave open is named from this drop on: what explains most of what was left
 #: is worth telling, be it the drive that is late or the record. Below it, sampling explains it as well.
@@ -33,7 +34,8 @@ MOST_OF_IT = 0.5
 #: Neither a residual nor an error of an instrument's gain means anything below this share of the signal: links are
 #: cut into pieces and gauges calibrated to no better.
 NEGLIGIBLE = 0.005
-#: An error of an instrument shows so many times as large in a balance that it is more than an error of the model there.
+#: An error of an instrument shows so many times as large in the residual that it is more than an error of the model
+#: there.
 MAGNIFIED = 4.0
 #: One-sided 95 % quantile of the normal distribution: a simulation that is worse by less is worse by chance.
 NORMAL_95_ONE_SIDED = 1.6448536269514722
@@ -65,7 +67,7 @@ class Thresholds:
         return float(stdtrit(max(1, pieces - 1), 1.0 - FALSE_ALARM_LEVEL / max(1, self.candidates)))
 
     def needed(self, validation: Gain, *, asked: bool = False) -> float:
-        """Standard deviations that a gain has to have: more where most of the residual stays and no run asks for it."""
+        """Standard deviations that a gain has to have: more where most of the residual stays and no run supports it."""
         modest = validation.relative < MODEST_GAIN and not asked
         return self.score(validation.pieces) * (MODEST_FACTOR if modest else 1.0)
 
@@ -225,7 +227,7 @@ def _no_way(trial: Trial) -> str:
 
 
 def _creeps(trial: Trial) -> str:
-    """A spring in series that its damper holds back does not wind up: it slips as a fluid coupling does."""
+    """A spring in series that its damper holds back does not deflect: it slips as a fluid coupling does."""
     candidate, model = trial.probe.candidate, trial.judged.model
     if not candidate.effect.winds_up:
         return ""
@@ -236,7 +238,7 @@ def _creeps(trial: Trial) -> str:
         return ""
     return (
         f"its damping is {ratio:.3g} times the critical one, and it needs {damping / stiffness:.3g} s to come back: "
-        "that is no spring that winds up"
+        "that is no compliant spring"
     )
 
 
@@ -263,7 +265,7 @@ def _trifling_size(trial: Trial) -> str:
     """An instrument's gain that is none.
 
     Where an effort is the small difference of large readings, as of the pressures on both sides of a piston, a gain
-    that is hardly wrong leaves a gap that is not small: one that explains most of such a gap is believed.
+    that is hardly wrong leaves a gap that is not small: one that explains most of such a gap is accepted.
     """
     if not trial.probe.candidate.effect.scales:
         return ""
@@ -298,17 +300,17 @@ def _not_clear(trial: Trial) -> str:
 
 
 def _only_impacts(trial: Trial) -> str:
-    """Beside a play: a law that is right helps what is slow as well, where impacts hardly show."""
+    """Beside a backlash: a law that is right helps what is slow as well, where impacts hardly show."""
     if trial.slow is None or trial.slow.relative >= -LEAST_GAIN:
         return ""
     return (
         f"it {_moves('the validation error', trial.validation)} and {_moves('its slow part', trial.slow)}: "
-        "it makes up for single impacts of the play"
+        "it makes up for single impacts of the backlash"
     )
 
 
 def slow_shows_it(trial: Trial, thresholds: Thresholds) -> bool:
-    """Whether what is slow shows an effect that single impacts of a play cover, and does not speak alone."""
+    """Whether what is slow shows an effect that single impacts of a backlash cover, and does not speak alone."""
     validation, sure = trial.validation, NORMAL_95_ONE_SIDED
     whole = validation.relative >= LEAST_GAIN and validation.score >= sure
     return trial.slow is not None and whole and thresholds.met(trial.slow)
@@ -350,7 +352,7 @@ def worse_in_simulation(trial: Trial) -> str:
     if simulated.relative < -LEAST_GAIN:
         joined = "and" if trial.validation.relative < 0.0 else "but"
         return (
-            f"it {_moves('the validation error of the balance of effort', trial.validation)}, {joined} "
+            f"it {_moves('the validation error of the inverse-dynamics residual', trial.validation)}, {joined} "
             f"{_moves('that of the simulation', simulated)}, {simulated.harm:.1f} standard deviations"
         )
     return ""

@@ -46,7 +46,7 @@ class Joints:
 
     @classmethod
     def of(cls, gap: Mapping[str, ChannelGap], left: Structure, observed: Mapping[str, float]) -> Joints:
-        """Of a balance of effort, with what is left there, and what an observer says of a joint, see `Search.left`."""
+        """From the residual and what is left of it, and the error of an observer of a joint, see `Search.left`."""
         efforts = {channel.rpartition(".")[0]: g for channel, g in gap.items() if _is_effort(channel, g)}
         efforts = {joint: g for joint, g in efforts.items() if _is_clear(g.recalibrated, g)}
         shares = {

@@ -1,4 +1,4 @@
-"""Noise of a measured motion that rings in links that bend: it is not white in the balance, and no physics is missing.
+"""Noise of a measured motion that rings in links that bend: it is not white in the residual, and no physics is missing.
 
 How much of it there is, the model's own simulation says, with noise like that of the records; see
 `vpm.discrepancy.floor`.
@@ -31,7 +31,7 @@ def noise_alone(model: Model, data: Data, validation: Array) -> bool:
 
 
 def only_ringing(current: Judged, data: Data, trial: Trial) -> str:
-    """Why a trial that would be believed only damps what noise makes ring, or ""."""
+    """Why a trial that would be accepted only damps what noise makes ring, or ""."""
     if data.simulation is None or not bends(current.model) or not trial.probe.candidate.effect.damps:
         return ""
     before, after = _ringing(current.model, data), _ringing(trial.judged.model, data)

@@ -58,7 +58,7 @@ def discriminated(
         second = fitted_prediction(run, data)
         comparison = None if first is None or second is None else compared(first, second, data)
         if comparison is not None and comparison.sure(thresholds):
-            return exchanged(found, known, data, place, trial, "in its place is what runs of the model itself ask for")
+            return exchanged(found, known, data, place, trial, "in its place is what closed-loop predictions support")
     return found, tuple(known)
 
 

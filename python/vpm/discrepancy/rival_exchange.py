@@ -57,7 +57,7 @@ def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search
 def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresholds: Thresholds) -> float:
     """Standard deviations by which the validation data prefer a rival, 0 if not beyond chance or not in every view."""
     if trial.probe.candidate.effect.late and entry.effect.late:
-        return 0.0  # their runs along the reference said which, and the balance knows less of it
+        return 0.0  # their runs along the reference said which, and the residual knows less of it
     if not alike(trial.probe.candidate, entry.trial.probe.candidate) or refuse_trial(trial, thresholds):
         return 0.0
     judged = trial.judged
@@ -80,7 +80,7 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
 
 
 def timed_again(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search, tuple[Rivals, ...]]:
-    """Let each late effect be chosen again among what comes late or slow, now that the others are known.
+    """Choose each delay or lag again among all of these, now that the other effects are known.
 
     When it came in another effect was missing, and what that one left was blamed on the drive rather than on an
     instrument, and was in the runs along the reference by which a delay is told from a lag. One that came in last was
@@ -110,7 +110,7 @@ def timed_again(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Sea
 
 
 def _thresholds(known: Sequence[Rivals], data: Data) -> Thresholds:
-    """What is asked of rivals when so many were tried."""
+    """Thresholds for rivals when so many were tried."""
     return Thresholds(max(1, sum(len(r.tried) for r in known)), min(m.dt for m in data.training.motions))
 
 

@@ -1,4 +1,4 @@
-"""One round of the search: screen every candidate, refit with the most promising, believe or refuse each."""
+"""One round of the search: screen every candidate, refit with the most promising, accept or refuse each."""
 
 from __future__ import annotations
 
@@ -38,8 +38,8 @@ from vpm.identify import gain, segments
 from vpm.identify.along import bends, has_own_drives
 from vpm.identify.tangent import drives_on_tangent
 
-#: Where links bend already, the noise of the measured motion rings in them: a spring more has to promise this share of
-#: the residual, and only the best is refitted.
+#: Where links bend already, the noise of the measured motion rings in them: another spring needs a predicted gain of
+#: this share of the residual, and only the best is refitted.
 RINGING, FEW = 0.2, 1
 
 #: Called with a sentence on what is being done.
@@ -67,7 +67,7 @@ class Round:
         """The best of the candidates whose regressor follows from the measured motion alone."""
         self.screen(effects, without, heavy=False)
         if self._promising and self._promising[0].candidate.effect.has_play:
-            # What winds up passes for play, and has to compete with it.
+            # What is compliant passes for backlash, and has to compete with it.
             light = self._promising
             self.screen(effects, without, heavy=True)
             self._promising = sorted((*light, *self._promising), key=lambda p: -p.score)
@@ -92,7 +92,7 @@ class Round:
         return self.best()
 
     def alone(self, without: set[Key]) -> Accepted | None:
-        """The best of what acts close to rest, which runs of the model itself show where the balance shows nothing."""
+        """The best of the effects close to rest that closed-loop predictions show and the residual does not."""
         asked = [
             p for p in self.probes if p.candidate.key not in without and needs_prediction(self.current, self.data, p)
         ]
@@ -115,7 +115,7 @@ class Round:
         return best
 
     def again(self, several: set[Key]) -> Accepted | None:
-        """The best of a few that were believed before another one came in, if any still is."""
+        """The best of a few that were accepted before another one came in, if any still is."""
         self.screen([name for name, _ in several], set(), heavy=False, only=several)
         self.confirm()
         return self.best()
@@ -126,7 +126,7 @@ class Round:
         return max(len(self._ranking), self._chosen_from)
 
     def elsewhere(self, best: Accepted) -> set[Key]:
-        """What is believed, too, at other joints than what comes in, and has no motion of its own."""
+        """What is accepted, too, at other joints than what comes in, and has no motion of its own."""
         model = self.current.model
         here = joint_at(model, best.key[1])
         believed = [trial.probe.candidate for trial in self._believed]
@@ -186,7 +186,7 @@ class Round:
         """Whether it adds a motion that nobody measures, which has to be simulated for every probe.
 
         Where the log holds that motion, it is evidence like any. So is the bending of a rigid beam beside others that
-        bend, and a play between links that do not, which its flights tell at once: light effects would only imitate
+        bend, and a backlash between links that do not, which its flights tell at once: light effects would only imitate
         them.
         """
         model, motion = self.current.model, candidate.effect.motion
@@ -225,9 +225,9 @@ class Round:
             )
 
     def _refit(self, short_list: Sequence[Probe]) -> None:
-        """Refit with each of some candidates, and believe or refuse it."""
+        """Refit with each of some candidates, and accept or refuse it."""
         if drives_on_tangent(self.current.model, self.data.training) and len(short_list) > 1:
-            # What one of them explains tells which of the others are worth more than a glance.
+            # What one of them explains tells which of the others are worth a refit.
             first = max(short_list, key=lambda p: p.drop)
             believed = len(self._believed)
             self._tried([first], np.inf)
@@ -256,9 +256,9 @@ class Round:
                 self._believed.append(trial)
 
     def _confirmed(self, one: Probe, rival: float) -> Trial:
-        """A trial; of a play between soft contacts that does not simulate, that between hard ones if it does better.
+        """A trial; a backlash with soft contacts that does not simulate gives way to hard ones if these do better.
 
-        The balance hardly tells how hard the contacts are, for errors of the flights add up between lively ones.
+        The residual hardly tells how hard the contacts are, for errors of the flights add up between lively ones.
         """
         trial = confirm(self.current, self.data, one, rival)
         if not is_read_off(self.current.model, self.data.training, one.candidate) or not worse_in_simulation(trial):
@@ -268,7 +268,7 @@ class Round:
         return trial if worse_in_simulation(harder) else harder
 
     def thresholds(self) -> Thresholds:
-        """What is asked of an effect when so many have been tried."""
+        """Thresholds for an effect when so many have been tried."""
         return Thresholds(self.tried * self.number, min(m.dt for m in self.data.training.motions))
 
     @cached_property
@@ -277,7 +277,7 @@ class Round:
         return in_time(self.current, self.data)
 
     def _refused(self, trial: Trial, thresholds: Thresholds) -> str:
-        """Why a trial is not believed, or ""."""
+        """Why a trial is not accepted, or ""."""
         candidate = trial.probe.candidate
         reason = refuse_trial(trial, thresholds) or self._only_timing(trial, thresholds)
         if reason and self._is_predicted(trial, thresholds):
@@ -289,8 +289,8 @@ class Round:
     def _is_predicted(self, trial: Trial, thresholds: Thresholds) -> bool:
         """Whether a delay gains little and surely, and closed-loop predictions of validation records support it.
 
-        What sticks is late in a balance of effort, and so imitates it, but not in a run; nor does a run know or mind to
-        which of two samples a command was logged.
+        What sticks is late in an inverse-dynamics residual, and so imitates it, but not in a run; nor does a run know
+        or mind to which of two samples a command was logged.
         """
         late = is_late(trial.probe.candidate.effect, trial.judged.model) and not self._takes_long()
         if not late or refuse_trial(replace(trial, asked=True), thresholds) or self.alone_run is None:
@@ -303,7 +303,7 @@ class Round:
         return prediction_without(self.current, self.data)
 
     def _only_timing(self, trial: Trial, thresholds: Thresholds) -> str:
-        """Why a trial that would be believed does no more than a shift of the commands does, or ""."""
+        """Why a trial that would be accepted does no more than a shift of the commands does, or ""."""
         if self.timed.shift == 0.0 or explains_most(trial):
             return ""
         shifted = in_time(trial.judged, self.data)
@@ -317,7 +317,7 @@ class Round:
         return refuse_timing(timed, self.timed.shift, thresholds, beside=shifted.shift)
 
     def best(self) -> Accepted | None:
-        """The one that comes in, if any is believed; fitted to the end it has to stand as it did before."""
+        """The one that comes in, if any is accepted; fitted to the end it has to stand as it did before."""
         while self._believed:
             best = choose(self._believed, self.data)
             whole = finished(self.current, self.data, best.trial)

@@ -123,7 +123,7 @@ def _short(model: Model, candidate: Candidate, name: str) -> str:
 def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *, hard: bool = False) -> Probe:
     """Try all start values of a candidate and keep the best, a possible one before an impossible one.
 
-    A play that is read off the motion has one start, with the contacts that suit it or ``hard`` ones.
+    A backlash that is read off the motion has one start, with the contacts that suit it or ``hard`` ones.
     """
     if is_read_off(base.model, data, candidate):
         base = replace(base, model=believed(base.model, data.nominal, base.free))
@@ -142,7 +142,7 @@ def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *,
 
 
 def _searched(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe | None:
-    """A drive that winds up, as it stands at the best of its starts; None where none of them leaves less."""
+    """A drive with joint compliance, as it stands at the best of its starts; None where none of them leaves less."""
     if not is_searched(base.model, data, candidate):
         return None
     start = best_start(base.model, base.jacobian, data, candidate)
@@ -151,7 +151,7 @@ def _searched(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate
 
 
 def screening_effort(candidate: Candidate) -> float:
-    """Guess of the time that `probe` takes, in starts that do nothing: a play is searched by its flights."""
+    """Guess of the time that `probe` takes, in starts that do nothing: a backlash is searched by its flights."""
     searched = 50.0 if candidate.effect.has_play else 0.0
     return searched + len(candidate.starts) * (1.0 if candidate.neutral else 2.0)
 

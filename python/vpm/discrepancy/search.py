@@ -81,7 +81,7 @@ class Search:
 def search(
     start: Judged, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: SideBySide
 ) -> Search:
-    """Add effects one at a time, and drop earlier ones that later ones replace, until none is believed any more."""
+    """Add effects one at a time, and drop earlier ones that later ones replace, until none is accepted any more."""
     found = Search((Stage("recalibrated", "", "", start),), (), (), (), start.fit.interrupted)
     return found if found.interrupted else further(found, data, effects, limit, tell, each)
 
@@ -101,7 +101,7 @@ def further(
     over = Over()
     interrupted = False
     first = 1 + max((candidate.round for candidate in ranking), default=0)
-    waiting, tried = set[Key](), 0  # what was believed at other joints, too, when the last effect came in, of how many
+    waiting, tried = set[Key](), 0  # what was accepted at other joints, too, when the last effect came in, of how many
     for number in range(first, 2 * limit + 2):
         outcome = Round(stages[-1].judged, data, number, tell, each, tried)
         best, pair, again = None, None, False

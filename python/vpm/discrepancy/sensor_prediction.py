@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 def preferred_sensor(chosen: Trial, equals: Sequence[Trial], data: Data) -> Trial:
-    """Of what explains the data as well as ``chosen``, the instrument whose own reading asks for it; else ``chosen``.
+    """Of what explains the data as well as ``chosen``, the instrument whose own reading supports it; else ``chosen``.
 
     It has to predict its channel better than ``chosen`` does by as much as is worth a name, surely, on the training
     records and on the validation ones, and to leave no more of all channels together on either.

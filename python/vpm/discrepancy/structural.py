@@ -1,4 +1,4 @@
-"""Start values of effects that bend, wind up or stop what is described as rigid and free.
+"""Start values of effects that bend, comply or stop what is described as rigid and free.
 
 A spring between two masses shows by its resonance, so that stiffnesses are tried at a grid of frequencies.
 """
@@ -29,7 +29,7 @@ FREQUENCIES = (3.0, 8.0, 20.0, 50.0)
 LOOSE, CONTACT = 0.05, 0.1
 #: Slowest of these in a fit, Hz: a softer spring holds nothing.
 SLOWEST = 0.5
-#: Frequency of the contacts of play, Hz, and widths of it tried, as shares of the half travel.
+#: Frequency of the contacts of backlash, Hz, and widths of it tried, as shares of the half travel.
 CONTACT_FREQUENCY = 50.0
 GAP_SHARES = (5e-4, 3e-3, 1.5e-2)
 #: Places of a stop, as shares of the half travel from its middle.
@@ -47,7 +47,7 @@ Bounds = Mapping[str, tuple[float, float]]
 def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
     """Sites of an effect but those where it cannot show: links that bend already, damping of rigid beams.
 
-    Play is looked for where an actuator drives the joint; elsewhere it needs a joint of its own. Effects of joints may
+    A backlash is tried where an actuator drives the joint; elsewhere it needs a joint of its own. Effects of joints may
     be on the motor side of a transmission too, but for those of links.
     """
     sites = model.sites(effect.site)

@@ -26,7 +26,7 @@ _OPEN = " What is left at {joints} is structured, and no effect of the catalogue
 
 
 def main_gaps(gap: Mapping[str, ChannelGap]) -> list[ChannelGap]:
-    """Those of the balance."""
+    """Those of the residual."""
     return [g for g in gap.values() if g.mode == "inverse_dynamics"]
 
 
@@ -127,8 +127,8 @@ def _is_worse_than_none(gap: ChannelGap) -> bool:
 def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], observed: float) -> bool:
     """Whether named effects leave most of a measured effort where they act, or more than a model without any force.
 
-    No noise excuses that: the floor of a drive that gives next to nothing is as large as its effort. A play is hard to
-    balance: where little is left of what an observer sees, that says more.
+    No noise excuses that: the floor of a drive that gives next to nothing is as large as its effort. A backlash is hard
+    to balance: where little is left of what an observer sees, that says more.
     """
     if observed <= MOSTLY_OPEN and any(effect.type.has_play for effect in found.final.model.effects):
         return False
@@ -138,7 +138,7 @@ def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], observed: float) -
 
 
 def _is_unmeasured(found: Search, data: Data) -> bool:
-    """Whether all that was named acts at joints that a balance does not see."""
+    """Whether all that was named acts at joints that the residual does not see."""
     at = _joints(found)
     return bool(at) and not at & {*data.training.joints, ""}
 
@@ -160,7 +160,7 @@ def _is_described_better(rest: Remainder | None) -> bool:
 
 
 def _is_explanation(found: Search, observed: float, mostly_open: bool) -> bool:
-    """Whether what was found explains the gap, where a balance of effort is said to leave it mostly open or not.
+    """Whether what was found explains the gap, where the residual is said to leave it mostly open or not.
 
     A machine that an observer keeps beside validation records tells it where it is clear: effects that leave little in
     the channel ``observed`` best are the explanation of what is missing there, those that leave more than all none.
@@ -179,9 +179,9 @@ def _farthest(away: Mapping[str, float]) -> str:
 
 
 def _shown_by_predictions(found: Search) -> bool:
-    """Whether runs of the model itself told all that was accepted, and it explains most of what they had left.
+    """Whether closed-loop predictions told all that was accepted, and it explains most of what they had left.
 
-    What a balance of effort hardly sees may leave as much of it as there was, and be the explanation.
+    What the inverse-dynamics residual hardly shows may leave as much of it as there was, and be the explanation.
     """
     return all(entry.trial.alone and entry.trial.validation.relative >= MOST_OF_IT for entry in found.accepted)
 
@@ -193,7 +193,7 @@ def _nothing_missing(
     both: tuple[list[ChannelGap], list[ChannelGap]],
     worst: ChannelGap,
 ) -> tuple[str, str]:
-    """Of gaps of the balance, and of an observer of joints that it does not see."""
+    """Of gaps of the residual, and of an observer of joints that it does not see."""
     (main, beside), numbers = both, _stages(worst)
     small = max(g.before / g.signal if g.signal > 0.0 else 0.0 for g in main) <= NEGLIGIBLE
     agrees = small or max((g.before / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main) <= FLOOR_FACTOR

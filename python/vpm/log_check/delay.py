@@ -1,4 +1,4 @@
-"""A record of which some channels were stamped late, by a time that is fitted with the parameters of a model."""
+"""A record with delayed channels: the delay is fitted together with the parameters of a model."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ DELAY = "delay"
 STEP = 0.1
 
 
-class Late(Observed):
-    """A record of which some channels come as late as the value says that follows the parameters of the model.
+class Delayed(Observed):
+    """A record with delayed channels; the delay follows the parameters of the model in ``theta``.
 
-    However late they are, it has the same samples: those at its ends have no value of their own, and are cut.
+    It has the same samples for every delay: those at its ends, which have no values of their own, are cut.
 
     Parameters
     ----------
     model : Model
     record : Experiment
     correction : Correction
-        Its channels are late; its delay is where a fit begins.
-    latest : float
+        Its channels are delayed; its delay is the start value of a fit.
+    longest_delay : float
         Longest delay, s.
     settings : Settings
     setup : Setup
@@ -46,13 +46,13 @@ class Late(Observed):
         model: Model,
         record: Experiment,
         correction: Correction,
-        latest: float,
+        longest_delay: float,
         settings: Settings,
         setup: Setup,
     ) -> None:
         self.logged, self.correction = record, correction
         # A sample more than the longest delay takes, for the derivative there.
-        self.cut = int(np.ceil(latest / record.dt)) + 1
+        self.cut = int(np.ceil(longest_delay / record.dt)) + 1
         super().__init__(model, [self._corrected(correction.delay)], settings, setup)
 
     def follow(
@@ -78,9 +78,9 @@ class Late(Observed):
         return replace(later, time=later.time[kept], data=later.data[kept])
 
 
-def with_delay(structure: Structure, delay: float, latest: float) -> Structure:
+def with_delay(structure: Structure, delay: float, longest_delay: float) -> Structure:
     """A structure one of whose unknowns is a delay, s."""
-    prior = Prior(0.0, latest, -latest, latest)
+    prior = Prior(0.0, longest_delay, -longest_delay, longest_delay)
     theta = np.append(structure.theta, delay)
     return replace(structure, theta=theta, priors={**structure.priors, DELAY: prior}, firsts=(DELAY,))
 

@@ -223,10 +223,10 @@ class Explainer:
     def _late(
         self, part: Experiment, used: Sequence[str], tangent: Tangent | None, left: Shares, known: float
     ) -> list[_Trial]:
-        """The few delays that promise to leave least if parameters give way: friction looks much like a delay.
+        """The few delays that are predicted to leave least if parameters give way: friction looks much like a delay.
 
-        From fitted values, else from those of the model: a long delay drives fitted ones far away. They have to promise
-        about as little as the best correction that is ``known``.
+        From fitted values, else from those of the model: a long delay drives fitted ones far away. They have to be
+        predicted to leave about as little as the best correction that is ``known``.
         """
         some = left.above(self.settings.negligible)
         corrections = self._about(delays(self.model, used, self.settings), some, left)
@@ -248,7 +248,7 @@ class Explainer:
         return found
 
     def _promised(self, correction: Correction, part: Experiment, tangent: Tangent) -> tuple[Correction, Shares]:
-        """A delay by which a tangent promises to leave least, by secants: what is left is not linear in a long one."""
+        """The delay for which a tangent predicts the least error, by secants: errors are not linear in long ones."""
         shares = tangent.shares
         for _ in range(self.settings.rounds):
             corrected = correction.applied(part)
@@ -281,11 +281,11 @@ class Explainer:
 
     def _settled(self, correction: Correction, part: Experiment, tangent: Tangent, left: Shares) -> _Trial:
         """A delay with what is left before and after it is corrected, fitted with the parameters and all forces."""
-        finer, after = self.judge.late(part, correction, tangent)
-        return _Trial(finer, left, after)
+        refined, after = self.judge.fit_delay(part, correction, tangent)
+        return _Trial(refined, left, after)
 
     def _possible(self, delay: float) -> float:
-        return float(np.clip(delay, -self.settings.latest, self.settings.latest))
+        return float(np.clip(delay, -self.settings.longest_delay, self.settings.longest_delay))
 
     def _explains(self, correction: Correction, before: Shares, after: Shares, count: int = 1) -> bool:
         """Whether a correction explains what a model leaves, or by which values it leaves nothing.

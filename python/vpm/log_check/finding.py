@@ -25,7 +25,7 @@ class Finding(Storable):
     repair : str
         What to do about it.
     mistake : bool
-        No machine does that by itself: nothing that follows from the log can be believed.
+        No machine does that by itself: nothing that follows from the log can be trusted.
     factor : float
         By which the values have to be multiplied.
     delay : float

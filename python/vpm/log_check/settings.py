@@ -71,7 +71,7 @@ class Settings:
         Factor, or its inverse, from which on a wrong scale is no fault of a machine.
     delays : tuple of float
         Delays of channels that are tried, s: by these the change of what is left is taken as linear.
-    latest : float
+    longest_delay : float
         Longest delay that is told, s.
     held : float
         Delays of fewer samples are how commands are held from one sample to the next.
@@ -133,7 +133,7 @@ class Settings:
     rounds: int = 3
     smallest: float = 2.0
     delays: tuple[float, ...] = (0.01, 0.05)
-    latest: float = 0.1
+    longest_delay: float = 0.1
     held: float = 0.75
     harmless: float = 1e-3
     settled: float = 0.1

@@ -15,7 +15,7 @@ from vpm.catalogue.effects import BUILT_IN
 from vpm.experiment import Experiment
 from vpm.initial import initial_state
 from vpm.log_check.correction import Correction
-from vpm.log_check.delay import Late, with_delay, without_delay
+from vpm.log_check.delay import Delayed, with_delay, without_delay
 from vpm.log_check.settings import Settings
 from vpm.model import Model
 from vpm.observer import measured_outputs
@@ -196,16 +196,16 @@ class Judge:
         shares = self._shares(observed, fitted.residual, observer, fitted.structure.theta)
         return Tangent(fitted.structure, fitted.residual, kept, self._believed(shares, fitted.structure))
 
-    def late(self, record: Experiment, correction: Correction, tangent: Tangent) -> tuple[Correction, Shares]:
+    def fit_delay(self, record: Experiment, correction: Correction, tangent: Tangent) -> tuple[Correction, Shares]:
         """A delay that is fitted with the parameters and all forces, from the values of a tangent without it."""
-        observer, latest = self._observer(record), self.settings.latest
-        structure = with_delay(tangent.structure, correction.delay, latest)
+        observer, longest_delay = self._observer(record), self.settings.longest_delay
+        structure = with_delay(tangent.structure, correction.delay, longest_delay)
         try:
-            whole = Late(self.model, record, correction, latest, self._ranking(record), self.setup)
+            whole = Delayed(self.model, record, correction, longest_delay, self._ranking(record), self.setup)
             observed = whole.whole()
             residual, slope = observed.follow(self.model, structure.theta, observer, [len(self.model.theta)])
             known = tangent.slopes[whole.cut : whole.cut + len(residual)]
-            start = Tangent(structure, residual, np.concatenate([known, slope * latest], axis=2), tangent.shares)
+            start = Tangent(structure, residual, np.concatenate([known, slope * longest_delay], axis=2), tangent.shares)
             view = View(white_noise(residual, observed.parts))
             found, _ = Fitter(observed, observed.settings).moved(start.followed(observer), view, anew=True)
         except ASTRAY:

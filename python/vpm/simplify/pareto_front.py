@@ -97,7 +97,7 @@ class Ladder(Result):
     budget : BudgetReport
         Of the chosen model: what its times are taken from.
     cut : int
-        Reduced models that were not fitted, because a glance showed that something quicker loses next to nothing.
+        Reduced models that were not fitted, because coarse timing showed that something quicker loses next to nothing.
     """
 
     rungs: tuple[Rung, ...]
@@ -148,7 +148,7 @@ class Ladder(Result):
     def __str__(self) -> str:
         """The choice, the verdict, and the rungs that nothing beats."""
         chosen = self.chosen
-        cut = f" ({self.cut} models were cut after a glance)" if self.cut else ""
+        cut = f" ({self.cut} models were cut after coarse timing)" if self.cut else ""
         lines = [
             f"cheapest within {100 * self.tolerance:g} %: {', '.join(chosen.removed) or 'the full model'}; "
             f"{chosen.stepping}; error {100 * chosen.error:.2f} % of {chosen.worst} (loss {100 * chosen.loss:.2f} %), "

@@ -50,8 +50,8 @@ class Reduction(Storable):
         Effect, level, component, change of a drive, see `vpm.simplify.hydraulics`, or of terms ``"velocity"`` (products
         of rates), ``"coupling"`` (entries of the mass matrix across joints), ``"second-order"`` (in the deflection).
     at : str
-        Site of the effect, flexible link, drive; of velocity terms bodies and links, of coupling joints, with commas
-        between them, or ``"the machine"``.
+        Site of the effect, flexible link, drive; of Coriolis and centrifugal terms bodies and links, of coupling
+        joints, with commas between them, or ``"the machine"``.
     side : {"motor", "link"}
         Of an effect at a joint with a compliance or backlash.
     """

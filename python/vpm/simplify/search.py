@@ -1,10 +1,10 @@
 """Walk a model back down: the cheapest one that still predicts the data within a tolerance.
 
 The search goes in four strides. All flexible links together are made finer, from the coarsest, until that loses next to
-nothing: what comes next is tried on that model, which is cheap, and what a glance shows to be dearer is not fitted.
-Then each place by itself is made simpler by each of its changes. Losses and savings of single changes are added up to
-foresee those of all combinations, and the combinations that should be best are fitted, simulated and timed. From the
-best one each further change is tried while one pays.
+nothing: what comes next is tried on that model, which is cheap, and what coarse timing shows to be dearer is not
+fitted. Then each place by itself is made simpler by each of its changes. Losses and savings of single changes are added
+up to foresee those of all combinations, and the combinations that should be best are fitted, simulated and timed. From
+the best one each further change is tried while one pays.
 """
 
 from __future__ import annotations
@@ -58,10 +58,11 @@ def simplify(
     """Make a model simpler, place by place, as far as the tolerance allows, and find the cheapest way to step it.
 
     Effects are left out, flexible links made coarser or rigid in single deformations, spools of hydraulic drives made
-    static, their pressures one, NARX elements put in their place, velocity terms, coupling across joints and terms of
-    second order of links left out where their shares allow it, and every integrator of fixed steps is tried with one,
-    two and four steps in a period. The adjustable parameters of every reduced model are fitted again before it is
-    judged by simulation, so that what remains may take over what it can. Ctrl-C ends the search with what is known.
+    static, their pressures one, NARX elements put in their place, Coriolis and centrifugal terms, coupling across
+    joints and terms of second order of links left out where their shares allow it, and every integrator of fixed steps
+    is tried with one, two and four steps in a period. The adjustable parameters of every reduced model are fitted again
+    before it is judged by simulation, so that what remains may take over what it can. Ctrl-C ends the search with what
+    is known.
 
     Parameters
     ----------
@@ -122,7 +123,7 @@ def simplify(
         _weigh_terms(trials, sites)
         _descend(trials, sites)
     except KeyboardInterrupt:
-        if not trials.rungs:
+        if not trials.candidates:
             raise
         say("interrupted: the best of what was tried")
     return _concluded(trials, sites, share, against)
@@ -135,15 +136,15 @@ def _descend(trials: Trials, sites: Sites) -> None:
             f"{trials.model.name}: no integrator of fixed steps can simulate the records at {trials.judge.rate:g} Hz: "
             f"{trials.reason}"
         )
-    limit = min(rung.error for rung in full) + trials.tolerance
+    limit = min(candidate.error for candidate in full) + trials.tolerance
     base = _together(trials, sites, limit)
     singles = (_with(base, change) for changes in sites.values() for change in _coarser(changes, base))
     trials.ahead(singles, trials.as_quick_as(base))
     alone = {site: _alone(trials, base, changes) for site, changes in sites.items()}
     foreseen = _foreseen(trials, base, {site: _paying(found) for site, found in alone.items()}, limit)
-    trials.ahead(foreseen, _within(trials.rungs, limit).seconds)
+    trials.ahead(foreseen, _within(trials.candidates, limit).seconds)
     for changes in foreseen:
-        trials.attempt(changes, _within(trials.rungs, limit).seconds)
+        trials.attempt(changes, _within(trials.candidates, limit).seconds)
     lost = {change: added for found in alone.values() for change, (_, added) in found.items()}
     _polish(trials, sites, limit, {change for change, added in lost.items() if added > TOO_MUCH * trials.tolerance})
 
@@ -176,18 +177,18 @@ def _together(trials: Trials, sites: Sites, limit: float) -> Changes:
     """All links at the same coarser level: the cheapest that loses next to nothing.
 
     The coarsest come first, by the number of coordinates: they are quick to fit, and once one of them loses next to
-    nothing, a glance at the finer ones shows that they need no look.
+    nothing, coarse timing of the finer ones shows that they need no look.
     """
     best: Changes = ()
-    seconds = min(rung.seconds for rung in trials.attempt(()))
+    seconds = min(candidate.seconds for candidate in trials.attempt(()))
     levels = [changes for (kind, _), changes in sites.items() if kind == "level"]
     together = [tuple(c for each in levels for c in each if c.name == level) for level in OFFERED]
     coarsest = sorted(filter(None, together), key=lambda changes: reduced(trials.model, changes).core.n_states)
     trials.ahead(coarsest)
     for changes in coarsest:
-        rung = trials.cheapest(changes, limit - (1.0 - NEGLIGIBLE) * trials.tolerance)
-        if rung is not None and rung.seconds < seconds:
-            best, seconds = changes, rung.seconds
+        candidate = trials.cheapest(changes, limit - (1.0 - NEGLIGIBLE) * trials.tolerance)
+        if candidate is not None and candidate.seconds < seconds:
+            best, seconds = changes, candidate.seconds
     return best
 
 
@@ -199,9 +200,9 @@ def _alone(trials: Trials, base: Changes, changes: Sequence[Reduction]) -> dict[
     start, longest = _best(trials.attempt(base)), trials.as_quick_as(base)
     found: dict[Reduction, tuple[float, float]] = {}
     for change in _coarser(changes, base):
-        rungs = trials.attempt(_with(base, change), longest)
-        if rungs:
-            best = _best(rungs)
+        candidates = trials.attempt(_with(base, change), longest)
+        if candidates:
+            best = _best(candidates)
             found[change] = (start.seconds - best.seconds, best.error - start.error)
     return found
 
@@ -229,10 +230,13 @@ def _is_idle(change: Reduction, straight: set[str]) -> bool:
     return change.name == "second-order" and change.at in straight
 
 
-def _best(rungs: Sequence[Rung]) -> Rung:
-    """The cheapest rung among those whose error is near the least."""
-    least = min(rung.error for rung in rungs)
-    return min((rung for rung in rungs if rung.error <= NEAR * least), key=lambda rung: rung.seconds)
+def _best(candidates: Sequence[Rung]) -> Rung:
+    """The cheapest candidate among those whose error is near the least."""
+    least = min(candidate.error for candidate in candidates)
+    return min(
+        (candidate for candidate in candidates if candidate.error <= NEAR * least),
+        key=lambda candidate: candidate.seconds,
+    )
 
 
 def _with(base: Changes, change: Reduction) -> Changes:
@@ -268,24 +272,26 @@ def _foreseen(
 def _polish(trials: Trials, sites: Sites, limit: float, hopeless: set[Reduction]) -> None:
     """From the cheapest within the limit, single changes as long as one pays."""
     while True:
-        best = _within(trials.rungs, limit)
+        best = _within(trials.candidates, limit)
         base = trials.changes_of(best)
         further = [change for changes in sites.values() for change in _coarser(changes, base) if change not in hopeless]
         trials.ahead((_with(base, change) for change in further), best.seconds)
         for change in further:
             trials.attempt(_with(base, change), best.seconds)
-        if not _within(trials.rungs, limit).seconds < SAVED * best.seconds:
+        if not _within(trials.candidates, limit).seconds < SAVED * best.seconds:
             return
 
 
-def _within(rungs: Sequence[Rung], limit: float) -> Rung:
-    return min((rung for rung in rungs if rung.error <= limit), key=lambda rung: rung.seconds)
+def _within(candidates: Sequence[Rung], limit: float) -> Rung:
+    return min(
+        (candidate for candidate in candidates if candidate.error <= limit), key=lambda candidate: candidate.seconds
+    )
 
 
 def _concluded(trials: Trials, sites: Sites, share: float, against: str) -> Ladder:
     """The choice, its steps timed once more as `vpm.budget` does."""
-    rungs, judge = trials.rungs, trials.judge
-    chosen = _simplest([rung for rung in rungs if rung.loss <= trials.tolerance])
+    candidates, judge = trials.candidates, trials.judge
+    chosen = _simplest([candidate for candidate in candidates if candidate.loss <= trials.tolerance])
     model = trials.fitted(trials.changes_of(chosen))
     report = budget(
         model,
@@ -296,14 +302,14 @@ def _concluded(trials: Trials, sites: Sites, share: float, against: str) -> Ladd
         substeps=chosen.substeps,
         experiment=trials.courses.record(model),
         priority=PRIORITY,
-        # As all rungs were timed.
+        # As all candidates were timed.
         compiled=False,
     )
-    place = rungs.index(chosen)
+    place = candidates.index(chosen)
     chosen = chosen.timed(report.quantiles["p50"], report.quantiles["p99.9"])
-    rungs[place] = chosen
+    candidates[place] = chosen
     return Ladder(
-        tuple(sorted(rungs, key=lambda rung: rung.seconds)),
+        tuple(sorted(candidates, key=lambda candidate: candidate.seconds)),
         chosen,
         report.holds,
         judge.rate,
@@ -318,23 +324,27 @@ def _concluded(trials: Trials, sites: Sites, share: float, against: str) -> Ladd
     )
 
 
-def _simplest(rungs: Sequence[Rung]) -> Rung:
+def _simplest(candidates: Sequence[Rung]) -> Rung:
     """The cheapest, or what a clock does not tell from it and has more left out, or as much and errs less."""
-    best = rungs[0]
+    best = candidates[0]
     longest = ALIKE * best.seconds + CLOCK
-    more = [rung for rung in rungs if set(rung.removed) >= set(best.removed) and rung.seconds <= longest]
-    others = [
-        rung
-        for rung in rungs
-        if (len(rung.removed), rung.states) == (len(best.removed), best.states)
-        and rung.seconds <= REPEATED * best.seconds
+    more = [
+        candidate
+        for candidate in candidates
+        if set(candidate.removed) >= set(best.removed) and candidate.seconds <= longest
     ]
-    return max((*more, *others), key=lambda rung: (len(rung.removed), -rung.error))
+    others = [
+        candidate
+        for candidate in candidates
+        if (len(candidate.removed), candidate.states) == (len(best.removed), best.states)
+        and candidate.seconds <= REPEATED * best.seconds
+    ]
+    return max((*more, *others), key=lambda candidate: (len(candidate.removed), -candidate.error))
 
 
 def _dearest(trials: Trials, sites: Sites) -> tuple[tuple[str, float], ...]:
-    """What a glance says that a step of the full model saves by the last change of each place alone, the most first."""
-    full = min((r for r in trials.rungs if not r.removed), key=lambda r: r.seconds)
+    """Savings of a step by the last change of each place alone, by coarse timing, the most first."""
+    full = min((r for r in trials.candidates if not r.removed), key=lambda r: r.seconds)
     setup = Setup(full.integrator, full.substeps)
     saved = ((str(changes[-1]), trials.saved(changes[-1], setup)) for changes in sites.values())
     return tuple(sorted(((name, gain) for name, gain in saved if gain > 0.0), key=lambda pair: -pair[1]))

@@ -101,7 +101,7 @@ def coupling_joints(content: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _moving(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Bodies that a joint carries, and flexible links that bend: what has velocity terms of its own."""
+    """Bodies that a joint carries, and flexible links that bend: what has Coriolis and centrifugal terms of its own."""
     carried = [joint["child"] for joint in content.get("joints", {}).values() if joint["type"] != "fixed"]
     bodies = {name: content["bodies"][name] for name in carried}
     beams = content.get("beams", {}).items()
