@@ -126,15 +126,13 @@ def rows(repeats: int, quick: bool) -> Iterator[Row]:
 
 def table(found: list[Row], motion: str) -> str:
     """Rows of a motion, and for each peer how much faster the fastest of ours is that is no worse in any error."""
-    head = ("engine, per link", "tip, m", "strain 1", "strain 2", "CPU, ms", "median, spread", "ratio")
+    head = ("engine, per link", "tip, m", "strain 1", "strain 2", "CPU, ms", "ratio")
     lines = []
     for row in (each for each in found if each.motion == motion):
         ratio, best = faster(row, found)
         against = "" if row.engine == "vpm" else f"{ratio:.0f} ({best.setting})" if best else "none as good"
-        wall = [1e3 * each for each in row.wall]
-        spread = f"{statistics.median(wall):.1f}, {max(wall) - min(wall):.1f}"
         errors = (f"{row.tip:.1e}", *(f"{strain:.1e}" for strain in row.strains))
-        lines.append((f"{row.engine}, {row.setting}", *errors, f"{1e3 * min(row.cpu):.1f}", spread, against))
+        lines.append((f"{row.engine}, {row.setting}", *errors, f"{1e3 * min(row.cpu):.1f}", against))
     return markdown.table(head, lines)
 
 
@@ -143,6 +141,12 @@ def faster(row: Row, found: list[Row]) -> tuple[float, Row | None]:
     ours = [own for own in found if own.engine == "vpm" and own.motion == row.motion and own.no_worse_than(row)]
     best = min(ours, key=lambda own: min(own.cpu), default=None)
     return (min(row.cpu) / min(best.cpu), best) if best else (math.nan, None)
+
+
+def noise(found: list[Row]) -> str:
+    """How much the load of the machine moved the times."""
+    worst = max(statistics.median(row.wall) / min(row.wall) for row in found)
+    return f"Medians of the wall times are up to {worst - 1.0:.0%} above the least."
 
 
 def other(found: list[Row]) -> str:
@@ -175,7 +179,7 @@ def main() -> None:
     parser.add_argument("--markdown", type=Path, help="write the section of the performance page here")
     options = parser.parse_args()
     found = list(rows(options.repeats, options.quick))
-    text = f"{table(found, 'fast')}\n\n{other(found)} {goal(found)}\n"
+    text = f"{table(found, 'fast')}\n\n{other(found)} {goal(found)} {noise(found)}\n"
     print(table(found, "slow"), text, sep="\n\n")
     if options.markdown:
         options.markdown.write_text(text, encoding="utf-8")

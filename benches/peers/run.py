@@ -25,8 +25,8 @@ $ make peers
 $ make bench-counts
 ```
 
-Measured on {cpu}, {system}, with {versions}. CPU and wall times are the least of all repeats, ratios those of CPU
-time; then median and spread (largest less least) of the wall time.
+Measured on {cpu}, {system}, with {versions}.
+CPU and wall times are the least of all repeats; ratios are those of CPU time.
 
 ## A flexible arm
 
