@@ -110,8 +110,8 @@ _SUMMARY = """
 _PUBLISHED = """
 ## Published values
 
-| what | vpm | published | difference | allowed | where |
-| --- | --- | --- | --- | --- | --- |
+| what | vpm | published | allowed | where |
+| --- | --- | --- | --- | --- |
 """
 _WITHOUT = """
 ## Reference values that are not compared
@@ -132,7 +132,7 @@ def page(rows: Mapping[str, list[Row]]) -> str:
     for found in (one for each in rows.values() for one in each if one.source.startswith("published")):
         where = found.source.removeprefix("published: ").partition(";")[0]
         reference = found.reference if found.unit == "1" else f"{found.reference} {found.unit}"
-        lines.append(_line(f"`{found.name}`", found.shown, reference, found.difference, found.allowed, where))
+        lines.append(_line(f"`{found.name}`", found.shown, reference, found.allowed, where))
     return "".join([*lines, _WITHOUT, *(_line(what, why) for what, why in _UNCOMPUTED.items())])
 
 
