@@ -100,7 +100,7 @@ lint-python: $(VENV)/.installed
 	$(BIN)/python -m mypy.stubtest --mypy-config-file pyproject.toml vpm._core
 	$(BIN)/lint-imports
 
-validation: $(VENV)/.installed ## compute the validation table anew, into docs/validation.md
+validation: $(VENV)/.installed ## compute the validation table anew, into docs/validation.md and .csv
 	cd tests && PYTHONPATH=support ../$(BIN)/python -m validation
 
 bench: | $(VENV)/.tools-found ## time the core: one result per line, with its spread
