@@ -26,6 +26,9 @@ BIN := $(VENV)/bin
 # With it every command compiles the bindings against the same interpreter, so that cargo builds them once.
 export PYO3_PYTHON = $(CURDIR)/$(BIN)/python
 
+# Programs that tests start would otherwise compile all of the package anew, a second each.
+unexport PYTHONDONTWRITEBYTECODE
+
 # Processor time of one program of Rust tests, s: an endless loop ends with SIGXCPU.
 RUST_SECONDS := 3600
 
@@ -62,9 +65,9 @@ test-rust: | $(VENV)/.tools-found
 reference: | $(VENV)/.tools-found ## integrators against an adaptive solver, which takes minutes to build
 	cargo test --features reference --test reference $(CARGO_ARGS)
 
-# Test files side by side on all cores; the linear algebra of each stays on one.
+# Tests side by side on all cores, whoever has none left takes from the others; the linear algebra of each stays on one.
 test-python: $(VENV)/.installed
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile $(PYTEST_ARGS)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal $(PYTEST_ARGS)
 
 test-nightly: $(VENV)/.installed ## the claims of some tests on many more cases, which takes minutes
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal -m nightly $(PYTEST_ARGS)
