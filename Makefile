@@ -65,9 +65,9 @@ test-rust: | $(VENV)/.tools-found
 reference: | $(VENV)/.tools-found ## integrators against an adaptive solver, which takes minutes to build
 	cargo test --features reference --test reference $(CARGO_ARGS)
 
-# Tests side by side on all cores, whoever has none left takes from the others; the linear algebra of each stays on one.
+# Test files side by side on all cores; the linear algebra of each stays on one.
 test-python: $(VENV)/.installed
-	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal $(PYTEST_ARGS)
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile $(PYTEST_ARGS)
 
 test-nightly: $(VENV)/.installed ## the claims of some tests on many more cases, which takes minutes
 	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist worksteal -m nightly $(PYTEST_ARGS)
