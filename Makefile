@@ -26,6 +26,9 @@ BIN := $(VENV)/bin
 # With it every command compiles the bindings against the same interpreter, so that cargo builds them once.
 export PYO3_PYTHON = $(CURDIR)/$(BIN)/python
 
+# Programs that tests start would otherwise compile all of the package anew, a second each.
+unexport PYTHONDONTWRITEBYTECODE
+
 # Processor time of one program of Rust tests, s: an endless loop ends with SIGXCPU.
 RUST_SECONDS := 3600
 
