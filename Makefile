@@ -26,6 +26,9 @@ BIN := $(VENV)/bin
 # With it every command compiles the bindings against the same interpreter, so that cargo builds them once.
 export PYO3_PYTHON = $(CURDIR)/$(BIN)/python
 
+# Programs that tests start would otherwise compile all of the package anew, a second each.
+unexport PYTHONDONTWRITEBYTECODE
+
 # Processor time of one program of Rust tests, s: an endless loop ends with SIGXCPU.
 RUST_SECONDS := 3600
 
@@ -100,7 +103,7 @@ lint-python: $(VENV)/.installed
 	$(BIN)/python -m mypy.stubtest --mypy-config-file pyproject.toml vpm._core
 	$(BIN)/lint-imports
 
-validation: $(VENV)/.installed ## compute the validation table anew, into docs/validation.md
+validation: $(VENV)/.installed ## compute the validation table anew, into docs/validation.md and .csv
 	cd tests && PYTHONPATH=support ../$(BIN)/python -m validation
 
 bench: | $(VENV)/.tools-found ## time the core: one result per line, with its spread

@@ -32,11 +32,9 @@ PAGE = ROOT / "docs" / "performance.md"
 BEGIN, END = "<!-- begin of make bench-diagnosis -->\n", "<!-- end of make bench-diagnosis -->\n"
 SECTION = """## A diagnosis
 
-Written by `make bench-diagnosis` on {cpu}, {system}, {repeats} repeats. Wall time is the least of all repeats, then
-median and spread (largest less least); CPU time is that of the process over all its threads, the least of all repeats,
-so that wall time on an idle machine of four cores lies between a quarter of it and the whole. Processor load of others
-while it ran: {load:.0f} processes. `python benches/diagnosis/diagnosis.py --write --only axis` times one
-machine alone and leaves the other out of the table.
+Written by `make bench-diagnosis` on {cpu}, {system}, {repeats} repeats, beside {load:.0f} processes of others.
+Wall time is the least of all repeats, then median and spread; CPU time is that over all threads.
+`python benches/diagnosis/diagnosis.py --write --only axis` times one machine alone.
 
 {rows}
 """

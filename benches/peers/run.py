@@ -17,33 +17,28 @@ DIAGNOSIS = "<!-- begin of make bench-diagnosis -->"
 
 PAGE = """# Performance beside other engines
 
-Written by `make peers`; do not edit. Times depend on the machine and on what else runs on it, ratios less so.
+With this page you can judge how fast and how exact vpm is beside other engines, and measure it again. It is written
+by `make peers`; do not edit. Times depend on the machine and its load, ratios less so.
 
 ```console
 $ make peers
 $ make bench-counts
 ```
 
-Measured on {cpu}, {system}, with
-{versions}.
-Wall time is the least of all repeats, then median and spread (largest less least); CPU time is that of the process, the
-least of all repeats, and ratios are ratios of CPU time.
+Measured on {cpu}, {system}, with {versions}.
+CPU and wall times are the least of all repeats; ratios are those of CPU time.
 
 ## A flexible arm
 
-Two flexible links under control, 24 s of a slow and a fast motion; one call from Python that runs the whole motion,
-with results at 10 Hz. Errors are root mean squares over all samples against converged motions: of the tip in m, of the
-strains beside the clamps relative to their own root mean square. The last column says how many times faster the
-fastest setting of vpm is that is no worse than this row in the tip and in both strains.
+Two flexible links under control, 24 s, results at 10 Hz; the table has the fast motion. Errors are root mean squares
+against a converged motion: of the tip in m, of the strains relative to their own. The ratio is to the fastest setting
+of vpm that is no worse in any error.
 
 {flexible_arm}
-Exudyn runs geometrically exact beam elements of three nodes, compiled without range checks, with symbolic functions for
-the references, a modified Newton method with the loosest tolerance that keeps its accuracy (1e-4), with and without a
-new Jacobian in each step, one thread, and the fastest of three linear solvers. Its beams can stretch and shear and
-their sections have rotary inertia, which is not so in the reference and in vpm: a part of its error. MuJoCo runs rigid
-segments with elastic hinges, implicit in the damping. vpm runs the arm of a model file by `vpm.simulate`, with the
-integrator `additive` and the hold `cubic`, its links at the level that stands there. The first of the repeats records
-its equations and makes machine code of them, which takes a tenth of a second; the least of all repeats is without.
+Exudyn: geometrically exact elements of three nodes, symbolic references, modified Newton with the loosest tolerance
+that keeps its accuracy, one thread, the fastest of three solvers. Its beams stretch and shear and have rotary
+inertia, a part of its error. MuJoCo: rigid segments with hinges. vpm: `additive` with the hold `cubic`, without the
+first run, which makes machine code in a tenth of a second.
 
 ## Elements
 
@@ -54,22 +49,19 @@ Exudyn: quadratic, three nodes), processor time of a step. `crank_nicolson` and 
 {elements}
 ## A servo-cylinder
 
-One second of the servo-cylinder of [hydraulics.md](hydraulics.md), six states, under a current of 0.5 mA from 2 to
-50 Hz. Errors are the largest of place and both pressures over rows of 10 ms, relative to the range of each, against the
-loop in C in long double at a tolerance of 1e-15. All engines take turns in one run; the time is that of one second.
+One second of the servo-cylinder of [hydraulics.md](hydraulics.md) under a current of 0.5 mA from 2 to 50 Hz. Errors
+are the largest of position and pressures over rows of 10 ms, relative to their range, against the loop in C in long
+double at 1e-15. Engines take turns.
 
 {servo_chirp}
-vpm runs in Rust, with the time of the chirp as a seventh state, from the general laws with exact Jacobians. The loop
-in C (`benches/peers/servo_chirp.c`) is the explicit pair of Dormand and Prince, written for this one cylinder, which is
-hardly stiff as long as it stays away from its ends and from vapour. CVODES comes with CasADi, with exact Jacobians and
-compiled expressions; LSODA with SciPy, its right-hand side compiled by Numba and called through Python. `make chirp`
-repeats this table alone.
+vpm runs the general laws with exact Jacobians; the loop in C (`benches/peers/servo_chirp.c`) is written for this one
+cylinder, away from its ends and from vapour. CVODES comes with CasADi, compiled; LSODA with SciPy, its right-hand
+side compiled by Numba. `make chirp` repeats this table.
 
 ## A NARX model
 
-A free run of a model of 20 terms, time of one step. All engines take turns in one run, on ready arrays of their own.
-The difference is the largest to vpm, on values of about one. sysidentpy's `predict` and the loop in Python run 1000
-samples, the others 20 000.
+A simulation of a model of 20 terms, time of one step, on ready arrays. The difference is the largest to vpm, on
+values of about one. sysidentpy and the loop in Python run 1000 samples, the others 20 000.
 
 {narx}
 ## A rigid arm of seven joints
@@ -77,7 +69,7 @@ samples, the others 20 000.
 One call from Python, on prepared buffers and ready arrays; then a whole record in one call.
 
 {rigid_chain}
-Instructions of one call inside the core, counted by valgrind, which no other load on the machine disturbs:
+Instructions of one call inside the core, counted by valgrind:
 
 {instruction_counts}"""
 

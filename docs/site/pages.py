@@ -71,7 +71,10 @@ def set_formulas(text: str) -> str:
 
     def formula(found: re.Match[str]) -> str:
         displayed = found["displayed"]
-        return convert(displayed.strip(), display="block") if displayed else convert(found["inline"].strip())
+        if displayed:
+            return f"<p>{convert(displayed.strip(), display='block')}</p>"
+        # A line that begins with <math> would be taken for a block of its own.
+        return f"<span>{convert(found['inline'].strip())}</span>"
 
     return _FORMULA.sub(formula, text)
 

@@ -244,10 +244,10 @@ def test_a_record_knows_its_file_until_it_is_changed() -> None:
 
 def test_long_records_make_no_large_page_and_keep_their_peaks(diagnosis: vpm.Diagnosis) -> None:
     (picture,), trace = diagnosis.pictures, diagnosis.traces[0]
-    n, random = 400_000, np.random.default_rng(0)
+    n, random = 100_000, np.random.default_rng(0)
     time, noise = np.linspace(0.0, 400.0, n), random.standard_normal((5, n))
-    noise[4, 200_000:200_500] = np.nan
-    noise[4, 300_000] = 77.0
+    noise[4, 50_000:50_125] = np.nan
+    noise[4, 75_000] = 77.0
     names = ("position", "velocity", "measured", "recalibrated", "after")
     long = replace(picture, time=time, before=noise[4], **dict(zip(names, noise, strict=True)))
     traced = replace(trace, time=time, measured=noise[0], before=noise[1], after=noise[2])

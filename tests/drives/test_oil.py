@@ -377,6 +377,7 @@ def test_boiling_oil_is_noted() -> None:
     )
 
 
+@pytest.mark.nightly
 def test_the_script_prints_its_tables(capsys: pytest.CaptureFixture[str]) -> None:
     bench.main(0)
     printed = capsys.readouterr().out

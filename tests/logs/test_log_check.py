@@ -128,7 +128,7 @@ def test_no_machine_moves_before_its_command(logs: dict[str, Columns]) -> None:
     assert one.delay == pytest.approx(0.02, abs=0.002)
 
 
-@pytest.mark.parametrize("samples", [-25, 20])
+@pytest.mark.parametrize("samples", at_night([-25, 20], but=[-25]))
 def test_a_long_delay_is_found_to_a_tenth_of_a_sample(logs: dict[str, Columns], samples: int) -> None:
     """A command 80 ms late, an encoder 100 ms early: far from what is linear in a delay."""
     column, channel = ("i2", "m2.command") if samples > 0 else ("q1", "one.position")
@@ -240,14 +240,17 @@ def test_a_late_answer_may_be_the_clock_or_the_machine(logs: dict[str, Columns])
     assert "or a delay of the machine" in late[0].sentence
 
 
+@pytest.mark.nightly
 def test_two_mistakes_are_found_one_after_the_other(logs: dict[str, Columns]) -> None:
     log = record(both(scaled("q1", 180.0 / np.pi), scaled("i2", 1e3))(logs["none"]))
     found = vpm.check_log(MODEL, log, workers=1).mistakes
     assert {one.channels for one in found} == {("one.position",), ("m2.command",)}
 
 
-@pytest.mark.parametrize("fault", ["none", "friction"])
-@pytest.mark.parametrize("channels", ["one", "all"])
+@pytest.mark.parametrize(
+    ("fault", "channels"),
+    at_night([(f, c) for f in ("none", "friction") for c in ("one", "all")], but=[("friction", "one")]),
+)
 def test_finds_two_mistakes_that_hide_each_other(logs: dict[str, Columns], fault: str, channels: str) -> None:
     """Degrees and milliamperes of one joint: either alone makes the log less likely, or hardly more."""
     joints = "12" if channels == "all" else "1"

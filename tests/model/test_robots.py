@@ -551,6 +551,7 @@ ROOT = Path(__file__).resolve().parents[2]
 BLOCK = re.compile(r"^```(toml|text)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
+@pytest.mark.nightly
 @needs("rosbags")
 def test_the_tutorial_leads_from_a_urdf_and_a_bag_to_a_named_effect_in_three_commands(tmp_path: Path) -> None:
     """Dry friction of 1.5 N m is hidden in the elbow; only the channel table is written by hand."""

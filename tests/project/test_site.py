@@ -39,5 +39,6 @@ def test_formulas_are_set_but_code_is_not(tmp_path: Path) -> None:
     text = pages.moved(tmp_path / "page.md", {}, tmp_path)
     assert text.count("<math") == 2
     assert 'display="block"' in text
+    assert "mass <span><math" in text  # inline also where a line begins with it
     assert "`$HOME`" in text
     assert 'x["a"](b)\necho = "$A $B"' in text

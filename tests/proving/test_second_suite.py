@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 import vpm
+from nightly import at_night
 from second_suite import belt
 from second_suite.cases import (
     CLEAN,
@@ -64,6 +65,10 @@ EXACT = (
     ("scara", "joint_compliance@shoulder"),
     ("hoist", "payload@load"),
 )
+
+
+#: Machines that are simulated outside of `make test-nightly`: one joint, two joints that disturb each other, a line.
+FEW = ("belt", "cart", "hoist")
 
 
 def without_dry_friction(m: Machine) -> dict[str, float]:
@@ -179,7 +184,7 @@ def gap(m: Machine, model: Model, log: Experiment, state: Array) -> float:
     return max(float(np.abs(run[c] - log[c]).max() / max(np.ptp(log[c]), 0.1)) for c in channels)
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", at_night(NAMES, but=FEW))
 def test_the_machine_moves_as_its_model_file_does(name: str) -> None:
     m = short(name)
     values = without_dry_friction(m)
@@ -189,7 +194,7 @@ def test_the_machine_moves_as_its_model_file_does(name: str) -> None:
         assert gap(m, written(m, values), log, signals.position[0, :, record]) < ALIKE[name]
 
 
-@pytest.mark.parametrize(("name", "word"), EXACT)
+@pytest.mark.parametrize(("name", "word"), at_night(EXACT, but=[one for one in EXACT if one[0] in FEW]))
 def test_a_hidden_effect_is_that_of_the_catalogue(name: str, word: str) -> None:
     m = short(name)
     values, hidden = without_dry_friction(m), hidden_of(m, word, 0)
@@ -202,7 +207,7 @@ def test_a_hidden_effect_is_that_of_the_catalogue(name: str, word: str) -> None:
     assert left < 0.06 * gap(m, written(m, values), log, place)
 
 
-@pytest.mark.parametrize("name", ["belt", "rotary", "cart", "scara", "arm"])
+@pytest.mark.parametrize("name", at_night(["belt", "rotary", "cart", "scara", "arm"], but=("belt", "cart")))
 def test_a_clean_log_leaves_no_effort(name: str) -> None:
     m = replace(MACHINES[name], lengths=(2.0 if name == "arm" else 3.0,) * 4)
     values = without_dry_friction(m)
@@ -217,7 +222,7 @@ def test_a_clean_log_leaves_no_effort(name: str) -> None:
     assert (left < 0.1 * noise).all()
 
 
-@pytest.mark.parametrize("name", sorted({*NAMES} - {"boom"}))
+@pytest.mark.parametrize("name", at_night(sorted({*NAMES} - {"boom"}), but=FEW))
 def test_dry_friction_is_that_of_the_model_file(name: str) -> None:
     m = short(name)
     values = true_values(m, 0)

@@ -46,17 +46,30 @@ class Row:
         difference = np.abs(self.found - self.expected)
         return np.where(difference == 0.0, 0.0, difference / np.maximum(allowed, np.finfo(float).tiny))
 
-    def markdown(self) -> str:
-        """Row of the table; of a long list the number that is worst."""
-        worst = int(np.argmax(self._shares()))
-        found, expected = self.found[worst], self.expected[worst]
-        count = f" ({self.found.size} values, the worst)" if self.found.size > 1 else ""
-        tolerance = (
-            f"{self.relative:.2g} rel." if self.relative else f"{self.absolute:.2g}" if self.absolute else "none"
-        )
-        difference = abs(found - expected) / (abs(expected) if self.relative else 1.0)
-        cells = [f"{self.name}{count}", f"{found:.7g}", f"{expected:.7g}", self.unit, f"{difference:.1e}", tolerance]
-        return "| " + " | ".join([*cells, self.source]) + " |"
+    @property
+    def shown(self) -> str:
+        """What was found; of a list the number that is nearest to its tolerance."""
+        return f"{self.found[self._worst]:.7g}"
+
+    @property
+    def reference(self) -> str:
+        """What is expected of it."""
+        return f"{self.expected[self._worst]:.7g}"
+
+    @property
+    def difference(self) -> str:
+        """How far the two are apart, relative to the reference where the tolerance is."""
+        found, expected = self.found[self._worst], self.expected[self._worst]
+        return f"{abs(found - expected) / (abs(expected) if self.relative else 1.0):.1e}"
+
+    @property
+    def allowed(self) -> str:
+        """The tolerance."""
+        return f"{self.relative:.2g} rel." if self.relative else f"{self.absolute:.2g}" if self.absolute else "none"
+
+    @property
+    def _worst(self) -> int:
+        return int(np.argmax(self._shares()))
 
 
 def row(

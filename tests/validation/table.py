@@ -1,11 +1,14 @@
-"""The whole table, and the page that shows it."""
+"""The whole table, and the page that sums it up."""
 
 from __future__ import annotations
 
+import csv
+import io
 import json
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import NamedTuple
 
 from validation import (
     beams,
@@ -25,64 +28,14 @@ from validation.row import Row, row
 
 ROOT = Path(__file__).resolve().parent.parent.parent
 PAGE = ROOT / "docs" / "validation.md"
-
-#: Title of each part, and what makes its rows.
-PARTS: dict[str, Callable[[], list[Row]]] = {
-    "KARL, a limb on two strokes": linkages.karl,
-    "The leg of HyQ": linkages.leg,
-    "Masses and inertias by least squares": inertial.reference,
-    "A hydraulic servo-cylinder": hydraulics.rig,
-    "Oil and valve of a cylinder by least squares": oil.least_squares,
-    "A Maxwell element from records": maxwell_narx.rows,
-    "The HyL leg stands and falls": hyl.reference,
-    "The HyL leg beside a solution without vpm": hyl.witnessed,
-    "Stiffness and damping from loops and landings": impedance.rows,
-    "Vibrations of beams": beams.frequencies,
-    "Beams at rest": beams.statics,
-    "A two-link arm about its rest": beams.two_links,
-    "Spinning up a flexible arm": motions.spinning,
-    "A soft pendulum falls": motions.falling,
-    "A two-link arm in motion": motions.two_links,
-    "TUDOR at rest": tudor.static,
-    "TUDOR in motion": tudor.dynamic,
-    "TUDOR, the published table": tudor.published,
-    "A carton and a fingertip": studies.printed,
-    "A panel that bends, a curved bar and a ball on a layer": studies.solved,
-    "Parameters of the examples from noisy logs": identification.recovered,
-}
-
-_HEAD = """# Validation
-
-What vpm computes beside numbers that it did not make: closed forms, published values, converged solutions of other
-codes. Every row is a test (`tests/project/test_validation.py`, those of the last part
-`crates/vpm-core/tests/all/validation`); `make validation` computes all of them anew and writes this page. A row that
-stands for several numbers shows the one that comes nearest to its tolerance.
-"""
-
-#: Reference values that no row can stand for, each with the reason.
-_UNCOMPUTED = {
-    "`tudor.merit.static_fit`, `.first_mode`, `.scale`": "of a public record that is not part of the repository; "
-    "`tests/beams/test_merit.py` compares them where it is at hand",
-    "`narx.reported.sigma`": "of a record that nobody else has",
-    "`ident.table5_2.stiffness`": "measured on the leg, and 2.2 and 2.6 times as stiff at twice the gain; a "
-    "controller's `P / l^2` is twice, see `ident.stiffness_from_gain`",
-    "`ident.table5_3.Kv_hip`, `.beta_hip`": "of records that nobody else has; what such a regression finds where the "
-    "truth is known: `oil.compliance`, `oil.flow_gain`",
-}
-
-_COLUMNS = (
-    "| what | vpm | reference | unit | difference | allowed | source |\n| --- | --- | --- | --- | --- | --- | --- |\n"
-)
+TABLE = PAGE.with_suffix(".csv")
 
 
-def wrong(part: str) -> list[str]:
-    """Rows of a part that are off by more than is allowed, or stand on no page."""
-    rows, text = PARTS[part](), PAGE.read_text(encoding="utf-8")
-    if not rows:
-        return [f"{part}: no row"]
-    off = [f"{each.name}: {each.error:.3g} times what is allowed" for each in rows if not each.error <= 1.0]
-    missing = [each.name for each in rows if f"| {each.name}" not in text]
-    return off + [f"{name} stands on no page: run make validation" for name in missing]
+class Part(NamedTuple):
+    """What makes the rows of a part, and what they stand beside."""
+
+    make: Callable[[], list[Row]]
+    against: str
 
 
 def core_rows() -> list[Row]:
@@ -98,12 +51,120 @@ def core_rows() -> list[Row]:
     ]
 
 
-def page() -> str:
+#: The parts that Python can make, by their titles.
+PARTS = {
+    "KARL, a limb on two strokes": Part(linkages.karl, "published strokes and counts; other code"),
+    "The leg of HyQ": Part(linkages.leg, "published shares; three derivations; other code"),
+    "Masses and inertias by least squares": Part(inertial.reference, "published masses; regrouping by hand"),
+    "A hydraulic servo-cylinder": Part(hydraulics.rig, "closed forms; Radau method at 1e-10"),
+    "Oil and valve of a cylinder by least squares": Part(oil.least_squares, "closed forms; LSODA at 1e-10"),
+    "A Maxwell element from records": Part(maxwell_narx.rows, "closed form of its equation"),
+    "The HyL leg stands and falls": Part(hyl.reference, "closed forms; other code"),
+    "The HyL leg beside a solution without vpm": Part(hyl.witnessed, "Kane's equations, DOP853 at 1e-10"),
+    "Stiffness and damping from loops and landings": Part(impedance.rows, "closed forms; DOP853 at 1e-11"),
+    "Vibrations of beams": Part(beams.frequencies, "frequency equations; converged series"),
+    "Beams at rest": Part(beams.statics, "elliptic integrals; closed forms; converged series"),
+    "A two-link arm about its rest": Part(beams.two_links, "converged series"),
+    "Spinning up a flexible arm": Part(motions.spinning, "two codes, converged; closed form"),
+    "A soft pendulum falls": Part(motions.falling, "two codes, converged; conservation of energy"),
+    "A two-link arm in motion": Part(motions.two_links, "converged series, 240 samples"),
+    "TUDOR at rest": Part(tudor.static, "closed forms; other code"),
+    "TUDOR in motion": Part(tudor.dynamic, "other code"),
+    "TUDOR, the published table": Part(tudor.published, "published strains; a factor and a swing sought for them"),
+    "A carton and a fingertip": Part(studies.printed, "published constants and means"),
+    "A panel that bends, a curved bar and a ball on a layer": Part(studies.solved, "elastica; Golovin; Dimitriadis"),
+    "Parameters of the examples from noisy logs": Part(identification.recovered, "truth, within three deviations"),
+}
+#: All parts of the page.
+ALL = PARTS | {
+    "Derivations, conservation and convergence in the core": Part(
+        core_rows, "Lagrange's equations; differences; conservation; orders of methods; closed forms"
+    )
+}
+
+
+def wrong(part: str) -> list[str]:
+    """Rows of a part that are off by more than is allowed, or do not stand in the table as it is written."""
+    rows = PARTS[part].make()
+    if not rows:
+        return [f"{part}: no row"]
+    off = [f"{each.name}: {each.error:.3g} times what is allowed" for each in rows if not each.error <= 1.0]
+    lines = {line["what"] for line in written() if line["part"] == part}
+    changed = lines.symmetric_difference(each.name for each in rows)
+    return off + [f"{name} is in the table or among the rows alone: run make validation" for name in sorted(changed)]
+
+
+def written() -> list[dict[str, str]]:
+    """The table as it is written."""
+    with TABLE.open(encoding="utf-8", newline="") as file:
+        return list(csv.DictReader(file))
+
+
+_HEAD = """# Validation
+
+With this page you can look up how far vpm is from numbers that it did not make: closed forms, published values and
+converged solutions of other codes. `make validation` computes all of them and writes the page.
+[validation.csv](validation.csv) has every quantity with its unit, tolerance and source. Each one is a test
+(`tests/project/test_validation.py`; the last part in `crates/vpm-core/tests/all/validation`).
+
+*Nearest* is the quantity of a part that comes nearest to its tolerance; *allowed* is that tolerance, absolute or
+relative (*rel.*) to the reference. Sections, equations and tables are those of M. D'Imperio's PhD thesis (2016).
+"""
+#: Reference values that no row can stand for, each with the reason.
+_UNCOMPUTED = {
+    "`tudor.merit.static_fit`, `.first_mode`, `.scale`": "the public record is not part of the repository; "
+    "`tests/beams/test_merit.py` compares them where it is at hand",
+    "`narx.reported.sigma`": "the record is not public",
+    "`ident.table5_2.stiffness`": "measured on the leg, 2.2 and 2.6 times as stiff at twice the gain; `P / l^2` of a "
+    "controller is twice (`ident.stiffness_from_gain`)",
+    "`ident.table5_3.Kv_hip`, `.beta_hip`": "the records are not public; where the truth is known see "
+    "`oil.compliance`, `oil.flow_gain`",
+}
+
+_SUMMARY = """
+| part | values | against | nearest | difference | allowed |
+| --- | --- | --- | --- | --- | --- |
+"""
+_PUBLISHED = """
+## Published values
+
+| what | vpm | published | allowed | where |
+| --- | --- | --- | --- | --- |
+"""
+_WITHOUT = """
+## Reference values that are not compared
+
+| what | why |
+| --- | --- |
+"""
+
+
+def page(rows: Mapping[str, list[Row]]) -> str:
     """Text of the page."""
-    parts = [_HEAD]
-    for title, make in {**PARTS, "Derivations, conservation and convergence in the core": core_rows}.items():
-        rows = make()
-        parts.append(f"## {title}\n\n{_COLUMNS}" + "\n".join(each.markdown() for each in rows) + "\n")
-    reasons = "\n".join(f"| {what} | {why} |" for what, why in _UNCOMPUTED.items())
-    parts.append(f"## Reference values without a row\n\n| what | why |\n| --- | --- |\n{reasons}\n")
-    return "\n".join(parts)
+    lines = [_HEAD, _SUMMARY]
+    for title, each in rows.items():
+        worst, count = max(each, key=lambda one: one.error), sum(one.found.size for one in each)
+        cells = (title, str(count), ALL[title].against, f"`{worst.name}`", worst.difference, worst.allowed)
+        lines.append(_line(*cells))
+    lines.append(_PUBLISHED)
+    for found in (one for each in rows.values() for one in each if one.source.startswith("published")):
+        where = found.source.removeprefix("published: ").partition(";")[0]
+        reference = found.reference if found.unit == "1" else f"{found.reference} {found.unit}"
+        lines.append(_line(f"`{found.name}`", found.shown, reference, found.allowed, where))
+    return "".join([*lines, _WITHOUT, *(_line(what, why) for what, why in _UNCOMPUTED.items())])
+
+
+def table(rows: Mapping[str, list[Row]]) -> str:
+    """All quantities as comma-separated values; of a list the number that is nearest to its tolerance."""
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(("part", "what", "values", "vpm", "reference", "unit", "difference", "allowed", "source"))
+    for title, each in rows.items():
+        writer.writerows(
+            (title, r.name, r.found.size, r.shown, r.reference, r.unit, r.difference, r.allowed, r.source) for r in each
+        )
+    return text.getvalue()
+
+
+def _line(*cells: str) -> str:
+    return "| " + " | ".join(cells) + " |\n"
