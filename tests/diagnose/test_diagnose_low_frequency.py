@@ -1,4 +1,4 @@
-"""The slow part of a residual, and what a bound lets a candidate do in screening."""
+"""The low-frequency part of a residual, and what a bound lets a candidate do in screening."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 from vpm import Experiment, Model
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Candidate, candidates
-from vpm.discrepancy.low_frequency import AVERAGED, has_impacts, slow
+from vpm.discrepancy.low_frequency import AVERAGED, has_impacts, low_frequency
 from vpm.discrepancy.screening import Baseline, probe
 from vpm.identify import InverseDynamicsProblem
 
@@ -69,12 +69,12 @@ def test_asymmetric_friction_is_screened_with_a_change_of_direction_as_sharp_as_
     assert found.values["axis.friction.coulomb_difference"] == pytest.approx(0.8, rel=0.1)
 
 
-def test_what_is_slow_keeps_what_lasts_and_loses_what_is_over_soon(problem: InverseDynamicsProblem) -> None:
+def test_low_frequencies_keep_what_lasts_and_loses_what_is_over_soon(problem: InverseDynamicsProblem) -> None:
     block = problem.blocks[0]
     lasting = np.sin(2.0 * np.pi * 0.2 / AVERAGED * block.time)
     short = np.sin(2.0 * np.pi * 2.5 / AVERAGED * block.time)
     middle = slice(block.time.size // 4, 3 * block.time.size // 4)
-    kept = slow(problem, lasting + short)[middle]
+    kept = low_frequency(problem, lasting + short)[middle]
     assert np.std(kept) == pytest.approx(np.std(lasting[middle]) * np.sinc(0.2) ** 2, rel=0.05)
 
 

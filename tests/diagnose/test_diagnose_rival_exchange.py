@@ -148,8 +148,8 @@ def test_what_is_late_is_chosen_again_beside_effects_that_came_later(
     data = SimpleNamespace(training=SimpleNamespace(motions=[SimpleNamespace(dt=1e-3)]))
     asked = list[list[SimpleNamespace]]()
 
-    def choose(believed: list[SimpleNamespace], _: object) -> SimpleNamespace:
-        asked.append(believed)
+    def choose(supported: list[SimpleNamespace], _: object) -> SimpleNamespace:
+        asked.append(supported)
         return SimpleNamespace(trial=right)
 
     for name, instead in {

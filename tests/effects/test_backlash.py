@@ -1,4 +1,4 @@
-"""Play between motor and load, found along the motion of the motor alone; the machine is written out here."""
+"""Backlash between motor and load, found along the motion of the motor alone; the machine is written out here."""
 
 from __future__ import annotations
 

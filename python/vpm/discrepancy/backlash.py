@@ -67,7 +67,7 @@ def is_read_off(model: Model, data: InverseDynamicsProblem, candidate: Candidate
     return candidate.effect.has_play and measured and not (bends(model) or has_own_drives(model))
 
 
-def believed(model: Model, nominal: Model, free: Sequence[str]) -> Model:
+def near_prior(model: Model, nominal: Model, free: Sequence[str]) -> Model:
     """The model with the parameters of the nominal one, if the recalibration moved any of these beyond its prior.
 
     A backlash looks like a load that comes and goes; a fit without it may make a body weightless, along which nothing
@@ -84,8 +84,8 @@ def believed(model: Model, nominal: Model, free: Sequence[str]) -> Model:
 
 def only_compliant(model: Model, site: str, data: InverseDynamicsProblem) -> str:
     """Why a fitted play is none, or "": under the effort its contacts give way further than the link flies."""
-    play = next(effect.parameter_names for effect in model.effects if effect.type.has_play and effect.at == site)
-    gap, stiffness = (model.parameters[play[name]] for name in ("gap", "stiffness"))
+    names = next(effect.parameter_names for effect in model.effects if effect.type.has_play and effect.at == site)
+    gap, stiffness = (model.parameters[names[name]] for name in ("gap", "stiffness"))
     if site not in data.joints:
         return ""
     effort = max(data.efforts(record)[data.joints.index(site)].scale for record in range(len(data.motions)))

@@ -65,27 +65,27 @@ class Accepted:
         return bool(np.isfinite(self.evidence))
 
 
-def choose(believed: Sequence[Trial], data: Data) -> Accepted:
+def choose(supported: Sequence[Trial], data: Data) -> Accepted:
     """The candidate that leaves least for its numbers; of those that are as good, the best simulation.
 
     One that refines another only takes its place if it leaves less than ``REFINED`` of what that leaves.
     """
-    first = min(believed, key=cost)
-    plain = [t for t in believed if _plainer(t, first)]
+    first = min(supported, key=cost)
+    plain = [t for t in supported if _plainer(t, first)]
     first = min(plain, key=cost) if plain else first
-    equals = [t for t in believed if _as_good(t, first)]
-    chosen = _late_or_slow(preferred_sensor(_first_named(equals), equals, data), believed, data)
+    equals = [t for t in supported if _as_good(t, first)]
+    chosen = _late_or_slow(preferred_sensor(_first_named(equals), equals, data), supported, data)
     return Accepted(chosen, tuple(t.probe.candidate.label for t in equals if t is not chosen))
 
 
-def _late_or_slow(chosen: Trial, believed: Sequence[Trial], data: Data) -> Trial:
+def _late_or_slow(chosen: Trial, supported: Sequence[Trial], data: Data) -> Trial:
     """Of delay, lag and slow spool, where several would do: what the reference tells from the others, else the delay.
 
     A delay shifts in time; a lag does so too and weakens what is fast, which has to be seen.
     """
     if not _late(chosen):
         return chosen
-    alike = [t for t in believed if _left(t) <= SAME * _left(chosen)]
+    alike = [t for t in supported if _left(t) <= SAME * _left(chosen)]
     kinds = [[t for t in alike if _late(t) == kind] for kind in KINDS]
     rest = [min(kind, key=_evidence) for kind in kinds if kind]
     best, runs = rest.pop(0), Runs(data)

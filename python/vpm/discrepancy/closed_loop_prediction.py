@@ -29,15 +29,15 @@ from vpm.simulate import Setup
 Array = NDArray[np.float64]
 Spectra = list[NDArray[np.complex128]]
 
-#: Steps of the integration in one delay or lag, those beside dry friction, of which a step blurs when it lets go, and
-#: most of them in one sampling interval: both times may be shorter than that, and an error of steps is as small a
-#: difference as theirs.
+#: Steps of the integration in one delay or lag, those beside dry friction, where a step blurs the break-away, and at
+#: most in one sampling interval. Delay and lag may be shorter than an interval, and the error of steps has to be
+#: smaller than their difference.
 STEPS, DRY_STEPS, MOST_STEPS = 3, 10, 10
 #: Tapered share of each record; frequencies left out at the low end, where a record is one slope.
 TAPERED, LOWEST = 0.1, 2
 #: The spectrum of noise is the mean over this share of the frequencies, and over so many at least.
 SMOOTHED, FEWEST = 1.0 / 60.0, 15
-#: Share of the power of each reading that is taken for its own, so that readings that agree in all can be told apart.
+#: Share of the power of each reading that is taken for its own, so that identical readings stay distinct.
 ALIKE = 1e-6
 #: Times that the spectrum is taken again from what is left.
 ROUNDS = 3
@@ -250,8 +250,8 @@ def _with_slopes(
     known = beside.free if beside is not None and len(beside.slopes) == len(left) else ()
     coarse = OutputErrorProblem(model, problem.experiments, "closed_loop", setup=setup)
     slopes = np.zeros((len(left), len(free)))
-    asked = [place for place, name in enumerate(free) if name not in known]
-    _, slopes[:, asked] = coarse.evaluate(model, model.theta, [model.index(free[place]) for place in asked])
+    unknown = [place for place, name in enumerate(free) if name not in known]
+    _, slopes[:, unknown] = coarse.evaluate(model, model.theta, [model.index(free[place]) for place in unknown])
     for place, name in enumerate(free):
         if beside is not None and name in known:
             slopes[:, place] = beside.slopes[:, beside.free.index(name)]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vpm.discrepancy.candidates import joint_at
 from vpm.discrepancy.closed_loop_delay import gain_in_closed_loop, timed_in_closed_loop
 from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction
-from vpm.discrepancy.low_frequency import has_impacts, slow
+from vpm.discrepancy.low_frequency import has_impacts, low_frequency
 from vpm.discrepancy.motion_only import CREEPING, Timed, is_dry, is_late
 from vpm.discrepancy.screening import Alias, Baseline, Probe, size_is_clear
 from vpm.discrepancy.starting import nearer_start
@@ -45,7 +45,7 @@ FAR_AWAY = 1e3
 #: is there gains most in the first.
 FEW_EVALUATIONS = 6
 #: A refit that has lowered the training error by less than this share of its mean square in so many evaluations, and
-#: hardly goes on, is ended: ten times as much is asked of it on validation data.
+#: hardly goes on, ends early: validation data have to show ten times as much.
 SLOW_GAIN, SLOW_EVALUATIONS = 0.01, 10
 #: Of two candidates, one that leaves so many times what the other leaves is not the one that comes in.
 HOPELESS = 10.0
@@ -109,17 +109,17 @@ class Trial:
     away : Gain or None
         The validation gain away from reversals, for an effect of a drive or an instrument, or a compliant joint, on
         a machine with dry friction.
-    slow : Gain or None
-        The validation gain of the slow part, where a backlash is in the model already; None elsewhere.
+    low_frequency : Gain or None
+        The validation gain of the low-frequency part, where a backlash is in the model already; None elsewhere.
     diverged : str
         Why the simulation of the validation records stopped, or "".
     clear : bool
         Whether the effect's size differs from zero on the training data.
-    alone : bool
+    from_prediction : bool
         Whether the gains are those of closed-loop predictions, where the residual hardly shows them.
-    gap : float
+    error : float
         Largest share of its signal that the model without the effect leaves of a validation channel.
-    asked : bool
+    supported : bool
         Whether closed-loop predictions support it too, so that little that is sure is enough.
     here : Gain or None
         The validation gain of the effort on the joint where the effect acts, if nothing is lost elsewhere.
@@ -135,10 +135,10 @@ class Trial:
     away: Gain | None
     diverged: str
     clear: bool
-    slow: Gain | None = None
-    alone: bool = False
-    gap: float = 0.0
-    asked: bool = False
+    low_frequency: Gain | None = None
+    from_prediction: bool = False
+    error: float = 0.0
+    supported: bool = False
     here: Gain | None = None
 
     @property
@@ -229,11 +229,11 @@ def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) ->
         origin = None if origin is None else judged.model.theta
         judged, diverged = judged_anyhow(judged.model, free, data, bounds, origin, worth)
     own = free[len(current.free) :]
-    timed, alone = _timed(current, judged, data, probe)
+    timed, prediction = _timed(current, judged, data, probe)
     if timed is not None:
         judged, diverged = judged_anyhow(judged.model, free, data, {**bounds, **timed.bounds}, origin)
     trial = measured(current, data, probe, judged, own, (*doubtful, *held), timed, diverged)
-    return _witnessed(trial, current, alone, data)
+    return _witnessed(trial, current, prediction, data)
 
 
 def finished(current: Judged, data: Data, trial: Trial) -> Trial:
@@ -269,8 +269,8 @@ def measured(
         timed.validation if timed is not None else _away_gain(current, judged, data.validation, probe),
         diverged,
         is_clear(judged, own),
-        _slow_gain(current, validation, data.validation),
-        gap=max(share for _, share, _ in gaps(data.validation, current.validation).values()),
+        _low_frequency_gain(current, validation, data.validation),
+        error=max(share for _, share, _ in gaps(data.validation, current.validation).values()),
         here=_where_it_acts(current, validation, data.validation, probe.candidate.site),
     )
 
@@ -379,10 +379,10 @@ def _simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:
     return gain(current.simulated, judged.simulated, segments(data.simulation))
 
 
-def _slow_gain(current: Judged, validation: Array, data: InverseDynamicsProblem) -> Gain | None:
+def _low_frequency_gain(current: Judged, validation: Array, data: InverseDynamicsProblem) -> Gain | None:
     if not has_impacts(current.model):
         return None
-    return gain(slow(data, current.validation), slow(data, validation), segments(data))
+    return gain(low_frequency(data, current.validation), low_frequency(data, validation), segments(data))
 
 
 def _timed(
@@ -395,19 +395,19 @@ def _timed(
     return timed_in_closed_loop(before, late, data.training, data.validation, data.simulation, judged.bounds)
 
 
-def _witnessed(trial: Trial, current: Judged, alone: ClosedLoopPrediction | None, data: Data) -> Trial:
+def _witnessed(trial: Trial, current: Judged, prediction: ClosedLoopPrediction | None, data: Data) -> Trial:
     """A trial; of something late that makes simulations worse those count in which each model suits its own run."""
-    if alone is None or data.simulation is None or trial.simulated is None or trial.simulated.relative >= 0.0:
+    if prediction is None or data.simulation is None or trial.simulated is None or trial.simulated.relative >= 0.0:
         return trial
-    gained = gain_in_closed_loop(current.model, current.free, alone, data.simulation)
+    gained = gain_in_closed_loop(current.model, current.free, prediction, data.simulation)
     return trial if gained is None else replace(trial, simulated=gained)
 
 
 def _away_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem, probe: Probe) -> Gain | None:
     """Gain on samples at which every joint is clearly in motion.
 
-    Where a joint with dry friction turns round it sticks for a while, which no smooth law follows, and a late drive or
-    sensor imitates that, or a spring in the joint that deflects meanwhile; elsewhere they cannot.
+    At a reversal a joint with dry friction sticks for a while, which no smooth law follows. A delay or a joint
+    compliance imitates that there, and nowhere else.
     """
     imitates = probe.candidate.effect.site in {"actuator", "sensor"} or probe.candidate.effect.winds_up
     if not is_dry(current.model) or not imitates:
@@ -416,8 +416,8 @@ def _away_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem, pr
     speeds = [np.abs(data.state(record)[1]) for record in range(len(data.motions))]
     largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
     for record, speed in enumerate(speeds):
-        slow = (speed < CREEPING * largest).any(axis=1)
-        near = slow | np.append(slow[1:], False) | np.insert(slow[:-1], 0, False)
+        creeping = (speed < CREEPING * largest).any(axis=1)
+        near = creeping | np.append(creeping[1:], False) | np.insert(creeping[:-1], 0, False)
         for block in data.efforts(record):
             counted[block.samples] = ~near
     return gain(current.validation * counted, judged.validation * counted, segments(data))
@@ -481,9 +481,9 @@ def _release(
 def is_clear(judged: Judged, own: tuple[str, ...]) -> bool:
     """Whether an effect's linear parameters (its size) differ from zero together, for the shape that was found.
 
-    Size and shape of a law often make up for each other (a friction close to rest that is higher and fades sooner), and
-    where there is no size, there is no shape to be uncertain of. The size of a backlash is its width, however hard its
-    contacts are: what is as hard as rigid has a stiffness that no data bound from above.
+    Size and shape of a law often compensate each other, such as a higher friction close to rest that fades sooner. A
+    law without size has no uncertain shape. The size of a backlash is its width, however hard its contacts are: what is
+    as hard as rigid has a stiffness that no data bound from above.
     """
     widths = {effect.parameter_names["gap"] for effect in judged.model.effects if effect.type.has_play}
     size = [n for n in own if n in widths]

@@ -85,10 +85,10 @@ def _harder(final: Judged, entry: Accepted, data: Data, each: SideBySide) -> Jud
     )
     better = [run for run in fitted if not isinstance(run, Failure)]
     balanced = [_balanced(final, run, names, key, ratio, data) for run in better for ratio in SWALLOWING]
-    believed = [
+    supported = [
         one for one in balanced if one is not None and _better(final, one, data) and _predicts_better(before, one, runs)
     ]
-    return min(believed, key=lambda one: float(one.fit.residual @ one.fit.residual), default=final)
+    return min(supported, key=lambda one: float(one.fit.residual @ one.fit.residual), default=final)
 
 
 def beginnings(records: Sequence[Experiment]) -> list[Experiment]:

@@ -30,15 +30,14 @@ class Stage:
 def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
     """Backward elimination: drop every earlier effect without which the model predicts the validation data as well.
 
-    Where a parameter of a later effect was held because the data show it only together with one of the earlier effect,
-    it is set free for the trial: a spring whose rest was held beside a constant force needs that force no more if it
-    may rest elsewhere. One name for what two would say is the shorter answer. So is it where a size was held, as that
-    of a difference of dry friction beside a constant force, which are one in motion: with the later effect sure, its
-    own size does that work. Where neither size has work to do beside it, these data do not tell, and both names stay.
-    What closed-loop predictions show is not judged by the residual, which hardly shows it.
+    A parameter of a later effect may have been held because the data show it only together with the earlier effect. It
+    is set free for the trial: a spring that may rest elsewhere needs no constant force beside it. One name for what two
+    would say is the shorter answer. The same holds for a size, such as a difference of dry friction beside a constant
+    force, which are one effect in motion. Where neither size has work to do beside it, these data do not tell, and both
+    names stay. What closed-loop predictions show is not judged by the residual, which hardly shows it.
     """
     newest = accepted[-1]
-    for entry in (one for one in accepted[:-1] if not one.trial.alone):
+    for entry in (one for one in accepted[:-1] if not one.trial.from_prediction):
         current = stages[-1].judged
         own = set(entry.trial.parameters)
         freed = {alias.parameter for other in accepted for alias in other.trial.held if alias.partner in own}

@@ -32,8 +32,8 @@ def filters(
     Parameters
     ----------
     model : Model
-        Links that bend and drives with states of their own answer to the whole motion, with noise that rings in them:
-        for these, and where ``cutoff`` is given, the band is all that the motion filter leaves alone.
+        Flexible links and drives with states respond to the whole motion, and noise rings in them. For these, and where
+        ``cutoff`` is given, the band is that of the motion filter.
     training : InverseDynamicsProblem
         With the cut-off frequencies that suit each record.
     cutoff : float or None

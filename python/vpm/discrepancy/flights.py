@@ -45,10 +45,10 @@ def flights(
 ) -> Array:
     """What backlashes would add to the residual, shape (n, backlashes).
 
-    Law: within the gap the link feels none of the effort that the motion passes on; beyond it a spring and a damper
-    hold it, ``y'' = pull - w^2 (y -+ gap/2) - 2 z w y'`` with ``w = 2 pi frequency`` and the damping ratio z, stepped
-    with the damping at the new velocity, which is stable up to ``w`` times the interval of 2.
-    Source: dead-zone model of Nordin and Gutman, Automatica 38(10), 2002, section 2.
+    Law: within the gap no effort is transmitted to the link. Beyond it a spring and a damper hold it, ``y'' = pull -
+    w^2 (y -+ gap/2) - 2 z w y'``, with ``w = 2 pi frequency`` and the damping ratio z. Steps take the damping at the
+    new velocity, which is stable up to ``w`` times the interval of 2. Source: dead-zone model of Nordin and Gutman,
+    Automatica 38(10), 2002, section 2.
 
     Parameters
     ----------

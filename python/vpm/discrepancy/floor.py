@@ -30,12 +30,11 @@ def noise_floor(
 ) -> dict[str, float]:
     """Root mean square that would remain in the residual of the right model, by channel.
 
-    The larger of two. The first is known beforehand: the model runs the records by itself, in closed loop where that is
-    possible, and its own log, with noise of the size estimated from the measured one, is balanced like that one; what
-    remains is noise and the error of filters and steps. Where the model cannot run them so, noise is added to the
-    measured motion once more, and what that changes is taken. The second comes from the residual: what is white in it,
-    such as the ripple of a drive that shows in no channel (see `white_level`), or what was white before a drive with
-    states summed it up (see `noise_shapes`).
+    The larger of two. The first is known beforehand. The model predicts the records, in closed loop where that is
+    possible, and noise of the measured size is added. The residual of that log is noise and the error of filters and
+    steps. Where the model cannot run them so, noise is added to the measured motion once more, and what that changes is
+    taken. The second comes from the residual: its white part, such as the ripple of a drive that no channel shows (see
+    `white_level`), or noise that was white before a drive with states integrated it (see `noise_shapes`).
 
     Parameters
     ----------
@@ -81,7 +80,7 @@ def white_level(residual: Array, moving: Array, shape: Array | None = None) -> f
     moving : ndarray, shape (n,)
         1 where it counts.
     shape : ndarray, optional
-        Of noise that is coloured on its way, see `noise_shapes`; then the size of that is meant.
+        Of noise whose spectrum is not flat, see `noise_shapes`; then the size of that is meant.
     """
     n = residual.size
     count = float(np.count_nonzero(moving))

@@ -1,10 +1,10 @@
 """A sparse formula for what is left: which few terms of the library of empirical forces describe a residual.
 
-Forward selection: of all terms at all joints the one that takes most per number from the training residual comes next,
-every time together with the parameters that are free already, so that no term is credited with what a better mass
-would have done; a term stays only if it predicts parts of the training records that were left out (S. Chen, S. Billings
-and W. Luo, "Orthogonal least squares methods and their application to non-linear system identification", *Int. J.
-Control* 50, 1989, with cross-validation in place of their error reduction ratio). The validation records take no part.
+Forward selection: of all terms at all joints the one that explains most of the training residual per number comes next.
+It is fitted together with the parameters that are free already, so that it gains nothing that a better mass would
+explain. A term stays only if it predicts parts of the training records that were left out (S. Chen, S. Billings and W.
+Luo, "Orthogonal least squares methods and their application to non-linear system identification", *Int. J. Control* 50,
+1989, with cross-validation in place of their error reduction ratio). The validation records take no part.
 """
 
 from __future__ import annotations

@@ -54,9 +54,9 @@ def forward_step(found: Search, data: Data, each: SideBySide) -> Search:
     before = predicted(found.final, data) if promising else None
     if before is None:
         return found
-    asked = each("one effect more: running", partial(_run, found, data, before), promising, lambda p: p.candidate.label)
+    tried = each("one effect more: running", partial(_run, found, data, before), promising, lambda p: p.candidate.label)
     least = criterion(before) - WORTH_A_FIT
-    worth = [one for one in asked if isinstance(one, _Predicted) and criterion(one.run) < least]
+    worth = [one for one in tried if isinstance(one, _Predicted) and criterion(one.run) < least]
     first = fitted_prediction(before, data) if worth else None
     if first is None:
         return found
@@ -142,11 +142,11 @@ def _sprung(found: Search, data: Data, before: ClosedLoopPrediction, probe: Prob
     return predicted(replace(found.final, model=model, free=free), data)
 
 
-def _accepted(found: Search, data: Data, asked: _Predicted, comparison: Comparison) -> Accepted | None:
+def _accepted(found: Search, data: Data, tried: _Predicted, comparison: Comparison) -> Accepted | None:
     """The effect with its refit near the values of the predictions, and with the gain of these."""
     final, run = found.final, comparison.run
     own = tuple(name for name in run.free if name not in final.free)
-    bounds, values = dict(final.bounds if asked.trial is None else asked.trial.judged.bounds), {}
+    bounds, values = dict(final.bounds if tried.trial is None else tried.trial.judged.bounds), {}
     for name in own:
         value, std = run.estimated(name)
         if not np.isfinite(std):  # a dead zone that swallows every command, for instance: nothing says how wide it is
@@ -155,16 +155,18 @@ def _accepted(found: Search, data: Data, asked: _Predicted, comparison: Comparis
         bounds[name] = max(parameter.minimum, value - WITHIN * std), min(parameter.maximum, value + WITHIN * std)
         values[name] = float(np.clip(value, *bounds[name]))
     known = {name: final.model.parameters[name].value for name in final.free}
-    model = run.model.with_parameters(known) if asked.trial is None else asked.trial.judged.model
+    model = run.model.with_parameters(known) if tried.trial is None else tried.trial.judged.model
     try:
-        trial = asked.trial or confirm(final, data, asked.probe)
+        trial = tried.trial or confirm(final, data, tried.probe)
         judged = judge(model.with_parameters(values), (*final.free, *own), data, bounds)
     except VpmError:
         return None
     judged_by_prediction = replace(
         trial, judged=judged, training=comparison.training, validation=comparison.validation, simulated=None, away=None
     )
-    return Accepted(replace(judged_by_prediction, parameters=own, held=(), clear=True, alone=True, diverged=""), ())
+    return Accepted(
+        replace(judged_by_prediction, parameters=own, held=(), clear=True, from_prediction=True, diverged=""), ()
+    )
 
 
 def _added(found: Search, more: Accepted) -> Search:

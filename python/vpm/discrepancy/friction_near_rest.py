@@ -46,14 +46,14 @@ SIZES = (0.1, 0.4, 1.6)
 
 
 @dataclass(frozen=True)
-class Asked:
+class Support:
     """What records say of the change from one run of a model to another.
 
     Attributes
     ----------
     training, validation : Gain
-        Of what the run without the effect leaves, relative to the noise at each frequency; the weight is the share of
-        the change that the records support beside all parameters that are known without it.
+        Of what the run without the effect leaves, relative to the noise at each frequency; the weight is the supported
+        share of the change, beside all parameters without it.
     run : ClosedLoopPrediction
         With the effect, fitted to the training records.
     """
@@ -101,13 +101,13 @@ def judged_by_prediction(
         Of the candidate.
     """
     trial = confirm(current, data, probe)
-    answer = asked(before, trial, data)
+    answer = support_of(before, trial, data)
     if answer is None:
         return "in closed-loop predictions it does not fit the training records better"
     return _refused(answer, probe, thresholds) or _fitted_trial(current, trial, answer, data)
 
 
-def _refused(answer: Asked, probe: Probe, thresholds: Thresholds) -> str:
+def _refused(answer: Support, probe: Probe, thresholds: Thresholds) -> str:
     """Why friction close to rest is not accepted by its prediction, or "".
 
     The model creeps where a machine sticks, so that as much is asked of a run as of what explains a modest part only.
@@ -126,7 +126,7 @@ def _refused(answer: Asked, probe: Probe, thresholds: Thresholds) -> str:
     return ""
 
 
-def asked(before: ClosedLoopPrediction, trial: Trial, data: Data) -> Asked | None:
+def support_of(before: ClosedLoopPrediction, trial: Trial, data: Data) -> Support | None:
     """Run a model with the effect of a trial, and ask all records for the change from the run ``before`` to that.
 
     None if there is no such run that fits the training records better.
@@ -147,14 +147,13 @@ def asked(before: ClosedLoopPrediction, trial: Trial, data: Data) -> Asked | Non
         pair = [predict(run.model, run.free, data.validation.experiments, setup) for run in (before, best)]
     except VpmError:
         return None
-    return Asked(gain_of_predictions(before, best), gain_of_predictions(*pair), best)
+    return Support(gain_of_predictions(before, best), gain_of_predictions(*pair), best)
 
 
 def is_supported(before: ClosedLoopPrediction, trial: Trial, data: Data, thresholds: Thresholds) -> bool:
     """Whether closed-loop predictions of validation records support an effect of the size that the residual says.
 
-    The run along the training records is no witness of it: a friction that is not quite that of the machine has been
-    fitted to these, and may have taken a part of what is late.
+    Training records do not count: the friction was fitted to them and may imitate a part of the delay.
 
     Parameters
     ----------
@@ -181,7 +180,7 @@ def is_supported(before: ClosedLoopPrediction, trial: Trial, data: Data, thresho
     return LEAST_SUPPORT <= gained.weight <= 1.0 / LEAST_SUPPORT and gained.score >= thresholds.score(gained.pieces)
 
 
-def _fitted_trial(current: Judged, trial: Trial, answer: Asked, data: Data) -> Trial:
+def _fitted_trial(current: Judged, trial: Trial, answer: Support, data: Data) -> Trial:
     """The trial with its refit near the values of the predictions, and with their gain on the validation records."""
     own = [name for name in answer.run.free if name not in current.free]
     values = {name: answer.run.estimated(name) for name in own}
@@ -201,7 +200,7 @@ def _fitted_trial(current: Judged, trial: Trial, answer: Asked, data: Data) -> T
         validation=answer.validation,
         training=answer.training,
         clear=True,
-        alone=True,
+        from_prediction=True,
     )
 
 

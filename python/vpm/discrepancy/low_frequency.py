@@ -24,7 +24,7 @@ def has_impacts(model: Model) -> bool:
     return any(effect.type.has_play for effect in model.effects)
 
 
-def slow(problem: InverseDynamicsProblem, residual: Array) -> Array:
+def low_frequency(problem: InverseDynamicsProblem, residual: Array) -> Array:
     """A residual averaged over ``AVERAGED`` twice, each channel of each record by itself."""
     from scipy.ndimage import uniform_filter1d
 

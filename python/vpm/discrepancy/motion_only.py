@@ -1,10 +1,10 @@
 """Late drives and instruments, timed on samples at which every joint is clearly in motion.
 
-Where a joint with dry friction turns round it sticks for a while, and filtered samples do not say when it lets go: what
-is left of the residual there is several times what is left elsewhere, and it is late by itself. A time fitted to all
-samples comes out too long for it (twice the true delay of a stiff axis is usual), long enough to make its simulation
-worse. In clear motion friction is as smooth as the rest, so a time is fitted there, and kept within what that says when
-all the other parameters are fitted to all samples.
+At a reversal a joint with dry friction sticks for a while, and filtered samples do not show when it breaks away. The
+residual there is several times as large as elsewhere, and looks like a delay. A time fitted to all samples comes out
+too long for it (twice the true delay of a stiff axis is usual), long enough to make its simulation worse. In clear
+motion friction is as smooth as the rest, so a time is fitted there, and kept within what that says when all the other
+parameters are fitted to all samples.
 """
 
 from __future__ import annotations
@@ -81,9 +81,9 @@ def in_motion(problem: InverseDynamicsProblem) -> Array:
     largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
     counted = np.zeros(sum(block.time.size for block in problem.blocks))
     for record, (m, speed) in enumerate(zip(problem.motions, speeds, strict=True)):
-        slow = (speed < CREEPING * largest).any(axis=1)
+        creeping = (speed < CREEPING * largest).any(axis=1)
         reach = m.decimation + round(1.0 / (m.cutoff * m.dt))
-        near = maximum_filter1d(slow.view(np.uint8), 2 * reach + 1)[m.retained] > 0
+        near = maximum_filter1d(creeping.view(np.uint8), 2 * reach + 1)[m.retained] > 0
         for block in problem.efforts(record):
             counted[block.samples] = ~near
     return counted

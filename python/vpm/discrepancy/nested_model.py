@@ -75,9 +75,9 @@ def probe_beside(final: Judged, without: Judged, data: InverseDynamicsProblem, e
 def contains(rival: Judged, parameters: tuple[str, ...], final: Judged, own: tuple[str, ...]) -> bool:
     """Whether a rival can do all that an accepted effect does, and something more.
 
-    Then the effect is the rival with a number that is zero, and how far from zero the training records show it is as
-    good a witness as what it predicts: validation records, which are fewer, have to gain by it and need not be sure. Of
-    laws that are different, and of friction whose fit makes up for reversals that filters smooth, neither holds.
+    Then the effect is the rival with one number at zero. The distance of that number from zero on the training records
+    counts as evidence, so validation records, which are fewer, only have to improve. Of laws that are different, and of
+    friction whose fit makes up for reversals that filters smooth, neither holds.
 
     Parameters
     ----------

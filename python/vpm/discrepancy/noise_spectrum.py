@@ -47,8 +47,8 @@ def noise_shapes(model: Model, problem: InverseDynamicsProblem) -> tuple[Array |
     Returns
     -------
     tuple of (ndarray, shape (2, n // 2 + 1)) or None
-        For each block in its order; in units of the weighted residual squared per frequency for the first row, as large
-        as the instruments make it, and of an unknown size in the second. None where no drive colours the noise.
+        For each block in its order. The first row is the noise of the instruments, in units of the weighted residual
+        squared per frequency; the second row has an unknown scale. None where no drive colours the noise.
     """
     if not problem.shown or not has_own_drives(model):
         return (None,) * len(problem.blocks)

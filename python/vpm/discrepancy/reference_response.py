@@ -35,8 +35,8 @@ class Verdict:
         By how many standard deviations of the noise they differ along it, the smaller of both views; 0 where it cannot
         be said.
     first, second : float
-        By how many standard deviations the data ask each of them for what the other one does instead: nothing of one
-        that is right, as much as both differ of one that is wrong, with an error of one.
+        Estimated part of the rival in the error of each model, in standard deviations: zero for the right model, and
+        the whole difference of both for the wrong one, with an error of one.
     """
 
     apart: float
@@ -90,9 +90,9 @@ class Runs:
 def compare_driven(first: Judged, second: Judged, data: Data, runs: Runs | None = None) -> Verdict | None:
     """Let two models run the records by themselves, as well as each can, and ask which of them did what was measured.
 
-    Of what one model leaves, the part of the gap to its rival's run is estimated together with changes of its fitted
-    parameters: 0 of a model that is right, 1 of one whose rival is. None where one of them cannot follow its
-    references. With ``runs``, what was worked out for another comparison is known.
+    The part of the difference to the rival in the error of one model is estimated together with changes of its fitted
+    parameters: 0 for a right model, 1 if its rival is right. None where one of them cannot follow its references. With
+    ``runs``, what was worked out for another comparison is known.
     """
     runs = runs or Runs(data)
     one = runs(first)
@@ -111,8 +111,8 @@ def against(mine: ClosedLoopPrediction, rival: ClosedLoopPrediction) -> Spectra:
 def inexact(run: ClosedLoopPrediction) -> Spectra | None:
     """Transforms of the share of each reading that no model of oil is exact to; None of drives without states.
 
-    A motion of a few hertz towers above noise, and pressures answer to how a held command changes within a sample, to
-    how a valve shuts and what lines hold: that is more than what parts late from slow there.
+    A motion of a few hertz is far above noise. Pressures depend on how a held command changes within a sample, how a
+    valve shuts and how much oil pipes hold. That exceeds the difference of a delay and a lag there.
     """
     if not has_own_drives(run.model):
         return None

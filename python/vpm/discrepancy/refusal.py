@@ -24,12 +24,11 @@ WORTH_A_NAME = 0.1
 #: Below this drop most of the residual is something else, which the effect might merely imitate: the evidence then has
 #: to be this many times as strong.
 MODEST_GAIN, MODEST_FACTOR = 0.3, 3.0
-#: From this drop on, the inverse-dynamics residual decides alone on a machine of several joints: with two effects
-#: missing, the simulation of a machine that has one of them may well be worse, because errors of coupled joints had
-#: cancelled.
+#: From this drop on, the inverse-dynamics residual decides alone on a machine of several joints. With two effects
+#: missing, adding one may worsen the simulation, because errors of coupled joints had cancelled.
 CLEAR_GAIN = 0.5
-#: A delay or lag that the times of samples leave open is named from this drop on: what explains most of what was left
-#: is worth telling, be it the drive that is late or the record. Below it, sampling explains it as well.
+#: A delay or lag that the times of samples leave open is named from this drop on: it matters whether the delay is that
+#: of the drive or of the record. Below it, sampling explains it as well.
 MOST_OF_IT = 0.5
 #: Neither a residual nor an error of an instrument's gain means anything below this share of the signal: links are
 #: cut into pieces and gauges calibrated to no better.
@@ -66,9 +65,9 @@ class Thresholds:
         """Least standard deviations of validation gain, by Student's t with one degree of freedom less than pieces."""
         return float(stdtrit(max(1, pieces - 1), 1.0 - FALSE_ALARM_LEVEL / max(1, self.candidates)))
 
-    def needed(self, validation: Gain, *, asked: bool = False) -> float:
+    def needed(self, validation: Gain, *, supported: bool = False) -> float:
         """Standard deviations that a gain has to have: more where most of the residual stays and no run supports it."""
-        modest = validation.relative < MODEST_GAIN and not asked
+        modest = validation.relative < MODEST_GAIN and not supported
         return self.score(validation.pieces) * (MODEST_FACTOR if modest else 1.0)
 
     def met(self, validation: Gain) -> bool:
@@ -151,8 +150,9 @@ def refuse_timing(timed: Gain, shift: float, thresholds: Thresholds, *, beside: 
         How much later commands hold without the candidate, in sampling intervals.
     thresholds : Thresholds
     beside : float
-        The same with it. Where beside the candidate no shift matters, and beside the shift the candidate does, the two
-        are one finding with two names: that is one question, and the data answer it if they are sure at all.
+        The same with it. The shift and the candidate are one finding with two names if beside the candidate no shift
+        matters, and beside the shift the candidate does. That is one question, and the data answer it if they are
+        clear.
     """
     encompasses = beside == 0.0 and timed.relative >= LEAST_GAIN
     if thresholds.met(timed) or (encompasses and timed.score >= replace(thresholds, candidates=1).score(timed.pieces)):
@@ -173,10 +173,9 @@ def _impossible(probe: Probe, name: str) -> str:
 def _too_short(trial: Trial, interval: float) -> str:
     """A delay or lag below one sampling interval that explains little is as well a matter of how commands are logged.
 
-    The hold is that of all commands: where one of several drives, or of several joints' instruments, is late and the
-    others are not, `refuse_timing` judges it beside a shift of them all, if it explains more than an imitation would:
-    instruments are read one after the other, and links are cut into pieces. The time of a lossy link is no delay: it
-    is a share of its stiffness.
+    The hold is that of all commands. Where one of several drives or instruments has a delay and the others have none,
+    `refuse_timing` judges it beside a shift of them all, if it explains more than an imitation would. The time of a
+    lossy link is no delay: it is a share of its stiffness.
     """
     model = trial.judged.model
     site = trial.probe.candidate.effect.site
@@ -203,9 +202,9 @@ def has_peers(model: Model, site: str) -> bool:
 def _no_way(trial: Trial) -> str:
     """A hysteresis that turns round within the way of one sample is dry friction, as far as the data can see.
 
-    So is one within the way of two, unless its way is clearly longer than that of one. Where the joint's dry friction
-    is fitted beside it and it explains most of what that leaves, the data have told the two apart: joints turn round
-    slowly, and take many samples for a way that they pass in one at full speed.
+    So is one within the way of two, unless its way is clearly longer than that of one. If the joint's dry friction is
+    fitted beside it and it explains most of the remaining error, the data discriminate the two: joints reverse slowly,
+    over many samples.
     """
     candidate, bounds = trial.probe.candidate, trial.judged.bounds
     way = next((tried.parameter for tried in candidate.effect.tried if tried.sampled), None)
@@ -253,7 +252,7 @@ def _trifling_gain(trial: Trial) -> str:
     value = trial.judged.model.parameters[name].value
     if reason := _trifling_size(trial):
         return reason
-    if trial.slow is None and 0.0 <= drop < MODEST_GAIN:
+    if trial.low_frequency is None and 0.0 <= drop < MODEST_GAIN:
         return (
             f"{name} comes out as {value:.4g} and {_moves('the validation error', trial.validation, 'only ')}: "
             "an instrument is blamed where it explains more than an imitation would"
@@ -264,14 +263,14 @@ def _trifling_gain(trial: Trial) -> str:
 def _trifling_size(trial: Trial) -> str:
     """An instrument's gain that is none.
 
-    Where an effort is the small difference of large readings, as of the pressures on both sides of a piston, a gain
-    that is hardly wrong leaves a gap that is not small: one that explains most of such a gap is accepted.
+    An effort may be the small difference of large readings, as of the pressures on both sides of a piston. A small
+    error of a gain then leaves a large error of the effort; a gain that explains most of it is accepted.
     """
     if not trial.probe.candidate.effect.scales:
         return ""
     name = trial.parameters[0]
     value = trial.judged.model.parameters[name].value
-    magnified = trial.validation.relative >= CLEAR_GAIN and trial.gap > MAGNIFIED * abs(value - 1.0)
+    magnified = trial.validation.relative >= CLEAR_GAIN and trial.error > MAGNIFIED * abs(value - 1.0)
     if abs(value - 1.0) >= NEGLIGIBLE or magnified:
         return ""
     return (
@@ -300,29 +299,29 @@ def _not_clear(trial: Trial) -> str:
 
 
 def _only_impacts(trial: Trial) -> str:
-    """Beside a backlash: a law that is right helps what is slow as well, where impacts hardly show."""
-    if trial.slow is None or trial.slow.relative >= -LEAST_GAIN:
+    """Beside a backlash: a right law also helps low frequencies, where impacts hardly show."""
+    if trial.low_frequency is None or trial.low_frequency.relative >= -LEAST_GAIN:
         return ""
     return (
-        f"it {_moves('the validation error', trial.validation)} and {_moves('its slow part', trial.slow)}: "
-        "it makes up for single impacts of the backlash"
+        f"it {_moves('the validation error', trial.validation)} and "
+        f"{_moves('its low-frequency part', trial.low_frequency)}: it makes up for single impacts of the backlash"
     )
 
 
-def slow_shows_it(trial: Trial, thresholds: Thresholds) -> bool:
-    """Whether what is slow shows an effect that single impacts of a backlash cover, and does not speak alone."""
+def low_frequency_shows_it(trial: Trial, thresholds: Thresholds) -> bool:
+    """Whether low frequencies, and not they alone, show an effect that single impacts of a backlash cover."""
     validation, sure = trial.validation, NORMAL_95_ONE_SIDED
     whole = validation.relative >= LEAST_GAIN and validation.score >= sure
-    return trial.slow is not None and whole and thresholds.met(trial.slow)
+    return trial.low_frequency is not None and whole and thresholds.met(trial.low_frequency)
 
 
 def _too_little(trial: Trial, thresholds: Thresholds) -> str:
     validation = trial.there
-    if slow_shows_it(trial, thresholds):
+    if low_frequency_shows_it(trial, thresholds):
         return ""
     if validation.relative < WORTH_A_NAME:
         return f"it {_moves('the validation error', validation, 'only ')}"
-    needed = thresholds.needed(validation, asked=trial.asked)
+    needed = thresholds.needed(validation, supported=trial.supported)
     if validation.score < needed:
         return (
             f"its gain of {percent(validation.relative)} on validation data is {validation.score:.1f} standard "

@@ -31,29 +31,29 @@ def discriminated(
     """
     tried = [(place, trial) for place, rivals in enumerate(known) for trial in rivals.tried]
     interval = min(m.dt for m in data.training.motions)
-    asked = [
+    possible = [
         (place, trial)
         for place, trial in tried
         if trial.probe.candidate.key not in found.gone and _possible(trial, interval)
     ]
-    before = predicted(found.final, data) if asked else None
+    before = predicted(found.final, data) if possible else None
     if before is None:
         return found, tuple(known)
     runs = each(
         "telling apart: running",
         lambda one: predicted(one[1].judged, data) or "",
-        asked,
+        possible,
         lambda one: one[1].probe.candidate.label,
     )
     better = [
         (criterion(run), place, trial, run)
-        for (place, trial), run in zip(asked, runs, strict=True)
+        for (place, trial), run in zip(possible, runs, strict=True)
         if isinstance(run, ClosedLoopPrediction) and criterion(run) < criterion(before) - WORTH_A_FIT
     ]
     if not better:
         return found, tuple(known)
     first = fitted_prediction(before, data)
-    thresholds = Thresholds(len(asked), interval)
+    thresholds = Thresholds(len(possible), interval)
     for _, place, trial, run in sorted(better, key=lambda one: one[0]):
         second = fitted_prediction(run, data)
         comparison = None if first is None or second is None else compared(first, second, data)

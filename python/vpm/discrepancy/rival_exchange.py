@@ -82,9 +82,9 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
 def timed_again(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search, tuple[Rivals, ...]]:
     """Choose each delay or lag again among all of these, now that the other effects are known.
 
-    When it came in another effect was missing, and what that one left was blamed on the drive rather than on an
-    instrument, and was in the runs along the reference by which a delay is told from a lag. One that came in last was
-    chosen beside all the others already.
+    When it came in, another effect was missing. The error of that one was attributed to the drive rather than to an
+    instrument, and disturbed the predictions that discriminate a delay from a lag. One that came in last was chosen
+    beside all the others already.
     """
     thresholds = _thresholds(known, data)
     for place, entry in enumerate(found.accepted):
@@ -165,8 +165,8 @@ def exchanged(
 def in_order(found: Search, known: Sequence[Rivals]) -> tuple[Search, tuple[Rivals, ...]]:
     """Accepted effects by what each adds to the prediction of validation data given all the others, the most first.
 
-    One of which a number was held, because the data show it only together with another effect, stands after that other
-    one: taken out alone, the two would share their work in a way that the held number decides.
+    An effect with a held number, which the data show only together with another effect, comes after that one: with
+    either removed, the held number would decide how they share the residual.
     """
     power = float(found.final.validation @ found.final.validation)
     adds = [np.inf if r.without is None else float(r.without.validation @ r.without.validation) - power for r in known]

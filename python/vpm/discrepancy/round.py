@@ -16,16 +16,16 @@ from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, finished
 from vpm.discrepancy.diagnosis import RankedCandidate
 from vpm.discrepancy.friction_near_rest import is_supported, judged_by_prediction, needs_prediction, prediction_without
-from vpm.discrepancy.low_frequency import slow
+from vpm.discrepancy.low_frequency import low_frequency
 from vpm.discrepancy.motion_only import in_motion, is_late
 from vpm.discrepancy.refusal import (
     CLEAR_GAIN,
     Thresholds,
     explains_most,
+    low_frequency_shows_it,
     refuse_probe,
     refuse_timing,
     refuse_trial,
-    slow_shows_it,
     worse_in_simulation,
 )
 from vpm.discrepancy.ringing import NOISE_ONLY, noise_alone, only_ringing
@@ -55,7 +55,7 @@ class Round:
         self.refused: dict[Key, str] = {}
         self._ranking: dict[Key, RankedCandidate] = {}
         self._promising: list[Probe] = []
-        self._believed: list[Trial] = []
+        self._supported: list[Trial] = []
         self.probes: list[Probe] = []
         self.trials: list[Trial] = []
 
@@ -77,12 +77,12 @@ class Round:
     def heavy(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
         """The best of those with a motion of their own, tried where more than noise is left to explain.
 
-        A spring that swings within the whole band leaves what is as white as noise: of rigid machines one that promises
-        much of the residual is refitted all the same.
+        A spring that swings within the whole band leaves a residual as white as noise. On rigid machines, one with a
+        large predicted gain is refitted all the same.
         """
         model = self.current.model
         left = structure(model, self.data.training, self.data.validation, self.timed.fitted, self.timed.validation)
-        quiet = not left.present and left.coloured <= NOISE_ONLY
+        quiet = not left.present and left.above_white <= NOISE_ONLY
         if (quiet and self._takes_long()) or self.done():
             return None
         self.screen(effects, without, heavy=True)
@@ -91,24 +91,24 @@ class Round:
         self.confirm()
         return self.best()
 
-    def alone(self, without: set[Key]) -> Accepted | None:
+    def by_prediction(self, without: set[Key]) -> Accepted | None:
         """The best of the effects close to rest that closed-loop predictions show and the residual does not."""
-        asked = [
+        tried = [
             p for p in self.probes if p.candidate.key not in without and needs_prediction(self.current, self.data, p)
         ]
-        before = self.alone_run if asked else None
+        before = self.prediction if tried else None
         if before is None:
             return None
-        self.tell(f"round {self.number}: running with {', '.join(p.candidate.label for p in asked)}")
+        self.tell(f"round {self.number}: running with {', '.join(p.candidate.label for p in tried)}")
         ask = partial(judged_by_prediction, self.current, self.data, before, self.thresholds())
-        answers = self.each(f"round {self.number}: running", ask, asked, lambda p: p.candidate.label, refit_effort)
-        for one, answer in zip(asked, answers, strict=True):
+        answers = self.each(f"round {self.number}: running", ask, tried, lambda p: p.candidate.label, refit_effort)
+        for one, answer in zip(tried, answers, strict=True):
             if not isinstance(answer, Trial):
                 self.refused[one.candidate.key] = answer.reason if isinstance(answer, Failure) else answer
-        believed = [answer for answer in answers if isinstance(answer, Trial)]
-        if not believed:
+        supported = [answer for answer in answers if isinstance(answer, Trial)]
+        if not supported:
             return None
-        best = Accepted(max(believed, key=lambda trial: trial.validation.score), ())
+        best = Accepted(max(supported, key=lambda trial: trial.validation.score), ())
         self.refused.pop(best.key, None)
         self._ranking[best.key] = replace(self._ranking[best.key], unseen=best.trial.validation.relative)
         self.mark(best.key)
@@ -129,8 +129,8 @@ class Round:
         """What is accepted, too, at other joints than what comes in, and has no motion of its own."""
         model = self.current.model
         here = joint_at(model, best.key[1])
-        believed = [trial.probe.candidate for trial in self._believed]
-        light = [one for one in believed if not self._is_heavy(one) and joint_at(model, one.site)]
+        supported = [trial.probe.candidate for trial in self._supported]
+        light = [one for one in supported if not self._is_heavy(one) and joint_at(model, one.site)]
         return {one.key for one in light if here and joint_at(model, one.site) != here}
 
     def weak(self, best: Accepted) -> bool:
@@ -204,10 +204,10 @@ class Round:
             self.tell(f"round {self.number}: refitting with {', '.join(p.candidate.label for p in short_list)}")
         twins = same_models(short_list)
         self._refit([one for one in short_list if one.candidate.key not in twins])
-        believed = {trial.probe.candidate.key for trial in self._believed}
-        again = [one for one in short_list if twins.get(one.candidate.key) in believed]
+        supported = {trial.probe.candidate.key for trial in self._supported}
+        again = [one for one in short_list if twins.get(one.candidate.key) in supported]
         self._refit(again)
-        if any(EFFECTS[name].late for name, _ in believed):
+        if any(EFFECTS[name].late for name, _ in supported):
             # Which of them it is no promise tells, so that all of its kind compete with it.
             kin = [one for one in self._promising if one.candidate.effect.late]
             kin = [one for one in kin if one not in short_list]
@@ -229,10 +229,10 @@ class Round:
         if drives_on_tangent(self.current.model, self.data.training) and len(short_list) > 1:
             # What one of them explains tells which of the others are worth a refit.
             first = max(short_list, key=lambda p: p.drop)
-            believed = len(self._believed)
+            supported = len(self._supported)
             self._tried([first], np.inf)
             rest = [one for one in short_list if one is not first]
-            left = [float(t.judged.fit.residual @ t.judged.fit.residual) for t in self._believed[believed:]]
+            left = [float(t.judged.fit.residual @ t.judged.fit.residual) for t in self._supported[supported:]]
             self._tried(rest, min(left, default=np.inf))
         else:
             self._tried(short_list, np.inf)
@@ -253,7 +253,7 @@ class Round:
             if reason := self._refused(trial, thresholds):
                 self.refused[key] = reason
             else:
-                self._believed.append(trial)
+                self._supported.append(trial)
 
     def _confirmed(self, one: Probe, rival: float) -> Trial:
         """A trial; a backlash with soft contacts that does not simulate gives way to hard ones if these do better.
@@ -293,12 +293,12 @@ class Round:
         or mind to which of two samples a command was logged.
         """
         late = is_late(trial.probe.candidate.effect, trial.judged.model) and not self._takes_long()
-        if not late or refuse_trial(replace(trial, asked=True), thresholds) or self.alone_run is None:
+        if not late or refuse_trial(replace(trial, supported=True), thresholds) or self.prediction is None:
             return False
-        return is_supported(self.alone_run, trial, self.data, thresholds)
+        return is_supported(self.prediction, trial, self.data, thresholds)
 
     @cached_property
-    def alone_run(self) -> ClosedLoopPrediction | None:
+    def prediction(self) -> ClosedLoopPrediction | None:
         """The model at hand, run along the training records by itself."""
         return prediction_without(self.current, self.data)
 
@@ -308,8 +308,8 @@ class Round:
             return ""
         shifted = in_time(trial.judged, self.data)
         before, validation = self.timed.validation, shifted.validation
-        if slow_shows_it(trial, thresholds):
-            before, validation = (slow(self.data.validation, each) for each in (before, validation))
+        if low_frequency_shows_it(trial, thresholds):
+            before, validation = (low_frequency(self.data.validation, each) for each in (before, validation))
         if is_late(trial.probe.candidate.effect, trial.judged.model):
             # What sticks is late by itself, with a shift as without: what is late is judged where nothing sticks.
             before, validation = (in_motion(self.data.validation) * each for each in (before, validation))
@@ -318,18 +318,18 @@ class Round:
 
     def best(self) -> Accepted | None:
         """The one that comes in, if any is accepted; fitted to the end it has to stand as it did before."""
-        while self._believed:
-            best = choose(self._believed, self.data)
+        while self._supported:
+            best = choose(self._supported, self.data)
             whole = finished(self.current, self.data, best.trial)
             if whole is best.trial:
                 self.mark(best.key)
                 return best
-            place = next(n for n, trial in enumerate(self._believed) if trial is best.trial)
+            place = next(n for n, trial in enumerate(self._supported) if trial is best.trial)
             if reason := self._refused(whole, self.thresholds()):
                 self.refused[best.key] = reason
-                del self._believed[place]
+                del self._supported[place]
             else:
-                self._believed[place] = whole
+                self._supported[place] = whole
         return None
 
     def mark(self, accepted: Key) -> None:

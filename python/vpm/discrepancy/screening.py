@@ -1,7 +1,7 @@
 """Cheap look at every candidate: the share of the training residual that its regressor would take away.
 
-For each candidate the parameters that are already free and the new ones are moved together in one linearised step, so
-that a candidate is never credited with what a better value of a known parameter would have done.
+For each candidate one linearised step moves the free parameters and the new ones together. So a candidate gains nothing
+that a better value of a known parameter would explain.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from vpm.discrepancy.backlash import believed, is_read_off, read_off
+from vpm.discrepancy.backlash import is_read_off, near_prior, read_off
 from vpm.discrepancy.candidates import Candidate
 from vpm.discrepancy.first_step import is_outside, linear_step, softened, step_without
 from vpm.discrepancy.joint_compliance import best_start, is_searched
@@ -126,7 +126,7 @@ def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *,
     A backlash that is read off the motion has one start, with the contacts that suit it or ``hard`` ones.
     """
     if is_read_off(base.model, data, candidate):
-        base = replace(base, model=believed(base.model, data.nominal, base.free))
+        base = replace(base, model=near_prior(base.model, data.nominal, base.free))
         start = read_off(base.model, base.free, data, candidate, hard=hard)
         return _probe_start(base, data, start, still=True)
     if (found := _searched(base, data, candidate)) is not None:
@@ -242,10 +242,10 @@ def _stepped(
 ) -> tuple[Array, Array, float]:
     """Step of the known parameters and those of a candidate, see `linear_step`; some of them stay where they are.
 
-    What a bound holds stays there: beyond it, it would seem to explain what no fit can. A loss of a spring in series
-    that comes out negative stays at its ``start``: it shows with the square of the compliance, so that a step from a
-    start which is clearly stiffer or softer has it wrong, down to its sign. A refit finds it; whether there is a spring
-    at all, its stiffness tells.
+    What a bound holds stays there: beyond it, it would seem to explain what no fit can. A negative loss of a spring in
+    series stays at its ``start``. It depends on the square of the compliance, so a step from a clearly stiffer or
+    softer start gives a wrong value, even a wrong sign. A refit finds it; whether there is a spring at all, its
+    stiffness tells.
     """
     values, std, left = linear_step(data, jacobian, residual)
     held = [i for i, name in enumerate(base.free) if base.pushed.get(name, 0) * values[i] > 0.0]

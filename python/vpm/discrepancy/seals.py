@@ -2,8 +2,8 @@
 
 An asymmetric cylinder has other pressures on its way out than on its way back, so that such friction looks like a dry
 one and a constant force beside it. The sum of the logged pressures tells more than the direction: it changes with the
-load and at each reversal. One number, the share of the piston's area that seals would press with, is fitted together
-with all that is free in the model without any effect, and what is left is compared with what the effects leave.
+load and at each reversal. One number, the share of the piston's area that presses the seals, is fitted together with
+the free parameters of the model without any effect. Its residual is compared with that of the effects.
 """
 
 from __future__ import annotations

@@ -163,7 +163,7 @@ def _whole(
     if best is None or outcome.weak(best):
         best = outcome.heavy(effects, without) or best
     pair = together(outcome, best, outcome.data, effects, without) if several else None
-    return best or (outcome.alone(without) if pair is None else None), pair
+    return best or (outcome.by_prediction(without) if pair is None else None), pair
 
 
 def _loosened(stage: Stage, data: Data) -> tuple[Stage, bool]:

@@ -22,13 +22,13 @@ Array = NDArray[np.float64]
 def preferred_sensor(chosen: Trial, equals: Sequence[Trial], data: Data) -> Trial:
     """Of what explains the data as well as ``chosen``, the instrument whose own reading supports it; else ``chosen``.
 
-    It has to predict its channel better than ``chosen`` does by as much as is worth a name, surely, on the training
-    records and on the validation ones, and to leave no more of all channels together on either.
+    On training and on validation records it has to predict its channel clearly better than ``chosen`` does, by as much
+    as is worth a name, and to leave no more of all channels together.
     """
     if chosen.probe.candidate.effect.site == "sensor":
         return chosen
-    asked = [t for t in equals if t.probe.candidate.effect.site == "sensor" and _is_supported(t, chosen, data)]
-    return min(asked, key=lambda t: _power(t.judged.validation), default=chosen)
+    supported = [t for t in equals if t.probe.candidate.effect.site == "sensor" and _is_supported(t, chosen, data)]
+    return min(supported, key=lambda t: _power(t.judged.validation), default=chosen)
 
 
 def _is_supported(trial: Trial, chosen: Trial, data: Data) -> bool:

@@ -76,9 +76,9 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
 def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str], *, simulated: bool = False) -> str:
     """Why a model with one effect more could not be built, or balanced along the ``measured`` joints, or "".
 
-    A motion with joints that nobody measures is integrated, and there no effect carries its memory along; but it does
-    on the motor side of a joint that is split where that is measured, see `vpm.identify.parts.bending`, and where all
-    is ``simulated``.
+    A motion with joints that no channel measures is integrated, and there effects with a memory are refused. They work
+    on the motor side of a split joint where that is measured, see `vpm.identify.parts.bending`, and where all is
+    ``simulated``.
     """
     remembering = [f"{entry.type.title} at {entry.at}" for entry in model.effects if entry.type.memory]
     split_off = {model.joint_behind(entry.at) for entry in model.effects if entry.type.splits}
@@ -190,8 +190,8 @@ def softest(model: Model, site: str) -> float:
 def stop_starts(position: Array, residual: Array, middle: float, travel: float, least: float) -> tuple[Starts, Bounds]:
     """The same for the ends of a way: one end, or both where either side looks like one.
 
-    A stop pushes back over the last bit of the way, so the residual (applied - required) there grows from its place on,
-    outwards; the places on either side are those at which such a ramp takes most of it.
+    A stop pushes back over the last part of the travel, so the residual (applied - required) grows outwards from its
+    position. The positions on either side are those at which such a ramp explains most of it.
 
     Parameters
     ----------

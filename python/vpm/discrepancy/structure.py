@@ -21,13 +21,12 @@ THINNED = 2
 #: Share of the validation residual that a state map must predict, and share of its power in the lowest tenth of the
 #: band (a tenth for white noise), before it counts as structured.
 PREDICTED_SHARE = 0.1
-SLOW_SHARE = 0.5
-#: So many times what is white in it, it is coloured.
-COLOURED = 1.6
-#: Strains and what else shows of hidden motion sum up the noise of what feeds them, which colours them about so much.
+LOW_FREQUENCY_SHARE = 0.5
+#: A residual of so many times its white part is not white.
+ABOVE_WHITE = 1.6
+#: Strains and other signs of hidden motion integrate noise, which raises them above their white part about so much.
 DRIFTING = 1.5
-#: So many times the relative gap of the training records, that of the validation ones holds something they never
-#: showed.
+#: Validation records with so many times the relative error of the training records hold something new.
 NEW = 4.0
 #: From so many standard deviations of the rank correlation between the two on, its size grows with that of the effort.
 GROWING = 4.0
@@ -42,20 +41,20 @@ class Structure:
     predicted : float
         Share of the validation residual's mean square that a map of position, velocity, acceleration and effort, drawn
         from the training residual, predicts.
-    slow : float
+    low_frequency : float
         Share of its power in the lowest tenth of the retained band.
-    coloured : float
-        How many times the residual is larger than what is white in it, on the records where it is least so.
+    above_white : float
+        Ratio of the residual to its white part, on the records where that is smaller.
     growing : float
         Rank correlation of its size with that of the effort, in standard deviations: noise of sensors and drives does
-        not know how hard the drive works.
+        not depend on the effort.
     new : float
         Relative gap on validation records over that on training records.
     """
 
     predicted: float
-    slow: float
-    coloured: float
+    low_frequency: float
+    above_white: float
     growing: float
     new: float
 
@@ -63,7 +62,7 @@ class Structure:
     def present(self) -> bool:
         """Whether the residual is more than noise."""
         follows = self.predicted > PREDICTED_SHARE or self.growing > GROWING
-        return follows or self.slow > SLOW_SHARE or self.coloured > COLOURED or self.new > NEW
+        return follows or self.low_frequency > LOW_FREQUENCY_SHARE or self.above_white > ABOVE_WHITE or self.new > NEW
 
 
 def structure(
@@ -78,15 +77,17 @@ def structure(
     joints = range(len(training.joints))
     predicted = max(_predicted(model, training, validation, fitted, residual, joint) for joint in joints)
     blocks = zip(validation.blocks, validation_shapes, strict=True)
-    slow = float(np.mean([_slow_share(residual[block.samples], shape) for block, shape in blocks]))
-    coloured = min(_drift(training, fitted, training_shapes), _drift(validation, residual, validation_shapes))
+    low_frequency = float(np.mean([_low_frequency_share(residual[block.samples], shape) for block, shape in blocks]))
+    above_white = min(
+        _above_white(training, fitted, training_shapes), _above_white(validation, residual, validation_shapes)
+    )
     growing = min(_growing(model, training, fitted), _growing(model, validation, residual))
-    seen, fresh = gaps(training, fitted), gaps(validation, residual)
-    new = max(fresh[c][1] / seen[c][1] if seen[c][1] > 0.0 else 0.0 for c in fresh)
-    return Structure(predicted, slow, coloured, growing, new)
+    known, fresh = gaps(training, fitted), gaps(validation, residual)
+    new = max(fresh[c][1] / known[c][1] if known[c][1] > 0.0 else 0.0 for c in fresh)
+    return Structure(predicted, low_frequency, above_white, growing, new)
 
 
-def _drift(problem: InverseDynamicsProblem, residual: Array, shapes: tuple[Array | None, ...]) -> float:
+def _above_white(problem: InverseDynamicsProblem, residual: Array, shapes: tuple[Array | None, ...]) -> float:
     """Largest ratio of any channel between its residual and the noise in it."""
     ratios = []
     for channel in dict.fromkeys(block.channel for block in problem.blocks):
@@ -161,7 +162,7 @@ def _features(state: Array, edges: list[Array], reference: Array) -> Array:
     return np.column_stack([*columns, further, against]).astype(np.float64)
 
 
-def _slow_share(residual: Array, shape: Array | None) -> float:
+def _low_frequency_share(residual: Array, shape: Array | None) -> float:
     power = np.abs(np.fft.rfft(residual)) ** 2
     if shape is not None:
         power = power / noise_spectrum(residual, shape, QUIET_SHARE)

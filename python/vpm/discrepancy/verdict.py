@@ -162,8 +162,8 @@ def _is_described_better(rest: Remainder | None) -> bool:
 def _is_explanation(found: Search, observed: float, mostly_open: bool) -> bool:
     """Whether what was found explains the gap, where the residual is said to leave it mostly open or not.
 
-    A machine that an observer keeps beside validation records tells it where it is clear: effects that leave little in
-    the channel ``observed`` best are the explanation of what is missing there, those that leave more than all none.
+    The error of an observer along validation records decides where it is clear. Effects that leave little in the
+    channel ``observed`` best are the explanation there; those that leave more than there was are none.
     """
     if found.within_laws:
         return True
@@ -183,7 +183,9 @@ def _shown_by_predictions(found: Search) -> bool:
 
     What the inverse-dynamics residual hardly shows may leave as much of it as there was, and be the explanation.
     """
-    return all(entry.trial.alone and entry.trial.validation.relative >= MOST_OF_IT for entry in found.accepted)
+    return all(
+        entry.trial.from_prediction and entry.trial.validation.relative >= MOST_OF_IT for entry in found.accepted
+    )
 
 
 def _nothing_missing(

@@ -20,7 +20,7 @@ SAMPLED = ("narx", "maxwell_narx")
 #: Integrator of fits: the one that is stable whatever the reduced model is like.
 FITTING = "linearly_implicit"
 #: Fits end where parameters or sum of squares move by less than this share, and after so many evaluations in any case:
-#: what is left of both is far less than a tolerance asks about.
+#: the remainder of both is far below a tolerance.
 FIT_TOLERANCE, FIT_EVALUATIONS = 1e-3, 20
 
 

@@ -1,10 +1,10 @@
 """Walk a model back down: the cheapest one that still predicts the data within a tolerance.
 
-The search goes in four strides. All flexible links together are made finer, from the coarsest, until that loses next to
-nothing: what comes next is tried on that model, which is cheap, and what coarse timing shows to be dearer is not
-fitted. Then each place by itself is made simpler by each of its changes. Losses and savings of single changes are added
-up to foresee those of all combinations, and the combinations that should be best are fitted, simulated and timed. From
-the best one each further change is tried while one pays.
+The search goes in four strides. All flexible links together are refined, from the coarsest level, until the loss is
+next to nothing. Later changes are tried on that cheap model, and slower ones by coarse timing are not fitted. Then each
+place by itself is made simpler by each of its changes. Losses and savings of single changes are added up to foresee
+those of all combinations, and the combinations that should be best are fitted, simulated and timed. From the best one
+each further change is tried while one pays.
 """
 
 from __future__ import annotations
@@ -57,12 +57,11 @@ def simplify(
 ) -> Ladder:
     """Make a model simpler, place by place, as far as the tolerance allows, and find the cheapest way to step it.
 
-    Effects are left out, flexible links made coarser or rigid in single deformations, spools of hydraulic drives made
-    static, their pressures one, NARX elements put in their place, Coriolis and centrifugal terms, coupling across
-    joints and terms of second order of links left out where their shares allow it, and every integrator of fixed steps
-    is tried with one, two and four steps in a period. The adjustable parameters of every reduced model are fitted again
-    before it is judged by simulation, so that what remains may take over what it can. Ctrl-C ends the search with what
-    is known.
+    Effects are left out, and flexible links made coarser or rigid in single deformations. Hydraulic drives get static
+    spools, one pressure, or NARX elements in their place. Coriolis and centrifugal terms, coupling across joints and
+    terms of second order of links go where their shares allow it. Every integrator of fixed steps is tried with one,
+    two and four steps in a period. The adjustable parameters of every reduced model are fitted again before it is
+    judged by simulation, so that what remains may take over what it can. Ctrl-C ends the search with what is known.
 
     Parameters
     ----------
@@ -176,8 +175,8 @@ def _weigh_terms(trials: Trials, sites: Sites) -> None:
 def _together(trials: Trials, sites: Sites, limit: float) -> Changes:
     """All links at the same coarser level: the cheapest that loses next to nothing.
 
-    The coarsest come first, by the number of coordinates: they are quick to fit, and once one of them loses next to
-    nothing, coarse timing of the finer ones shows that they need no look.
+    The coarsest come first, by the number of coordinates, because they are quick to fit. Once one of them loses next to
+    nothing, coarse timing rules out the more detailed ones.
     """
     best: Changes = ()
     seconds = min(candidate.seconds for candidate in trials.attempt(()))

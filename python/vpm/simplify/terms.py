@@ -1,8 +1,7 @@
 """Terms of the equations of motion that a model can do without: of a part of it, or of the whole machine.
 
-Products of rates (Coriolis, centrifugal, gyroscopic terms) are those of bodies and flexible links; entries of the mass
-matrix couple what is inward of a joint with what is beyond; terms of second order are those in the deflection of a
-flexible link.
+Products of rates (Coriolis, centrifugal, gyroscopic terms) belong to bodies and flexible links. Entries of the mass
+matrix couple the two sides of a joint. Terms of second order are those in the deflection of a flexible link.
 """
 
 from __future__ import annotations
