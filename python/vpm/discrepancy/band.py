@@ -1,4 +1,4 @@
-"""The band in which a machine works: forces that depend on its motion live there, the noise of accelerations above."""
+"""The frequency band of the motion: forces that depend on the motion are in it, noise of accelerations above."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
 """Effects that a ranking names: refitted to the inverse-dynamics residual, and measured on validation records.
 
-A ranking says what is missing and in which order. Nothing here takes a name away or adds one, but for a machine whose
-efforts cannot be balanced with it. The values that are reported are those of the residual wherever it shows them.
+A ranking names what is missing, in order. This module changes none of its names, except on machines whose inverse
+dynamics cannot be computed with an effect. Reported values are those of the residual wherever it shows them.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which of several accepted candidates comes in: little left, few numbers, the machine before its instruments."""
+"""Choice among supported candidates: small residual, few parameters, the machine before its instruments."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vpm.discrepancy.sensor_prediction import preferred_sensor
 from vpm.discrepancy.structural import coupled
 from vpm.identify import Gain
 
-#: What comes late, and what is slow and looks late.
+#: Kinds of delay: pure delays, lags of drives, slow spools.
 KINDS: tuple[Late, ...] = ("delay", "lag", "spool")
 #: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
 SENSOR_SHARE = 0.25
@@ -74,36 +74,36 @@ def choose(supported: Sequence[Trial], data: Data) -> Accepted:
     plain = [t for t in supported if _plainer(t, first)]
     first = min(plain, key=cost) if plain else first
     equals = [t for t in supported if _as_good(t, first)]
-    chosen = _late_or_slow(preferred_sensor(_first_named(equals), equals, data), supported, data)
+    chosen = _delay_or_lag(preferred_sensor(_first_named(equals), equals, data), supported, data)
     return Accepted(chosen, tuple(t.probe.candidate.label for t in equals if t is not chosen))
 
 
-def _late_or_slow(chosen: Trial, supported: Sequence[Trial], data: Data) -> Trial:
-    """Of delay, lag and slow spool, where several would do: what the reference tells from the others, else the delay.
+def _delay_or_lag(chosen: Trial, supported: Sequence[Trial], data: Data) -> Trial:
+    """Of delay, lag and slow spool, where several would do: the one that the response to the reference discriminates.
 
-    A delay shifts in time; a lag does so too and weakens what is fast, which has to be seen.
+    A delay shifts in time; a lag also weakens high frequencies, which has to show. Without a result it is the delay.
     """
-    if not _late(chosen):
+    if not _kind_of_delay(chosen):
         return chosen
     alike = [t for t in supported if _left(t) <= SAME * _left(chosen)]
-    kinds = [[t for t in alike if _late(t) == kind] for kind in KINDS]
+    kinds = [[t for t in alike if _kind_of_delay(t) == kind] for kind in KINDS]
     rest = [min(kind, key=_evidence) for kind in kinds if kind]
     best, runs = rest.pop(0), Runs(data)
     for rival in rest:
         response = compare_driven(rival.judged, best.judged, data, runs)
         if response is None:
             return chosen
-        if response.prefers_first(ODDS if _late(best) == "delay" else 1.0):
+        if response.prefers_first(ODDS if _kind_of_delay(best) == "delay" else 1.0):
             best = rival
     return best
 
 
-def _late(trial: Trial) -> Late:
+def _kind_of_delay(trial: Trial) -> Late:
     return trial.probe.candidate.effect.late
 
 
 def _first_named(equals: Sequence[Trial]) -> Trial:
-    """The trial with the best evidence; of several that no digit of the data parts, the first in the catalogue.
+    """The trial with the best evidence; of several identical models, the first in the catalogue.
 
     On a single link a drive with joint compliance and a link that bends at its root are one and the same model, and
     rounding would decide.

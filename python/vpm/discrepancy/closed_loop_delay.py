@@ -27,7 +27,7 @@ def timed_in_closed_loop(
     simulation: OutputErrorProblem | None,
     bounds: Mapping[str, tuple[float, float]],
 ) -> tuple[Timed | None, ClosedLoopPrediction | None]:
-    """A late effect timed on samples in motion, within what a run along the training records says where there is one.
+    """A delay fitted to samples in motion, within the interval of a prediction of training records if there is one.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def timed_in_closed_loop(
         Without the effect and with it, each with its free parameters; those that only ``late`` has are the effect's.
     training, validation : InverseDynamicsProblem
     simulation : OutputErrorProblem or None
-        How the validation records are simulated; only a closed loop is run alone.
+        How the validation records are simulated; only a closed loop is predicted.
     bounds : mapping
         Bounds of free parameters that replace those of the models.
 
@@ -67,8 +67,8 @@ def gain_in_closed_loop(
 ) -> Gain | None:
     """Gain of a delay in simulations of validation records, each model with the parameters of its own prediction.
 
-    Without the effect, a transition of friction that is too wide may pass for it in a simulation, and with it make it
-    late twice. None where the model without it has no prediction.
+    A transition of friction that is too wide imitates the delay in a simulation without it, and doubles it with it.
+    None where the model without it has no prediction.
     """
     try:
         before = fit_prediction(model, free, late.problem.experiments, simulation.setup)

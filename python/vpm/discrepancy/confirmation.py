@@ -1,4 +1,4 @@
-"""The real test of a short-listed effect: refit the model with it, then predict data that were not in the fit."""
+"""The test of a short-listed effect: refit the model with it, then predict validation records."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ class Data:
     training, validation : InverseDynamicsProblem
         Inverse-dynamics residual on the records that are fitted and on those that are not.
     simulation : OutputErrorProblem or None
-        Simulation of the validation records, the second witness.
+        Simulation of the validation records, the second criterion.
     """
 
     training: InverseDynamicsProblem
@@ -233,7 +233,7 @@ def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) ->
     if timed is not None:
         judged, diverged = judged_anyhow(judged.model, free, data, {**bounds, **timed.bounds}, origin)
     trial = measured(current, data, probe, judged, own, (*doubtful, *held), timed, diverged)
-    return _witnessed(trial, current, prediction, data)
+    return _checked_by_prediction(trial, current, prediction, data)
 
 
 def finished(current: Judged, data: Data, trial: Trial) -> Trial:
@@ -255,7 +255,7 @@ def measured(
     timed: Timed | None,
     diverged: str,
 ) -> Trial:
-    """What a refit gains on all the data; of something late it counts what it gains in motion, if that was timed."""
+    """Gain of a refit on all the data; a delay counts by its gain in motion, if it was fitted there."""
     fitted = judged.fit.residual * shrinkage(data.training, current, judged)
     validation = judged.validation * shrinkage(data.validation, current, judged)
     return Trial(
@@ -341,7 +341,7 @@ def _origin(data: InverseDynamicsProblem, probe: Probe, start: Model) -> Array |
 def weaker(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> Array:
     """How much weaker the actuators of each joint have become, at least 1 (joints,).
 
-    An effect that swallows the command, or a gain that shrinks, leaves a small gap between two small efforts; errors
+    An effect that suppresses the command, or a gain that shrinks, leaves a small gap between two small efforts; errors
     are compared relative to the effort, so that nothing is won that way. One drive may do so where others are stronger.
     """
     after, before = (problem.strengths(one.model) for one in (judged, current))
@@ -388,15 +388,15 @@ def _low_frequency_gain(current: Judged, validation: Array, data: InverseDynamic
 def _timed(
     current: Judged, judged: Judged, data: Data, probe: Probe
 ) -> tuple[Timed | None, ClosedLoopPrediction | None]:
-    """A late drive or instrument on a machine with dry friction, timed in motion, and the run that timed it if any."""
+    """A delay on a machine with dry friction, fitted in motion, and the prediction that fitted it, if any."""
     if not is_late(probe.candidate.effect, current.model) or has_tangent(probe.model, data.training):
         return None, None
     before, late = (current.model, current.free), (judged.model, judged.free)
     return timed_in_closed_loop(before, late, data.training, data.validation, data.simulation, judged.bounds)
 
 
-def _witnessed(trial: Trial, current: Judged, prediction: ClosedLoopPrediction | None, data: Data) -> Trial:
-    """A trial; of something late that makes simulations worse those count in which each model suits its own run."""
+def _checked_by_prediction(trial: Trial, current: Judged, prediction: ClosedLoopPrediction | None, data: Data) -> Trial:
+    """A trial; for a delay that worsens simulations, predictions of models fitted in closed loop count instead."""
     if prediction is None or data.simulation is None or trial.simulated is None or trial.simulated.relative >= 0.0:
         return trial
     gained = gain_in_closed_loop(current.model, current.free, prediction, data.simulation)

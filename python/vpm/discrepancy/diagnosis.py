@@ -118,7 +118,7 @@ class RankedCandidate(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Ambiguity(Storable):
-    """Effects that these data cannot tell from an accepted one, and why."""
+    """Effects that these data do not discriminate from an accepted one, and why."""
 
     name: str
     site: str
@@ -207,7 +207,7 @@ class ChannelGap(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class ProposedExperiment(Storable):
-    """An experiment that would tell two effects apart.
+    """A discriminating experiment for two effects.
 
     Attributes
     ----------
@@ -339,7 +339,7 @@ class Diagnosis(Result):
     candidates : tuple of RankedCandidate
     ambiguous_with : tuple of Ambiguity
     where : dict of str to tuple of str
-        Where the residual lives before any effect was added, by channel.
+        Residual by state region before any effect was added, by channel.
     steps : tuple of Step
         The recalibrated model and the model after each effect that came in or went out again.
     training, unseen : tuple of str
@@ -356,13 +356,13 @@ class Diagnosis(Result):
     interrupted : bool
         Ctrl-C ended the search: the effects are those accepted until then, and there may be more.
     evidence : tuple of Evidence
-        For each accepted effect the residual over the state that it lives in, without it and with it.
+        For each accepted effect the residual over the state that it depends on, without it and with it.
     empirical : Empirical or None
         What is said of a residual that no effect explains.
     experiments : tuple of ProposedExperiment
-        For each pair of effects that the data cannot tell apart, the experiment that would.
+        For each pair of effects that the data do not discriminate, the discriminating experiment.
     classes : tuple of tuple of str
-        Each accepted effect that has rivals, with these, as ``effect at site``: the records do not tell them apart.
+        Each accepted effect that has rivals, with these, as ``effect at site``: the records do not discriminate them.
     traces : tuple of Trace
         What was measured and what is simulated; none where no validation record could be simulated.
     stated : dict of str to float

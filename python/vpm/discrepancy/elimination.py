@@ -1,4 +1,4 @@
-"""What later effects make superfluous is dropped, and what kept candidates apart is loosened once the names stand."""
+"""Backward elimination: drops effects that later ones replace, and frees parameters that were held."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is said where no effect explains a residual: on what it depends, and a formula that is no more than a fit."""
+"""Description of a residual that no effect explains: the states that it depends on, and an empirical formula."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the limit of a drive is looked for: at the command from which on the drive delivers less than it is told."""
+"""Start value for the limit of a drive: the command above which the drive delivers less than commanded."""
 
 from __future__ import annotations
 

@@ -1,10 +1,9 @@
-"""Late drives and instruments, timed on samples at which every joint is clearly in motion.
+"""Delays of drives and instruments, fitted to samples at which every joint is clearly in motion.
 
 At a reversal a joint with dry friction sticks for a while, and filtered samples do not show when it breaks away. The
-residual there is several times as large as elsewhere, and looks like a delay. A time fitted to all samples comes out
-too long for it (twice the true delay of a stiff axis is usual), long enough to make its simulation worse. In clear
-motion friction is as smooth as the rest, so a time is fitted there, and kept within what that says when all the other
-parameters are fitted to all samples.
+residual there is several times as large as elsewhere, and looks like a delay. A delay fitted to all samples is often
+twice the true one on a stiff axis, which makes the simulation worse. In clear motion friction is smooth. So the delay
+is fitted there, and held within that estimate while all other parameters are fitted to all samples.
 """
 
 from __future__ import annotations
@@ -71,7 +70,7 @@ def is_dry(model: Model) -> bool:
 
 
 def is_late(effect: EffectType, model: Model) -> bool:
-    """Whether an effect comes late in a model that can stick, so that it has to be timed where nothing does."""
+    """Whether an effect is a delay in a model that can stick, so that it is fitted in motion only."""
     return effect.shifts and is_dry(model)
 
 
@@ -96,7 +95,7 @@ def timed_in_motion(
     validation: InverseDynamicsProblem,
     bounds: Mapping[str, tuple[float, float]],
 ) -> Timed | None:
-    """Fit a model without a late effect and with it to the samples in motion; None where those are too few.
+    """Fit a model without a delay and with it to the samples in motion; None where those are too few.
 
     Parameters
     ----------
@@ -133,7 +132,7 @@ def _near(
 
 
 def _shown(model: Model, free: Sequence[str], problem: InMotion, own: Sequence[str]) -> list[str]:
-    """Free parameters that show themselves in motion, and those of the late effect."""
+    """Free parameters that samples in motion show, and those of the delay."""
     columns = [model.index(name) for name in free]
     _, whole = problem.data.evaluate(model, model.theta, columns)
     shares = np.sum((problem.counted[:, None] * whole) ** 2, axis=0) / column_lengths(whole) ** 2

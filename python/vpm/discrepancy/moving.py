@@ -1,4 +1,4 @@
-"""Whether records show what the machine does: channels that stand still although it moves."""
+"""Checks that records show the motion: channels that stand still although the machine moves."""
 
 from __future__ import annotations
 

@@ -100,7 +100,7 @@ def recalibrated_of(model: Model, data: Data, notes: list[str], each: SideBySide
 def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[float, float]]:
     """Transition velocities of the dry friction that the model has, with bounds from the data.
 
-    Nobody knows them beforehand, and a wrong one leaves a gap at every reversal, where the finer effects live.
+    Nobody knows them beforehand, and a wrong one leaves an error at every reversal, where small effects show.
     """
     found = {}
     for effect in model.effects:

@@ -21,7 +21,7 @@ from vpm.errors import VpmError
 from vpm.identify.along import has_own_drives
 from vpm.identify.identifiability import column_lengths
 
-#: What is late is twice as often late by a delay, which a drive or an instrument may have, as by a lag of the drive.
+#: Prior odds: a delay, which drives and instruments may have, is twice as frequent as a lag, which only drives have.
 ODDS = 2.0
 
 

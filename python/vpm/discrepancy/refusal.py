@@ -130,7 +130,7 @@ def refuse_ringing(share: float, trial: Trial) -> str:
 
 
 def explains_most(trial: Trial) -> bool:
-    """Whether what is late explains so much that it is named even where the times of samples would leave it open.
+    """Whether a delay explains so much that it is named even where the times of samples leave it open.
 
     Where there are peers on its clock, a shift of all commands tells what is physics.
     """
@@ -341,7 +341,7 @@ def _only_reversals(trial: Trial) -> str:
 
 
 def worse_in_simulation(trial: Trial) -> str:
-    """Why the second witness speaks against a trial, or ""."""
+    """Why the simulation speaks against a trial, or ""."""
     if trial.diverged:
         return f"with it the simulation of the validation record fails: {trial.diverged}"
     simulated = trial.simulated

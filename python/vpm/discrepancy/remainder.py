@@ -1,8 +1,8 @@
-"""What effects leave: whether it repeats on validation records, and how much of the gap they are the explanation of.
+"""The residual after all effects: whether it repeats on validation records, and the share that effects explain.
 
-The floor of the noise is an estimate, and a residual need not stand far above it to be no noise. So a fit without
-physics is put beside the effects: what it predicts of records that it never saw, physics would predict too. Effects
-that leave much of what a mere fit finds were only the nearest of the catalogue.
+The noise floor is an estimate, and a residual close to it may still not be noise. So an empirical fit is compared with
+the effects: what it predicts of validation records, the right physics would predict too. Effects that leave much of
+what such a fit explains were only the nearest ones of the catalogue.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Joints whose residual no effect explains, separated from those whose residual effects explain."""
+"""Joints whose residual no effect explains, apart from joints whose residual effects explain."""
 
 from __future__ import annotations
 

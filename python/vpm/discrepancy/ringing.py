@@ -1,7 +1,6 @@
-"""Noise of a measured motion that rings in links that bend: it is not white in the residual, and no physics is missing.
+"""Noise of a measured motion that rings in flexible links: not white in the residual, and no missing physics.
 
-How much of it there is, the model's own simulation says, with noise like that of the records; see
-`vpm.discrepancy.floor`.
+Its size follows from simulations of the model with noise like that of the records; see `vpm.discrepancy.floor`.
 """
 
 from __future__ import annotations

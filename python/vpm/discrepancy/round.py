@@ -311,7 +311,7 @@ class Round:
         if low_frequency_shows_it(trial, thresholds):
             before, validation = (low_frequency(self.data.validation, each) for each in (before, validation))
         if is_late(trial.probe.candidate.effect, trial.judged.model):
-            # What sticks is late by itself, with a shift as without: what is late is judged where nothing sticks.
+            # Stiction looks like a delay, with a shift as without, so delays are judged in motion only.
             before, validation = (in_motion(self.data.validation) * each for each in (before, validation))
         timed = gain(before, validation, segments(self.data.validation))
         return refuse_timing(timed, self.timed.shift, thresholds, beside=shifted.shift)

@@ -1,4 +1,4 @@
-"""Cheap look at every candidate: the share of the training residual that its regressor would take away.
+"""Screening of candidates: the share of the training residual that the regressor of each explains.
 
 For each candidate one linearised step moves the free parameters and the new ones together. So a candidate gains nothing
 that a better value of a known parameter would explain.

@@ -1,4 +1,4 @@
-"""The search: round after round, accept at most one effect and drop what is not needed any more."""
+"""The search: each round accepts at most one effect and drops what is not needed any more."""
 
 from __future__ import annotations
 

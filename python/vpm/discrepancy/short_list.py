@@ -1,4 +1,4 @@
-"""Which candidates of a round are refitted, and which of them are one model under two names."""
+"""Candidates of a round to be refitted, and candidates that are one model under two names."""
 
 from __future__ import annotations
 

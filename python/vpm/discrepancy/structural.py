@@ -1,6 +1,6 @@
-"""Start values of effects that bend, comply or stop what is described as rigid and free.
+"""Start values of effects that add compliance or stops to what is described as rigid and free.
 
-A spring between two masses shows by its resonance, so that stiffnesses are tried at a grid of frequencies.
+A spring between two masses shows by its resonance, so stiffnesses are tried at a grid of frequencies.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""What the times of samples leave open: commands may hold up to one sampling interval earlier or later than is said.
+"""Uncertain times of samples: commands may hold up to one sampling interval earlier or later than stated.
 
-Whether a logged command is the one that holds from its sample on, the mean over the interval, or the one that held
-until then, no log says. What a shift by no more than that explains is no physics that is missing.
+A logged command may hold from its sample on, until its sample, or as the mean over the interval; the log does not tell.
+What a shift within one interval explains is therefore no missing physics.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""States of a record as seen from the site of an effect: what its residual can be drawn over."""
+"""States of a record at the site of an effect, over which its residual is drawn."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The mistake of a channel table that explains what a model leaves of a record, if one does."""
+"""The mistake of a channel table that explains the error of a model on a record, if one does."""
 
 from __future__ import annotations
 

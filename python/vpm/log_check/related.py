@@ -1,4 +1,4 @@
-"""Channels that another one tells: references by what follows them, accelerations by the motion."""
+"""Channels that follow from another one: references from measured channels, accelerations from the motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a model leaves of a record, as a share of what masses leave on which nothing acts."""
+"""Error of a model on a record, as a share of the error of masses without forces."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ PIECES = 200
 
 @dataclass(frozen=True, eq=False)
 class Shares:
-    """What is left of each channel, between 0 and 1: nobody has to believe a model that leaves more than nothing does.
+    """What is left of each channel, between 0 and 1: a model that leaves more than no model is not used.
 
     A share does not depend on the scale of its channel, so that records in other units can be compared by it.
 

@@ -1,4 +1,4 @@
-"""The diagnosis told in a terminal."""
+"""The diagnosis as text in a terminal."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Along what reduced models are timed: the commands that each of them gets, and where it starts."""
+"""Inputs for the timing of reduced models: commands of each model, and its start state."""
 
 from __future__ import annotations
 

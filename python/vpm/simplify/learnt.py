@@ -1,6 +1,6 @@
-"""Elements in sampled time from what a drive did: Maxwell and polynomial NARX, as actuators of a model file.
+"""Discrete-time elements from records of a drive: Maxwell and polynomial NARX, as actuators of a model file.
 
-How rich an element is, its degree, is chosen among the records to learn from, each left out in turn.
+The degree of an element is chosen by cross-validation among the training records.
 """
 
 from __future__ import annotations

@@ -1,10 +1,9 @@
-"""Walk a model back down: the cheapest one that still predicts the data within a tolerance.
+"""Model reduction: the cheapest model that still predicts the data within a tolerance.
 
-The search goes in four strides. All flexible links together are refined, from the coarsest level, until the loss is
-next to nothing. Later changes are tried on that cheap model, and slower ones by coarse timing are not fitted. Then each
-place by itself is made simpler by each of its changes. Losses and savings of single changes are added up to foresee
-those of all combinations, and the combinations that should be best are fitted, simulated and timed. From the best one
-each further change is tried while one pays.
+The search has four steps. All flexible links together are refined, from the coarsest level, until the loss is next to
+nothing. Each place is then made simpler on that model by each of its changes, unless coarse timing shows no saving.
+Losses and savings of single changes are added up to predict all combinations, and the best combinations are fitted,
+simulated and timed. From the best one, single changes are tried as long as one pays.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Coefficients of a NARX element from what the machine does with it: in the loop that its own forces close.
+"""Coefficients of a NARX element, trained on the motion of the machine that the element drives.
 
-One step ahead, and along a given motion, an element is told where the machine is. In the machine its error moves the
-joints, whose motion is its input, so that the least error of a prediction is not that of a simulation.
+A one-step prediction along a given motion uses the measured state. In the machine the error of the element moves the
+joints, and their motion is its input. So the least error of a prediction is not the least error of a simulation.
 """
 
 from __future__ import annotations
