@@ -84,9 +84,9 @@ def diagnose(
     Logs with a wrong unit, sign, name or clock are refused, see `vpm.check_log`. The parameters that the model file
     calls uncertain are fitted first, for a wrong parameter is not a missing effect. Where links are rigid and up to
     three joints move, a ranking of the training records names what is missing, see `vpm.rank`, and validation records
-    decide no name. Elsewhere every effect is screened at every site by its regressor; the promising ones are refitted
-    together with the model and have to predict validation records, by the inverse-dynamics residual and in simulation.
-    One is accepted at a time, the one with the largest validation gain per number.
+    decide no name. Elsewhere every effect is screened at every site by its regressor; those with the largest predicted
+    gain are refitted together with the model. They have to predict validation records, by the inverse-dynamics residual
+    and in simulation. One is accepted at a time, the one with the largest validation gain per number.
 
     Parameters
     ----------
@@ -309,7 +309,7 @@ def _told(known: _Known, found: Search, mode: str, setup: Setup, each: SideBySid
     beyond = observed_gaps(known.ranking, data.training.joints) if known.ranking is not None else {}
     said = verdict(data, known.nominal, known.recalibrated, found, gap | beyond, left, rest)
     concluded = _concluded(known, found, said, gap, floor, rest)
-    say("looking for the experiment that tells effects apart")
+    say("designing discriminating experiments")
     if stopped or known.late:
         notes.append(STOPPED_LATE)
     concluded = replace(concluded, gap=concluded.gap | beyond)

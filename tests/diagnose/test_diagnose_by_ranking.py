@@ -122,7 +122,7 @@ def test_each_reason_is_one_sentence(name: str, value: float, said: str) -> None
 def test_what_is_not_told_apart_is_one_class(named: vpm.Diagnosis, tmp_path: Path) -> None:
     assert named.classes == (("coulomb_friction at axis", "spring at axis"),)
     (told,) = [a for a in named.ambiguous_with if "spring at axis" in a.others]
-    assert told.reason == "the records do not tell them apart"
+    assert told.reason == "the records do not discriminate them"
     assert [e.rival for e in named.experiments] == ["spring at axis"]
     report = json.loads(named.save_json(tmp_path / "report.json").read_text(encoding="utf-8"))
     assert report["classes"] == [["coulomb_friction at axis", "spring at axis"]]

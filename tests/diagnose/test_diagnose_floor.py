@@ -9,7 +9,7 @@ from synthetic import Truth, nominal, simulate_axis
 from vpm.diagnosing import diagnose
 from vpm.discrepancy.diagnosis import RankedCandidate
 from vpm.discrepancy.floor import white_level
-from vpm.discrepancy.round import _promise
+from vpm.discrepancy.round import _by_gain
 from vpm.discrepancy.structure import structure
 from vpm.identify import InverseDynamicsProblem
 
@@ -72,7 +72,7 @@ def test_ranking_puts_what_was_confirmed_first() -> None:
         entry("helps", 0.1, 0.4),
         entry("accepted", 0.2, 0.3, accepted=True),
     ]
-    assert [c.name for c in sorted(ranked, key=_promise)] == ["accepted", "helps", "screened", "hurts"]
+    assert [c.name for c in sorted(ranked, key=_by_gain)] == ["accepted", "helps", "screened", "hurts"]
 
 
 def test_a_name_that_leaves_most_open_is_no_explanation() -> None:

@@ -1,4 +1,4 @@
-"""Two effects that one record cannot tell apart, and the experiment that can."""
+"""Two effects that one record does not discriminate, and the experiment that does."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Late or slow: a delay and a lag, told apart by what the reference alone drives."""
+"""A delay and a lag, discriminated by the response to the reference alone."""
 
 from __future__ import annotations
 

@@ -20,7 +20,7 @@ from vpm.identify.along import bends
 from vpm.model import Model
 
 #: Rivals that are refitted in the place of an effect, and how many of the others that may refine it.
-SHORT_LIST, FINER = 3, 2
+SHORT_LIST, NESTED = 3, 2
 #: A rival that takes less than this share of what the effect takes from the training residual is none.
 LEAST_SHARE = 0.8
 #: A rival that leaves up to this share more of the validation mean square predicts as well.
@@ -77,9 +77,9 @@ def rivals(
 ) -> tuple[Rivals, ...]:
     """Replace each accepted effect in turn by every other that could do its work, and keep those that do it as well.
 
-    All rivals are screened on the model without the effect; the few that take nearly as much from the training residual
-    are refitted, and have to predict the validation records as the effect does. What the ``last`` effect competed with
-    when it came in is not worked out again.
+    All rivals are screened on the model without the effect; the few with nearly the same share of the training residual
+    are refitted. They have to predict the validation records as well as the effect. What the ``last`` effect competed
+    with when it came in is not worked out again.
     """
     each = each or SideBySide(1)
     known = {last.key: last} if last is not None else {}
@@ -180,8 +180,8 @@ def _short_list(final: Judged, without: Judged | None, entry: Accepted, probes: 
     ]
     good.sort(key=lambda p: -p.score)
     own = entry.trial.probe.candidate
-    finer = [p for p in good[SHORT_LIST:] if alike(p.candidate, own)]
-    return good[:SHORT_LIST] + sorted(finer, key=lambda p: -p.drop)[:FINER]
+    nested = [p for p in good[SHORT_LIST:] if alike(p.candidate, own)]
+    return good[:SHORT_LIST] + sorted(nested, key=lambda p: -p.drop)[:NESTED]
 
 
 def _near(candidate: Candidate, entry: Accepted) -> bool:

@@ -117,7 +117,7 @@ def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
         std = float(final.fit.std[final.free.index(dotted)]) if dotted in final.free else 0.0
         estimates.append(EffectParameterEstimate(short, dotted, parameter.value, parameter.unit, std))
     texts = {e.name: f"{e.value:.4g} {e.unit}" for e in estimates}
-    notes = [f"{alias.parameter} held: not told from {alias.partner}" for alias in entry.trial.held]
+    notes = [f"{alias.parameter} held: not discriminated from {alias.partner}" for alias in entry.trial.held]
     if entry.trial.from_prediction:
         notes.append("shown by closed-loop predictions; the inverse-dynamics residual hardly shows it")
     elif not entry.ranked and not is_clear(final, tuple(e.dotted for e in estimates if e.std > 0.0)):
@@ -129,7 +129,7 @@ def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
         tuple(estimates),
         entry.trial.validation.relative,
         entry.trial.validation.score,
-        (*notes, *(f"{'not told from it' if entry.ranked else ALIKE}: {rival}" for rival in entry.rivals)),
+        (*notes, *(f"{'not discriminated from it' if entry.ranked else ALIKE}: {rival}" for rival in entry.rivals)),
         entry.probability,
         entry.evidence,
         entry.class_probability,

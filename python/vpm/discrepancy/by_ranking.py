@@ -334,7 +334,7 @@ def _unpromising(ranking: Ranking, final: Judged, data: Data, effects: Sequence[
     """Effects that could be there and that no round of a ranking fitted, with the reason."""
     offered = candidates(final.model, data.training, final.fit.residual, asked_for(effects), simulated=True)
     tried = {one.key for several in ranking.rounds for one in several}
-    reason = "the first step of a fit promised less evidence than others did, or too little for a fit"
+    reason = "the first step of a fit predicted less evidence than others did, or too little for a fit"
     return {candidate.key: reason for candidate in offered if candidate.key not in tried}
 
 

@@ -192,7 +192,7 @@ def _tried(
     effect: EffectType, site: str, model: Model, seen: Excitation, limit: Callable[[str, int], float | None]
 ) -> Candidate:
     """With the start values and bounds that the catalogue gives; a ``limit`` of commands is guessed from data too."""
-    # A way that is passed between two samples cannot be told from dry friction.
+    # A way that is passed between two samples is like dry friction.
     least = min(seen.speed * seen.interval, 0.5 * seen.travel)
     grids, bounds = list[list[tuple[str, float]]](), dict[str, tuple[float, float]]()
     for tried in effect.tried:
@@ -293,9 +293,9 @@ def _excitation(data: InverseDynamicsProblem, model: Model, site: str, actuator:
 def _ripple_periods(position: Array, values: Array, fewest: float) -> list[float]:
     """Periods in position at which a residual is strongest: peaks of its least-squares periodogram.
 
-    Evenly spaced frequencies up to what the decimated samples resolve, from ``fewest`` periods per travel; what rubs
-    turns round with the motion, and is told from the rest of the machine over half a period already; N. Lomb,
-    *Astrophysics and Space Science* 39, 1976.
+    Evenly spaced frequencies up to what the decimated samples resolve, from ``fewest`` periods per travel; friction
+    changes its sign with the motion, and half a period suffices for it; N. Lomb, *Astrophysics and Space Science* 39,
+    1976.
     """
     thin = max(1, len(values) // 4000)
     position, values = position[::thin], values[::thin]

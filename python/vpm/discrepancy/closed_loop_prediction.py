@@ -243,7 +243,7 @@ def _with_slopes(
     setup: Setup,
     beside: ClosedLoopPrediction | None = None,
 ) -> ClosedLoopPrediction:
-    """A run with its derivatives, which are worth few digits: no finer steps, and those that are known ``beside`` it.
+    """A run with its derivatives, which are worth few digits: no shorter steps, and those that are known ``beside`` it.
 
     Each takes as long as the run itself, and models of which one is a little later or slower share all but their own.
     """

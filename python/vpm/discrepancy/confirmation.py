@@ -203,8 +203,8 @@ def unmoved(
 def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) -> Trial:
     """Refit with the candidate, release what has become visible, and measure the gain on validation data.
 
-    ``rival`` is the sum of squares that another one leaves of the training records: one that stays above ``HOPELESS``
-    times that has no chance beside it, and its refit may end early.
+    ``rival`` is the sum of squares that another one leaves of the training records: the refit of a candidate above
+    ``HOPELESS`` times that may end early.
     """
     bounds = {**current.bounds, **_bounds(probe)}
     start = probe.model.with_parameters(_inside(probe, bounds))
@@ -300,8 +300,8 @@ def judged_anyhow(
 def _visible_now(judged: Judged, data: Data, probe: Probe) -> tuple[str, ...]:
     """Parameters that looked like others where the fit began and do not where it ended.
 
-    A stiffness looks like the inertia behind it as long as neither is near its value. Of an effect that does nothing at
-    its start a doubtful parameter may stay there; any other start is a guess, and is left if the data show it at all.
+    A stiffness looks like the inertia behind it as long as neither is near its value. A doubtful parameter of an effect
+    that does nothing at its start may stay there. Any other start is a guess, so it moves if the data show it at all.
     """
     names = [alias.parameter for alias in probe.held]
     if not names:
@@ -341,8 +341,8 @@ def _origin(data: InverseDynamicsProblem, probe: Probe, start: Model) -> Array |
 def weaker(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> Array:
     """How much weaker the actuators of each joint have become, at least 1 (joints,).
 
-    An effect that suppresses the command, or a gain that shrinks, leaves a small gap between two small efforts; errors
-    are compared relative to the effort, so that nothing is won that way. One drive may do so where others are stronger.
+    An effect that suppresses the command, or a gain that shrinks, leaves a small difference of two small efforts. So
+    errors are compared relative to the effort. One drive may do so where others are stronger.
     """
     after, before = (problem.strengths(one.model) for one in (judged, current))
     return np.asarray(np.maximum(1.0, before / np.maximum(after, np.maximum(1e-6 * before, 1e-300))))

@@ -39,8 +39,8 @@ class Shares:
     of : dict of str to float
         Share of the mean square on validation data by state, the largest first.
     alike : tuple of str
-        States whose share these data cannot tell from the largest, the largest itself among them; none if they cannot
-        tell the largest from zero.
+        States whose share these data do not discriminate from the largest, the largest itself among them; none if they
+        cannot tell the largest from zero.
     """
 
     of: dict[str, float]

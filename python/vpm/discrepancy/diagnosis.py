@@ -58,7 +58,7 @@ class AcceptedEffect(Storable):
     score : float
         That gain in standard deviations between independent blocks.
     notes : tuple of str
-        What was held, and what it cannot be told from.
+        What was held, and what the data do not discriminate from it.
     probability : float
         That this is what was missing beside the effects before it; NaN where no ranking named it.
     evidence_nats : float
@@ -157,8 +157,8 @@ class Empirical(Storable):
         Root mean square of the weighted residual on validation data without and with the formula.
     sentence : str
     alike : tuple of str
-        States whose share these data cannot tell from the largest, the largest itself among them; none if they cannot
-        tell the largest from zero.
+        States whose share these data do not discriminate from the largest, the largest itself among them; none if they
+        cannot tell the largest from zero.
     predicted : float
         Share of the mean square on validation data that the formula, or what the remark says, predicts.
     """

@@ -27,12 +27,12 @@ from vpm.model import Model
 
 Array = NDArray[np.float64]
 
-#: A difference below this many times the noise tells nothing apart.
+#: A difference below this many times the noise discriminates nothing.
 TELLING = 1.0
 
 
 @dataclass(frozen=True)
-class _Balance:
+class _Residual:
     """What shows of a model along a motion: effort applied less effort required (n, joints), and its derivative."""
 
     residual: Array
@@ -42,7 +42,7 @@ class _Balance:
 def experiments(
     final: Judged, ambiguous: Sequence[Rivals], data: InverseDynamicsProblem, noise: Mapping[str, float]
 ) -> tuple[ProposedExperiment, ...]:
-    """For each pair of an effect and a rival, the motion that tells them apart best.
+    """For each pair of an effect and a rival, the motion that discriminates them best.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def experiments(
     for rivals in ambiguous:
         for trial in rivals.trials:
             if has_hidden(trial.judged.model, data.motions[0].joints):
-                continue  # its balance needs a motion that nobody measures
+                continue  # its residual needs a motion that no channel measures
             rival = trial.probe.candidate.label
             joint = _joint_of(final.model, rivals.site, data.joints)
             best = propose(final, trial.judged, (rivals.label, rival), excitation_range(data, joint), noise)
@@ -109,8 +109,8 @@ def _difference(first: Judged, second: Judged, motion: Motion, seen: ExcitationR
     """Root mean square difference that the second model cannot imitate, and the joint where it is largest."""
     model = first.model
     inputs = _commands(model, motion, seen)
-    one = _balance(model, (), motion, inputs)
-    other = _balance(second.model, second.free, motion, inputs)
+    one = _residual(model, (), motion, inputs)
+    other = _residual(second.model, second.free, motion, inputs)
     change = other.residual - one.residual
     flat, slopes = change.reshape(-1), other.slopes.reshape(change.size, -1)
     spread = max(float(np.sqrt(np.mean(second.fit.residual**2))), 1e-12) * seen.effort
@@ -136,12 +136,12 @@ def _imitation(change: Array, slopes: Array, second: Judged, spread: float) -> A
     return np.asarray(std * np.linalg.lstsq(normal, scaled.T @ (change / spread), rcond=1e-12)[0])
 
 
-def _balance(model: Model, free: Sequence[str], motion: Motion, inputs: Array) -> _Balance:
+def _residual(model: Model, free: Sequence[str], motion: Motion, inputs: Array) -> _Residual:
     columns = [model.index(name) for name in free]
     required, applied, jacobian = model.core.inverse_dynamics(
         model.theta, motion.position, motion.velocity, motion.acceleration, inputs, motion.time_step, columns
     )
-    return _Balance(applied - required, -jacobian)
+    return _Residual(applied - required, -jacobian)
 
 
 def _commands(model: Model, motion: Motion, seen: ExcitationRange) -> Array:

@@ -67,7 +67,7 @@ def together(
         return None
     name, site = lead.probe.candidate.key
     judged = _without(partner.trial.judged, (name, site), data)
-    # What comes with a delay or a lag is told from others of its kind again, with the partner in its place.
+    # A delay or lag is chosen among its kind again, with the partner in its place.
     kin = [one for one, entry in EFFECTS.items() if entry.late] if lead.probe.candidate.effect.late else [name]
     names = [one for one in kin if effects is None or one in effects]
     beside = outcome.after(judged)

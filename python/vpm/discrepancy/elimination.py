@@ -107,7 +107,7 @@ def _released(entry: Accepted, freed: set[str]) -> Accepted:
     return replace(entry, trial=replace(trial, held=held, parameters=(*trial.parameters, *mine)))
 
 
-def settled(best: Accepted, data: Data) -> Accepted:
+def refitted(best: Accepted, data: Data) -> Accepted:
     """What was fitted on a tangent, fitted to the end: the next round starts from it."""
     judged = best.trial.judged
     try:

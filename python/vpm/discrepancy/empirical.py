@@ -34,8 +34,8 @@ PERIOD_RANGE = 1.15
 def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
     """Describe what a model leaves, and add a formula for it to the model where one predicts the validation data.
 
-    What runs with the time of the record, a drift or a rhythm, is told in words: as a force of the machine's state it
-    would be wrong in the next record.
+    A drift or a rhythm depends on the time of the record and is described in words: as a force of the machine's state
+    it would be wrong in the next record.
 
     Returns
     -------
@@ -234,7 +234,7 @@ def _in_time(states: dict[str, float], beat: Rhythm | None, formula_share: float
 
 
 def _depends(states: Shares) -> str:
-    """The state that predicts most, what these data cannot tell from it, and what predicts clearly less."""
+    """The state that predicts most, states not discriminated from it, and states that predict clearly less."""
     named = [name for name, share in states.of.items() if share >= NAMED][:MOST_NAMED]
     if not named or not states.alike:
         return "no single state of the machine predicts it"
@@ -246,7 +246,7 @@ def _depends(states: Shares) -> str:
     less = [name for name in named[1:] if name not in states.alike]
     sentence = f"it follows {listed(named[:1])}"
     if alike:
-        sentence += f", which these data cannot tell from {listed(alike)}"
+        sentence += f", which these data do not discriminate from {listed(alike)}"
     if less:
         sentence += f"{';' if alike else ','} less {listed(less)}"
     return sentence

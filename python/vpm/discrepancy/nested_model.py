@@ -37,9 +37,8 @@ def probe_beside(final: Judged, without: Judged, data: InverseDynamicsProblem, e
     Returns
     -------
     Probe
-        To be refitted from the size that one step beside the effect says; ``probe`` where it is none that was held, is
-        not confused with the effect at its site, cannot be computed beside it, or has no size there that is clear
-        (95 %).
+        To be refitted from the size that one step beside the effect says; ``probe`` itself if it was not held, is not
+        confused with the effect at its site, cannot be computed beside it, or has no clear size there (95 %).
     """
     candidate = probe.candidate
     if probe.free or not probe.held or not candidate.neutral or not alike(candidate, entry.trial.probe.candidate):

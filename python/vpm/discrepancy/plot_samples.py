@@ -59,7 +59,7 @@ def pictures(data: Data, nominal: Judged, recalibrated: Judged, final: Judged) -
 
 
 def where(model: Model, validation: InverseDynamicsProblem) -> dict[str, tuple[str, ...]]:
-    """Where the efforts of the first validation record part, in words, by channel: over the samples that count."""
+    """Sentences on the residual by state region, for each channel of the first validation record."""
     time, applied, required = validation.effort(model, model.theta, 0)
     record, sentences = validation.experiments[0], {}
     for joint, block in enumerate(validation.efforts(0)):
@@ -73,6 +73,6 @@ def where(model: Model, validation: InverseDynamicsProblem) -> dict[str, tuple[s
             model.name, record.name, "inverse_dynamics", time[rows], (block.channel,), (block.unit,), *columns, starts
         )
         (found,) = compare(run, record, [block.channel]).channels
-        # The machine is not set anew where a stretch begins, as in restarts: only what counts begins there.
+        # Unlike in multi-step predictions, the state is not reset where a stretch begins.
         sentences[block.channel] = tuple(r.sentence for r in found.where.regions if r.quantity != "time since restart")
     return sentences

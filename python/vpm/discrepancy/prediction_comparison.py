@@ -23,8 +23,8 @@ from vpm.identify import Gain
 from vpm.identify.along import bends, has_own_drives
 from vpm.model import Model
 
-#: Logarithm of how many times as likely the training records have to be with another model, as both are fitted to the
-#: balance, before both are fitted to the records in closed loop.
+#: Log likelihood ratio of the training records, for two models fitted to the residual, from which on both are fitted to
+#: the records in closed loop.
 WORTH_A_FIT = 10.0
 
 

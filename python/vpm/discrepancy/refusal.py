@@ -80,7 +80,7 @@ def refuse_probe(probe: Probe) -> str:
     if not probe.free:
         if probe.held:
             partners = ", ".join(dict.fromkeys(alias.partner for alias in probe.held))
-            return f"these data cannot tell it from {partners}"
+            return f"these data do not discriminate it from {partners}"
         return "it has no influence on these data"
     if probe.drop < 0.0:
         return "it would make the training error larger wherever it was tried"
@@ -188,7 +188,7 @@ def _too_short(trial: Trial, interval: float) -> str:
             return (
                 f"{name} comes out as {1e3 * parameter.value:.3g} ms, less than the sampling interval of "
                 f"{1e3 * interval:.3g} ms, and {_moves('the validation error', trial.validation)}: "
-                "so little cannot be told from the sampling itself"
+                "so little is not discriminated from the sampling itself"
             )
     return ""
 
@@ -221,7 +221,7 @@ def _no_way(trial: Trial) -> str:
         return ""
     return (
         f"{parameter_text(trial.judged.model, name, std)}, and the joint passes {least:.3g} "
-        f"{parameter.unit} between two samples: what builds up within two of them cannot be told from dry friction"
+        f"{parameter.unit} between two samples: what builds up within two of them is like dry friction"
     )
 
 
@@ -274,8 +274,8 @@ def _trifling_size(trial: Trial) -> str:
     if abs(value - 1.0) >= NEGLIGIBLE or magnified:
         return ""
     return (
-        f"{name} comes out as {value:.4g}: less than {percent(NEGLIGIBLE)} of the signal is no error "
-        "to be told from that of the model"
+        f"{name} comes out as {value:.4g}: less than {percent(NEGLIGIBLE)} of the signal is no more "
+        "than an error of the model"
     )
 
 

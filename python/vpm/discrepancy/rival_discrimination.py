@@ -40,7 +40,7 @@ def discriminated(
     if before is None:
         return found, tuple(known)
     runs = each(
-        "telling apart: running",
+        "discriminating rivals: running",
         lambda one: predicted(one[1].judged, data) or "",
         possible,
         lambda one: one[1].probe.candidate.label,

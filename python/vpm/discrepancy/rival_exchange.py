@@ -27,8 +27,8 @@ from vpm.identify import Gain, gain, segments
 def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search, tuple[Rivals, ...]]:
     """Let the rival that the validation data prefer most take the place of the effect it was put for, if there is one.
 
-    A rival counts that acts at the same site and is confused with the effect. No new name is claimed but one of two,
-    so that it need not halve what is left: it has to know something of the validation data that the effect does not.
+    A rival counts that acts at the same site and is confused with the effect. A rival changes a name and adds none, so
+    it need not halve the residual: it only has to predict the validation data better than the effect.
 
     Returns
     -------
@@ -68,8 +68,8 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
     more = len(trial.parameters) - len(entry.trial.parameters)
     if not earned(fitted, more) or validation.score < thresholds.score(validation.pieces):
         return 0.0
-    finer = contains(judged, trial.parameters, final, entry.trial.parameters)
-    shown = finer and fitted.score >= thresholds.score(fitted.pieces)
+    nested = contains(judged, trial.parameters, final, entry.trial.parameters)
+    shown = nested and fitted.score >= thresholds.score(fitted.pieces)
     if validation.harm > (0.0 if shown else -NORMAL_95_ONE_SIDED):
         return 0.0
     if data.simulation is not None and final.simulated is not None and judged.simulated is not None:
@@ -117,8 +117,8 @@ def _thresholds(known: Sequence[Rivals], data: Data) -> Thresholds:
 def earned(fitted: Gain, more: int) -> bool:
     """Whether a rival lowers the training error by what its additional numbers cost.
 
-    By the information criterion: numbers that the records they were fitted to do not show tell nothing of other
-    records, where a law of dry friction is wrong in a few reversals.
+    By the information criterion on training records: parameters that these do not show would only fit the errors of
+    friction laws at a few reversals of other records.
 
     Parameters
     ----------

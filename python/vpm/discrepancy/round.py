@@ -38,8 +38,8 @@ from vpm.identify import gain, segments
 from vpm.identify.along import bends, has_own_drives
 from vpm.identify.tangent import drives_on_tangent
 
-#: Where links bend already, the noise of the measured motion rings in them: another spring needs a predicted gain of
-#: this share of the residual, and only the best is refitted.
+#: Where links bend already, the noise of the measured motion rings in them: another spring needs this predicted gain as
+#: a share of the residual. Only the best is refitted.
 RINGING, FEW = 0.2, 1
 
 #: Called with a sentence on what is being done.
@@ -185,8 +185,8 @@ class Round:
     def _is_heavy(self, candidate: Candidate) -> bool:
         """Whether it adds a motion that nobody measures, which has to be simulated for every probe.
 
-        Where the log holds that motion, it is evidence like any. So is the bending of a rigid beam beside others that
-        bend, and a backlash between links that do not, which its flights tell at once: light effects would only imitate
+        Where the log holds that motion, it is evidence like any. The same holds for bending of a rigid beam beside
+        flexible ones, and for a backlash between rigid links, which its flights show: light effects would only imitate
         them.
         """
         model, motion = self.current.model, candidate.effect.motion
@@ -208,7 +208,7 @@ class Round:
         again = [one for one in short_list if twins.get(one.candidate.key) in supported]
         self._refit(again)
         if any(EFFECTS[name].late for name, _ in supported):
-            # Which of them it is no promise tells, so that all of its kind compete with it.
+            # Predicted gains do not discriminate delays, so that all of them compete.
             kin = [one for one in self._promising if one.candidate.effect.late]
             kin = [one for one in kin if one not in short_list]
             self._refit(kin)
@@ -289,8 +289,8 @@ class Round:
     def _is_predicted(self, trial: Trial, thresholds: Thresholds) -> bool:
         """Whether a delay gains little and surely, and closed-loop predictions of validation records support it.
 
-        What sticks is late in an inverse-dynamics residual, and so imitates it, but not in a run; nor does a run know
-        or mind to which of two samples a command was logged.
+        Stiction imitates a delay in an inverse-dynamics residual, but not in a prediction. A prediction also does not
+        depend on the sample to which a command was logged.
         """
         late = is_late(trial.probe.candidate.effect, trial.judged.model) and not self._takes_long()
         if not late or refuse_trial(replace(trial, supported=True), thresholds) or self.prediction is None:
@@ -343,10 +343,10 @@ class Round:
 
     def ranked(self) -> list[RankedCandidate]:
         """Candidates of this round: what was accepted, what helped on validation data, then by predicted gain."""
-        return sorted(self._ranking.values(), key=_promise)
+        return sorted(self._ranking.values(), key=_by_gain)
 
 
-def _promise(candidate: RankedCandidate) -> tuple[int, float]:
+def _by_gain(candidate: RankedCandidate) -> tuple[int, float]:
     """Sorts a ranking."""
     if candidate.accepted:
         return 0, 0.0

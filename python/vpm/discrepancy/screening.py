@@ -51,7 +51,7 @@ class Probe:
     free : tuple of str
         Dotted names of the effect's parameters that the data can see.
     held : tuple of Alias
-        Those that they cannot tell from others.
+        Those that they do not discriminate from others.
     invisible : tuple of str
         Those without any influence at the start values.
     values, std : dict

@@ -10,7 +10,7 @@ from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, Trial
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
 from vpm.discrepancy.effect_pair import Pair, together
-from vpm.discrepancy.elimination import Stage, drop_replaced, drop_springs, settled, without_tight_bounds
+from vpm.discrepancy.elimination import Stage, drop_replaced, drop_springs, refitted, without_tight_bounds
 from vpm.discrepancy.round import Round, Tell
 from vpm.discrepancy.screening import Probe
 from vpm.discrepancy.side_by_side import SideBySide
@@ -51,7 +51,7 @@ class Search:
     """Outcome of the whole search, or of what was done of it when Ctrl-C was pressed.
 
     ``last`` is given if nothing has changed since the last effect came in; ``over`` is the last round, if it accepted
-    nothing. ``left`` is told by a ranking: by joint the share of the error power of validation records that effects
+    nothing. ``left`` comes from a ranking: by joint the share of the error power of validation records that effects
     leave; ``ranked`` is its model, and ``within_laws`` whether it leaves less than laws are wrong by.
     """
 
@@ -128,7 +128,7 @@ def further(
             over = Over(tuple(outcome.probes), tuple(outcome.trials))
             break
         if has_tangent(best.trial.judged.model, data.training):
-            best = settled(best, data)
+            best = refitted(best, data)
         # Beside the first of a pair, and in a round of a few, little else was tried.
         known = Tried(best.key, outcome.current, tuple(outcome.probes), tuple(outcome.trials))
         last = known if pair is None and not again else None
@@ -177,13 +177,13 @@ def _listed(refused: dict[Key, str]) -> tuple[RefusedEffect, ...]:
 
 
 def ambiguities(accepted: Sequence[Accepted]) -> tuple[Ambiguity, ...]:
-    """What the data cannot tell from each accepted effect: rivals in its round, and parameters held for its sake."""
+    """What is not discriminated from each accepted effect: rivals in its round, and parameters held beside it."""
     found = []
     for entry in accepted:
         candidate = entry.trial.probe.candidate
         if entry.rivals:
             reason = "they predict the validation data equally well"
-            reason = "the records do not tell them apart" if entry.ranked else reason
+            reason = "the records do not discriminate them" if entry.ranked else reason
             found.append(Ambiguity(candidate.effect.name, candidate.site, entry.rivals, reason))
         for alias in entry.trial.held:
             reason = f"{alias.parameter} was held at its start: these data show it only together with {alias.partner}"

@@ -18,8 +18,8 @@ Array = NDArray[np.float64]
 BINS = 8
 #: One sample in so many is taken for independent of the others.
 THINNED = 2
-#: Share of the validation residual that a state map must predict, and share of its power in the lowest tenth of the
-#: band (a tenth for white noise), before it counts as structured.
+#: A residual is structured above this share that a state map predicts, or this share of its power in the lowest tenth
+#: of the band (a tenth for white noise).
 PREDICTED_SHARE = 0.1
 LOW_FREQUENCY_SHARE = 0.5
 #: A residual of so many times its white part is not white.

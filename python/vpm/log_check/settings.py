@@ -78,8 +78,8 @@ class Settings:
     harmless : float
         Share of a channel that harms no conclusion. A delay that leaves no more is told, but is no mistake; of such
         ones no two are tried.
-    settled : float
-        A delay is as the record has it when it moves by less, in samples, while it is looked for.
+    delay_tolerance : float
+        A search for a delay ends when the delay moves by less, in samples.
     stuck : int
         Samples of one value, in a channel with noise, that no sensor gives by chance.
     jump : float
@@ -136,7 +136,7 @@ class Settings:
     longest_delay: float = 0.1
     held: float = 0.75
     harmless: float = 1e-3
-    settled: float = 0.1
+    delay_tolerance: float = 0.1
     stuck: int = 20
     jump: float = 3.0
     clipped: float = 0.01

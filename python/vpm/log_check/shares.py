@@ -153,10 +153,10 @@ class Judge:
         except ASTRAY:
             return self.measured(record)
         shares = self._shares(observed, found.residual, observer, found.structure.theta)
-        return self._believed(shares, found.structure)
+        return self._with_departure(shares, found.structure)
 
     def tangent(self, record: Experiment, at: Shares, forces: Collection[str] = FRICTION) -> Tangent | None:
-        """How what is left changes with the parameters, about some values of them; None where that cannot be told."""
+        """Change of the error with the parameters, about some values of them; None where that cannot be computed."""
         if at.residual is None:
             return None
         observer, structure = self._observer(record), replace(self._structure(record, forces), theta=at.values)
@@ -194,7 +194,7 @@ class Judge:
         seen = _seen(observed)
         kept[seen] = (slopes.reshape(len(sizes), -1, slopes.shape[1]) * sizes).transpose(1, 0, 2)
         shares = self._shares(observed, fitted.residual, observer, fitted.structure.theta)
-        return Tangent(fitted.structure, fitted.residual, kept, self._believed(shares, fitted.structure))
+        return Tangent(fitted.structure, fitted.residual, kept, self._with_departure(shares, fitted.structure))
 
     def fit_delay(self, record: Experiment, correction: Correction, tangent: Tangent) -> tuple[Correction, Shares]:
         """A delay that is fitted with the parameters and all forces, from the values of a tangent without it."""
@@ -211,11 +211,11 @@ class Judge:
         except ASTRAY:
             return correction, self._lost(record, tangent.shares.values)
         *values, delay = found.structure.theta.tolist()
-        finer = replace(correction, delay=delay)
-        shares = self.measured(finer.applied(record), np.array(values))
-        return finer, self._believed(shares, without_delay(found.structure))
+        refined = replace(correction, delay=delay)
+        shares = self.measured(refined.applied(record), np.array(values))
+        return refined, self._with_departure(shares, without_delay(found.structure))
 
-    def _believed(self, shares: Shares, structure: Structure) -> Shares:
+    def _with_departure(self, shares: Shares, structure: Structure) -> Shares:
         """With how far the parameters of the model are from what its file states."""
         from scipy.stats import chi2  # slow to import, and seldom needed
 
@@ -347,7 +347,7 @@ class Tangent:
         spread = np.diag(np.linalg.pinv(normal * np.outer(sizes, sizes), hermitian=True))
         return np.asarray(sizes * np.sqrt(np.maximum(spread, 0.0)))
 
-    def promised(self, corrected: Experiment, record: Experiment, residual: Array) -> tuple[Shares, float]:
+    def predicted(self, corrected: Experiment, record: Experiment, residual: Array) -> tuple[Shares, float]:
         """What is left if more or less of a correction is done and all parameters give way, and how much of it that is.
 
         ``residual`` is what the same values of the parameters leave of the corrected record.

@@ -16,7 +16,7 @@ VERDICT_WORDS = {
 
 
 def estimate(value: float, std: float, unit: str, stated: float | None = None) -> str:
-    """``0.55 ± 0.01 N m``, and whether it can be told from zero and from what the model file states.
+    """``0.55 ± 0.01 N m``, and whether it differs from zero and from the model file.
 
     Parameters
     ----------
@@ -56,7 +56,7 @@ def probability(effect: AcceptedEffect) -> str:
     if isnan(effect.evidence_nats):
         return ""
     own, whole = effect.probability, effect.class_probability
-    beside = f", {whole:.2f} with what is not told from it" if whole > own else ""
+    beside = f", {whole:.2f} with what is not discriminated from it" if whole > own else ""
     return f"evidence {short(effect.evidence_nats)} nats, probability {own:.2f}{beside}"
 
 

@@ -60,7 +60,7 @@ class Drawn:
 
 
 def drawn(anchor: str, title: str, caption: str, words: str, figure: Figure, *, joint: bool = False) -> Drawn:
-    """A picture with words, which say what is to be seen."""
+    """A picture with words, which describe it."""
     return Drawn(anchor, title, caption, figure_to_svg(figure, words), joint)
 
 
@@ -94,7 +94,7 @@ def finding(evidence: Evidence, number: int) -> Drawn:
     )
     caption = (
         f"{title}, which was never fitted. What it looks like: {looks[0].lower()}{looks[1:]}. Points: residual of "
-        f"{evidence.channel} at the samples that count, without the effect (all other parameters as fitted with it) "
+        f"{evidence.channel} at the samples used, without the effect (all other parameters as fitted with it) "
         f"and with it. Black: the fitted law{law}. {sizes}"
     )
     words = f"Residual of {evidence.channel} over {evidence.name}, without and with {title}. {sizes}"
@@ -174,7 +174,7 @@ def _joint(p: Picture, number: int, last: str) -> Iterator[Drawn]:
     yield drawn(
         f"picture-{number}-state",
         f"{name}: against velocity and position",
-        "Points: samples that count. Lines: means, of forward and of backward motion apart, so that a step at zero "
+        "Points: samples used. Lines: means of forward and of backward motion, so that a step at zero "
         "velocity stays one.",
         f"Residual of {p.channel} against velocity and position. Mean residual, {means}.",
         plot_joint_over_state(p, stages),
@@ -205,7 +205,7 @@ def _noise(p: Picture, stages: Mapping[str, Array], number: int, name: str) -> I
         f"picture-{number}-noise",
         f"{name}: what is left",
         "Left: correlation with its own past, and the band that holds 95 % of it for white noise. Right: spectra, over "
-        "stretches of samples that count.",
+        "stretches of samples used.",
         words,
         plot_joint_noise(stages, (lags, values, band), rate, p.unit),
         joint=True,
@@ -242,7 +242,7 @@ def _parameters(d: Diagnosis) -> Iterator[Drawn]:
     yield drawn("picture-parameters", "Fitted parameters", caption, f"Fitted: {words}.", figure)
     if len(fit.names) > 1:
         title = "Correlation of the fitted parameters"
-        caption = "Near 1 or −1, the data show two parameters hardly apart; an empty row is one that they do not show."
+        caption = "Near 1 or −1, the data hardly separate two parameters; an empty row is one that they do not show."
         picture = plot_parameter_correlation(fit.names, fit.correlation)
         yield drawn("picture-correlation", title, caption, _pairs(fit.names, fit.correlation), picture)
 

@@ -68,7 +68,7 @@ def _refused(d: Diagnosis) -> list[str]:
 def _ambiguous(d: Diagnosis) -> list[str]:
     lines = [f"  {a.name} at {a.site} and {', '.join(a.others)}: {a.reason}" for a in d.ambiguous_with]
     listed = [f"  {experiment.sentence}" for experiment in d.experiments]
-    head = ["these data cannot tell apart:", *lines] if lines else []
+    head = ["these data do not discriminate:", *lines] if lines else []
     return [*head, *(["experiments that would:", *listed] if listed else [])]
 
 

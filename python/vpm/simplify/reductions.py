@@ -44,8 +44,8 @@ class Reduction(Storable):
     Attributes
     ----------
     kind : {"effect", "level", "component", "drive", "terms"}
-        An effect that is left out, a coarser level of a flexible link, a deformation of a link that is held rigid, a
-        hydraulic drive with fewer states, terms of the equations of motion that are left out.
+        An effect left out, a coarser level of a flexible link, a deformation held rigid, a hydraulic drive with fewer
+        states, or terms of the equations of motion left out.
     name : str
         Effect, level, component, change of a drive, see `vpm.simplify.hydraulics`, or of terms ``"velocity"`` (products
         of rates), ``"coupling"`` (entries of the mass matrix across joints), ``"second-order"`` (in the deflection).

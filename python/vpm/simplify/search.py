@@ -78,8 +78,8 @@ def simplify(
     against : {"data", "model"}
         Reference: what was measured, or what the full model does on the commands of the records.
     mode : str, optional
-        Mode of simulation to judge in; by default closed loop or restarts, see `vpm.simulate.judging_mode`, and
-        against the model free run instead of restarts.
+        Mode of simulation to judge in; by default closed loop or multi-step predictions, see
+        `vpm.simulate.judging_mode`, and against the model a free run instead of the latter.
     channels : sequence of str, optional
         What is compared; by default all measured outputs, and against the model strains, places of markers and
         pressures, or the positions of the joints where there are none.
@@ -212,7 +212,7 @@ def _paying(found: dict[Reduction, tuple[float, float]]) -> dict[Reduction, tupl
 
 
 def _coarser(changes: Sequence[Reduction], base: Changes) -> Sequence[Reduction]:
-    """Changes of one site beyond that in the base: they come finest first, and what is finer costs more."""
+    """Changes of one site beyond that in the base; they come with the most detailed first."""
     straight = _straight(base)
     changes = [each for each in changes if not _is_idle(each, straight)]
     taken = next((each for each in base if each in changes), None)

@@ -47,8 +47,7 @@ Changes = tuple[Reduction, ...]
 class Trials:
     """Reduced models by their changes, each tried once.
 
-    What coarse timing shows to be much slower than something that loses next to nothing is not fitted: it can neither
-    be chosen nor be a choice that anybody would take instead.
+    A model that is much slower by coarse timing than one that loses next to nothing is not fitted: it cannot be chosen.
 
     Parameters
     ----------
