@@ -11,10 +11,9 @@ from pydantic import Field
 from vpm.model.component import Component, Described, Index
 from vpm.model.entry import ZERO, ParameterValue, Switch
 from vpm.model.messages import Problem, place
-from vpm.model.parameters import ABOVE_ZERO, ANY, NOT_NEGATIVE, Keys, Slot
+from vpm.model.parameters import ABOVE_ZERO, ANY, NOT_NEGATIVE, Keys, Parameter, Slot
 
 if TYPE_CHECKING:
-    from vpm.model.parameters import Parameter
     from vpm.model.schema import Document
     from vpm.model.structure import Structure
 

@@ -12,12 +12,11 @@ from vpm.errors import UnitError
 from vpm.model.component import Component, Described, Index
 from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Text, Vector
 from vpm.model.messages import Problem, place
-from vpm.model.parameters import ANY, FEEDING, NOT_NEGATIVE, Keys, Slot
+from vpm.model.parameters import ANY, FEEDING, NOT_NEGATIVE, Keys, Parameter, Slot
 from vpm.model.pose import Frame, pose
 from vpm.units import factor_to_si
 
 if TYPE_CHECKING:
-    from vpm.model.parameters import Parameter
     from vpm.model.structure import Structure
 
 #: The six directions of a bushing, in the order of all spatial vectors.

@@ -25,7 +25,7 @@ from vpm.model.messages import Problem, check_plain, raise_first
 from vpm.model.omissions import omission_problems
 from vpm.model.parameters import Parameter, Slot
 from vpm.model.schema import Document
-from vpm.model.sensor import sensor_problems
+from vpm.model.sensor import noise_problems, sensor_problems
 from vpm.model.splitting import reshapes, stop_problems
 from vpm.model.structure import Structure, build_structure
 from vpm.model.tree import name_problems, tree_problems
@@ -61,8 +61,7 @@ def check_document(content: Mapping[str, object], path: str | None = None) -> Ch
     _stop_at([*tree_problems(document), *_place_problems(document)], path)
     structure = build_structure(document)
     _stop_at([*_reference_problems(document, structure), *drives.command_problems(document)], path)
-    sensors = document.sensors.items()
-    _stop_at([problem for name, entry in sensors for problem in entry.noise_problems(name, structure)], path)
+    _stop_at(list(noise_problems(document, structure)), path)
     said = [*drives.unit_problems(document), *effect_problems(document, structure)]
     _stop_at([*said, *channel_problems(document, structure)], path)
     document = _complete(complete_effects(document, structure))
@@ -121,10 +120,9 @@ def _slots(document: Document, structure: Structure) -> Iterator[Slot]:
         yield from joint.slots(("joints", name), structure)
     for name in structure.beams:
         yield from document.beams[name].slots(("beams", name), structure)
-    for section in ("lines", "transmissions", "supplies", "actuators", "controllers", "contacts", "bushings"):
-        components: Mapping[str, Component] = getattr(document, section)
-        for name, component in components.items():
-            yield from component.slots((section, name), structure)
+    others = ("lines", "transmissions", "supplies", "actuators", "controllers", "contacts", "bushings")
+    for section, name, component in document.components(*others):
+        yield from component.slots((section, name), structure)
     for position, effect in enumerate(document.effects):
         yield from effect.slots(position, structure)
 
@@ -151,10 +149,8 @@ def _size_problems(document: Document, parameters: Mapping[str, Parameter]) -> I
 def _value_problems(
     sections: tuple[str, ...], document: Document, parameters: Mapping[str, Parameter]
 ) -> Iterator[Problem]:
-    for section in sections:
-        components: Mapping[str, Component] = getattr(document, section)
-        for name, component in components.items():
-            yield from component.value_problems(name, parameters)
+    for _, name, component in document.components(*sections):
+        yield from component.value_problems(name, parameters)
 
 
 def _stop_at(problems: list[Problem], path: str | None) -> None:
@@ -196,22 +192,16 @@ def _reference_problems(document: Document, structure: Structure) -> Iterator[Pr
         yield from actuator.target_problems(name, structure)
     yield from sensor_problems(document, structure)
     yield from controller_problems(document, structure)
-    yield from _problems(structure, "lines", "transmissions")
+    for _, name, component in document.components("lines", "transmissions"):
+        yield from component.problems(name, structure)
     yield from drives.drive_problems(document, structure)
-    yield from _problems(structure, "contacts", "bushings", "loops", "load_cells")
+    for _, name, component in document.components("contacts", "bushings", "loops", "load_cells"):
+        yield from component.problems(name, structure)
     yield from omission_problems(document, structure)
 
 
-def _problems(structure: Structure, *sections: str) -> Iterator[Problem]:
-    for section in sections:
-        components: Mapping[str, Component] = getattr(structure.document, section)
-        for name, component in components.items():
-            yield from component.problems(name, structure)
-
-
 def _complete(document: Document) -> Document:
-    found = {}
-    for section in ("actuators", "contacts"):
-        components: Mapping[str, Component] = getattr(document, section)
-        found[section] = {name: component.complete() for name, component in components.items()}
+    found: dict[str, dict[str, Component]] = {"actuators": {}, "contacts": {}}
+    for section, name, component in document.components(*found):
+        found[section][name] = component.complete()
     return document.model_copy(update=found)

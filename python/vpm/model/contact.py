@@ -9,12 +9,11 @@ from vpm.errors import UnitError
 from vpm.model.component import Component, Described, Index
 from vpm.model.entry import ORIGIN, ZERO, Entry, Number, ParameterValue, Quantity, Text, Vector
 from vpm.model.messages import Problem, place
-from vpm.model.parameters import ABOVE_ZERO, FEEDING, NOT_NEGATIVE, PUSHING, Rule
+from vpm.model.parameters import ABOVE_ZERO, FEEDING, NOT_NEGATIVE, PUSHING, Parameter, Rule
 from vpm.model.pose import Pose
 from vpm.units import convert, require_dimension
 
 if TYPE_CHECKING:
-    from vpm.model.parameters import Parameter
     from vpm.model.structure import Structure
 
 

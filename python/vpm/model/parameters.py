@@ -27,6 +27,7 @@ SHARE: Range = (1e-30, 1.0)
 
 #: What values below zero would mean.
 FEEDING = "negative damping would feed energy into the motion"
+INERTIA = "an inertia cannot be negative"
 PUSHING = "negative friction would push along the motion and feed energy into it"
 
 

@@ -5,7 +5,7 @@ Only form is checked by it. What needs more than one key to judge (references, u
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 from pydantic import BaseModel, Field
 
@@ -14,6 +14,7 @@ from vpm.model.beams.gauge import Gauge
 from vpm.model.body import Body
 from vpm.model.bushing import Bushing
 from vpm.model.channels import ChannelEntry
+from vpm.model.component import Component
 from vpm.model.contact import Contact
 from vpm.model.controller import TYPES, Controller
 from vpm.model.drives.actuator import ACTUATOR_TYPES, Actuator
@@ -52,6 +53,12 @@ class Document(Entry):
     loops: dict[str, Loop] = Field(default_factory=dict)
     effects: tuple[EffectEntry, ...] = ()
     channels: dict[str, ChannelEntry] | None = None
+
+    def components(self, *sections: str) -> Iterator[tuple[str, str, Component]]:
+        """Components of some sections, in their order, each with its section and its name."""
+        for section in sections:
+            named: dict[str, Component] = getattr(self, section)
+            yield from ((section, name, component) for name, component in named.items())
 
 
 #: Tables of named components, in the order in which a file is written.

@@ -46,14 +46,6 @@ class Sensor(Component):
             if quantity is not None:
                 yield Slot(("sensors", name, key), quantity, structure.unit(self.measures), _RANGE)
 
-    def noise_problems(self, name: str, structure: Structure) -> Iterator[Problem]:
-        """Units that are none of the channel, sizes that are not positive, uncertainties of what is no parameter."""
-        for slot in self.stated(name, structure):
-            given = slot.quantity
-            if (given.uncertainty, given.minimum, given.maximum) != (None, None, None):
-                yield Problem(place(*slot.keys), "is no parameter: give its value and its unit alone")
-            yield from slot.problems()
-
     def described(self, name: str, structure: Structure, index: Index) -> Described:
         """What the core reads of it."""
         effects = {key: index.get(f"{name}.{key}.{last}") for key, last in _EFFECTS.items()}
@@ -75,6 +67,16 @@ def sensor_problems(document: Document, structure: Structure) -> Iterator[Proble
         elif read in seen:
             yield Problem(where, f'is "{read}", which sensor "{seen[read]}" already reads; remove one')
         seen.setdefault(read, name)
+
+
+def noise_problems(document: Document, structure: Structure) -> Iterator[Problem]:
+    """Units that are none of the channel, sizes that are not positive, uncertainties of what is no parameter."""
+    for name, sensor in document.sensors.items():
+        for slot in sensor.stated(name, structure):
+            given = slot.quantity
+            if (given.uncertainty, given.minimum, given.maximum) != (None, None, None):
+                yield Problem(place(*slot.keys), "is no parameter: give its value and its unit alone")
+            yield from slot.problems()
 
 
 def stated_noise(document: Document, structure: Structure) -> dict[str, float]:

@@ -11,7 +11,7 @@ from vpm.model.component import Component, Described, Index
 from vpm.model.entry import ParameterValue
 from vpm.model.joint import COORDINATE_UNIT, coordinate_problems
 from vpm.model.messages import Problem, place
-from vpm.model.parameters import ANY, NOT_NEGATIVE, Keys, Slot
+from vpm.model.parameters import ANY, INERTIA, NOT_NEGATIVE, Keys, Slot
 
 if TYPE_CHECKING:
     from vpm.model.structure import Structure
@@ -42,8 +42,7 @@ class Transmission(Component):
             unit = COORDINATE_UNIT[structure.joint_kind(joint)]
             yield Slot((*keys, "ratios", joint), ratio, "1" if unit == "rad" else f"rad/{unit}", ANY)
         if self.inertia is not None:
-            impossible = "an inertia cannot be negative"
-            yield Slot((*keys, "inertia"), self.inertia, "kg m^2", NOT_NEGATIVE, impossible, "linear")
+            yield Slot((*keys, "inertia"), self.inertia, "kg m^2", NOT_NEGATIVE, INERTIA, "linear")
 
     def levers(self, name: str, structure: Structure, index: Index) -> list[dict[str, int]]:
         """Its ratios, with the numbers of their joints."""

@@ -17,20 +17,15 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 def name_problems(document: Document) -> Iterator[Problem]:
     """Names that cannot be written in a dotted name, that are reserved, or that two components share."""
     owner: dict[str, str] = {}
-    for section in SECTIONS:
-        if section == "channels":
-            continue
-        for name in getattr(document, section):
-            where = place(section, name)
-            if not _NAME.fullmatch(name):
-                yield Problem(where, "has a name that is not letters, digits, - and _ after a letter; rename it")
-            elif name in _RESERVED:
-                yield Problem(where, f'has the name "{name}", which is reserved; rename it')
-            elif name in owner:
-                yield Problem(
-                    where, f"has the same name as {owner[name]}; all components share one namespace, rename one"
-                )
-            owner.setdefault(name, where)
+    for section, name, _ in document.components(*(section for section in SECTIONS if section != "channels")):
+        where = place(section, name)
+        if not _NAME.fullmatch(name):
+            yield Problem(where, "has a name that is not letters, digits, - and _ after a letter; rename it")
+        elif name in _RESERVED:
+            yield Problem(where, f'has the name "{name}", which is reserved; rename it')
+        elif name in owner:
+            yield Problem(where, f"has the same name as {owner[name]}; all components share one namespace, rename one")
+        owner.setdefault(name, where)
     for name, joint in document.joints.items():
         for coordinate in joint.coordinate_names(name):
             if coordinate != name and coordinate in owner:

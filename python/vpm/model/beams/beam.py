@@ -18,10 +18,9 @@ from vpm.model.beams.section import Layers, Material, Section, Stiffness, Way, s
 from vpm.model.component import Component, Described, Index
 from vpm.model.entry import ONE, ORIGIN, Entry, Number, ParameterValue, Switch, Text, Vector
 from vpm.model.messages import Problem, place
-from vpm.model.parameters import ABOVE_ZERO, FEEDING, NOT_NEGATIVE, Keys, Rule, Slot, rules_of, slots_of
+from vpm.model.parameters import ABOVE_ZERO, FEEDING, NOT_NEGATIVE, Keys, Parameter, Rule, Slot, rules_of, slots_of
 
 if TYPE_CHECKING:
-    from vpm.model.parameters import Parameter
     from vpm.model.schema import Document
     from vpm.model.structure import Structure
 

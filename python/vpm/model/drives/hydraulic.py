@@ -21,13 +21,13 @@ from vpm.model.parameters import (
     SHARE,
     TINY,
     Keys,
+    Parameter,
     Rule,
     Slot,
 )
 from vpm.units import convert, parse_unit, require_dimension, si_unit
 
 if TYPE_CHECKING:
-    from vpm.model.parameters import Parameter
     from vpm.model.schema import Document
     from vpm.model.structure import Structure
 

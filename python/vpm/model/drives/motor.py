@@ -9,10 +9,13 @@ from vpm.model.component import Described, Index
 from vpm.model.drives.drive import Drive, numbers
 from vpm.model.entry import ONE, ParameterValue, Quantity, Text
 from vpm.model.messages import Problem, place
-from vpm.model.parameters import ABOVE_ZERO, ANY, NOT_NEGATIVE, SHARE, TINY, Keys, Rule, Slot, rules_of
+from vpm.model.parameters import ABOVE_ZERO, ANY, INERTIA, NOT_NEGATIVE, SHARE, TINY, Keys, Rule, Slot, rules_of
 
 if TYPE_CHECKING:
     from vpm.model.structure import Structure
+
+
+_TURN = Quantity(value=0.01)
 
 
 class DcMotor(Drive):
@@ -43,12 +46,8 @@ class DcMotor(Drive):
     efficiency: Annotated[
         ParameterValue, Rule("1", SHARE, "a gear gives no more than it takes, and one that gives nothing is none")
     ] = ONE
-    transition_velocity: Annotated[ParameterValue, Rule("", ABOVE_ZERO, "the loss turns over a velocity")] = Quantity(
-        value=0.01
-    )
-    rotor_inertia: Annotated[ParameterValue | None, Rule("kg m^2", NOT_NEGATIVE, "an inertia cannot be negative")] = (
-        None
-    )
+    transition_velocity: Annotated[ParameterValue, Rule("", ABOVE_ZERO, "the loss turns over a velocity")] = _TURN
+    rotor_inertia: Annotated[ParameterValue | None, Rule("kg m^2", NOT_NEGATIVE, INERTIA)] = None
     command_unit: Text = "V"
 
     def carrier_problems(self, name: str, structure: Structure) -> Iterator[Problem]:  # noqa: ARG002

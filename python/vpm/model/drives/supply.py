@@ -11,10 +11,9 @@ from vpm.model.component import Component, Described, Index
 from vpm.model.drives.drive import group, numbers
 from vpm.model.entry import Entry, ParameterValue, Quantity
 from vpm.model.messages import Problem, place
-from vpm.model.parameters import TINY, Rule
+from vpm.model.parameters import TINY, Parameter, Rule
 
 if TYPE_CHECKING:
-    from vpm.model.parameters import Parameter
     from vpm.model.schema import Document
     from vpm.model.structure import Structure
 
