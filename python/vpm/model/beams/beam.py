@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -105,7 +106,7 @@ class Beam(Component):
         """Level of detail."""
         return parse_level(self.level)
 
-    @property
+    @cached_property
     def solid(self) -> ReducedLink | None:
         """The reduced solid that it is, if it is one."""
         return None if self.reduced is None else link_of(self.reduced)
@@ -283,12 +284,10 @@ class Beam(Component):
         VpmError
             The file is not there, or the numbers are damaged.
         """
-        if self.reduced is None or self.reduced.startswith(EMBEDDED):
-            _ = self.solid  # damaged ones are told here
-            return self
-        text = embedded(read_bytes(folder / self.reduced))
-        _ = link_of(text)
-        return self.model_copy(update={"reduced": text})
+        own = self.reduced is None or self.reduced.startswith(EMBEDDED)
+        read = self if own else self.model_copy(update={"reduced": embedded(read_bytes(folder / str(self.reduced)))})
+        _ = read.solid  # damaged ones are told here
+        return read
 
     def slots(self, keys: Keys, structure: Structure) -> Iterator[Slot]:  # noqa: ARG002
         """Material, sections, damping; the effort of a motion is linear in none of them, for they bend the beam."""

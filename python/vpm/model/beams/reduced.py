@@ -13,7 +13,6 @@ import zipfile
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from functools import lru_cache
 from os import PathLike
 from pathlib import Path
 from typing import Any, Self
@@ -214,7 +213,6 @@ def embedded(content: bytes) -> str:
     return EMBEDDED + base64.b64encode(content).decode("ascii")
 
 
-@lru_cache(maxsize=32)
 def link_of(text: str) -> ReducedLink:
     """The solid that a text of `embedded` stands for.
 
