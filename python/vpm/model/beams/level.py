@@ -17,8 +17,6 @@ COMPONENTS: tuple[Component, ...] = get_args(Component)
 #: What a link deforms in unless its model says otherwise.
 USUAL: tuple[Component, ...] = ("bending_x", "bending_y", "torsion")
 
-LevelName = Literal["rigid", "lumped", "modal", "bezier", "deflection", "hermite", "strain", "elements", "reduced"]
-
 _WRITTEN = re.compile(r"\s*(?P<name>[A-Za-z_]+)\s*(?:\(\s*(?P<number>[+-]?\d+)\s*\)\s*)?")
 
 

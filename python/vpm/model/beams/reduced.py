@@ -29,7 +29,6 @@ Array = NDArray[np.float64]
 EMBEDDED = "data:"
 #: Most modes, interfaces and bytes of a file: beyond them it is no reduced solid, or one that no machine could use.
 MODES, INTERFACES, BYTES = 64, 32, 50_000_000
-_SUFFIX = ".npz"
 
 
 @dataclass(frozen=True, eq=False)
