@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from vpm.errors import ExperimentError
 from vpm.experiment import Experiment, Motion, joints_from_shafts, motion
 from vpm.model import Model
-from vpm.model.commanded import commanded_states
-from vpm.model.loop_states import kept, measured
-from vpm.model.steady_state import follow, rest
+from vpm.model.drives.states import commanded_states, follow, rest
+from vpm.model.loops.states import kept, measured
 
 Array = NDArray[np.float64]
 

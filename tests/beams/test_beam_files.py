@@ -11,7 +11,7 @@ from model_texts import changed, described
 from random_trees import trees
 from vpm.errors import ModelError
 from vpm.model import Model
-from vpm.model.level import FORMS, Level, parse_level
+from vpm.model.beams.level import FORMS, Level, parse_level
 
 ARM = """
 name = "arm"

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 import vpm
 from brick import bar_archive, bricks, write_archive
 from vpm.errors import ModelError, ReductionError
-from vpm.model.reduced import ReducedLink
+from vpm.model.beams.reduced import ReducedLink
 from vpm.reduction import Interface, Reduction, Structure, read_structure, reduce_structure
 from vpm.reduction.structure import rigid_motions
 

@@ -16,7 +16,7 @@ from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.identify.counted import SETTLING
 from vpm.identify.stops import at_stops
 from vpm.initial import joint_motion, measured_states
-from vpm.model.commanded import commanded_states
+from vpm.model.drives.states import commanded_states
 
 Array = NDArray[np.float64]
 

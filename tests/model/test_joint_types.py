@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from model_texts import described
 from vpm.errors import ModelError
 from vpm.model import Model
-from vpm.model.expand import plane, unit
+from vpm.model.joint import plane, unit
 
 Matrix = NDArray[np.float64]
 

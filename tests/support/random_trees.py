@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from hypothesis import strategies as st
 
-from vpm.model.level import COMPONENTS, FORMS
+from vpm.model.beams.level import COMPONENTS, FORMS
 
 sizes = st.floats(1e-3, 0.1)
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from vpm.errors import VpmError
 from vpm.model import Model
-from vpm.model.level import size_of
+from vpm.model.beams.level import size_of
 
 #: What the lowest level is called, and the one with what the actuators do besides following their commands.
 RIGID, ACTUATORS = "rigid", "rigid with its actuators"

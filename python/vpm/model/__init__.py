@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from vpm.model.channels import load_channel_table, parse_channel_table
+from vpm.model.channel_table import load_channel_table, parse_channel_table
+from vpm.model.channels import ChannelEntry
+from vpm.model.cores import Shape
 from vpm.model.dynamics import Dynamics
 from vpm.model.effects import Effect
-from vpm.model.model import Model, Shape
+from vpm.model.model import Model
 from vpm.model.parameters import Parameter
-from vpm.model.schema import ChannelEntry
 
 __all__ = [
     "ChannelEntry",

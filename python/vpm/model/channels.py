@@ -5,59 +5,124 @@ The value of a channel is ``scale column + offset``, in ``unit``; the samples ar
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from os import PathLike
-from types import MappingProxyType
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Self
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-from vpm.model.form import schema_problems
-from vpm.model.messages import raise_first, read_toml
-from vpm.model.schema import ChannelEntry
+from vpm.errors import UnitError, near_match
+from vpm.expression import read_expression
+from vpm.model.entry import Number, Switch, Text
+from vpm.model.messages import Problem, place
+from vpm.units import parse_unit, require_dimension
 
-_TABLE = TypeAdapter(dict[str, ChannelEntry])
+if TYPE_CHECKING:
+    from vpm.model.schema import Document
+    from vpm.model.structure import Structure
 
 
-def parse_channel_table(content: Mapping[str, object], *, path: str | None = None) -> Mapping[str, ChannelEntry]:
-    """Check a channel table.
+def _not_zero(value: float) -> float:
+    if value == 0.0:
+        raise ValueError("is 0, which would erase the column; give another factor")
+    return value
 
-    Parameters
+
+def _readable(unit: str) -> str:
+    parse_unit(unit)
+    return unit
+
+
+class ColumnPart(BaseModel):
+    """Column that a value is built from; as a name alone it holds pure numbers.
+
+    Attributes
     ----------
-    content : mapping
-        Channel names (and ``"time"``) to tables; or all of that under the key ``channels``.
-    path : str, optional
-        File that it comes from, for messages.
-
-    Returns
-    -------
-    mapping of str to ChannelEntry
-
-    Raises
-    ------
-    ModelError
-        A key is unknown or missing, or a value is of the wrong kind.
+    column : str
+    unit : str
     """
-    table = content.get("channels", content) if set(content) == {"channels"} else content
-    try:
-        return MappingProxyType(_TABLE.validate_python(table))
-    except ValidationError as error:
-        raise_first(schema_problems(error, within=("channels",)), path)
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    column: Text
+    unit: Annotated[Text, AfterValidator(_readable)] = "1"
 
 
-def load_channel_table(path: str | PathLike[str]) -> Mapping[str, ChannelEntry]:
-    """Read a channel table from a TOML file of its own.
+def _part(given: object) -> object:
+    return {"column": given} if isinstance(given, str) else given
 
-    Parameters
+
+def _expression(text: str) -> str:
+    if text:
+        read_expression(text)
+    return text
+
+
+class ChannelEntry(BaseModel):
+    """Column of a log that holds one channel, or columns that it is built from.
+
+    Attributes
     ----------
-    path : path-like
-
-    Returns
-    -------
-    mapping of str to ChannelEntry
-
-    Raises
-    ------
-    ModelError
-        The file cannot be read, is no TOML, or is not a channel table.
+    column : str
+        Name of the column; none where there is a `value`.
+    value : str
+        Expression over `columns`, worked out in SI; see `vpm.expression`.
+    columns : dict of str to ColumnPart
+        Column of each name in `value`.
+    unit : str
+        Unit of ``scale column + offset``; a `value` has to be of its kind.
+    scale : float
+        Factor on the numbers of the column.
+    offset : float
+        Added after the scaling, in `unit`.
+    delay : float
+        How late the samples are stamped (s).
+    optional : bool
+        A log without the column holds zeros here.
     """
-    return parse_channel_table(read_toml(path), path=str(path))
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    column: str = ""
+    value: Annotated[str, AfterValidator(_expression)] = ""
+    columns: dict[str, Annotated[ColumnPart, BeforeValidator(_part)]] = Field(default_factory=dict)
+    unit: Annotated[Text, AfterValidator(_readable)]
+    scale: Annotated[Number, AfterValidator(_not_zero)] = 1.0
+    offset: Number = 0.0
+    delay: Number = 0.0
+    optional: Switch = False
+
+    @model_validator(mode="after")
+    def _is_one(self) -> Self:
+        """Check that it is a column, or a value over columns that it names all."""
+        if bool(self.column) == bool(self.value):
+            raise ValueError("needs either a column, or a value over columns; give one of them")
+        named = set(read_expression(self.value).names) if self.value else set()
+        for name in sorted(named.symmetric_difference(self.columns)):
+            if name in self.columns:
+                raise ValueError(f'has columns.{name}, which its value "{self.value}" does not name; leave it out')
+            raise ValueError(f'has the value "{self.value}", but columns has no {name}; name its column')
+        return self
+
+    @property
+    def parts(self) -> dict[str, ColumnPart]:
+        """Columns by the names that the value has for them; a column alone has the name ``""``."""
+        return self.columns or {"": ColumnPart(column=self.column, unit=self.unit)}
+
+    @property
+    def told(self) -> str:
+        """What it is read from, in words."""
+        return f'value "{self.value}"' if self.value else f'column "{self.column}"'
+
+
+def channel_problems(document: Document, structure: Structure) -> Iterator[Problem]:
+    """Channels that are none of the model, and columns in other units."""
+    known = ("time", *structure.channels)
+    for name, entry in (document.channels or {}).items():
+        if name not in known and name not in structure.deflections:
+            repair = near_match(name, known, what="its channels are")
+            yield Problem(place("channels", name), f"is no channel of the model; {repair}")
+            continue
+        try:
+            require_dimension(entry.unit, "s" if name == "time" else structure.unit(name))
+        except UnitError as error:
+            yield Problem(place("channels", name, "unit"), f"is wrong: {error}")

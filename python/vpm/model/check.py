@@ -1,34 +1,34 @@
-"""From parsed TOML to a checked document: every way in goes through `check_document`."""
+"""From parsed TOML to a checked document: every way in goes through `check_document`.
+
+What is checked stands with the components; here is the order.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
+from pathlib import Path
 
-import numpy as np
 from pydantic import ValidationError
 
-from vpm.errors import ModelError, UnitError, near_match
-from vpm.model.beam_check import beam_problems, size_problems
+from vpm.errors import ModelError
+from vpm.model.beams.beam import with_solids
+from vpm.model.body import inertia_problems
+from vpm.model.channels import channel_problems
 from vpm.model.checked import Checked, Rule
-from vpm.model.connection_check import complete_contacts, connection_problems, connection_value_problems
-from vpm.model.drive_check import complete_drives, drive_problems, unit_problems, value_problems
-from vpm.model.effects import complete_effects, effect_problems
+from vpm.model.component import Component
+from vpm.model.controller import controller_problems
+from vpm.model.drives import actuator as drives
+from vpm.model.effects import EffectEntry, complete_effects, effect_problems
 from vpm.model.form import schema_problems
-from vpm.model.messages import Problem, check_plain, place, raise_first
+from vpm.model.messages import Problem, check_plain, raise_first
 from vpm.model.omissions import omission_problems
-from vpm.model.parameters import Parameter, effect_slots, slots, table
-from vpm.model.references import gauge_problems, reference_problems
-from vpm.model.sampled_files import with_files
-from vpm.model.schema import Document, EffectEntry
-from vpm.model.sensor_noise import noise_problems
+from vpm.model.parameters import Parameter, Slot
+from vpm.model.schema import Document
+from vpm.model.sensor import noise_problems, sensor_problems
 from vpm.model.splitting import reshapes, stop_problems
 from vpm.model.structure import Structure, build_structure
-from vpm.model.tree import joint_problems, name_problems, tree_problems
-from vpm.units import parse_unit, require_dimension
-
-#: An inertia may break its conditions by this share of its size: numbers in files are rounded.
-INERTIA_TOLERANCE = 1e-6
+from vpm.model.tree import name_problems, tree_problems
 
 
 def check_document(content: Mapping[str, object], path: str | None = None) -> Checked:
@@ -53,24 +53,22 @@ def check_document(content: Mapping[str, object], path: str | None = None) -> Ch
         document = Document.model_validate(content)
     except ValidationError as error:
         raise_first(schema_problems(error), path)
-    document, unread = with_files(document, path)
-    _stop_at(unread, path)
-    _stop_at([*_empty_problems(document), *name_problems(document), *beam_problems(document)], path)
-    _stop_at([*tree_problems(document), *joint_problems(document), *gauge_problems(document)], path)
+    folder = Path() if path is None else Path(path).parent
+    document, unread = drives.with_files(document, folder)
+    document, damaged = with_solids(document, folder)
+    _stop_at([*unread, *damaged], path)
+    _stop_at([*_empty_problems(document), *name_problems(document), *_beam_problems(document)], path)
+    _stop_at([*tree_problems(document), *_place_problems(document)], path)
     structure = build_structure(document)
-    references = [*reference_problems(document, structure), *drive_problems(document, structure)]
-    references += connection_problems(document, structure)
-    references += omission_problems(document, structure)
-    _stop_at([*references, *_command_problems(document)], path)
+    _stop_at([*_reference_problems(document, structure), *drives.command_problems(document)], path)
     _stop_at(list(noise_problems(document, structure)), path)
-    _stop_at(
-        [*unit_problems(document), *effect_problems(document, structure), *_channel_problems(document, structure)], path
-    )
-    document = complete_contacts(complete_drives(complete_effects(document, structure)))
+    said = [*drives.unit_problems(document), *effect_problems(document, structure)]
+    _stop_at([*said, *channel_problems(document, structure)], path)
+    document = _complete(complete_effects(document, structure))
     structure = build_structure(document)
-    found = tuple(slots(document, structure))
+    found = tuple(_slots(document, structure))
     _stop_at([problem for slot in found for problem in slot.problems()], path)
-    parameters = table(list(found))
+    parameters = _table(found)
     judged = [rule.judge(document, parameters) for rule in _rules(structure)]
     _stop_at([problem for _, problems in judged for problem in problems], path)
     return Checked(document, structure, found, parameters, tuple(rule for rule, _ in judged))
@@ -99,14 +97,14 @@ def check_effect(checked: Checked, content: Mapping[str, object]) -> Checked | N
         return None
     document = checked.base.model_copy(update={"effects": (*checked.base.effects, added)})
     structure = checked.structure.with_document(document)
-    if any(drive_problems(document, structure)) or any(effect_problems(document, structure)):
+    if any(drives.drive_problems(document, structure)) or any(effect_problems(document, structure)):
         return None
     document = complete_effects(document, structure)
     structure = checked.structure.with_document(document)
-    found = tuple(effect_slots(len(document.effects) - 1, document.effects[-1], structure))
+    found = tuple(document.effects[-1].slots(len(document.effects) - 1, structure))
     if any(problem for slot in found for problem in slot.problems()):
         return None
-    parameters = {**checked.parameters, **table(list(found))}
+    parameters = {**checked.parameters, **_table(found)}
     judged = [rule.judge(document, parameters) if rule.of_effects else (rule, []) for rule in checked.rules]
     if any(problems for _, problems in judged):
         return None
@@ -114,11 +112,45 @@ def check_effect(checked: Checked, content: Mapping[str, object]) -> Checked | N
     return Checked(document, structure, (*checked.slots, *found), parameters, rules, checked.changed)
 
 
+def _slots(document: Document, structure: Structure) -> Iterator[Slot]:
+    """Every parameter of a document whose references are right and whose effects are complete, in index order."""
+    for name in structure.bodies:
+        yield from document.bodies[name].slots(("bodies", name), structure)
+    for name, joint in document.joints.items():
+        yield from joint.slots(("joints", name), structure)
+    for name in structure.beams:
+        yield from document.beams[name].slots(("beams", name), structure)
+    others = ("lines", "transmissions", "supplies", "actuators", "controllers", "contacts", "bushings")
+    for section, name, component in document.components(*others):
+        yield from component.slots((section, name), structure)
+    for position, effect in enumerate(document.effects):
+        yield from effect.slots(position, structure)
+
+
+def _table(slots: Iterable[Slot]) -> Mapping[str, Parameter]:
+    """Parameters by name, in index order."""
+    return {slot.name: slot.parameter() for slot in slots}
+
+
 def _rules(structure: Structure) -> Iterator[Rule]:
     """What has to hold between parameters, in the order in which it is told."""
-    yield from (Rule(partial(_inertia_problems, body)) for body in structure.bodies)
-    yield from map(Rule, (size_problems, value_problems, connection_value_problems))
+    yield from (Rule(partial(inertia_problems, body)) for body in structure.bodies)
+    yield Rule(_size_problems)
+    for sections in (("supplies", "actuators"), ("contacts", "bushings")):
+        yield Rule(partial(_value_problems, sections))
     yield Rule(stop_problems, of_effects=True)
+
+
+def _size_problems(document: Document, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:
+    for name, beam in document.beams.items():
+        yield from beam.size_problems(name, document, parameters)
+
+
+def _value_problems(
+    sections: tuple[str, ...], document: Document, parameters: Mapping[str, Parameter]
+) -> Iterator[Problem]:
+    for _, name, component in document.components(*sections):
+        yield from component.value_problems(name, parameters)
 
 
 def _stop_at(problems: list[Problem], path: str | None) -> None:
@@ -141,47 +173,35 @@ def _empty_problems(document: Document) -> Iterator[Problem]:
         yield Problem("joints", 'has fixed joints only, so nothing moves; add one that does, such as type = "revolute"')
 
 
-def _command_problems(document: Document) -> Iterator[Problem]:
+def _beam_problems(document: Document) -> Iterator[Problem]:
+    for name, beam in document.beams.items():
+        yield from beam.form_problems(name)
+
+
+def _place_problems(document: Document) -> Iterator[Problem]:
+    """Joints that move in no way, gauges where nothing strains them."""
+    for name, joint in document.joints.items():
+        yield from joint.form_problems(name)
+    for name, gauge in document.gauges.items():
+        yield from gauge.beam_problems(name, document)
+
+
+def _reference_problems(document: Document, structure: Structure) -> Iterator[Problem]:
+    """Components that name what is not there, or cannot be where they are."""
     for name, actuator in document.actuators.items():
-        try:
-            parse_unit(actuator.command_unit)
-        except UnitError as error:
-            yield Problem(place("actuators", name, "command_unit"), f"is wrong: {error}")
+        yield from actuator.target_problems(name, structure)
+    yield from sensor_problems(document, structure)
+    yield from controller_problems(document, structure)
+    for _, name, component in document.components("lines", "transmissions"):
+        yield from component.problems(name, structure)
+    yield from drives.drive_problems(document, structure)
+    for _, name, component in document.components("contacts", "bushings", "loops", "load_cells"):
+        yield from component.problems(name, structure)
+    yield from omission_problems(document, structure)
 
 
-def _channel_problems(document: Document, structure: Structure) -> Iterator[Problem]:
-    known = ("time", *structure.channels)
-    for name, entry in (document.channels or {}).items():
-        if name not in known and name not in structure.deflections:
-            repair = near_match(name, known, what="its channels are")
-            yield Problem(place("channels", name), f"is no channel of the model; {repair}")
-            continue
-        try:
-            require_dimension(entry.unit, "s" if name == "time" else structure.unit(name))
-        except UnitError as error:
-            yield Problem(place("channels", name, "unit"), f"is wrong: {error}")
-
-
-def _inertia_problems(body: str, _: Document, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:
-    """Conditions on the inertia about the centre of mass: no negative principal moment, and the triangle inequality.
-
-    Principal moments are integrals of squared distances, for example of y^2 + z^2, so none exceeds the sum of the other
-    two. (J. Wittenburg, "Dynamics of Multibody Systems", 2008, section 3.1.)
-    """
-    xx, yy, zz, xy, xz, yz = (
-        parameters[f"{body}.inertia.{axes}"].value for axes in ("xx", "yy", "zz", "xy", "xz", "yz")
-    )
-    moments = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    slack = INERTIA_TOLERANCE * float(np.abs(moments).max()) + float(np.finfo(np.float64).tiny)
-    shown = ", ".join(f"{moment:.4g}" for moment in moments)
-    where = place("bodies", body, "inertia")
-    if moments[0] < -slack:
-        yield Problem(
-            where, f"has the principal moments {shown} kg m^2, but none can be negative; correct the products"
-        )
-    elif moments[0] + moments[1] < moments[2] - slack:
-        rest = (
-            f"has the principal moments {shown} kg m^2, but the largest cannot exceed the sum of the others"
-            f" ({moments[0] + moments[1]:.4g}); correct it"
-        )
-        yield Problem(where, rest)
+def _complete(document: Document) -> Document:
+    found: dict[str, dict[str, Component]] = {"actuators": {}, "contacts": {}}
+    for section, name, component in document.components(*found):
+        found[section][name] = component.complete()
+    return document.model_copy(update=found)

@@ -8,12 +8,11 @@ from types import MappingProxyType
 
 from vpm.catalogue import JointKind
 from vpm.errors import ModelError
+from vpm.model.channels import ChannelEntry
 from vpm.model.checked import Checked
-from vpm.model.contact import Loop
-from vpm.model.drive_components import DriveComponents
-from vpm.model.drives import acted_on
-from vpm.model.schema import ChannelEntry
-from vpm.model.sensor_noise import stated_noise
+from vpm.model.drives.answers import DriveComponents
+from vpm.model.loops.loop import Loop
+from vpm.model.sensor import stated_noise
 from vpm.model.splitting import name_behind
 
 #: Drives whose effort follows from the command alone.
@@ -146,7 +145,9 @@ class Components(DriveComponents):
         document = self._checked.document
         hits = any(effect.traits.impacts for effect in document.effects)
         elastic = any(level != "rigid" for level in self.levels.values())
-        direct = all(entry.type in DIRECT and not self._rubs(name) for name, entry in document.actuators.items())
+        direct = all(
+            entry.type in DIRECT and not entry.rubs(name, document) for name, entry in document.actuators.items()
+        )
         free = not document.contacts and not document.bushings and not document.loops
         return elastic and direct and free and not hits
 
@@ -200,7 +201,7 @@ class Components(DriveComponents):
         """
         entry = self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")]
         if entry.joint is None:
-            rest = f"drives {acted_on(entry)}, which moves several joints; ask joints_of_actuator"
+            rest = f"drives {entry.acted_on}, which moves several joints; ask joints_of_actuator"
             raise ModelError(f"actuator {actuator} {rest}", where=actuator)
         return entry.joint
 

@@ -7,6 +7,7 @@ same structure.
 from __future__ import annotations
 
 from collections import OrderedDict
+from dataclasses import dataclass, field
 from threading import Lock
 from typing import TYPE_CHECKING
 
@@ -18,6 +19,7 @@ from vpm.model.compile import described
 
 if TYPE_CHECKING:
     from vpm._core import System
+    from vpm.model.model import Model
 
 #: Systems that are kept; each holds what it recorded and compiled.
 KEPT = 64
@@ -53,3 +55,21 @@ def core_of(structure: str, theta: NDArray[np.float64]) -> System:
         while len(_systems) > KEPT:
             _systems.popitem(last=False)
     return system
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A model of which the structure counts alone: the key of answers that hold whatever the values are.
+
+    Attributes
+    ----------
+    model : Model
+        One of those that differ in values only.
+    structure : str
+    """
+
+    model: Model = field(compare=False)
+    structure: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "structure", self.model.structure)

@@ -1,19 +1,84 @@
-"""Effects of a model: checks against the catalogue, and the values that a file need not give."""
+"""Effects of a model: their tables, checks against the catalogue, values that a file need not give, parameters."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from pydantic import BaseModel, ConfigDict, Field
 
 from vpm.catalogue import EFFECTS, EffectParameter, EffectType, Side, repair_of
 from vpm.catalogue.kinds import in_words
+from vpm.catalogue.traits import Traits
 from vpm.errors import near_match
-from vpm.model.entry import Quantity
+from vpm.model.component import Index
+from vpm.model.entry import ParameterValue, Quantity, Text
+from vpm.model.joint import COORDINATE_UNIT, EFFORT_UNIT
 from vpm.model.messages import Problem, place
-from vpm.model.schema import Document, EffectEntry
-from vpm.model.splitting import splitting_problems
-from vpm.model.structure import COORDINATE_UNIT, EFFORT_UNIT, Structure
+from vpm.model.parameters import Slot
+from vpm.model.splitting import bendings, deflections, splitting_problems
 from vpm.units import si_unit
+
+if TYPE_CHECKING:
+    from vpm.model.schema import Document
+    from vpm.model.structure import Structure
+
+#: Sites whose effects are entries of their own for the core; those of actuators and sensors are keys of them.
+SITES = frozenset({"joint", "body", "link", "beam", "world"})
+
+
+class EffectEntry(BaseModel):
+    """An effect of the catalogue at a site; the other keys are its parameters.
+
+    Attributes
+    ----------
+    type : str
+    at : str
+    side : {"motor", "link"}
+        Where at a joint with a compliance or backlash.
+    """
+
+    model_config = ConfigDict(extra="allow", frozen=True)
+    __pydantic_extra__: dict[str, ParameterValue] = Field(init=False)
+
+    type: Text
+    at: Text
+    side: Side = "motor"
+
+    @property
+    def owner(self) -> str:
+        """What the dotted names of its parameters begin with."""
+        return self.at if self.side == "motor" else f"{self.at}.{self.side}"
+
+    @property
+    def traits(self) -> Traits:
+        """What it does; nothing if the catalogue does not have it."""
+        return EFFECTS.get(self.type, Traits())
+
+    @property
+    def values(self) -> dict[str, Quantity]:
+        """Parameters by short name, as far as they are given."""
+        return dict(self.__pydantic_extra__)
+
+    @property
+    def parameters(self) -> tuple[EffectParameter, ...]:
+        """Parameters that it has when it is complete: all but optional ones that are not given."""
+        return tuple(p for p in EFFECTS[self.type].parameters if not p.optional or p.name in self.values)
+
+    def slots(self, position: int, structure: Structure) -> Iterator[Slot]:
+        """Its parameters, when it is complete and stands at a position of the file."""
+        effect, given = EFFECTS[self.type], self.values
+        for parameter in self.parameters:
+            yield Slot(
+                ("effects", position, parameter.name),
+                given[parameter.name],
+                effect_unit(parameter.unit, self, structure),
+                parameter.physical,
+                effect.impossible,
+                "linear" if parameter.linear else "shape",
+                f"{self.owner}.{parameter.suffix}",
+            )
 
 
 @dataclass(frozen=True)
@@ -139,11 +204,6 @@ def complete_effects(document: Document, structure: Structure) -> Document:
     return document.model_copy(update={"effects": tuple(entries)})
 
 
-def parameters_of(entry: EffectEntry) -> tuple[EffectParameter, ...]:
-    """Parameters that an effect of a complete document has: all but optional ones that are not given."""
-    return tuple(p for p in EFFECTS[entry.type].parameters if not p.optional or p.name in entry.values)
-
-
 def effect_unit(template: str, entry: EffectEntry, structure: Structure) -> str:
     """SI unit of a parameter of an effect at its site, from the template of the catalogue."""
     site = EFFECTS[entry.type].site
@@ -168,6 +228,63 @@ class _Parenthesised(dict[str, str]):
 def effects_of(document: Document) -> tuple[Effect, ...]:
     """The effects of a checked document, in the order of the file."""
     return tuple(
-        Effect(entry.type, entry.at, entry.side, {p.name: f"{entry.owner}.{p.suffix}" for p in parameters_of(entry)})
+        Effect(entry.type, entry.at, entry.side, {p.name: f"{entry.owner}.{p.suffix}" for p in entry.parameters})
         for entry in document.effects
     )
+
+
+def effect_described(effect: Effect, structure: Structure, index: Index) -> list[dict[str, Any]]:
+    """Entries of one effect; one that splits a joint has two, its law behind and the inertia before."""
+    numbers = {short: index[dotted] for short, dotted in effect.parameter_names.items()}
+    match effect.type.site:
+        case "world":
+            return [{"type": effect.name, "axes": [list(axis) for axis in structure.horizontal], **numbers}]
+        case "beam":
+            return [{"type": effect.name, "beam": structure.beams.index(effect.at), **numbers}]
+        case "body":
+            position = [numbers.pop(axis) for axis in "xyz"]
+            return [{"type": effect.name, **_carrier(effect.at, structure), **numbers, "position": position}]
+        case "link" if effect.at in structure.beams:
+            numbers.pop("inertia")  # of what carries the beam
+            return [{"type": effect.name, "beam": structure.beams.index(effect.at), **numbers}]
+    return _on_joint(effect, structure, numbers, index)
+
+
+def _law(effect: Effect, seat: Mapping[str, Any], numbers: Mapping[str, int]) -> dict[str, Any]:
+    """An effect that is nothing but a law on one coordinate."""
+    formula = effect.type.formula
+    if formula is None:
+        return {"type": effect.name, **seat, **numbers}
+    law = {"program": list(formula.program), "constants": list(formula.constants)}
+    return {"type": "formula", **seat, **law, "parameters": list(numbers.values())}
+
+
+def _on_joint(effect: Effect, structure: Structure, numbers: dict[str, int], index: Index) -> list[dict[str, Any]]:
+    places = structure.joints
+    if effect.at in structure.document.transmissions:
+        shafts = structure.document.transmissions
+        seat = {
+            "transmission": list(shafts).index(effect.at),
+            "ratios": shafts[effect.at].levers(effect.at, structure, index),
+        }
+        return [_law(effect, seat, numbers)]
+    before, behind = effect.at, deflections(structure.document).get(effect.at)
+    if effect.type.site == "link":
+        before, behind = structure.turned[effect.at], bendings(structure.document)[effect.at]
+    seat = {"joint": places.index(before)}
+    if effect.side == "link" and behind is not None:
+        seat["behind"] = places.index(behind)
+    if not effect.type.motion:
+        return [_law(effect, seat, numbers)]
+    rotor = next(name for name, one in EFFECTS.items() if one.rotor)
+    inertia = {"type": rotor, "joint": places.index(before), "inertia": numbers.pop("inertia")}
+    return [{"type": effect.name, "joint": places.index(behind or before), **numbers}, inertia]
+
+
+def _carrier(site: str, structure: Structure) -> dict[str, int]:
+    """Where a payload sits: at a body of the core, at one that is fixed to something, or at the tip of a beam."""
+    if site in structure.beams:
+        return {"beam": structure.beams.index(site)}
+    if site in structure.welds:
+        return {"weld": structure.welds.index(site)}
+    return {"body": next(k for k, axis in enumerate(structure.axes) if axis.body == site)}

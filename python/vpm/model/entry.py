@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Annotated
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field
@@ -31,6 +31,12 @@ class Quantity(Entry):
     uncertainty: WideNumber | None = None
     minimum: WideNumber | None = Field(default=None, alias="min")
     maximum: WideNumber | None = Field(default=None, alias="max")
+
+    def mapped(self, change: Callable[[float], float], unit: str | None) -> Quantity:
+        """The same in another unit, by what that makes of each number."""
+        value, *others = (self.value, self.uncertainty, self.minimum, self.maximum)
+        spread, low, high = (None if number is None else change(number) for number in others)
+        return Quantity(value=change(value), unit=unit, uncertainty=spread, minimum=low, maximum=high)
 
 
 def _as_table(value: object) -> object:

@@ -9,11 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import CoreError, ModelError, near_match
 from vpm.linear import LinearModel
-from vpm.model.loop_rest import resting
-from vpm.model.loop_states import close, reduced
-from vpm.model.loops import Loops
+from vpm.model.drives.states import follow, rest
+from vpm.model.loops.loops import Loops
+from vpm.model.loops.states import close, reduced, resting
 from vpm.model.motions import Motions
-from vpm.model.steady_state import follow, rest
 from vpm.numbers import array_of, number_of
 
 Array = NDArray[np.float64]

@@ -9,14 +9,16 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from vpm.errors import near_match
-from vpm.model.beam import SECTION_KINDS, Damping, End, Layer, Material, Part, Rest
-from vpm.model.contact import EXAMPLES as CONNECTION_EXAMPLES
-from vpm.model.contact import NESTED as CONNECTION_TABLES
-from vpm.model.contact import TAGS
-from vpm.model.drives import ACTUATOR_TYPES, EXAMPLES, tables_inside
+from vpm.model.beams.beam import Damping, Rest
+from vpm.model.beams.section import SECTION_KINDS, Layer, Material
+from vpm.model.bushing import TAGS
+from vpm.model.component import Component
+from vpm.model.drives.actuator import ACTUATOR_TYPES
 from vpm.model.entry import Quantity
+from vpm.model.joint import DenavitHartenberg
+from vpm.model.line import End, Part
 from vpm.model.messages import Problem, place, shown
-from vpm.model.schema import SECTIONS, DenavitHartenberg, Document, keys_of
+from vpm.model.schema import SECTIONS, Document, keys_of
 
 #: How a key is written, for messages about missing ones.
 _EXAMPLES: Mapping[str, str] = {
@@ -45,11 +47,6 @@ _EXAMPLES: Mapping[str, str] = {
     "density": "density = 7850",
     "beam": 'beam = "link"',
     "gauges.at": "at = 0.05",
-    "ratios": "ratios = { pitch = 50.0, roll = 50.0 }",
-    "from": 'from = { parent = "world", point = [0.0, 0.0, 0.0] }',
-    "to": 'to = { parent = "link", point = [0.1, 0.0, 0.0] }',
-    **EXAMPLES,
-    **CONNECTION_EXAMPLES,
 }
 
 #: Tables inside of components, by their key.
@@ -145,17 +142,24 @@ def _sentence(
             return f'belongs to type = "{" or ".join(other)}", but this is {tag}; change the type or remove the key'
         return f"is not a known key; {near_match(str(keys[-1]), _known_keys(keys, tag))}"
     if kind == "missing":
-        example = _EXAMPLES.get(f"{keys[0]}.{keys[-1]}", _EXAMPLES.get(str(keys[-1])))
+        example = _example(str(keys[0]), str(keys[-1]))
         return "is missing; add it" + (f", for example {example}" if example else "")
     if kind in _KINDS:
         return f"is {shown(found)}, but has to be {_KINDS[kind]}; correct it"
     if kind in {"too_short", "too_long"}:
         needed = context.get("min_length") or context.get("max_length")
         if isinstance(found, Mapping):
-            return f"is empty; add {_EXAMPLES.get(str(keys[-1]), 'an entry')}"
+            return f"is empty; add {_example(str(keys[0]), str(keys[-1])) or 'an entry'}"
         bound = "at least one" if needed == 1 else needed
         return f"has {context['actual_length']} entries, but has to have {bound}; correct the list"
     return _choice_sentence(kind, keys, found, context, fallback)
+
+
+def _example(section: str, key: str) -> str | None:
+    """How a key is written."""
+    kinds = SECTIONS.get(section, ())
+    own = next((kind.EXAMPLES[key] for kind in kinds if issubclass(kind, Component) and key in kind.EXAMPLES), None)
+    return own or _EXAMPLES.get(f"{section}.{key}", _EXAMPLES.get(key))
 
 
 def _choice_sentence(
@@ -187,11 +191,10 @@ def _known_keys(keys: tuple[str | int, ...], tag: str | None = None) -> tuple[st
         return keys_of(Document)
     if len(keys) == 3 and tag is not None:
         return keys_of(ACTUATOR_TYPES[tag])
-    if keys[0] in {"actuators", "supplies"} and len(keys) > 3:
-        inside_of = tables_inside(str(keys[0]), tag)
+    if keys[0] in {"actuators", "supplies", "contacts", "bushings", "loops"} and len(keys) > 3:
+        kinds = SECTIONS[str(keys[0])] if tag is None else (ACTUATOR_TYPES[tag],)
+        inside_of = {key: table for kind in kinds if issubclass(kind, Component) for key, table in kind.NESTED.items()}
         return keys_of(inside_of.get(str(keys[-2]), Quantity))
-    if keys[0] in {"contacts", "bushings", "loops"} and len(keys) > 3:
-        return keys_of(CONNECTION_TABLES.get(str(keys[-2]), Quantity))
     if len(keys) == 3 and keys[0] in SECTIONS:
         return keys_of(*SECTIONS[str(keys[0])])
     inside = [key for key in keys[2:-1] if not isinstance(key, int)]

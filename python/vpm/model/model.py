@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -14,18 +12,18 @@ from typing import TYPE_CHECKING, Any, NoReturn, Self, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.catalogue import SITE_KINDS, EffectType, Side, effect_type
+from vpm.catalogue import SITE_KINDS, Side, effect_type
 from vpm.errors import CoreError, ModelError, near_match
 from vpm.files import write_text
 from vpm.model.check import check_document, check_effect
 from vpm.model.checked import Checked
 from vpm.model.compile import described, structure_text
 from vpm.model.cores import core_of
+from vpm.model.effect_start import starting_values
 from vpm.model.effects import Effect, effects_of
 from vpm.model.evaluation import Evaluations
 from vpm.model.messages import parse_toml, read_toml
 from vpm.model.parameters import Parameter
-from vpm.model.transmission import TURNING
 from vpm.model.writer import content_of, toml_of
 from vpm.numbers import number_of
 from vpm.results import Storable, html_table
@@ -34,8 +32,6 @@ if TYPE_CHECKING:
     from vpm._core import System
 
 
-#: Share of the inertia that a joint moves on the motor side of a spring or play, where nobody says better.
-MOTOR_SHARE = 0.1
 #: What a model keeps of its own values; the rest of what it keeps holds for all models of the same structure.
 _OF_VALUES = frozenset({"_checked", "_path", "_content", "parameters", "theta", "dynamics"})
 
@@ -260,25 +256,9 @@ class Model(Evaluations, Storable):
         ModelError
             Effect, site or parameter is unknown; the effect is already there; a value is physically impossible.
         """
-        effect = effect_type(name)
-        entry: dict[str, Any] = {"type": name, "at": at, "side": side}
-        for short in values:
-            effect.parameter(short)
-        kind = self.joint_kind(at) if at in self.joints else TURNING if at in self.transmissions else None
-        for parameter in effect.parameters:
-            if parameter.optional and parameter.name not in values:
-                continue
-            given = values.get(parameter.name, parameter.neutral)
-            if given is None:
-                given = parameter.default(kind)
-            if given is None:
-                continue  # the check below says what is missing
-            if parameter.scale == "inertia" and parameter.shape and parameter.name not in values:
-                given = self._motor_side(effect, at)
-            # Nobody knows beforehand at which velocity a friction law bends; places and periods are told.
-            known = parameter.shape and (parameter.name in values or not parameter.learnt)
-            number = number_of(given, f"{parameter.name} of {name}", ModelError)
-            entry[parameter.name] = number if known else {"value": number, "uncertainty": math.inf}
+        joint = self._checked.structure.turned.get(at, at)
+        begun = starting_values(self, effect_type(name), at, joint, values)
+        entry: dict[str, Any] = {"type": name, "at": at, "side": side, **begun}
         checked = check_effect(self._checked, entry)
         if checked is None:
             content = self.to_dict()
@@ -287,28 +267,6 @@ class Model(Evaluations, Storable):
         model = object.__new__(type(self))
         model.__dict__.update(_checked=checked, _path=None)
         return model
-
-    def _motor_side(self, effect: EffectType, at: str) -> float:
-        """Inertia to begin with before a spring or play: a share of what the joint moves, none where a rotor is known.
-
-        Of what the joint moves when all joints stand at zero.
-        """
-        joint = self._checked.structure.turned.get(at, at)
-        if joint not in self.joints or (effect.has_play and not self._is_driven(joint)):
-            return 0.0
-        known = [f"{joint}.rotor_inertia", f"{joint}.rotor.inertia"]
-        known += [f"{name}.rotor_inertia" for name in self.actuators if self._drives(name, joint)]
-        known += [f"{name}.inertia" for name in self.transmissions if joint in self.ratios(name)]
-        if any(name in self.parameters for name in known):
-            return 0.0
-        place = self.joints.index(joint)
-        return MOTOR_SHARE * float(self.masses_at_zero[place])
-
-    def _is_driven(self, joint: str) -> bool:
-        return any(self._drives(name, joint) for name in self.actuators)
-
-    def _drives(self, actuator: str, joint: str) -> bool:
-        return self.line_of_actuator(actuator) is None and joint in self.joints_of_actuator(actuator)
 
     def without_effect(self, name: str, at: str, side: Side = "motor") -> Self:
         """Model with one effect less.
@@ -443,24 +401,6 @@ class Model(Evaluations, Storable):
     def from_stored(cls, content: Mapping[str, Any]) -> Self:
         """Model from what `to_stored` gave."""
         return cls.from_toml(str(content["toml"]))
-
-
-@dataclass(frozen=True)
-class Shape:
-    """A model of which the structure counts alone: the key of answers that hold whatever the values are.
-
-    Attributes
-    ----------
-    model : Model
-        One of those that differ in values only.
-    structure : str
-    """
-
-    model: Model = field(compare=False)
-    structure: str = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "structure", self.model.structure)
 
 
 def _rebuild(cls: type[Model], content: dict[str, Any], path: str | None) -> Model:

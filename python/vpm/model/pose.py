@@ -1,13 +1,12 @@
-"""Places of frames: rotation matrices and constant transforms, composed before the core sees them."""
+"""Places of frames: what they are fixed to, and constant transforms, composed before the core sees them."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any, Literal
 
 import numpy as np
-
-from vpm.model.schema import DenavitHartenberg
 
 _IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
@@ -38,6 +37,46 @@ class Pose:
         turned = turn @ np.reshape(other.rotation, (3, 3))
         return Pose(tuple(moved.tolist()), tuple(turned.ravel().tolist()))
 
+    def described(self) -> dict[str, Any]:
+        """What the core reads of it."""
+        return {"translation": list(self.translation), "rotation": list(self.rotation)}
+
+
+@dataclass(frozen=True)
+class Mount:
+    """What of the core something is fixed to: the world, a body, or a section of a beam.
+
+    Attributes
+    ----------
+    kind : {"world", "body", "section"}
+    index : int
+        Of the body or the beam, in the order of the core.
+    at : float
+        Arc length of the section (m).
+    """
+
+    kind: Literal["world", "body", "section"] = "world"
+    index: int = 0
+    at: float = 0.0
+
+    def described(self) -> str | dict[str, Any]:
+        """What the core reads of it."""
+        if self.kind == "world":
+            return "world"
+        return {"body": self.index} if self.kind == "body" else {"section": {"beam": self.index, "at": self.at}}
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame that is fixed to a mount, at a constant place."""
+
+    mount: Mount
+    pose: Pose
+
+    def described(self) -> dict[str, Any]:
+        """What the core reads of it."""
+        return {"on": self.mount.described(), **self.pose.described()}
+
 
 def pose(translation: tuple[float, ...], angles: tuple[float, ...]) -> Pose:
     """Place from a translation (m) and roll, pitch, yaw (rad)."""
@@ -60,22 +99,3 @@ def rotation_matrix(roll: float, pitch: float, yaw: float) -> tuple[float, ...]:
         *(sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr),
         *(-sp, cp * sr, cp * cr),
     )
-
-
-def denavit_hartenberg(link: DenavitHartenberg) -> tuple[Pose, Pose]:
-    """Constant transforms before and after the joint, whose axis is z of the frame between them.
-
-    Standard: ``Rot_z(theta + q) Trans_z(d) Rot_x(alpha) Trans_x(a)``, the joint comes first
-    (J. Denavit and R. Hartenberg, *Journal of Applied Mechanics* 22, 1955; B. Siciliano et al., "Robotics", 2009,
-    equation 2.52). Modified: ``Rot_x(alpha) Trans_x(a) Rot_z(theta + q) Trans_z(d)``, the joint comes last (J. Craig,
-    "Introduction to Robotics", 3rd edition, equation 3.6).
-
-    Returns
-    -------
-    before, after : Pose
-    """
-    along_x = Pose((link.a, 0.0, 0.0), rotation_matrix(link.alpha, 0.0, 0.0))
-    along_z = Pose((0.0, 0.0, link.d), rotation_matrix(0.0, 0.0, link.theta))
-    if link.convention == "standard":
-        return Pose(), along_z @ along_x
-    return along_x @ along_z, Pose()

@@ -12,12 +12,13 @@ from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING
 
 from vpm.catalogue import effect_type
-from vpm.model.drives import Actuator, DcMotor
+from vpm.model.drives.motor import DcMotor
 from vpm.model.messages import Problem, place
-from vpm.model.schema import Document, EffectEntry
 
 if TYPE_CHECKING:
+    from vpm.model.effects import EffectEntry
     from vpm.model.parameters import Parameter
+    from vpm.model.schema import Document
 
 #: Level of a rigid beam that bends: two strain polynomials carry its first mode within 0.1 % (docs/beams.md).
 FLEXED = "strain(2)"
@@ -28,20 +29,13 @@ def name_behind(joint: str) -> str:
     return f"{joint}_deflection"
 
 
-def joints_turned(actuator: Actuator, document: Document) -> tuple[str, ...]:
-    """Joints that an actuator turns: its own, or those of its transmission; none where it acts along a line."""
-    if actuator.transmission in document.transmissions:
-        return tuple(document.transmissions[actuator.transmission].ratios)
-    return () if actuator.joint is None else (actuator.joint,)
-
-
 def splits_joint(entry: EffectEntry, document: Document) -> bool:
     """Whether an effect parts motor and link: wind-up always, play at a joint that an actuator drives directly.
 
     A joint without an actuator may be the play itself.
     """
     if entry.traits.has_play:
-        return any(entry.at in joints_turned(actuator, document) for actuator in document.actuators.values())
+        return any(entry.at in actuator.joints_turned(document) for actuator in document.actuators.values())
     return entry.traits.splits
 
 
@@ -136,4 +130,4 @@ def _has_rotor(document: Document, joint: str) -> bool:
     if any(shaft.inertia is not None and shaft.inertia.value > 0.0 for shaft in shafts):
         return True
     motors = (actuator for actuator in document.actuators.values() if isinstance(actuator, DcMotor))
-    return any(joint in joints_turned(motor, document) and motor.rotor_inertia is not None for motor in motors)
+    return any(joint in motor.joints_turned(document) and motor.rotor_inertia is not None for motor in motors)

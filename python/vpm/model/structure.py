@@ -1,78 +1,18 @@
-"""How the components of a model hang together: tree of bodies and beams, coordinates, channels and their units."""
+"""How the components of a model hang together: tree of bodies and beams, coordinates, sites, channels."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Literal
 
 from vpm.catalogue import JointKind, SiteKind
-from vpm.errors import ModelError, near_match
-from vpm.model.expand import ANGULAR, Coordinate, Direction, X, Y, Z, coordinates, plane, unit
-from vpm.model.pose import Pose, denavit_hartenberg, pose
-from vpm.model.schema import Document, Joint
+from vpm.model.joint import ANGULAR, EFFORT_UNIT, TURNING, Coordinate, Direction, Joint, X, Y, Z, plane, unit
+from vpm.model.outputs import channels_of, outputs_of, unit_of
+from vpm.model.pose import Frame, Mount, Pose, pose
+from vpm.model.schema import Document
 from vpm.model.splitting import bendings, deflections, flexed, name_behind
-from vpm.model.transmission import TURNING
 from vpm.model.tree import WORLD
-from vpm.units import si_unit
-
-JOINT_CHANNELS = ("position", "velocity", "acceleration", "effort")
-ACTUATOR_OUTPUTS = ("command", "force")
-ACTUATOR_CHANNELS = (*ACTUATOR_OUTPUTS, "reference", "disturbance")
-HYDRAULIC_CHANNELS: tuple[str, ...] = ("spool", "pressure_a", "pressure_b", "flow_a", "flow_b")
-MOTOR_CHANNELS = ("current",)
-SUPPLY_CHANNELS: tuple[str, ...] = ("pressure", "flow")
-DRIVE_UNITS: Mapping[str, str] = {
-    "pressure_a": "Pa",
-    "pressure_b": "Pa",
-    "flow_a": "m^3/s",
-    "flow_b": "m^3/s",
-    "current": "A",
-    "pressure": "Pa",
-    "flow": "m^3/s",
-}
-LINE_UNITS: Mapping[str, str] = {"length": "m", "rate": "m/s", "tension": "N"}
-#: The core calls them length, rate and tension: a transmission is a line whose levers do not change.
-SHAFT_UNITS: Mapping[str, str] = {"position": "rad", "velocity": "rad/s", "effort": "N m"}
-GAUGE_UNITS: Mapping[str, str] = {"strain": "1"}
-CONTACT_UNITS: Mapping[str, str] = {"depth": "m", "normal_force": "N", "fx": "N", "fy": "N", "fz": "N"}
-WRENCH_UNITS: Mapping[str, str] = {"mx": "N m", "my": "N m", "mz": "N m", "fx": "N", "fy": "N", "fz": "N"}
-#: Of a ball joint: unit quaternion of the child in the frame of the joint, angular velocity in axes of the child.
-BALL_UNITS: Mapping[str, str] = {
-    **dict.fromkeys(("qw", "qx", "qy", "qz"), "1"),
-    **dict.fromkeys(("wx", "wy", "wz"), "rad/s"),
-}
-MARKER_UNITS: Mapping[str, str] = {"x": "m", "y": "m", "z": "m", "rx": "rad", "ry": "rad", "rz": "rad"}
-
-COORDINATE_UNIT: Mapping[JointKind, str] = {"prismatic": "m", "revolute": "rad", "helical": "rad"}
-EFFORT_UNIT: Mapping[JointKind, str] = {"prismatic": "N", "revolute": "N m", "helical": "N m"}
-
-
-@dataclass(frozen=True)
-class Mount:
-    """What of the core something is fixed to: the world, a body, or a section of a beam.
-
-    Attributes
-    ----------
-    kind : {"world", "body", "section"}
-    index : int
-        Of the body or the beam, in the order of the core.
-    at : float
-        Arc length of the section (m).
-    """
-
-    kind: Literal["world", "body", "section"] = "world"
-    index: int = 0
-    at: float = 0.0
-
-
-@dataclass(frozen=True)
-class Frame:
-    """A frame that is fixed to a mount, at a constant place."""
-
-    mount: Mount
-    pose: Pose
 
 
 @dataclass(frozen=True)
@@ -276,32 +216,12 @@ class Structure:
     @cached_property
     def channels(self) -> tuple[str, ...]:
         """Every channel that a log may hold."""
-        return self._listed(ACTUATOR_CHANNELS)
+        return channels_of(self)
 
     @cached_property
     def outputs(self) -> tuple[str, ...]:
         """Channels that a simulation gives, in the order of the core."""
-        return self._listed(ACTUATOR_OUTPUTS)
-
-    def _listed(self, of_actuators: tuple[str, ...]) -> tuple[str, ...]:
-        document = self.document
-        groups: list[tuple[tuple[str, ...], tuple[str, ...]]] = [
-            (self.joints, JOINT_CHANNELS),
-            (tuple(document.actuators), of_actuators),
-            (tuple(document.lines), tuple(LINE_UNITS)),
-            (tuple(document.transmissions), tuple(SHAFT_UNITS)),
-            (tuple(document.gauges), tuple(GAUGE_UNITS)),
-            (tuple(document.markers), tuple(MARKER_UNITS)),
-            (self.driven_by("hydraulic"), HYDRAULIC_CHANNELS),
-            (self.driven_by("dc_motor"), MOTOR_CHANNELS),
-            (tuple(document.supplies), SUPPLY_CHANNELS),
-            (tuple(document.contacts), tuple(CONTACT_UNITS)),
-            (tuple(document.bushings), tuple(WRENCH_UNITS)),
-            (tuple(document.load_cells), tuple(WRENCH_UNITS)),
-            (tuple(self.balls), tuple(BALL_UNITS)),
-            (tuple(document.loops), tuple(WRENCH_UNITS)),
-        ]
-        return tuple(f"{owner}.{channel}" for owners, channels in groups for owner in owners for channel in channels)
+        return outputs_of(self)
 
     def driven_by(self, kind: str) -> tuple[str, ...]:
         """Actuators of a type, in the order of the file."""
@@ -316,7 +236,7 @@ class Structure:
             The model has no such channel; the message names near ones.
         """
         if channel not in self._units:
-            self._units[channel] = self._unit(channel)
+            self._units[channel] = unit_of(channel, self)
         return self._units[channel]
 
     @cached_property
@@ -325,40 +245,9 @@ class Structure:
         return {}
 
     @cached_property
-    def _known_channels(self) -> frozenset[str]:
+    def known_channels(self) -> frozenset[str]:
+        """The same, to look one up."""
         return frozenset(self.channels)
-
-    def _unit(self, channel: str) -> str:
-        owner, _, name = channel.partition(".")
-        if channel in self.deflections:
-            return COORDINATE_UNIT[self.joint_kind(self.deflections[channel])]
-        if channel not in self._known_channels:
-            repair = near_match(channel, self.channels, what="its channels are")
-            raise ModelError(f'the model has no channel "{channel}"; {repair}', where=channel)
-        if owner in self._kinds:
-            coordinate = COORDINATE_UNIT[self.joint_kind(owner)]
-            units = {"position": coordinate, "velocity": f"{coordinate}/s", "acceleration": f"{coordinate}/s^2"}
-            return units.get(name, EFFORT_UNIT[self.joint_kind(owner)])
-        if owner in self.document.transmissions:
-            return SHAFT_UNITS[name]
-        if name in DRIVE_UNITS:
-            return DRIVE_UNITS[name]
-        if owner in self.document.actuators:
-            return self._actuator_unit(owner, name)
-        return {**LINE_UNITS, **GAUGE_UNITS, **MARKER_UNITS, **CONTACT_UNITS, **WRENCH_UNITS, **BALL_UNITS}[name]
-
-    def _actuator_unit(self, actuator: str, channel: str) -> str:
-        if channel == "force":
-            return self.effort_unit(actuator)
-        if (
-            channel == "reference"
-        ):  # of what the controller holds: a position of some joint or shaft, a length of some line
-            pairs = [pair for controller in self.document.controllers.values() for pair in controller.pairs]
-            held = [measured for commanded, measured in pairs if commanded == actuator]
-            kind = self.driven_kind(actuator)
-            own = "m" if kind is None else COORDINATE_UNIT[kind]
-            return self.unit(held[0]) if held else own
-        return si_unit(self.document.actuators[actuator].command_unit)
 
     def effort_unit(self, actuator: str) -> str:
         """SI unit of the effort of an actuator: what its joint or shaft takes, or a force along its line."""
@@ -381,7 +270,7 @@ def build_structure(document: Document) -> Structure:
             beams.append(name)
         else:
             joint = document.joints[name]
-            before, after = _places(joint)
+            before, after = joint.poses()
             start = _mounted(joint.parent, joint.at, before, frames, tuple(beams), document)
             parts = _parts(name, joint, document)
             found = list(_chain(name, joint, parts, start, len(axes), carries=after == Pose()))
@@ -403,16 +292,11 @@ def _sorted(document: Document) -> Iterator[str]:
         yield ready
 
 
-def _places(joint: Joint) -> tuple[Pose, Pose]:
-    """Constant places before and after the motion of a joint."""
-    return (pose(joint.translation, joint.rotation), Pose()) if joint.dh is None else denavit_hartenberg(joint.dh)
-
-
 def _parts(name: str, joint: Joint, document: Document) -> list[tuple[Coordinate, bool]]:
     """Coordinates of a joint, with those that effects split off, and whether each is such a one."""
     split, bent = deflections(document), bendings(document)
     parts: list[tuple[Coordinate, bool]] = []
-    for part in coordinates(name, joint):
+    for part in joint.coordinates(name):
         parts.append((part, False))
         if part.name in split:
             parts.append((replace(part, name=split[part.name]), True))

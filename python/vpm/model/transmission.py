@@ -1,38 +1,54 @@
-"""Transmissions of a model file: shafts that turn with a combination of joints."""
+"""Transmissions: shafts that turn with a combination of joints."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from typing import Annotated
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 from pydantic import Field
 
-from vpm.catalogue import JointKind
-from vpm.model.drive_parameters import ANY, NOT_NEGATIVE, Row
-from vpm.model.entry import Entry, ParameterValue
+from vpm.model.component import Component, Described, Index
+from vpm.model.entry import ParameterValue
+from vpm.model.joint import COORDINATE_UNIT, coordinate_problems
+from vpm.model.messages import Problem, place
+from vpm.model.parameters import ANY, INERTIA, NOT_NEGATIVE, Keys, Slot
 
-#: Kind of joint that a shaft is like: it turns, and its effort is a torque.
-TURNING: JointKind = "revolute"
+if TYPE_CHECKING:
+    from vpm.model.structure import Structure
 
 
-class Transmission(Entry):
+class Transmission(Component):
     """Shaft whose angle is the sum of ratio times coordinate over joints, with the rotor on it."""
+
+    EXAMPLES: ClassVar[Mapping[str, str]] = {"ratios": "ratios = { pitch = 50.0, roll = 50.0 }"}
+    #: The core calls them length, rate and tension: a transmission is a line whose levers do not change.
+    CHANNELS: ClassVar[Mapping[str, str]] = {"position": "rad", "velocity": "rad/s", "effort": "N m"}
 
     ratios: Annotated[dict[str, ParameterValue], Field(min_length=1)]
     inertia: ParameterValue | None = None
 
+    def problems(self, name: str, structure: Structure) -> Iterator[Problem]:
+        """Joints that are not there or do not turn it."""
+        for joint, ratio in self.ratios.items():
+            where = place("transmissions", name, "ratios", joint)
+            yield from coordinate_problems(where, joint, structure)
+            if ratio.value == 0.0:
+                rest = f'is 0, but a shaft that does not turn with "{joint}" needs no ratio; leave the joint out'
+                yield Problem(where, rest)
 
-def transmission_rows(transmission: Transmission, units: dict[str, str]) -> Iterator[Row]:
-    """Parameters of a transmission.
+    def slots(self, keys: Keys, structure: Structure) -> Iterator[Slot]:
+        """Its parameters."""
+        for joint, ratio in self.ratios.items():
+            unit = COORDINATE_UNIT[structure.joint_kind(joint)]
+            yield Slot((*keys, "ratios", joint), ratio, "1" if unit == "rad" else f"rad/{unit}", ANY)
+        if self.inertia is not None:
+            yield Slot((*keys, "inertia"), self.inertia, "kg m^2", NOT_NEGATIVE, INERTIA, "linear")
 
-    Parameters
-    ----------
-    transmission : Transmission
-    units : dict of str to str
-        SI unit of the coordinate of each of its joints.
-    """
-    for joint, ratio in transmission.ratios.items():
-        yield Row(("ratios", joint), ratio, "1" if units[joint] == "rad" else f"rad/{units[joint]}", ANY, "")
-    if transmission.inertia is not None:
-        impossible = "an inertia cannot be negative"
-        yield Row(("inertia",), transmission.inertia, "kg m^2", NOT_NEGATIVE, impossible, "linear")
+    def levers(self, name: str, structure: Structure, index: Index) -> list[dict[str, int]]:
+        """Its ratios, with the numbers of their joints."""
+        places = structure.joints
+        return [{"joint": places.index(joint), "ratio": index[f"{name}.ratios.{joint}"]} for joint in self.ratios]
+
+    def described(self, name: str, structure: Structure, index: Index) -> Described:
+        """What the core reads of it."""
+        return {"name": name, "ratios": self.levers(name, structure, index), "inertia": index.get(f"{name}.inertia")}

@@ -9,8 +9,9 @@ from typing import Any
 import tomli_w
 from pydantic import BaseModel
 
+from vpm.model.effects import EffectEntry
 from vpm.model.entry import Quantity
-from vpm.model.schema import Document, EffectEntry
+from vpm.model.schema import Document
 
 
 def content_of(document: Document, *, complete: bool = False) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from scipy.linalg import expm, matrix_balance
 
 from vpm.errors import VpmError
 from vpm.model import Model
-from vpm.model.steady_state import rest as settled
+from vpm.model.drives.states import rest as settled
 from vpm.optimise.channels import Channels
 from vpm.optimise.collocation import spread
 from vpm.optimise.equations import casadi

@@ -16,7 +16,7 @@ import scipy.linalg
 from numpy.typing import NDArray
 
 from vpm.errors import ReductionError
-from vpm.model.reduced import MODES, ReducedLink
+from vpm.model.beams.reduced import MODES, ReducedLink
 from vpm.reduction.structure import Structure, check_structure, check_units, rigid_motions
 from vpm.reduction.tied import Tied
 

@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
 from vpm.errors import ReductionError, VpmError
+from vpm.model.beams.reduced import read_bytes
 from vpm.model.entry import Entry, Number, Switch, Text, Vector
-from vpm.model.reduced import read_bytes
 from vpm.reduction.craig_bampton import Reduction, reduce_structure
 from vpm.reduction.matrices import read_matrix, read_nodes
 from vpm.reduction.solid import box_mesh, read_mesh, solid

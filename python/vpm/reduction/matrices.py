@@ -10,7 +10,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from vpm.errors import ReductionError, VpmError
-from vpm.model.reduced import read_bytes
+from vpm.model.beams.reduced import read_bytes
 from vpm.reduction.structure import Matrix
 
 Array = NDArray[np.float64]

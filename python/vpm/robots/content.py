@@ -11,7 +11,7 @@ import numpy as np
 
 from vpm.catalogue import POSITIVE
 from vpm.catalogue.traits import Plain
-from vpm.model.expand import SUFFIXES
+from vpm.model.joint import SUFFIXES
 from vpm.model.pose import Pose
 from vpm.robots.lumping import WORLD, Lump, Tree
 from vpm.robots.markup import clean

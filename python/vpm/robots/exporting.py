@@ -12,7 +12,7 @@ import numpy as np
 from vpm.errors import ModelError
 from vpm.files import replacing
 from vpm.model import Model
-from vpm.model.check import INERTIA_TOLERANCE
+from vpm.model.body import INERTIA_TOLERANCE
 from vpm.model.pose import Pose, pose
 from vpm.robots.content import Draft
 from vpm.robots.edits import Changes, Edits

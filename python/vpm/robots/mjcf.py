@@ -14,8 +14,8 @@ from typing import Any
 import numpy as np
 
 from vpm.errors import MissingExtraError, ModelError
+from vpm.model.joint import JointType
 from vpm.model.pose import Pose
-from vpm.model.schema import JointType
 from vpm.robots.lumping import WORLD
 from vpm.robots.markup import Markup, clean
 from vpm.robots.mjcf_drives import drives_and_shafts, equalities

@@ -6,8 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from vpm.model.expand import SUFFIXES
-from vpm.model.schema import JointType
+from vpm.model.joint import SUFFIXES, JointType
 from vpm.robots.markup import clean
 
 _RESERVED = ("world", "time")

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.model.joint import JointType
 from vpm.model.pose import Pose
-from vpm.model.schema import JointType
 
 Array = NDArray[np.float64]
 Vector = tuple[float, ...]

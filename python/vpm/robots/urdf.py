@@ -12,9 +12,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vpm.model.check import INERTIA_TOLERANCE
+from vpm.model.body import INERTIA_TOLERANCE
+from vpm.model.joint import JointType
 from vpm.model.pose import pose
-from vpm.model.schema import JointType
 from vpm.robots.markup import Element, Markup, clean
 from vpm.robots.parts import ORIGIN, SINGLE, Inertial, Joint, Mimic, Robot, Vector, moved
 from vpm.robots.transmissions import read_transmissions

@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field
 
+from vpm.model.effects import EffectEntry
 from vpm.model.entry import Entry, Number, Text
-from vpm.model.schema import EffectEntry
 from vpm.simulate import AUTOMATIC
 
 

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from vpm.errors import ModelError, near_match
 from vpm.model import Model
-from vpm.model.loop_states import close, kept
-from vpm.model.steady_state import rest
+from vpm.model.drives.states import rest
+from vpm.model.loops.states import close, kept
 from vpm.scenario.messages import refuse
 from vpm.scenario.schema import Document
 from vpm.scenario.values import si_value

@@ -13,7 +13,7 @@ from typing import Any
 from vpm.catalogue.kinds import Side, in_words
 from vpm.errors import VpmError
 from vpm.model import Model
-from vpm.model.level import deforms_of, size_of
+from vpm.model.beams.level import deforms_of, size_of
 from vpm.results import Storable
 from vpm.simplify.hydraulics import hydraulic_drives, possible_changes, simpler
 from vpm.simplify.terms import MACHINE, removable, terms_site, without_terms

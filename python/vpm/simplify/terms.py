@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from vpm.model import Model
-from vpm.model.level import size_of
+from vpm.model.beams.level import size_of
 
 #: What all of it is called in the place of single parts.
 MACHINE = "the machine"

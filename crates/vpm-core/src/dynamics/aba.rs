@@ -114,19 +114,32 @@ pub(super) fn hand_on<S: Scalar>(slot: &AbaSlot<S>, parent: &mut AbaSlot<S>) {
     parent.bias_wrench += slot.pose.wrench(bias);
 }
 
+/// What the parent of a free joint feels of an effort `tau` and a wrench on the body, without inertias and rates.
+#[inline]
+pub(super) fn push_body<S: Scalar>(slot: &mut AbaSlot<S>, kind: JointKind, tau: S) -> Wrench<S> {
+    slot.effort = tau - kind.effort(&slot.bias_wrench);
+    slot.pose.wrench(slot.bias_wrench + slot.unit_wrench * (slot.effort * slot.inverse))
+}
+
 fn accelerations<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     let slots = &mut data.aba;
     slots[0].acceleration = Twist::new(Vector3::zero(), -model.gravity());
     for (k, (link, result)) in model.links().iter().zip(&mut data.acceleration).enumerate() {
         let (before, rest) = slots.split_at_mut(k + 1);
-        *result = accelerate_body(&mut rest[0], link.kind, &before[link.parent].acceleration);
+        let drift = rest[0].bias_acceleration;
+        *result = accelerate_body(&mut rest[0], link.kind, &before[link.parent].acceleration, drift);
     }
 }
 
-/// Outward over one joint: its acceleration, and A of its body on a carrier that accelerates with `carrier`.
+/// Outward over one joint: its acceleration, and A of its body on a carrier that accelerates with `carrier`, where rates alone add `drift`.
 #[inline]
-pub(super) fn accelerate_body<S: Scalar>(slot: &mut AbaSlot<S>, kind: JointKind, carrier: &Twist<S>) -> S {
-    slot.acceleration = slot.pose.inverse_twist(*carrier) + slot.bias_acceleration;
+pub(super) fn accelerate_body<S: Scalar>(
+    slot: &mut AbaSlot<S>,
+    kind: JointKind,
+    carrier: &Twist<S>,
+    drift: Twist<S>,
+) -> S {
+    slot.acceleration = slot.pose.inverse_twist(*carrier) + drift;
     let result = (slot.effort - slot.acceleration.power(slot.unit_wrench)) * slot.inverse;
     kind.add_rate(&mut slot.acceleration, result);
     result

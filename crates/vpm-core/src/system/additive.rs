@@ -2,7 +2,7 @@
 
 use super::Dynamics;
 use crate::contact::ContactFriction;
-use crate::dynamics::articulated::{Shift, shifted};
+use crate::dynamics::articulated::{Shift, response, shifted};
 use crate::dynamics::{flexible, poses};
 use crate::effect::{JointEffect, Seat};
 use crate::integrator::Lu;
@@ -242,13 +242,9 @@ impl<S: Scalar> Dynamics<S> {
             let shift = Shift { reach: stage.reach, resistances: damping };
             acceleration.copy_from_slice(shifted(model, data, (q, v), loads, shift));
             for (column, seat) in columns {
-                // The recursion is linear in the efforts.
-                column.copy_from_slice(loads);
+                loads.fill(S::zero());
                 seat.push(loads, S::one());
-                let pushed = shifted(model, data, (q, v), loads, shift);
-                loads.copy_from_slice(column);
-                column.copy_from_slice(pushed);
-                column.iter_mut().zip(&*acceleration).for_each(|(entry, &a)| *entry -= a);
+                column.copy_from_slice(response(model, data, loads));
             }
             return;
         }

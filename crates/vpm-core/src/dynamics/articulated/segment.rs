@@ -110,6 +110,15 @@ pub(super) fn attach<S: Scalar>(
     slot.wrench += pose.wrench(load);
 }
 
+/// Adds a wrench on a section alone.
+pub(super) fn load<S: Scalar>(slot: &mut SegmentSlot<S>, section: usize, wrench: Wrench<S>) {
+    let SegmentSlot { sections, efforts, .. } = slot;
+    let n = efforts.len();
+    let jacobian = &sections.columns[section * n..(section + 1) * n];
+    efforts.iter_mut().zip(jacobian).for_each(|(effort, &column)| *effort += column.power(wrench));
+    slot.wrench += sections.at[section].pose.wrench(wrench);
+}
+
 /// Adds what the pending coordinates of the next segment, the first `shared` ones there and the last ones here, do by themselves.
 pub(super) fn share<S: Scalar>(slot: &mut SegmentSlot<S>, next: &SegmentSlot<S>, shared: usize) {
     let SegmentSlot { sections, columns, matrix, efforts, drift, .. } = slot;
@@ -163,6 +172,19 @@ pub(super) fn eliminate<S: Scalar>(
                 *left -= share * across;
             }
         }
+    }
+}
+
+/// What other efforts `tau` leave of wrench and efforts, once [`eliminate`] has worked out the inertias.
+pub(super) fn release<S: Scalar>(segment: &Segment, slot: &mut SegmentSlot<S>, tau: &[S]) {
+    let n = segment.len();
+    let SegmentSlot { wrench, columns, matrix, efforts, inverses, .. } = slot;
+    for own in (segment.shared..n).rev() {
+        let effort = tau[segment.coordinates[own]] - efforts[own];
+        let solved = effort * inverses[own];
+        efforts[own] = effort;
+        *wrench += columns[own] * solved;
+        efforts.iter_mut().zip(&matrix[own * n..own * n + own]).for_each(|(other, &entry)| *other += entry * solved);
     }
 }
 

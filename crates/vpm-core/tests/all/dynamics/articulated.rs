@@ -6,7 +6,7 @@ use vpm_core::algebra::Cholesky;
 use vpm_core::beam::{Component, DampingEntry, Level};
 use vpm_core::body::{PointMass, Site};
 use vpm_core::data::Data;
-use vpm_core::dynamics::articulated::{Shift, articulated, shifted};
+use vpm_core::dynamics::articulated::{Shift, articulated, response, shifted};
 use vpm_core::dynamics::{aba, flexible};
 use vpm_core::joint::JointKind;
 use vpm_core::model::{Model, Parts};
@@ -122,6 +122,24 @@ proptest! {
         stiffen(&tree, &mut matrix, reach, &resistances);
         let mut data = Data::new(&tree);
         check(&matrix, shifted(&tree, &mut data, (q, v), tau, Shift { reach, resistances: &resistances }), &load)?;
+    }
+
+    #[test]
+    fn responses_are_those_of_the_shifted_matrix_alone(seed in any::<u64>(), exponent in -5.0..-1.0_f64) {
+        let tree = model::<f64>(&machine(seed)).unwrap();
+        prop_assume!(tree.n_coordinates() > 0);
+        let (state, reach) = (state(&tree, seed), 10.0_f64.powf(exponent));
+        let [q, v, tau] = &state;
+        let mut random = Random::new(seed);
+        let resistances: Vec<f64> = random.numbers(tree.n_joints(), 2.0).into_iter().map(f64::abs).collect();
+        let (mut matrix, _) = dense(&tree, &state);
+        stiffen(&tree, &mut matrix, reach, &resistances);
+        let mut data = Data::new(&tree);
+        shifted(&tree, &mut data, (q, v), tau, Shift { reach, resistances: &resistances });
+        for _ in 0..2 {
+            let push = random.numbers(tree.n_coordinates(), 1.0);
+            check(&matrix, response(&tree, &mut data, &push), &push)?;
+        }
     }
 
     #[test]

@@ -1,0 +1,60 @@
+"""Channel tables as files of their own: the same as ``[channels]`` of a model file."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from os import PathLike
+from types import MappingProxyType
+
+from pydantic import TypeAdapter, ValidationError
+
+from vpm.model.channels import ChannelEntry
+from vpm.model.form import schema_problems
+from vpm.model.messages import raise_first, read_toml
+
+_TABLE = TypeAdapter(dict[str, ChannelEntry])
+
+
+def parse_channel_table(content: Mapping[str, object], *, path: str | None = None) -> Mapping[str, ChannelEntry]:
+    """Check a channel table.
+
+    Parameters
+    ----------
+    content : mapping
+        Channel names (and ``"time"``) to tables; or all of that under the key ``channels``.
+    path : str, optional
+        File that it comes from, for messages.
+
+    Returns
+    -------
+    mapping of str to ChannelEntry
+
+    Raises
+    ------
+    ModelError
+        A key is unknown or missing, or a value is of the wrong kind.
+    """
+    table = content.get("channels", content) if set(content) == {"channels"} else content
+    try:
+        return MappingProxyType(_TABLE.validate_python(table))
+    except ValidationError as error:
+        raise_first(schema_problems(error, within=("channels",)), path)
+
+
+def load_channel_table(path: str | PathLike[str]) -> Mapping[str, ChannelEntry]:
+    """Read a channel table from a TOML file of its own.
+
+    Parameters
+    ----------
+    path : path-like
+
+    Returns
+    -------
+    mapping of str to ChannelEntry
+
+    Raises
+    ------
+    ModelError
+        The file cannot be read, is no TOML, or is not a channel table.
+    """
+    return parse_channel_table(read_toml(path), path=str(path))

@@ -1,0 +1,76 @@
+"""What an effect begins with that is added to a model: as good as none, as far as nobody says better."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from vpm.catalogue import EffectType
+from vpm.errors import ModelError
+from vpm.model.joint import TURNING
+from vpm.numbers import number_of
+
+if TYPE_CHECKING:
+    from vpm.model.model import Model
+
+#: Share of the inertia that a joint moves on the motor side of a spring or play, where nobody says better.
+MOTOR_SHARE = 0.1
+
+
+def starting_values(
+    model: Model, effect: EffectType, at: str, joint: str, values: Mapping[str, float]
+) -> dict[str, Any]:
+    """Values of an effect in the content of a model file.
+
+    Parameters
+    ----------
+    model : Model
+    effect : EffectType
+    at : str
+        Component that it sits at.
+    joint : str
+        Joint that it splits, if it splits one.
+    values : mapping of str to float
+        SI values by short name, as far as they are given.
+
+    Raises
+    ------
+    ModelError
+        The effect has no such parameter, or a value is no number.
+    """
+    for short in values:
+        effect.parameter(short)
+    entry: dict[str, Any] = {}
+    kind = model.joint_kind(at) if at in model.joints else TURNING if at in model.transmissions else None
+    for parameter in effect.parameters:
+        if parameter.optional and parameter.name not in values:
+            continue
+        given = values.get(parameter.name, parameter.neutral)
+        if given is None:
+            given = parameter.default(kind)
+        if given is None:
+            continue  # the check of the model says what is missing
+        if parameter.scale == "inertia" and parameter.shape and parameter.name not in values:
+            given = _motor_side(model, effect, joint)
+        # Nobody knows beforehand at which velocity a friction law bends; places and periods are told.
+        known = parameter.shape and (parameter.name in values or not parameter.learnt)
+        number = number_of(given, f"{parameter.name} of {effect.name}", ModelError)
+        entry[parameter.name] = number if known else {"value": number, "uncertainty": math.inf}
+    return entry
+
+
+def _motor_side(model: Model, effect: EffectType, joint: str) -> float:
+    """Inertia before a spring or play: a share of what the joint moves at zero, none where a rotor is known."""
+    driving = [name for name in model.actuators if _drives(model, name, joint)]
+    if joint not in model.joints or (effect.has_play and not driving):
+        return 0.0
+    known = [f"{joint}.rotor_inertia", f"{joint}.rotor.inertia", *(f"{name}.rotor_inertia" for name in driving)]
+    known += [f"{name}.inertia" for name in model.transmissions if joint in model.ratios(name)]
+    if any(name in model.parameters for name in known):
+        return 0.0
+    return MOTOR_SHARE * float(model.masses_at_zero[model.joints.index(joint)])
+
+
+def _drives(model: Model, actuator: str, joint: str) -> bool:
+    return model.line_of_actuator(actuator) is None and joint in model.joints_of_actuator(actuator)

@@ -1,0 +1,1 @@
+"""Closed loops: joints that close them, and what machines with closed loops do."""

@@ -1,0 +1,119 @@
+"""Assembly of machines with closed loops: coordinates at which the loops close, with some of them held.
+
+The equations of loops may be redundant, and the linear algebra of them stands here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from vpm.model.loops.loops import Loops
+
+Array = NDArray[np.float64]
+
+#: A closed loop has no larger gap (m, or the cosine of an angle that has to be a right one).
+CLOSED = 1e-12
+#: What is below this share is rounding: the square root of that of numbers.
+NOTHING = 1e-8
+#: Newton steps, and halvings of a step that does not bring the ends together.
+_STEPS, _HALVINGS = 200, 12
+#: Pieces of the way of an assembly from its start.
+_PIECES = 20
+
+
+def assembled(loops: Loops, start: Array, fixed: Mapping[int, float], joints: int) -> Array:
+    """The assembly next to a start, or what comes nearest to one.
+
+    Parameters
+    ----------
+    loops : Loops
+    start : ndarray, shape (n,)
+    fixed : mapping of int to float
+        Places of coordinates that are held, and where.
+    joints : int
+        Number of joints, which come first. Flexible links bend only where joints cannot close the loops.
+    """
+    free = [place for place in range(joints) if place not in fixed]
+    ways = [_moved(loops, _closed(loops, start, range(joints)), fixed, free), _put(loops, start, fixed, free)]
+    closed = min(ways, key=lambda q: _open(loops, q))
+    if _open(loops, closed) > CLOSED:
+        closed = _closed(loops, closed, [place for place in range(start.size) if place not in fixed])
+    return closed
+
+
+def _moved(loops: Loops, q: Array, fixed: Mapping[int, float], free: Sequence[int]) -> Array:
+    """Closed on the whole way to where some have to be: the assembly stays the same."""
+    start = {place: float(q[place]) for place in fixed}
+    for share in np.linspace(0.0, 1.0, _PIECES)[1:]:
+        ahead = {place: start[place] + float(share) * (end - start[place]) for place, end in fixed.items()}
+        q = _put(loops, q, ahead, free)
+        if _open(loops, q) > CLOSED:
+            break
+    return q
+
+
+def _put(loops: Loops, q: Array, fixed: Mapping[int, float], free: Sequence[int]) -> Array:
+    """Closed by the other joints, with some put where they have to be at once."""
+    q = q.copy()
+    for place, value in fixed.items():
+        q[place] = value
+    return _closed(loops, q, free)
+
+
+def _closed(loops: Loops, q: Array, free: Sequence[int]) -> Array:
+    """Newton's method with the smallest steps; one that does not bring the ends together is halved."""
+    state = loops.at(q)
+    for _ in range(_STEPS):
+        if not free or np.abs(state.gap).max(initial=0.0) < 0.01 * CLOSED:
+            break
+        step = np.zeros_like(q)
+        step[list(free)] = least(state.jacobian[:, list(free)], -state.gap)
+        moved, share = state, 1.0
+        for _ in range(_HALVINGS):
+            moved = loops.at(q + share * step)
+            if np.linalg.norm(moved.gap) < np.linalg.norm(state.gap):
+                break
+            share *= 0.5
+        else:
+            break
+        q, state = q + share * step, moved
+    return q
+
+
+def _open(loops: Loops, q: Array) -> float:
+    return float(np.abs(loops.at(q).gap).max(initial=0.0))
+
+
+def least(matrix: Array, right: Array) -> Array:
+    """Smallest solution of least squares; what rounding alone decides is left out."""
+    return np.asarray(np.linalg.lstsq(matrix, right, rcond=NOTHING)[0])
+
+
+def null_space(jacobian: Array) -> Array:
+    """Orthonormal columns of the motions that loops with this derivative allow."""
+    _, sizes, rows = np.linalg.svd(jacobian)
+    rank = int((sizes > NOTHING * float(sizes.max(initial=0.0))).sum())
+    return np.asarray(rows[rank:].T)
+
+
+def pivots(matrix: Array, rank: int, tiers: Sequence[Sequence[int]]) -> set[int]:
+    """Columns on which all others depend, as many as the rank: pivots of an elimination, tier after tier of columns."""
+    left, sizes = matrix.copy(), np.linalg.norm(matrix, axis=0)
+    found: set[int] = set()
+    for tier in tiers:
+        open_ones = list(tier)
+        while open_ones and len(found) < rank:
+            norms = np.linalg.norm(left[:, open_ones], axis=0)
+            place = open_ones[int(np.argmax(norms))]
+            if norms.max() <= NOTHING * max(sizes[place], 1.0):
+                break
+            way = left[:, place] / np.linalg.norm(left[:, place])
+            left -= np.outer(way, way @ left)
+            found.add(place)
+            open_ones.remove(place)
+    return found

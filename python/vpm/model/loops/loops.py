@@ -1,0 +1,366 @@
+"""Closed loops of a model: where they close, what is independent, what holds them, where they are singular."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from vpm.errors import ModelError, near_match
+from vpm.model.loops.assembly import CLOSED, NOTHING, assembled, least, null_space, pivots
+from vpm.model.loops.path import Path, Singularity
+from vpm.model.loops.states import rest
+from vpm.numbers import array_of, number_of
+
+if TYPE_CHECKING:
+    from vpm.model.evaluation import Evaluations
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LoopState:
+    """Where the closed loops of a machine are.
+
+    Attributes
+    ----------
+    gap : ndarray, shape (m,)
+        Per loop the way from A to B in the world (m), then cosines of angles that have to be right ones.
+    jacobian : ndarray, shape (m, n)
+        Its derivative J by the coordinates.
+    drift : ndarray, shape (m,)
+        ``J' v``.
+    independent : ndarray of bool, shape (m,)
+        Equations that say something that the others do not.
+    """
+
+    gap: Array
+    jacobian: Array
+    drift: Array
+    independent: NDArray[np.bool_]
+
+    @property
+    def rank(self) -> int:
+        """Number of independent equations."""
+        return int(self.independent.sum())
+
+
+class Loops:
+    """The closed loops of a model, in the order of the file.
+
+    Positions ``q``, velocities ``v`` and accelerations ``a`` have one number per coordinate, in the order of
+    ``model.coordinates``.
+
+    Parameters
+    ----------
+    model : Model
+
+    Examples
+    --------
+    >>> q = model.loops.assembled({"crank": 0.3})
+    >>> model.loops.efforts(q, v, a)
+    """
+
+    def __init__(self, model: Evaluations) -> None:
+        self._model = model
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names."""
+        return tuple(self._model.loop_entries)
+
+    def __len__(self) -> int:
+        return len(self.names)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.names)
+
+    def __repr__(self) -> str:
+        return f"Loops({', '.join(self.names)})"
+
+    # ---- kinematics --------------------------------------------------------------------------------------------------
+
+    def at(self, q: ArrayLike, v: ArrayLike | None = None) -> LoopState:
+        """Gap of the loops, its derivatives, and which equations are independent.
+
+        Parameters
+        ----------
+        q : array_like, shape (n,)
+        v : array_like, shape (n,), optional
+            Zero by default.
+        """
+        q = np.asarray(q, dtype=np.float64)
+        gap, jacobian, drift, chosen = self._model.core.loops(
+            self._model.theta, q, np.zeros_like(q) if v is None else np.asarray(v, dtype=np.float64)
+        )
+        return LoopState(gap, jacobian, drift, chosen > 0.5)
+
+    def assembled(self, held: Mapping[str, float] | None = None, guess: Mapping[str, float] | None = None) -> Array:
+        """Coordinates at which all loops are closed.
+
+        Parameters
+        ----------
+        held : mapping of str to float, optional
+            Positions (m, rad) of coordinates that stay as they are.
+        guess : mapping of str to float, optional
+            Where the others begin; elsewhere `start` of the model file, or zero. The assembly next to it is found.
+
+        Returns
+        -------
+        ndarray, shape (n,)
+
+        Raises
+        ------
+        ModelError
+            A name is unknown, or the loops do not close there; the message names the gap that is left.
+        """
+        held = held or {}
+        q = np.zeros(len(self._model.coordinates))
+        for name, value in {**self._starts, **(guess or {})}.items():
+            q[self.place(name)] = number_of(value, f"{self._model.name}: {name}", ModelError)
+        fixed = {
+            self.place(name): number_of(value, f"{self._model.name}: {name}", ModelError)
+            for name, value in held.items()
+        }
+        closed = assembled(self, q, fixed, len(self._model.joints))
+        self._complain(closed, held)
+        return closed
+
+    def velocities(self, q: ArrayLike, held: Mapping[str, float]) -> Array:
+        """Rates that keep the loops closed, the smallest ones with those of some coordinates given.
+
+        Raises
+        ------
+        ModelError
+            A name is unknown, or the loops do not let the coordinates move so.
+        """
+        v = np.zeros(len(self._model.coordinates))
+        for name, value in held.items():
+            v[self.place(name)] = number_of(value, f"{self._model.name}: {name}", ModelError)
+        fixed = [self.place(name) for name in held]
+        jacobian, left = self.at(q).jacobian, 0.0
+        for count in (len(self._model.joints), v.size):  # flexible links move only where joints cannot
+            free = [place for place in range(count) if place not in fixed]
+            v[free] = least(jacobian[:, free], -jacobian[:, fixed] @ v[fixed])
+            left = float(np.abs(jacobian @ v).max(initial=0.0))
+            if left <= NOTHING * max(float(np.abs(v).max(initial=0.0)), 1.0):
+                break
+        else:
+            given = ", ".join(f"{name} = {value:g}" for name, value in held.items())
+            raise ModelError(
+                f"the loops of {self._model.name} do not let {given} be velocities at once: they tear at {left:.3g} "
+                "m/s or rad/s; give as many as there are degrees of freedom, or none in a singular configuration"
+            )
+        return v
+
+    def independent(self, q: ArrayLike, prefer: Iterable[str] = ()) -> tuple[str, ...]:
+        """Coordinates that decide all others near ``q``: as many as there are degrees of freedom.
+
+        The dependent ones are the pivots of an elimination of the loops' derivative, sought among joints without an
+        actuator first, then among the others, then among those to ``prefer`` and the coordinates of flexible links.
+        """
+        names, joints = self._model.coordinates, range(len(self._model.joints))
+        preferred, driven = {self.place(name) for name in prefer}, {self.place(name) for name in self._driven}
+        tiers: list[list[int]] = [
+            [place for place in joints if place not in preferred | driven],
+            [place for place in joints if place in driven - preferred],
+            [place for place in joints if place in preferred],
+            list(range(len(joints), len(names))),
+        ]
+        state = self.at(q)
+        dependent = pivots(state.jacobian, state.rank, tiers)
+        return tuple(name for place, name in enumerate(names) if place not in dependent)
+
+    def transmission(self, q: ArrayLike, inputs: Sequence[str]) -> Array:
+        """Rates of all coordinates per unit rate of some that are independent, shape (n, len(inputs)).
+
+        Its rows are ratios and levers: rad/m of a joint by a stroke, and the effort on a stroke by one on the joint.
+
+        Raises
+        ------
+        ModelError
+            A name is unknown, or these coordinates do not decide the others there, as in singular configurations.
+        """
+        places = [self.place(name) for name in inputs]
+        state = self.at(q)
+        n = state.jacobian.shape[1]
+        free = [place for place in range(n) if place not in places]
+        block = state.jacobian[:, free]
+        if np.linalg.matrix_rank(block, tol=NOTHING) < len(free):
+            raise ModelError(
+                f"{', '.join(inputs)} do not decide the other coordinates of {self._model.name} there: the loops have "
+                f"{n - state.rank} degrees of freedom, or these are singular; name others, or move away"
+            )
+        whole = np.zeros((n, len(places)))
+        whole[places, np.arange(len(places))] = 1.0
+        whole[free] = -np.linalg.lstsq(block, state.jacobian[:, places], rcond=NOTHING)[0]
+        return whole
+
+    def accelerations(self, q: ArrayLike, v: ArrayLike, given: Mapping[str, float]) -> Array:
+        """Accelerations of all coordinates that follow from those of the independent ones, shape (n,)."""
+        state, names = self.at(q, v), tuple(given)
+        a: Array = self.transmission(q, names) @ np.array([given[name] for name in names])
+        free = [place for place, name in enumerate(self._model.coordinates) if name not in names]
+        a[free] += least(state.jacobian[:, free], -state.drift)
+        return a
+
+    def turns(self, coordinate: str) -> bool:
+        """Whether a coordinate is the angle of a joint, so that a whole turn of it changes nothing."""
+        return coordinate in self._model.joints and self._model.joint_kind(coordinate) == "revolute"
+
+    # ---- what is said of them ----------------------------------------------------------------------------------------
+
+    def summary(self, q: ArrayLike | None = None) -> str:
+        """One sentence: equations, those that are redundant, and degrees of freedom."""
+        state = self.at(self.assembled() if q is None else q)
+        m, n = state.jacobian.shape
+        redundant = m - state.rank
+        said = f"{redundant or 'none'} of them {'are' if redundant > 1 else 'is'} redundant"
+        return (
+            f"closed loops {', '.join(self.names)}: {m} equations, of which {state.rank} are independent ({said}), "
+            f"so that {n - state.rank} of {n} coordinates are free"
+        )
+
+    # ---- efforts -----------------------------------------------------------------------------------------------------
+
+    def efforts(
+        self, q: ArrayLike, v: ArrayLike, a: ArrayLike, joints: Sequence[str] | None = None
+    ) -> dict[str, float]:
+        """Efforts (N, N m) of the driven joints that a motion needs: inverse dynamics with closed loops.
+
+        Parameters
+        ----------
+        q, v, a : array_like, shape (n,)
+            With closed loops, see `assembled`, `velocities` and `accelerations`.
+        joints : sequence of str, optional
+            Joints that are driven; by default those with an actuator.
+
+        Raises
+        ------
+        ModelError
+            The motion opens the loops, or the joints are fewer or more than it needs.
+
+        Notes
+        -----
+        ``S u + J^T l = M a + h`` in all coordinates, projected on the motions that the loops allow.
+        """
+        q, v, a = (
+            array_of(x, f"{self._model.name}: {what}", ModelError) for x, what in zip((q, v, a), "qva", strict=True)
+        )
+        driven = tuple(self._driven if joints is None else joints)
+        state = self.at(q, v)
+        for what, left in (
+            ("position", state.gap),
+            ("velocity", state.jacobian @ v),
+            ("acceleration", state.jacobian @ a + state.drift),
+        ):
+            size = max(1.0, float(np.abs(v).max(initial=0.0)) ** 2, float(np.abs(a).max(initial=0.0)))
+            if (worst := np.abs(left).max(initial=0.0)) > 1e-6 * size:
+                raise ModelError(f"the {what} opens the loops by {worst:.3g}; take it from model.loops")
+        moves = null_space(state.jacobian)
+        levers = moves[[self.place(name) for name in driven]].T
+        if np.linalg.matrix_rank(levers, tol=NOTHING) < max(len(driven), moves.shape[1]):
+            raise ModelError(
+                f"the joints {', '.join(driven) or '(none)'} cannot be worked out for {moves.shape[1]} degrees of "
+                "freedom there; name as many driven joints that move the machine independently"
+            )
+        needed = np.asarray(self._model.inverse_dynamics(q, v, a))
+        return dict(zip(driven, np.linalg.solve(levers, moves.T @ needed).tolist(), strict=True))
+
+    def rest(self, held: Mapping[str, float]) -> tuple[Array, dict[str, float]]:
+        """Rest under gravity with some joints held: the others and flexible links where the loops' forces balance.
+
+        Parameters
+        ----------
+        held : mapping of str to float
+            Positions of the joints that are held (m, rad).
+
+        Returns
+        -------
+        coordinates : ndarray, shape (n,)
+        efforts : dict of str to float
+            Efforts (N, N m) on the held joints.
+
+        Raises
+        ------
+        ModelError
+            The loops do not close, or no rest is found.
+        """
+        return rest(self._model, held)
+
+    # ---- singular configurations -------------------------------------------------------------------------------------
+
+    def singularities(
+        self, coordinate: str, held: Mapping[str, float] | None = None, guess: Mapping[str, float] | None = None
+    ) -> tuple[Singularity, ...]:
+        """Singular configurations on the way of one degree of freedom, all others held.
+
+        Parameters
+        ----------
+        coordinate : str
+            The one that drives, such as the stroke of an actuator.
+        held : mapping of str to float, optional
+            Coordinates that stand still, so that one degree of freedom is left.
+        guess : mapping of str to float, optional
+            Where the way begins, see `assembled`; each assembly may have a way of its own.
+
+        Returns
+        -------
+        tuple of Singularity
+            Places at which the coordinate stands still while others move: there it loses control of them.
+
+        Raises
+        ------
+        ModelError
+            The loops do not close, or not one degree of freedom is left.
+        """
+        held = dict(held or {})
+        start = self.assembled(held, guess)
+        fixed = [self.place(name) for name in held]
+        return Path(self, self._model.coordinates, fixed).singular(start, self.place(coordinate))
+
+    # ---- inside ------------------------------------------------------------------------------------------------------
+
+    @cached_property
+    def _starts(self) -> dict[str, float]:
+        entries = self._model.loop_entries.values()
+        return {name: value for entry in entries for name, value in entry.start.items()}
+
+    @cached_property
+    def _driven(self) -> tuple[str, ...]:
+        model = self._model
+        direct = [name for name in model.actuators if model.line_of_actuator(name) is None]
+        return tuple(dict.fromkeys(joint for name in direct for joint in model.joints_of_actuator(name)))
+
+    def place(self, name: str) -> int:
+        """Number of a coordinate.
+
+        Raises
+        ------
+        ModelError
+            There is none of that name.
+        """
+        short = name.removesuffix(".position").removesuffix(".velocity")
+        if short not in self._model.coordinates:
+            repair = near_match(short, self._model.coordinates, what="it has")
+            raise ModelError(f'{self._model.name} has no coordinate "{short}"; {repair}', where=name)
+        return self._model.coordinates.index(short)
+
+    def _complain(self, q: Array, held: Mapping[str, float]) -> None:
+        gap, first, worst = self.at(q).gap, 0, ("", 0.0)
+        for name, entry in self._model.loop_entries.items():
+            size = float(np.abs(gap[first : first + entry.equations]).max())
+            worst = max(worst, (name, size), key=lambda pair: pair[1])
+            first += entry.equations
+        if worst[1] <= CLOSED:
+            return
+        given = " with " + ", ".join(f"{name} = {value:g}" for name, value in held.items()) + " held" if held else ""
+        way = float(np.linalg.norm(gap[:3])) if len(self) == 1 else worst[1]
+        raise ModelError(
+            f"the loops of {self._model.name} do not close{given}: loop {worst[0]} stays open by {way:.4g} m; hold "
+            "other positions, or give a start nearer to an assembly"
+        )
