@@ -103,11 +103,11 @@ def test_names_of_the_model_cannot_become_markup(diagnosis: vpm.Diagnosis) -> No
     assert "<script>" not in vpm.report(hostile)._repr_html_()
 
 
-def test_page_shows_the_way_down(diagnosis: vpm.Diagnosis) -> None:
+def test_page_shows_the_model_reduction(diagnosis: vpm.Diagnosis) -> None:
     model = diagnosis.model
     ladder = vpm.simplify(model, vpm.Experiment.load(VALIDATION, model=model), tolerance=0.5)
-    assert "The way down" in vpm.report(diagnosis, ladder)._repr_html_()
-    assert "The way down" not in vpm.report(diagnosis)._repr_html_()
+    assert "Model reduction" in vpm.report(diagnosis, ladder)._repr_html_()
+    assert "Model reduction" not in vpm.report(diagnosis)._repr_html_()
 
 
 # ---- the page as a document ------------------------------------------------------------------------------------------
