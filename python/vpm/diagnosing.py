@@ -142,8 +142,8 @@ def diagnose(
     if executor is None:
         diagnosis = diagnosed(model, *given, asked, workers, tell, progress)
     else:
-        told = done_by(executor, partial(recorded, diagnosed, model, *given, asked, workers or 1), tell)
-        diagnosis = told.repeat(tell, progress)
+        done = done_by(executor, partial(recorded, diagnosed, model, *given, asked, workers or 1), tell)
+        diagnosis = done.repeat(tell, progress)
     return with_provenance(diagnosis, model, *given, asked, workers)
 
 

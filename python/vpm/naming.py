@@ -102,8 +102,8 @@ def named(
     if ranking is not None:
         tell("measuring what was named on validation records")
         found, ambiguous = searched(ranking, recalibrated, data, Settings(effects=limit), effects)
-        told = {one.key for one in ranking.effects}
-        lost = [one for one in found.refused if (one.name, one.site) in told]
+        named = {one.key for one in ranking.effects}
+        lost = [one for one in found.refused if (one.name, one.site) in named]
         notes.extend([RANKED, *notes_of(found.accepted), *([STOPPED] if found.interrupted else [])])
         notes.extend(f"the ranking names {one.name} at {one.site}: {one.reason}" for one in lost)
         return found, ambiguous, False

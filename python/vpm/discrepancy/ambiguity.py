@@ -136,7 +136,7 @@ class _Job:
 
     @property
     def label(self) -> str:
-        """What is told of it."""
+        """Label in progress reports."""
         return f"{self.candidate.label} for {_label(self.entry)}"
 
 

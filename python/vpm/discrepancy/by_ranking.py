@@ -339,7 +339,7 @@ def _unpromising(ranking: Ranking, final: Judged, data: Data, effects: Sequence[
 
 
 def _accepts(several: Sequence[Ranked], settings: RankingSettings) -> bool:
-    """Whether the first effect of a round came in: evidence is told of effects that count, and of no others."""
+    """Whether the first effect of a round came in: only accepted effects have evidence."""
     return bool(several) and several[0].evidence > settings.odds
 
 

@@ -36,7 +36,7 @@ def only_ringing(current: Judged, data: Data, trial: Trial) -> str:
     before, after = _ringing(current.model, data), _ringing(trial.judged.model, data)
     weights = {block.channel: block.weight**2 for block in data.validation.blocks}
     alone = [sum(weight * ringing[name] ** 2 for name, weight in weights.items()) for ringing in (before, after)]
-    # One record of noise that rings in a narrow band may be twice as large as another: its share is what can be told.
+    # One record of noise that rings in a narrow band may be twice as large as another: only its share is known.
     return refuse_ringing(1.0 - alone[1] / alone[0], trial)
 
 

@@ -179,7 +179,7 @@ def _farthest(away: Mapping[str, float]) -> str:
 
 
 def _shown_by_predictions(found: Search) -> bool:
-    """Whether closed-loop predictions told all that was accepted, and it explains most of what they had left.
+    """Whether all accepted effects come from closed-loop predictions, and explain most of their error.
 
     What the inverse-dynamics residual hardly shows may leave as much of it as there was, and be the explanation.
     """

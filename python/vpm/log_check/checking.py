@@ -140,13 +140,13 @@ class _Check:
         for correction, related in wrong_scales(model, whole, units, self.settings):
             found.append(_of_related(correction, related, units, correction.entries(table), record.name))
         tangent = self.judge.tangent(part, left)
-        if tangent is not None and (unseen := self.judge.unseen(tangent)):
-            stretches.append(_of_parameters(unseen, record.name))
+        if tangent is not None and (undetermined := self.judge.undetermined(tangent)):
+            stretches.append(_of_parameters(undetermined, record.name))
         return [*found, *stretches], left
 
 
 def _beginning(record: Experiment, outputs: Sequence[str], settings: Settings) -> Experiment:
-    """The beginning of the motion of a record, from rest if it begins so: no observer knows what swings unseen."""
+    """The beginning of the motion of a record, from rest if it begins so: no observer knows unmeasured oscillations."""
     fewest, most = settings.samples
     speeds = np.zeros(len(record))
     for name in outputs:
@@ -234,8 +234,8 @@ def _evidence(found: Explanation, place: str) -> str:
     return f"of {place} the model leaves {left} unexplained as it is, and {then} with {corrected}"
 
 
-def _of_parameters(unseen: Sequence[str], record: str) -> Finding:
-    sentence = f"the beginning of its motion says next to nothing of {', '.join(unseen)}"
+def _of_parameters(undetermined: Sequence[str], record: str) -> Finding:
+    sentence = f"the beginning of its motion says next to nothing of {', '.join(undetermined)}"
     return Finding("unseen", (), (record,), sentence, "fit other parameters, or move the machine so that they matter")
 
 

@@ -226,10 +226,10 @@ class Judge:
         chance = float(chi2.sf(2.0 * unlikely, max(len(own), 1)))
         return replace(shares, far=own.get(farthest, 0.0), farthest=farthest, unlikely=unlikely, chance=chance)
 
-    def unseen(self, tangent: Tangent) -> list[str]:
+    def undetermined(self, tangent: Tangent) -> list[str]:
         """Uncertain parameters of the model of which a record says next to nothing."""
         deviations = zip(tangent.structure.priors, tangent.deviations.tolist(), strict=True)
-        return [name for name, left in deviations if left > self.settings.unseen and not self._is_added(name)]
+        return [name for name, left in deviations if left > self.settings.undetermined and not self._is_added(name)]
 
     def of_sensor(self, correction: Correction, record: Experiment, before: Shares) -> Shares | None:
         """What a correction of sensors that do not draw the model leaves; None where it takes another run."""

@@ -170,7 +170,7 @@ class Trials:
             raise KeyboardInterrupt
         for model, done in zip(begun, found, strict=True):
             if done is None or isinstance(done.error, ExecutorError):
-                continue  # it was told, and the trial fits the model here
+                continue  # it was reported, and the trial fits the model here
             if done.error is not None and not isinstance(done.error, VpmError):
                 raise done.error
             self._fits[model] = done.value if done.error is None else done.error
