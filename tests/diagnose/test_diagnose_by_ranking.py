@@ -93,7 +93,7 @@ def test_values_are_those_of_the_balance(named: vpm.Diagnosis) -> None:
 def test_what_was_tried_in_vain_is_refused_with_its_numbers(named: vpm.Diagnosis) -> None:
     reasons = {refused.name: refused.reason for refused in named.refused}
     assert reasons["spring"] == "it removes 3 % of the error power; 6 % have to go"
-    assert "promised" in reasons["torque_ripple"]
+    assert "predicted less evidence" in reasons["torque_ripple"]
     assert "empirical_force" not in reasons
     assert not {"coulomb_friction", "bias_force"} & set(reasons)
     assert [(c.name, c.round, c.accepted) for c in named.candidates if c.accepted] == [
