@@ -21,11 +21,12 @@ from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
 from vpm.initial import invertible
 from vpm.model import Model
+from vpm.observer import Record
 from vpm.ranking.extensions import Extensions
 from vpm.ranking.fit import Fitter, View, by_secant
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
-from vpm.ranking.observed import Observed, Observer
+from vpm.ranking.observed import Observed, Observer, observer_gain
 from vpm.ranking.proposals import Proposal, _seated, proposals
 from vpm.ranking.search import _is_worse
 from vpm.ranking.settings import Settings
@@ -115,6 +116,30 @@ def test_derivatives_by_what_is_known_stay_where_an_effect_does_nothing(effect: 
     scale = np.abs(plain.jacobian).max(axis=(0, 1))
     assert np.abs(more.residual - plain.residual).max() < 1e-12
     np.testing.assert_allclose(more.jacobian / scale, plain.jacobian / scale, atol=1e-9)
+
+
+def test_approximate_derivatives_miss_those_of_the_steps_by_the_order_of_the_steps() -> None:
+    model = Model.from_toml(STANDING).with_effect("coulomb_friction", "hinge", coulomb=0.05, transition_velocity=0.3)
+    record = Record.of(model, stood()).stretch(1000)
+    gain = observer_gain(model, record.channels, 1.0, record.dt, model.theta)
+    places = [model.output_channels.index(channel) for channel in record.channels]
+    columns = [model.index(name) for name in ("rod.mass", "hinge.friction.coulomb", "motor.gain")]
+
+    def observed(substeps: int, approximate: bool) -> tuple[Any, Any]:
+        tables = (record.readings, np.tile(gain.ravel(), (len(record.time), 1)), record.dt, substeps)
+        # Commands that run on are stepped stage by stage; a step that is recorded as a whole has its own derivatives.
+        how = ("linearly_implicit", columns, "first_order", True, approximate)
+        outputs, _, slopes = model.core.observe(model.theta, record.first, record.inputs, places, *tables, *how)
+        return outputs, slopes / np.abs(slopes).max(axis=(0, 1))
+
+    gaps = []
+    for substeps in (1, 2, 4):
+        (exact, slopes), (outputs, about) = (observed(substeps, approximate) for approximate in (False, True))
+        assert np.abs(outputs - exact).max() < 1e-12
+        gaps.append(np.abs(about - slopes).max())
+    assert 1e-7 < gaps[0] < 1e-2
+    assert gaps[1] < 0.35 * gaps[0]
+    assert gaps[2] < 0.35 * gaps[1]
 
 
 def test_structures_are_compared_by_steps_whose_errors_are_small() -> None:

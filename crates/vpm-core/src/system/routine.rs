@@ -294,12 +294,39 @@ pub(crate) struct Routines<S> {
     made: Vec<(Kind, Routine<S>)>,
     /// Which of them gave a matrix last.
     last: Option<usize>,
+    /// Gives the matrices of linearly implicit steps without their derivatives, if these may be left out.
+    constant: Option<Box<Constant>>,
+}
+
+/// Matrices in plain numbers, for numbers that carry derivatives.
+///
+/// Law: a linearly implicit step has its order whatever its matrix is, see [`crate::integrator::LinearlyImplicit`]; so have derivatives that
+/// follow the linearised equations by the same step with the same matrix. Derivatives of the step itself have those of the matrix beside
+/// them, which are derivatives of derivatives.
+#[derive(Clone, Debug)]
+struct Constant {
+    routines: Routines<f64>,
+    state: Vec<f64>,
+    matrix: Vec<f64>,
+    rates: Vec<f64>,
 }
 
 impl<S: Scalar> Routines<S> {
     /// For the checked parameters `theta`, `inputs` holding at first.
     pub(crate) fn new(functions: Arc<Functions>, theta: &[S], inputs: Vec<S>) -> Self {
-        Self { functions, theta: theta.to_vec(), held: inputs, made: Vec::new(), last: None }
+        Self { functions, theta: theta.to_vec(), held: inputs, made: Vec::new(), last: None, constant: None }
+    }
+
+    /// Leaves the derivatives out of the matrices of linearly implicit steps from now on, and works these out by machine code; or says why
+    /// there is none, and goes on as before.
+    pub(crate) fn leave_matrices_constant(&mut self) -> std::result::Result<(), String> {
+        let plain = |numbers: &[S]| numbers.iter().map(Scalar::re).collect::<Vec<_>>();
+        let mut routines = Routines::new(self.functions.clone(), &plain(&self.theta), plain(&self.held));
+        routines.compile(&Kind::Prepared)?;
+        self.forget(&Kind::Prepared);
+        let [state, matrix, rates] = [const { Vec::new() }; 3];
+        self.constant = Some(Box::new(Constant { routines, state, matrix, rates }));
+        Ok(())
     }
 
     /// Makes the function of that kind if it is not there yet.
@@ -370,6 +397,11 @@ impl<S: Scalar> Routines<S> {
 
     /// See [`Routine::matrix`]; what cannot be made is no number.
     pub(crate) fn matrix(&mut self, kind: &Kind, x: &[S], matrix: &mut [S], width: usize, values: &mut [S]) {
+        if let Some(constant) = self.constant.as_deref_mut().filter(|_| *kind == Kind::Prepared) {
+            constant.write(x, matrix, width);
+            self.last = None;
+            return self.copy(&Kind::Rates, x, &[], values);
+        }
         match self.made(kind) {
             Some(routine) => routine.matrix(x, matrix, width, values),
             None => matrix.fill(S::from_f64(f64::NAN)),
@@ -413,6 +445,22 @@ impl<S: Scalar> Routines<S> {
     pub(crate) fn hold(&mut self, number: usize, input: S) {
         self.held[number] = input;
         self.made.iter_mut().for_each(|(_, routine)| routine.hold(number, input));
+        if let Some(constant) = &mut self.constant {
+            constant.routines.hold(number, input.re());
+        }
+    }
+}
+
+impl Constant {
+    /// The matrix at `x`, row by row in `width` columns.
+    fn write<S: Scalar>(&mut self, x: &[S], matrix: &mut [S], width: usize) {
+        let Self { routines, state, matrix: values, rates } = self;
+        state.clear();
+        state.extend(x.iter().map(Scalar::re));
+        values.resize(matrix.len(), 0.0);
+        rates.resize(x.len(), 0.0);
+        routines.matrix(&Kind::Prepared, state, values, width, rates);
+        matrix.iter_mut().zip(&*values).for_each(|(entry, &value)| *entry = S::from_f64(value));
     }
 }
 
