@@ -21,6 +21,7 @@ from vpm.ranking.firsts import STEP, Firsts, hidden_states
 from vpm.ranking.noise_model import NoiseModel, Parts, Structured, frequencies
 from vpm.ranking.settings import Settings
 from vpm.simulate import Setup
+from vpm.simulate.setup import AUTOMATIC
 
 Array = NDArray[np.float64]
 
@@ -43,7 +44,8 @@ class Observer:
     band : float
         Bandwidth, Hz.
     fine : bool
-        Whether it takes steps that are short enough to compare structures by what they leave, or as few as it can.
+        Whether it takes steps that are short enough to compare structures by what they leave, or as few and cheap ones
+        as it can.
     """
 
     band: float
@@ -209,6 +211,12 @@ class Observed:
         fewest = STEPS if model.added_joints else 1
         return max(fewest, int(np.ceil(record.dt / self.settings.longest_step))) if observer.fine else fewest
 
+    def _method(self, model: Model, observer: Observer) -> str:
+        """Integrator: of a flexible machine, coarse observers take that of order 2, whose derivatives cost far less."""
+        method = self.setup.method(model, drawn=True)
+        chosen = self.setup.integrator != AUTOMATIC
+        return method if chosen or observer.fine or method != "additive" else "linearly_implicit"
+
     def _begun(self, model: Model) -> list[Array]:
         """First states, by a model's own values: an observer soon forgets them.
 
@@ -246,7 +254,7 @@ class Observed:
             np.tile(gain.ravel(), (len(record.time), 1)),
             record.dt,
             self.setup.substeps * self._steps(model, observer, record),
-            self.setup.method(model, drawn=True),
+            self._method(model, observer),
             list(columns),
             self.setup.course,
             alone=True,

@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::functions::{Function, Functions};
 use super::recorded::Kind;
 use crate::error::{Error, Result};
-use crate::graph::{Evaluator, Program, Work};
+use crate::graph::{Evaluator, LARGEST, Program, Work};
 use crate::integrator::Method;
 use crate::scalar::{Dual, Scalar};
 
@@ -317,9 +317,12 @@ impl<S: Scalar> Routines<S> {
         Self { functions, theta: theta.to_vec(), held: inputs, made: Vec::new(), last: None, constant: None }
     }
 
-    /// Leaves the derivatives out of the matrices of linearly implicit steps from now on, and works these out by machine code; or says why
-    /// there is none, and goes on as before.
+    /// Leaves the derivatives out of the matrices of linearly implicit steps from now on where there is machine code of these matrices, and
+    /// none of their derivatives; else it says why not, and goes on as before.
     pub(crate) fn leave_matrices_constant(&mut self) -> std::result::Result<(), String> {
+        if self.has_derivatives_to_compile(&Kind::Prepared) {
+            return Err("the derivatives of the matrices have machine code".to_owned());
+        }
         let plain = |numbers: &[S]| numbers.iter().map(Scalar::re).collect::<Vec<_>>();
         let mut routines = Routines::new(self.functions.clone(), &plain(&self.theta), plain(&self.held));
         routines.compile(&Kind::Prepared)?;
@@ -375,6 +378,14 @@ impl<S: Scalar> Routines<S> {
         let derived = derived.map_err(words)?;
         fits(&derived)?;
         self.get(kind).map_or(Ok(()), |routine| routine.differentiate_by(derived, &by))
+    }
+
+    /// Whether the derivatives of a function by the states alone, those by parameters being few beside, are not too many to compile.
+    fn has_derivatives_to_compile(&mut self, kind: &Kind) -> bool {
+        let Some(states) = self.get(kind).map(|routine| routine.function.places.states as u32) else { return false };
+        let values: Vec<f64> = self.theta.iter().map(Scalar::re).collect();
+        let derived = self.functions.function(&Kind::Derived(Box::new(kind.clone()), (0..states).collect()), &values);
+        derived.is_ok_and(|function| function.directions.is_none() && function.often.size() <= LARGEST)
     }
 
     /// Makes the functions of these kinds as machine code, all of them or none; or says why there is none.
