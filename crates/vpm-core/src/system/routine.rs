@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use super::constant::Constant;
 use super::functions::{Function, Functions};
 use super::recorded::Kind;
 use crate::error::{Error, Result};
@@ -298,19 +299,6 @@ pub(crate) struct Routines<S> {
     constant: Option<Box<Constant>>,
 }
 
-/// Matrices in plain numbers, for numbers that carry derivatives.
-///
-/// Law: a linearly implicit step has its order whatever its matrix is, see [`crate::integrator::LinearlyImplicit`]; so have derivatives that
-/// follow the linearised equations by the same step with the same matrix. Derivatives of the step itself have those of the matrix beside
-/// them, which are derivatives of derivatives.
-#[derive(Clone, Debug)]
-struct Constant {
-    routines: Routines<f64>,
-    state: Vec<f64>,
-    matrix: Vec<f64>,
-    rates: Vec<f64>,
-}
-
 impl<S: Scalar> Routines<S> {
     /// For the checked parameters `theta`, `inputs` holding at first.
     pub(crate) fn new(functions: Arc<Functions>, theta: &[S], inputs: Vec<S>) -> Self {
@@ -324,11 +312,9 @@ impl<S: Scalar> Routines<S> {
             return Err("the derivatives of the matrices have machine code".to_owned());
         }
         let plain = |numbers: &[S]| numbers.iter().map(Scalar::re).collect::<Vec<_>>();
-        let mut routines = Routines::new(self.functions.clone(), &plain(&self.theta), plain(&self.held));
-        routines.compile(&Kind::Prepared)?;
+        let routines = Routines::new(self.functions.clone(), &plain(&self.theta), plain(&self.held));
+        self.constant = Some(Box::new(Constant::new(routines)?));
         self.forget(&Kind::Prepared);
-        let [state, matrix, rates] = [const { Vec::new() }; 3];
-        self.constant = Some(Box::new(Constant { routines, state, matrix, rates }));
         Ok(())
     }
 
@@ -457,21 +443,8 @@ impl<S: Scalar> Routines<S> {
         self.held[number] = input;
         self.made.iter_mut().for_each(|(_, routine)| routine.hold(number, input));
         if let Some(constant) = &mut self.constant {
-            constant.routines.hold(number, input.re());
+            constant.hold(number, input.re());
         }
-    }
-}
-
-impl Constant {
-    /// The matrix at `x`, row by row in `width` columns.
-    fn write<S: Scalar>(&mut self, x: &[S], matrix: &mut [S], width: usize) {
-        let Self { routines, state, matrix: values, rates } = self;
-        state.clear();
-        state.extend(x.iter().map(Scalar::re));
-        values.resize(matrix.len(), 0.0);
-        rates.resize(x.len(), 0.0);
-        routines.matrix(&Kind::Prepared, state, values, width, rates);
-        matrix.iter_mut().zip(&*values).for_each(|(entry, &value)| *entry = S::from_f64(value));
     }
 }
 
