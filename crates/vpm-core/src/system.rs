@@ -3,6 +3,7 @@
 mod additive;
 mod answers;
 mod connections;
+mod constant;
 mod counted;
 mod drives;
 mod engine;
