@@ -187,7 +187,7 @@ def test_unknown_first_states_are_found() -> None:
 def test_derivatives_by_parameters_and_first_states_match_differences(piece: float) -> None:
     model, records = wrong(), [recorded(0, n=200), recorded(1, n=150)]
     data = ShootingProblem(
-        model, records, "free_run", states=("slide.position", "slide.velocity"), piece=piece, setup=SETUP
+        model, records, "free_run", Fitting(states=("slide.position", "slide.velocity"), piece=piece), setup=SETUP
     )
     columns = [model.index(name) for name in FREE]
     first = data.first_states

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from vpm.errors import CoreError, DivergedError, SimulationError
 from vpm.experiment import Experiment, Motion
-from vpm.identify.answers import Following, Pair
 from vpm.identify.drives import first_drives, picked, shown_and_efforts
+from vpm.identify.following import Following, Pair
 from vpm.identify.parts import Bending, Drives, Part, bending, carried, drives_of, whole
 from vpm.initial import whole_motion
 from vpm.model import Model

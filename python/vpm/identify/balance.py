@@ -24,13 +24,12 @@ from vpm.identify.along import (
     respond,
     shown_channels,
 )
-from vpm.identify.answers import Following, Memo
-from vpm.identify.beginning import BegunAnywhere
-from vpm.identify.counted import Counted, settled
-from vpm.identify.gauges import gauge_gains, hold_of
+from vpm.identify.first_states import BegunAnywhere
+from vpm.identify.following import Following, Memo, gauge_gains, hold_of
 from vpm.identify.parallel import in_order
 from vpm.identify.parts import Bending
 from vpm.identify.problem import FEWEST_SAMPLES, Block
+from vpm.identify.sample_mask import Counted, settled
 from vpm.initial import joint_motion
 from vpm.model import Model
 from vpm.simulate import AUTOMATIC
@@ -106,7 +105,7 @@ class InverseDynamicsProblem(BegunAnywhere):
         self._known = self._held(self.experiments, self.motions, [integrator] * len(self.motions), None)
         self.workers = 1
         self.blocks = self._lay_out(model)
-        #: What is left at the true values, as far as that is known; see `vpm.identify.own_simulation`.
+        #: What is left at the true values, as far as that is known; see `vpm.identify.closed_loop_prediction`.
         self.expected: Array | float = 0.0
 
     def _motions(self, experiments: Sequence[Experiment], cutoffs: Sequence[float | None]) -> tuple[Motion, ...]:

@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from vpm.errors import ExecutorError, IdentificationError
-from vpm.identify.estimation import blinded
+from vpm.identify.estimation import blinded, limits
 from vpm.identify.identifiability import Combination, column_lengths, unseen_combinations
-from vpm.identify.objective import AnyProblem, Objective, noise_levels
+from vpm.identify.objective import Objective, noise_levels
 from vpm.identify.parallel import worker_count
-from vpm.identify.sandwich import record_groups, sandwich
+from vpm.identify.problem import Problem
 from vpm.identify.settings import Fitting
 from vpm.identify.solver import Descent, Point, descend
+from vpm.identify.statistics import record_groups, sandwich
 from vpm.model import Model
 from vpm.sending import Parcel
 from vpm.tasks import Done, outcomes, until_interrupted
@@ -61,9 +62,8 @@ class Found:
 
 def fit_problem(
     model: Model,
-    data: AnyProblem,
+    data: Problem,
     free: Sequence[str],
-    bounds: tuple[Array, Array],
     fitting: Fitting,
     *,
     tolerance: float,
@@ -78,8 +78,6 @@ def fit_problem(
     model : Model
     data : problem
     free : sequence of str
-    bounds : tuple of ndarray
-        Least and largest value of each free parameter.
     fitting : Fitting
     tolerance : float
         Relative change of parameters or cost at which to stop.
@@ -96,6 +94,7 @@ def fit_problem(
     KeyboardInterrupt
         Ctrl-C before the first start was simulated.
     """
+    bounds = limits(model, free, fitting.bounds)
     objective = Objective(model, data, free, bounds, fitting, progress)
     # Starts are compared under weights that are the same for all; losses and noise are found from the best.
     search = Objective(model, data, free, bounds, _plain(fitting), progress) if _weighs_later(fitting) else objective

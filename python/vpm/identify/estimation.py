@@ -11,7 +11,6 @@ from scipy.optimize import least_squares, lsq_linear
 
 from vpm.identify.identifiability import RANK_TOLERANCE, Combination, column_lengths, unseen_combinations
 from vpm.identify.moments import Coordinates, real_bodies
-from vpm.identify.objective import AnyProblem
 from vpm.identify.problem import Problem, segments
 from vpm.identify.statistics import robust_covariance
 from vpm.model import Model
@@ -53,10 +52,16 @@ class Estimate:
         """Standard deviation of each estimate; infinite where the data cannot see it."""
         return np.sqrt(np.diag(self.covariance))
 
+    def on(self, model: Model, ties: Mapping[str, str] | None = None) -> Model:
+        """A model at these values, and at those of what follows them by ``ties``."""
+        values = dict(zip(self.names, map(float, self.values), strict=True))
+        followers = {follower: values[leader] for follower, leader in (ties or {}).items() if leader in values}
+        return model.with_parameters({**values, **followers})
+
 
 def estimate(
     model: Model,
-    data: AnyProblem | Problem,
+    data: Problem,
     free: Sequence[str],
     *,
     bounds: Mapping[str, tuple[float, float]] | None = None,
@@ -135,7 +140,7 @@ def estimate(
     )
 
 
-def standing(model: Model, data: AnyProblem | Problem, free: Sequence[str]) -> Estimate:
+def standing(model: Model, data: Problem, free: Sequence[str]) -> Estimate:
     """What is said of ``free`` parameters where they stand: residual, derivatives and uncertainty, nothing moved."""
     columns = [model.index(name) for name in free]
     residual, jacobian = data.evaluate(model, model.theta, columns)
@@ -194,7 +199,7 @@ class _Counter:
     def __init__(
         self,
         model: Model,
-        data: AnyProblem | Problem,
+        data: Problem,
         columns: list[int],
         progress: Progress | None,
         worth: Worth | None = None,
@@ -364,7 +369,7 @@ def _range(model: Model, name: str, free: Sequence[str]) -> tuple[float, float]:
 
 
 def _covariance(
-    data: AnyProblem | Problem, residual: Array, jacobian: Array, unseen: tuple[Combination, ...], free: Sequence[str]
+    data: Problem, residual: Array, jacobian: Array, unseen: tuple[Combination, ...], free: Sequence[str]
 ) -> Array:
     """Robust covariance; infinite variance for every parameter that takes part in an unseen combination."""
     lengths = column_lengths(jacobian)

@@ -13,8 +13,7 @@ from scipy.special import ndtri, stdtrit
 from vpm.errors import IdentificationError
 from vpm.identify.estimation import Estimate
 from vpm.identify.identifiability import Combination
-from vpm.identify.objective import AnyProblem
-from vpm.identify.problem import gaps
+from vpm.identify.problem import Problem, gaps
 from vpm.identify.settings import Fitting
 from vpm.identify.whiteness import Whiteness
 from vpm.model import Model
@@ -163,7 +162,7 @@ class Fit(Result):
 
 def fit_of(
     model: Model,
-    data: AnyProblem,
+    data: Problem,
     result: Estimate,
     before: Array,
     experiments: Sequence[str],

@@ -13,10 +13,8 @@ from vpm.catalogue import effects_for_site
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify.balance import InverseDynamicsProblem
-from vpm.identify.objective import AnyProblem
-from vpm.identify.problem import FEWEST_SAMPLES, Block
+from vpm.identify.problem import FEWEST_SAMPLES, Block, Problem, untied
 from vpm.identify.settings import Checks
-from vpm.identify.ties import untied
 from vpm.identify.whiteness import (
     SHARPNESS,
     Whiteness,
@@ -50,7 +48,7 @@ Groups = Callable[[Sequence[str], Block], list[_Law]]
 
 
 def whiteness(
-    model: Model, records: Sequence[Experiment], data: AnyProblem, residual: Array, jacobian: Array, checks: Checks
+    model: Model, records: Sequence[Experiment], data: Problem, residual: Array, jacobian: Array, checks: Checks
 ) -> tuple[Whiteness, ...]:
     """Judge what is left of each channel of each record.
 

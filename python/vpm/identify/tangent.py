@@ -85,7 +85,7 @@ def estimate_on_tangent(
         rough = estimate(at, Tangent(data, origin), free, bounds=bounds, tolerance=tolerance)
         for share in SHARES:
             values = _on_the_way(at.theta[columns], rough.values, share)
-            reached = at.with_parameters(dict(zip(free, map(float, values), strict=True)))
+            reached = replace(rough, values=values).on(at)
             residual = _residual(data, reached)
             if residual @ residual <= cost * (1.0 + OFF**2):
                 break

@@ -24,9 +24,8 @@ from scipy.linalg import qr, svd
 from scipy.special import chdtrc, fdtrc
 
 from vpm.identify.identifiability import column_lengths
-from vpm.identify.inertial_noise import autoregression
 from vpm.identify.problem import FEWEST_SAMPLES
-from vpm.identify.sandwich import white_sandwich
+from vpm.identify.statistics import autoregression, white_sandwich
 from vpm.results import Storable
 
 Array = NDArray[np.float64]

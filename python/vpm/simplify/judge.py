@@ -85,7 +85,7 @@ class Judge:
         if found.interrupted:
             # Ctrl-C is meant for the whole search, not for this one fit.
             raise KeyboardInterrupt
-        return model.with_parameters(dict(zip(free, map(float, found.values), strict=True)))
+        return found.on(model)
 
     def errors(self, model: Model, setup: Setup) -> dict[str, float]:
         """Relative error of each channel on the records to judge on.

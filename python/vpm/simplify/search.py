@@ -20,9 +20,8 @@ from vpm.model import Model
 from vpm.simplify.judge import FITTING, Judge, by_the_model, reference_mode, shown
 from vpm.simplify.ladder import Ladder, Rung, pareto
 from vpm.simplify.reductions import COUPLING_TERMS, OFFERED, VELOCITY_TERMS, Reduction, reduced, reductions
-from vpm.simplify.shares import ROUNDING, deformation_share, effort_share, motions, ranked
 from vpm.simplify.surrogates import surrogates
-from vpm.simplify.terms import CURVED
+from vpm.simplify.terms import CURVED, ROUNDING, deformation_share, effort_share, motions, ranked
 from vpm.simplify.trials import ALIKE, CLOCK, NEGLIGIBLE, PRIORITY, REPEATED, Changes, Trials
 from vpm.simulate import Setup
 

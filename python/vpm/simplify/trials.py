@@ -1,4 +1,4 @@
-"""Reduced models that were tried: glanced at, fitted, simulated in every way to step them that may pay, and timed."""
+"""Reduced models that were tried: coarsely timed, fitted, simulated in every way of stepping that may pay and timed."""
 
 from __future__ import annotations
 
@@ -8,16 +8,20 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vpm.budget import step_times
+from vpm.budget import commands, start_state, step_times
 from vpm.errors import ExecutorError, SimulationError, VpmError
+from vpm.experiment import Experiment
 from vpm.model import Model
-from vpm.simplify.course import Courses
 from vpm.simplify.judge import Judge
 from vpm.simplify.ladder import Rung
 from vpm.simplify.reductions import Reduction, reduced
+from vpm.simplify.replacement import commanded
 from vpm.simulate import FIXED_STEP, Setup
 from vpm.tasks import outcomes
+
+Array = NDArray[np.float64]
 
 #: Steps timed for each rung: as many as these seconds allow, within these numbers. A 99.9 % quantile needs the least.
 TIMED_SECONDS = 0.05
@@ -335,3 +339,41 @@ def _agree(rungs: Sequence[Rung]) -> bool:
         first.setdefault(rung.integrator, rung.error)
     least = sorted(first.values())[:2]
     return len(least) == 2 and least[0] > PAYS * least[1]
+
+
+class Courses:
+    """Commands along the first record to judge on, worked out once for all models with the same drives.
+
+    Parameters
+    ----------
+    model : Model
+        The full one.
+    judge : Judge
+    """
+
+    def __init__(self, model: Model, judge: Judge) -> None:
+        self._full, self._judge = model, judge
+        self._known: dict[tuple[str, ...], Array] = {}
+
+    def record(self, model: Model) -> Experiment:
+        """Record that drives a model.
+
+        Parameters
+        ----------
+        model : Model
+        """
+        return commanded(model, self._full, self._judge.driven)
+
+    def of(self, model: Model) -> tuple[Array, Array | None]:
+        """Inputs (N, inputs) of a model, and the state that it starts from; see `vpm.budget.start_state`.
+
+        Parameters
+        ----------
+        model : Model
+        """
+        record = self.record(model)
+        kinds = tuple(model.actuator_type(name) for name in model.actuators) + model.controlled_actuators
+        if kinds not in self._known:
+            # Reduced models of the same drives get what the first of them got, which is the full model.
+            self._known[kinds] = commands(model, self._judge.rate, record)
+        return self._known[kinds], start_state(model, record)

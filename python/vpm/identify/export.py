@@ -1,15 +1,20 @@
-"""Fits on the command line: settings out of words, results as lines."""
+"""What was found, for people: a fit as lines, and as files: the fitted model, a table, a report, a picture."""
 
 from __future__ import annotations
 
+import csv
 import math
 from collections.abc import Sequence
+from pathlib import Path
 
-from vpm.errors import IdentificationError
+from vpm.errors import MissingExtraError
 from vpm.experiment import Experiment
+from vpm.files import make_folder, replacing, write_text
 from vpm.identify.fitted import Fit
 from vpm.identify.intervals import Bootstrap, Profile, bootstrap, profile_intervals
-from vpm.identify.unseen import Gaps
+from vpm.identify.problem import Gaps
+
+_COLUMNS = ("name", "start", "value", "std", "low", "high", "unit")
 
 
 def told(fit: Fit) -> list[str]:
@@ -78,55 +83,69 @@ def told_intervals(found: Sequence[Profile | Bootstrap]) -> list[str]:
     return lines
 
 
-def numbers(words: Sequence[str] | None, option: str, form: str) -> dict[str, float]:
-    """Read ``NAME=NUMBER`` words of an option.
+def write_fit(fit: Fit, folder: Path, lines: Sequence[str] = ()) -> list[Path]:
+    """Write ``model.toml``, ``parameters.csv``, ``report.md``, ``fit.npz`` and, with the extra ``plot``, ``fit.png``.
+
+    Parameters
+    ----------
+    fit : Fit
+    folder : Path
+        Made if it is not there.
+    lines : sequence of str
+        What was told of the fit, for the report.
+
+    Returns
+    -------
+    list of Path
+        What was written.
 
     Raises
     ------
-    IdentificationError
-        A word has another form.
+    FileError
+        The folder cannot be made or written to.
     """
-    return {name: _number(value) for name, value in _pairs(words, option, form)}
-
-
-def ranges(words: Sequence[str] | None, option: str, form: str) -> dict[str, tuple[float, float]]:
-    """Read ``NAME=LOW:HIGH`` words of an option.
-
-    Raises
-    ------
-    IdentificationError
-        A word has another form.
-    """
-    found = {}
-    for name, word in _pairs(words, option, form):
-        low, sign, high = word.partition(":")
-        if not sign:
-            raise IdentificationError(f"{option} has '{word}' where a range belongs; write it as {form}")
-        found[name] = (_number(low), _number(high))
-    return found
-
-
-def names(words: Sequence[str] | None, option: str, form: str) -> dict[str, str]:
-    """Read ``NAME=NAME`` words of an option.
-
-    Raises
-    ------
-    IdentificationError
-        A word has another form.
-    """
-    return dict(_pairs(words, option, form))
-
-
-def _pairs(words: Sequence[str] | None, option: str, form: str) -> list[tuple[str, str]]:
-    pairs = [word.partition("=") for word in words or []]
-    for name, sign, value in pairs:
-        if not (name and sign and value):
-            raise IdentificationError(f"{option} is '{name}{sign}{value}'; write it as {form}")
-    return [(name, value) for name, _, value in pairs]
-
-
-def _number(word: str) -> float:
+    make_folder(folder)
+    write_text(folder / "report.md", _report(fit, lines))
+    with replacing(folder / "parameters.csv") as beside, beside.open("w", encoding="utf-8", newline="") as file:
+        table = csv.writer(file)
+        table.writerow(_COLUMNS)
+        table.writerows(_rows(fit))
+    fit.model.save(folder / "model.toml")
+    written = [folder / name for name in ("model.toml", "parameters.csv", "report.md")] + [fit.save(folder / "fit.npz")]
     try:
-        return float(word)
-    except ValueError:
-        raise IdentificationError(f"'{word}' is no number; write one like 1e-3, in SI units") from None
+        figure = fit.plot()
+    except MissingExtraError:  # a plain install draws nothing
+        return written
+    with replacing(folder / "fit.png") as beside:
+        figure.savefig(beside)
+    return [*written, folder / "fit.png"]
+
+
+def _rows(fit: Fit) -> list[tuple[object, ...]]:
+    each = zip(fit.names, fit.start, fit.values, fit.std, fit.intervals, fit.units, strict=True)
+    return [
+        (name, float(start), float(value), float(std), float(low), float(high), unit)
+        for name, start, value, std, (low, high), unit in each
+    ]
+
+
+def _report(fit: Fit, lines: Sequence[str]) -> str:
+    records = ", ".join(fit.experiments)
+    rows = [
+        f"| {name} | {start:.6g} | {value:.6g} | {low:.6g} | {high:.6g} | {unit} |"
+        for name, start, value, _, low, high, unit in _rows(fit)
+    ]
+    return "\n".join(
+        [
+            f"# {fit.model.name}: identification",
+            "",
+            f"Mode {fit.mode}, fitted to {records}, after {fit.evaluations} evaluations. Intervals of 95 %, SI units.",
+            "",
+            "| parameter | start | value | from | to | unit |",
+            "| --- | --- | --- | --- | --- | --- |",
+            *rows,
+            "",
+            *(f"- {line}" for line in lines),
+            "",
+        ]
+    )
