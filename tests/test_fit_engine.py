@@ -19,7 +19,7 @@ from vpm.experiment import Experiment
 from vpm.identify import Fit, Fitting, bootstrap, identify, problem, profile_intervals
 from vpm.identify.objective import Objective, losses_and_weights
 from vpm.identify.shooting import ShootingProblem
-from vpm.identify.solver import Point, descend
+from vpm.identify.solver import Box, Point, descend
 from vpm.model import Model
 from vpm.simulate import Setup, simulate
 
@@ -87,14 +87,11 @@ def test_descent_finds_the_bounded_minimum_of_a_known_function() -> None:
         return Point(x, float(r @ r), r, np.array([[-20.0 * x[0], 10.0], [-1.0, 0.0]]), (r, r))
 
     for top, least in ((np.inf, (1.0, 1.0)), (0.5, (0.5, 0.25))):
-        high, endless = np.array([top, np.inf]), np.full(2, np.inf)
+        high = np.array([top, np.inf])
         found = descend(
             evaluate,
             evaluate(np.array([-1.2, 1.0])),
-            np.array([-2.0, -2.0]),
-            high,
-            scale=np.ones(2),
-            reach=endless,
+            Box(np.array([-2.0, -2.0]), high, scale=np.ones(2)),
             tolerance=1e-10,
             most_evaluations=200,
         )

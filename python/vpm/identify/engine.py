@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from vpm.errors import ExecutorError, IdentificationError
-from vpm.identify.estimation import blinded, limits
+from vpm.identify.estimation import LEAST_SCALE, blinded, limits
 from vpm.identify.identifiability import Combination, column_lengths, unseen_combinations
 from vpm.identify.objective import Objective, noise_levels
 from vpm.identify.parallel import worker_count
 from vpm.identify.problem import Problem
 from vpm.identify.settings import Fitting
-from vpm.identify.solver import Descent, Point, descend
+from vpm.identify.solver import Box, Descent, Point, descend
 from vpm.identify.statistics import record_groups, sandwich
 from vpm.model import Model
 from vpm.sending import Parcel
@@ -213,17 +213,13 @@ def onward(
     """
     p = len(objective.columns)
     lengths = column_lengths(first.jacobian)
-    size = np.where(objective.log, 1.0, np.maximum(np.abs(first.x[:p]), 1e-3 * np.sqrt(first.cost) / lengths[:p]))
-    return descend(
-        evaluate or objective,
-        first,
-        low,
-        high,
-        scale=np.concatenate([size, np.ones(first.x.size - p)]),
-        reach=np.concatenate([np.where(objective.log, FARTHEST, np.inf), np.full(first.x.size - p, np.inf)]),
-        tolerance=tolerance,
-        most_evaluations=most_evaluations,
+    size = np.where(
+        objective.log, 1.0, np.maximum(np.abs(first.x[:p]), LEAST_SCALE * np.sqrt(first.cost) / lengths[:p])
     )
+    scale = np.concatenate([size, np.ones(first.x.size - p)])
+    reach = np.concatenate([np.where(objective.log, FARTHEST, np.inf), np.full(first.x.size - p, np.inf)])
+    box = Box(low, high, scale, reach)
+    return descend(evaluate or objective, first, box, tolerance=tolerance, most_evaluations=most_evaluations)
 
 
 def _onward(objective: Objective, first: Point, fitting: Fitting, tolerance: float) -> Descent:
