@@ -1,4 +1,4 @@
-"""Model refinement: at each level of detail the new parameters first, then all; unseen records decide if it pays."""
+"""Model refinement: at each level of detail the new parameters first, then all; validation decides if it pays."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from vpm.simulate import Setup, judging_mode
 
 Array = NDArray[np.float64]
 
-#: A level pays where it predicts unseen data better by so many standard deviations, and by more than this share.
+#: A level pays where it predicts validation records better by so many standard deviations, and by more than this share.
 SURE, WORTH = 2.0, 0.02
 #: A parameter is seen at a level where the residual moves by more than this share when it changes by its own size.
 SEEN = 1e-6
@@ -58,7 +58,7 @@ class _Data:
     """What a level is fitted to, and judged on."""
 
     train: OutputErrorProblem
-    unseen: OutputErrorProblem
+    validation: OutputErrorProblem
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ def climb(
     patience: int = 2,
     tell: Callable[[str], None] | None = None,
 ) -> Climb:
-    """Identify a model at each level of detail, as far up as unseen data say that detail pays.
+    """Identify a model at each level of detail, as far up as validation records tell that detail pays.
 
     The levels are: rigid with ideal actuators, rigid with what the actuators do, then the flexible links from springs
     between rigid segments over modes, Bezier curves and elements to the model's own; of each kind finer ones while the
@@ -121,7 +121,7 @@ def climb(
 
     Notes
     -----
-    A level pays if its residual on unseen data is smaller than that of the best level below by `SURE` standard
+    A level pays if its residual on validation records is smaller than that of the best level below by `SURE` standard
     deviations, which count how long residuals resemble themselves (`vpm.identify.gain`), and by a share of `WORTH` of
     the mean square.
     """
@@ -132,9 +132,9 @@ def climb(
             f"{model.name}: no parameter is adjustable; give some an uncertainty in the model file"
         )
     say = tell or (lambda _: None)
-    records, unseen = as_records(experiments), as_records(validate)
+    records, validation = as_records(experiments), as_records(validate)
     mode = mode or judging_mode(model, records)
-    data = _Data(*(_Remembered(model, each, mode, channels=channels, setup=setup) for each in (records, unseen)))
+    data = _Data(*(_Remembered(model, each, mode, channels=channels, setup=setup) for each in (records, validation)))
     offered = families(model)
     reached: list[_Reached] = []
     vain = 0
@@ -191,13 +191,13 @@ def _climbed(name: str, machine: Model, data: _Data, below: _Reached | None, bes
         if known and unknown:
             fitted = _fitted(start, data.train, unknown)[0]
         fitted, found = _fitted(fitted, data.train, seen) if seen else (fitted, None)
-        residual, _ = data.unseen.evaluate(fitted, fitted.theta)
+        residual, _ = data.validation.evaluate(fitted, fitted.theta)
     except VpmError:
         return None
     touching = () if found is None else found.at_bounds
     score, pays = np.inf, True
     if best is not None:
-        change = gain(best.residual, residual, segments(data.unseen))
+        change = gain(best.residual, residual, segments(data.validation))
         score, pays = -change.harm, -change.harm > SURE and change.relative > WORTH
     level = Level(
         name=name,
@@ -205,7 +205,7 @@ def _climbed(name: str, machine: Model, data: _Data, below: _Reached | None, bes
         freed=tuple(key for key in seen if below is None or key not in below.level.values),
         values={} if found is None else dict(zip(found.names, map(float, found.values), strict=True)),
         std={} if found is None else dict(zip(found.names, map(float, found.std), strict=True)),
-        errors={channel: share for channel, (_, share, _) in gaps(data.unseen, residual).items()},
+        errors={channel: share for channel, (_, share, _) in gaps(data.validation, residual).items()},
         score=float(score),
         pays=bool(pays),
     )
@@ -245,10 +245,6 @@ def families(model: Model) -> list[Family]:
 
     Effects at actuators (a lag, a delay, a dead zone) are left out of the lowest one; flexible links are rigid in it.
     Levels of links whose model would not be a valid one are skipped.
-
-    Parameters
-    ----------
-    model : Model
     """
     content = model.to_dict()
     beams: Mapping[str, Any] = content.get("beams", {})

@@ -1,6 +1,5 @@
 """Identification: parameters, their uncertainty, and what the data cannot see."""
 
-from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.comparison import FIT_MODES, problem
 from vpm.identify.estimation import Estimate, Worth, estimate
 from vpm.identify.export import write_fit
@@ -13,6 +12,7 @@ from vpm.identify.inertial_model import inertial_regression
 from vpm.identify.inertial_regression import InertialRegression
 from vpm.identify.input_error import InputErrorProblem
 from vpm.identify.intervals import Bootstrap, Profile, bootstrap, profile_intervals
+from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.identify.oil_equations import CylinderGeometry, pressures_from_force
 from vpm.identify.oil_fit import OilFit, identify_oil
 from vpm.identify.output_error import OutputErrorProblem

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
-from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.first_states import OF_PARAMETER, difference
 from vpm.identify.input_error import InputErrorProblem
+from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.identify.output_error import OutputErrorProblem
 from vpm.identify.parallel import worker_count
 from vpm.identify.prediction_error import PredictionErrorProblem

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from vpm.errors import ExecutorError, IdentificationError
-from vpm.identify.estimation import LEAST_SCALE, blinded, limits
+from vpm.identify.estimation import LEAST_SCALE, Estimate, blinded, limits, touching
 from vpm.identify.identifiability import Combination, column_lengths, unseen_combinations
 from vpm.identify.objective import Objective, noise_levels
 from vpm.identify.parallel import worker_count
@@ -38,25 +38,19 @@ WIDE = 1e4
 FARTHEST = float(np.log(30.0))
 
 
-@dataclass(frozen=True)
-class Found:
-    """Result of the engine, as arrays over the free parameters and the first states behind them.
+@dataclass(frozen=True, kw_only=True)
+class Found(Estimate):
+    """An estimate of the engine, with first states behind the free parameters.
 
     Rows of the residual went into the fit with their ``weights``.
     """
 
-    values: Array
-    covariance: Array
-    residual: Array
-    jacobian: Array
     weights: Array
-    unseen: tuple[Combination, ...]
     states: Array
     states_std: Array
     noise: dict[str, float]
     costs: Array
     agreeing: int
-    evaluations: int
     ended: str
 
 
@@ -289,20 +283,24 @@ def _found(objective: Objective, point: Point, free: Sequence[str], costs: Array
     covariance = _covariance(objective, point, labels, every)
     std = np.sqrt(np.diag(covariance))
     residual, jacobian = point.raw
+    values = objective.parameters(point.x)
     return Found(
-        objective.parameters(point.x),
-        covariance[:p, :p],
+        tuple(free),
+        values,
         residual,
         jacobian[:, :p] / slopes[:p],
-        _weights(point),
+        covariance[:p, :p],
         unseen,
-        point.x[p:] * objective.sizes,
-        std[p:],
-        dict(objective.noise),
-        costs,
-        agreeing,
+        touching(free, values, *objective.box),
         objective.count,
-        ended,
+        ended == "interrupted",
+        weights=_weights(point),
+        states=point.x[p:] * objective.sizes,
+        states_std=std[p:],
+        noise=dict(objective.noise),
+        costs=costs,
+        agreeing=agreeing,
+        ended=ended,
     )
 
 
@@ -315,13 +313,12 @@ def _weights(point: Point) -> Array:
 
 def _covariance(objective: Objective, point: Point, labels: Sequence[str], unseen: Sequence[Combination]) -> Array:
     """Covariance of parameters and first states: sandwich over records, with priors as what they claim to be."""
-    lengths = column_lengths(point.jacobian)
     rows, told = len(point.residual), objective.data.blocks[-1].samples.stop
     data = rows - objective.priors
     expected = point.residual.copy()
     expected[data:] = 1.0  # a prior is off by its own standard deviation, whatever it happens to be off by
     groups = record_groups(objective.data.blocks)
-    covariance = sandwich(point.jacobian / lengths, expected, groups, range(told, rows)) / np.outer(lengths, lengths)
+    covariance = sandwich(point.jacobian, expected, groups, range(told, rows))
     slopes = objective.slopes(point.x)
     covariance *= np.outer(slopes, slopes)
     return blinded(covariance, unseen, labels)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from vpm.identify.identifiability import RANK_TOLERANCE, Combination, column_lengths, unseen_combinations
-from vpm.identify.moments import Coordinates, real_bodies
+from vpm.identify.moments import AXES, PAIRS, Coordinates, real_bodies
 from vpm.identify.problem import Problem, segments
 from vpm.identify.solver import Box, Point, descend
 from vpm.identify.statistics import robust_covariance
@@ -30,6 +30,9 @@ CREEPING = 0.002
 LEAST_SCALE = 1e-3
 #: Share by which the sum of squares may grow along a direction that the data cannot see.
 UNCHANGED = 1e-9
+
+#: Relative difference to a bound at which an estimate rests on it, and distance to one that is zero.
+TOUCHING, NEAR_ZERO = 1e-6, 1e-12
 
 #: Called after every evaluation with (evaluations so far, root mean square of the weighted residual).
 Progress = Callable[[int, float], None]
@@ -133,13 +136,9 @@ def estimate(
     values, jacobian = frame.parameters(start), frame.by_parameters(jacobian)
     unseen = unseen_combinations(jacobian, free)
     covariance = _covariance(data, residual, jacobian, unseen, free)
-    touching = tuple(
-        name
-        for name, x, lo, hi in zip(free, values, *box, strict=True)
-        if np.isclose(x, lo, rtol=1e-6, atol=1e-12) or np.isclose(x, hi, rtol=1e-6, atol=1e-12)
-    )
+    at_bounds = touching(free, values, *box, near=NEAR_ZERO)
     return Estimate(
-        tuple(free), values, residual, jacobian, covariance, unseen, touching, counter.count, interrupted, early
+        tuple(free), values, residual, jacobian, covariance, unseen, at_bounds, counter.count, interrupted, early
     )
 
 
@@ -328,6 +327,12 @@ def _point(x: Array, residual: Array, slopes: Array) -> Point:
     return Point(x, float(residual @ residual), residual, slopes, (residual, slopes))
 
 
+def touching(names: Sequence[str], values: Array, low: Array, high: Array, near: float = 1e-300) -> tuple[str, ...]:
+    """Names of estimates that rest on a bound, or are as ``near`` to one that is zero."""
+    at = np.isclose(values, low, rtol=TOUCHING, atol=near) | np.isclose(values, high, rtol=TOUCHING, atol=near)
+    return tuple(name for name, rests in zip(names, at, strict=True) if rests)
+
+
 def limits(model: Model, free: Sequence[str], replaced: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
     """Least and largest value of each free parameter: as replaced, or of the model."""
     pairs = [replaced.get(n, _range(model, n, free)) for n in free]
@@ -341,9 +346,9 @@ def _range(model: Model, name: str, free: Sequence[str]) -> tuple[float, float]:
     """
     parameter = model.parameters[name]
     body, _, axis = name.rpartition(".inertia.")
-    names = [f"{body}.inertia.{other}" for other in ("xx", "yy", "zz") if other != axis]
-    products = [f"{body}.inertia.{pair}" for pair in ("xy", "xz", "yz")]
-    alone = axis in {"xx", "yy", "zz"} and not any(n in free for n in (*names, *products))
+    names = [f"{body}.inertia.{other}" for other in AXES if other != axis]
+    products = [f"{body}.inertia.{pair}" for pair in PAIRS]
+    alone = axis in AXES and not any(n in free for n in (*names, *products))
     if not alone or any(model.parameters[n].value for n in products):
         return parameter.minimum, parameter.maximum
     first, second = (model.parameters[n].value for n in names)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -14,6 +14,7 @@ from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
 from vpm.identify.closed_loop_prediction import Own
 from vpm.identify.comparison import comparison
+from vpm.identify.diagnostics import constant_channels, contradictions, lost_channels, remarks, resting
 from vpm.identify.engine import Found, fit_problem
 from vpm.identify.estimation import Estimate, Progress, blinded, estimate, limits
 from vpm.identify.fitted import Fit, fit_of
@@ -33,7 +34,6 @@ from vpm.identify.refitting import (
     with_first_states,
     with_noise,
 )
-from vpm.identify.remarks import constant_channels, contradictions, lost_channels, remarks, resting, touching
 from vpm.identify.settings import Checks, Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.statistics import freedom, record_groups, sandwich
@@ -128,8 +128,8 @@ def identify(
     data, found, own = beside_own(model, data, found, again, ties)
     fit = _dressed(model, data, found, before, [e.name for e in records], ties)
     fit = replace(fit, setup=setup, fitting=fitting, ties=ties)
-    if isinstance(found, _Engineered):
-        fit = with_offsets(fit, data, found.found.weights)
+    if isinstance(found, Found):
+        fit = with_offsets(fit, data, found.weights)
     fit = _judged(fit, data, found, records, checks, settled, own)
     return replace(fit, warnings=_told(model, records, data, fit, checks))
 
@@ -156,13 +156,6 @@ def _plainly(model: Model, data: Problem, names: tuple[str, ...], tolerance: flo
     return estimate(model, data, names, tolerance=tolerance, progress=progress, feasible=True), again
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Engineered(Estimate):
-    """An estimate of the engine, with all that this found."""
-
-    found: Found
-
-
 def _by_engine(
     model: Model,
     data: Problem,
@@ -174,42 +167,32 @@ def _by_engine(
 ) -> _Ways:
     """A fit by the engine from all its starts; later ones begin where the last one ended."""
     check_bounds(names, fitting)
-    box = limits(model, names, fitting.bounds)
     engine = partial(fit_problem, model, free=names, fitting=fitting, tolerance=tolerance)
-
-    def made(found: Found) -> Estimate:
-        interrupted, at = found.ended == "interrupted", touching(names, found.values, *box)
-        what = (found.residual, found.jacobian, found.covariance, found.unseen, at, found.evaluations, interrupted)
-        return _Engineered(names, found.values, *what, found=found)
 
     def again(_: Model, less: Problem, near: Estimate) -> Estimate:
         found = engine(less, begin=near.values)
         found = replace(found, evaluations=near.evaluations + found.evaluations)
         # What the starts reached, the first fit knows.
-        if isinstance(near, _Engineered):
-            found = replace(found, costs=near.found.costs, agreeing=near.found.agreeing)
-        return made(found)
+        return replace(found, costs=near.costs, agreeing=near.agreeing) if isinstance(near, Found) else found
 
-    return made(engine(data, progress=progress, executor=executor)), again
+    return engine(data, progress=progress, executor=executor), again
 
 
 def _dressed(
     model: Model, data: Problem, found: Estimate, before: Array, records: Sequence[str], ties: Mapping[str, str]
 ) -> Fit:
     """An estimate as a result, with the covariance of a final one."""
-    engineered = isinstance(found, _Engineered)
-    result = found if engineered else _with_intervals(data, found)
+    result = found if isinstance(found, Found) else _with_intervals(data, found)
     fit = fit_of(model, data, replace(result, residual=result.residual + expected(data)), before, records, ties)
-    if isinstance(found, _Engineered):
-        return _with_details(fit, data, found.found)
+    if isinstance(found, Found):
+        return _with_details(fit, data, found)
     return replace(fit, evaluations=found.evaluations, ended="interrupted" if found.interrupted else "")
 
 
 def _with_intervals(data: Problem, found: Estimate) -> Estimate:
     """The same with the covariance of a final estimate, which takes longer than that of a search."""
-    lengths = column_lengths(found.jacobian)
-    covariance = sandwich(found.jacobian / lengths, found.residual, record_groups(data.blocks))
-    return replace(found, covariance=blinded(covariance / np.outer(lengths, lengths), found.unseen, found.names))
+    covariance = sandwich(found.jacobian, found.residual, record_groups(data.blocks))
+    return replace(found, covariance=blinded(covariance, found.unseen, found.names))
 
 
 def _judged(
@@ -235,7 +218,7 @@ def _judged(
     # What is known beforehand no noise of records moves.
     if own is None or not own.alike or (fit.fitting and fit.fitting.priors):
         return fit
-    weights = found.found.weights if isinstance(found, _Engineered) else np.ones(len(found.residual))
+    weights = found.weights if isinstance(found, Found) else np.ones(len(found.residual))
     return with_noise(fit, data, slopes / lengths, lengths, own.noise, weights[: len(slopes)])
 
 

@@ -160,7 +160,7 @@ class InertialFit(Result):
             As for `repaired`.
         """
         from vpm.experiment import as_records
-        from vpm.identify.balance import InverseDynamicsProblem
+        from vpm.identify.inverse_dynamics import InverseDynamicsProblem
         from vpm.identify.problem import gaps
 
         data = InverseDynamicsProblem(model, as_records(experiments), cutoff=cutoff)

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, as_records
-from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.engine import onward
 from vpm.identify.estimation import limits
 from vpm.identify.first_states import BegunAnywhere, first_state_derivative
+from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.identify.objective import Objective
 from vpm.identify.parallel import in_order, worker_count
 from vpm.identify.problem import Block, tied, untied

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from vpm.catalogue import effects_for_site
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
-from vpm.identify.balance import InverseDynamicsProblem
+from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.identify.problem import FEWEST_SAMPLES, Block, Problem, untied
 from vpm.identify.settings import Checks
 from vpm.identify.whiteness import (
@@ -183,13 +183,7 @@ def _laws(motion: Sequence[Array], efforts: Sequence[Array], checks: Checks) -> 
 
 
 def missing_effects(judged: Sequence[Whiteness], checks: Checks) -> list[str]:
-    """Sentences about channels whose residual repeats with the motion.
-
-    Parameters
-    ----------
-    judged : sequence of Whiteness
-    checks : Checks
-    """
+    """Sentences about channels whose residual repeats with the motion."""
     level = checks.level / max(1, len(judged))
     return [
         f"the residual of {one.channel} in {one.experiment} repeats with the motion, which explains "

@@ -53,7 +53,8 @@ class Objective:
         self.columns = [model.index(name) for name in free]
         self._progress, self._lock = progress, Lock()
         self.count = 0
-        values, (low, high) = model.theta[self.columns], bounds
+        self.box = low, high = bounds
+        values = model.theta[self.columns]
         self.log = (values > 0.0) & (low >= 0.0) & fitting.log
         shooting = untied(data)
         self.shooting = shooting if isinstance(shooting, ShootingProblem) else None

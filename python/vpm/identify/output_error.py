@@ -270,9 +270,8 @@ def with_offsets(fit: Fit, data: Problem, weights: Array) -> Fit:
     columns = np.column_stack([weights[:, None] * jacobian @ seen, weights[:, None] * constants])
     columns = np.vstack([columns, np.column_stack([known @ seen, np.zeros((len(known), len(off)))])])
     left = np.concatenate([weights * (residual - constants @ values), np.ones(len(columns) - residual.size)])
-    lengths, outputs = column_lengths(columns), data.blocks[-1].samples.stop
-    covariance = sandwich(columns / lengths, left, record_groups(data.blocks), range(outputs, len(left)))
-    std = (np.sqrt(np.diag(covariance)) / lengths)[-len(off) :]
+    exact = range(data.blocks[-1].samples.stop, len(left))
+    std = np.sqrt(np.diag(sandwich(columns, left, record_groups(data.blocks), exact)))[-len(off) :]
     labels = [f"{block.experiment}: {block.channel}" for block in off]
     found, deviations = (dict(zip(labels, map(float, numbers), strict=True)) for numbers in (values, std))
     return replace(fit, offsets=found, offsets_std=deviations)

@@ -11,13 +11,13 @@ from numpy.typing import NDArray
 
 from vpm.errors import VpmError
 from vpm.experiment import Experiment, as_records
-from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.closed_loop_prediction import Noise, Own, noisy, own_residual
 from vpm.identify.comparison import comparison
 from vpm.identify.estimation import Estimate
 from vpm.identify.first_states import BegunAnywhere, begun_likeliest, matters
 from vpm.identify.fitted import Fit
 from vpm.identify.identifiability import RANK_TOLERANCE
+from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.identify.problem import Gaps, Problem, gaps, tied, untied
 from vpm.identify.settings import Checks, OwnSimulation
 from vpm.identify.statistics import pooled

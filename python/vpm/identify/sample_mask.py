@@ -38,7 +38,7 @@ _GEOMETRY = ("name", "gravity", "bodies", "joints", "beams", "lines")
 
 
 @dataclass(frozen=True)
-class Counted:
+class SampleMask:
     """Which samples of some records count.
 
     Attributes

@@ -18,6 +18,7 @@ from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_toeplitz
 from scipy.special import fdtri
 
+from vpm.identify.identifiability import column_lengths
 from vpm.identify.problem import Block
 from vpm.numbers import NORMAL_95
 
@@ -192,7 +193,6 @@ def sandwich(jacobian: Array, residual: Array, groups: Sequence[Sequence[slice]]
     Parameters
     ----------
     jacobian : ndarray, shape (n, p)
-        Columns of similar length.
     residual : ndarray, shape (n,)
     groups : sequence of sequence of slice
         Slices of one length each whose rows belong to the same times; see `record_groups`.
@@ -203,12 +203,13 @@ def sandwich(jacobian: Array, residual: Array, groups: Sequence[Sequence[slice]]
     -------
     ndarray, shape (p, p)
     """
-    bread, scores = _bread_and_scores(jacobian, residual, exact)
+    lengths = column_lengths(jacobian)
+    bread, scores = _bread_and_scores(jacobian / lengths, residual, exact)
     meat = scores[list(exact)].T @ scores[list(exact)]
     for group in groups:
         meat = meat + _long_run(np.sum([scores[rows] for rows in group], axis=0))
     covariance: Array = bread @ meat @ bread
-    return 0.5 * (covariance + covariance.T)
+    return 0.5 * (covariance + covariance.T) / np.outer(lengths, lengths)
 
 
 def white_sandwich(jacobian: Array, residual: Array) -> Array:

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from vpm.errors import DivergedError
 from vpm.identify.along import bends, has_hidden, has_own_drives, shows_drives_alone
-from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.estimation import Estimate, Worth, estimate
+from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.model import Model
 
 Array = NDArray[np.float64]

@@ -100,10 +100,6 @@ def explained_by(residual: Array, fitted: Array, added: Array, counts: NDArray[n
     added : ndarray, shape (n, k)
     counts : ndarray of bool, shape (n,)
         Samples that count.
-
-    Returns
-    -------
-    share, chance : float
     """
     old = basis(np.where(counts[:, None], fitted, 0.0))
     new = basis(np.where(counts[:, None], added, 0.0), old)

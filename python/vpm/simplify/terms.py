@@ -41,12 +41,7 @@ SETS = 3
 
 
 def removable(model: Model) -> Iterator[tuple[str, str]]:
-    """Terms that a model has, each with its place: single parts first, then the machine.
-
-    Parameters
-    ----------
-    model : Model
-    """
+    """Terms that a model has, each with its place: single parts first, then the machine."""
     content = model.to_dict()
     if content.get("velocity_terms", True):
         parts = [name for name, part in _moving(content).items() if part.get("velocity_terms", True)]

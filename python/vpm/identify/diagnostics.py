@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.experiment import Experiment
+from vpm.identify.estimation import touching
 from vpm.identify.problem import Block
 from vpm.identify.settings import Checks
 from vpm.model import Model
@@ -25,18 +26,10 @@ COLLINEAR = 0.99
 SAMPLES_EACH = 10
 #: A parameter has not moved if it changed by less than this share, and by less than this share of its deviation.
 STILL, STILL_STD = 1e-3, 1e-3
-#: Relative difference to a bound at which an estimate rests on it.
-TOUCHING = 1e-6
 #: Distance to a bound, in deviations of the estimate, at which it rests on it all the same.
 TOUCHING_STD = 1e-3
 #: Share of a measured signal beyond which a simulation has lost it: silence would be nearer.
 LOST = 1.0
-
-
-def touching(names: Sequence[str], values: Array, low: Array, high: Array) -> tuple[str, ...]:
-    """Names of estimates that rest on a bound."""
-    near = np.isclose(values, low, rtol=TOUCHING, atol=1e-300) | np.isclose(values, high, rtol=TOUCHING, atol=1e-300)
-    return tuple(name for name, at in zip(names, near, strict=True) if at)
 
 
 def resting(fit: Fit, box: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:

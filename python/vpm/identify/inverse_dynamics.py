@@ -29,7 +29,7 @@ from vpm.identify.following import Following, Memo, gauge_gains, hold_of
 from vpm.identify.parallel import in_order
 from vpm.identify.parts import Bending
 from vpm.identify.problem import FEWEST_SAMPLES, Block
-from vpm.identify.sample_mask import Counted, settled
+from vpm.identify.sample_mask import SampleMask, settled
 from vpm.initial import joint_motion
 from vpm.model import Model
 from vpm.simulate import AUTOMATIC
@@ -337,8 +337,8 @@ class InverseDynamicsProblem(BegunAnywhere):
         Efforts are as large as what the drives deliver, and of a joint that coasts as what its inertia takes; of other
         channels, such as pressures, it is the spread.
         """
-        counted = Counted(self.experiments, self.motions, self.joints, self._joints)
-        sizes, moving = [], counted.moving(model)
+        mask = SampleMask(self.experiments, self.motions, self.joints, self._joints)
+        sizes, moving = [], mask.moving(model)
         for record, (m, experiment) in enumerate(zip(self.motions, self.experiments, strict=True)):
             _, applied, _ = self.effort(model, model.theta, record)
             if len(applied) < FEWEST_SAMPLES:
@@ -354,7 +354,7 @@ class InverseDynamicsProblem(BegunAnywhere):
             spread = np.std(self._compared[record], axis=0)
             sizes.append(np.concatenate([efforts, spread]))
             ends = settled(len(applied), m.decimation)
-            columns = [counted.of_channel(model, channel, record, ends) for channel in self.shown]
+            columns = [mask.of_channel(model, channel, record, ends) for channel in self.shown]
             moving[record] = np.column_stack([moving[record], *columns])
         return sizes, moving
 
