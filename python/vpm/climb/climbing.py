@@ -63,7 +63,7 @@ class _Data:
 
 @dataclass(frozen=True)
 class _Reached:
-    """A level with its residual on unseen data."""
+    """A level with its residual on validation records."""
 
     level: Level
     model: Model

@@ -104,7 +104,7 @@ def check_along(model: Model, joints: Sequence[str]) -> None:
 
 
 def shown_channels(model: Model, joints: Sequence[str], experiments: Sequence[Experiment]) -> tuple[str, ...]:
-    """What every log holds beside the balance of effort and this machine works out along the motion, or lacks.
+    """What every log holds beside the inverse-dynamics residual and this machine works out along the motion, or lacks.
 
     It lacks the coordinates that effects would split off: where a log holds the deflection of a link or of a joint that
     the machine takes for rigid, it says zero.

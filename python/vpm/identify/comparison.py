@@ -115,7 +115,7 @@ def _check_offsets(model: Model, mode: str, fitting: Fitting) -> None:
 
 
 class RelativeProblem(InverseDynamicsProblem):
-    """A balance of effort, each joint divided by what its drives deliver over what they delivered before the fit.
+    """An inverse-dynamics residual, at each joint over what the drives deliver, in parts of that before the fit.
 
     A balance gets smaller with the gain of its drives: the least sum of squares belongs to a machine without forces.
     The commands were measured, not the efforts. Their density is that of the residual times the derivative of effort by

@@ -94,10 +94,15 @@ def fit_problem(
     search = Objective(model, data, free, bounds, _plain(fitting), progress) if _weighs_later(fitting) else objective
     begun = starts(model, free, search, fitting) if begin is None else [search.coordinates(begin)]
     rough = 1e2 * tolerance if _weighs_later(fitting) else tolerance
-    if executor is None or len(begun) == 1:
+    if len(begun) == 1:
+        descents = [_descent(search, begun[0], fitting, rough)]
+        interrupted = descents[0].interrupted
+    elif executor is None:
         descents, interrupted = _search(search, begun, fitting, rough)
     else:
         descents, interrupted = _search_elsewhere(search, begun, fitting, rough, executor, progress)
+    if interrupted and not descents:
+        raise KeyboardInterrupt
     best = min(descents, key=lambda d: d.point.cost)
     if not np.isfinite(best.point.cost):
         raise IdentificationError(
@@ -128,14 +133,8 @@ def _search(
 ) -> tuple[list[Descent], bool]:
     """Descents that have a point, and whether Ctrl-C ended them."""
     jobs = [partial(_descent, objective, x, fitting, tolerance) for x in begun]
-    if len(jobs) == 1:
-        only = jobs[0]()
-        return [only], only.interrupted
     found, interrupted = until_interrupted(jobs, worker_count(fitting.workers or None))
-    kept = [descent for descent in found if descent is not None]
-    if interrupted and not kept:
-        raise KeyboardInterrupt
-    return kept, interrupted
+    return [descent for descent in found if descent is not None], interrupted
 
 
 def _search_elsewhere(
@@ -164,8 +163,6 @@ def _search_elsewhere(
         if not kept or not isinstance(error, ExecutorError):
             raise error
         warnings.warn(f"{error}; the fit goes on with the other starts", RuntimeWarning, stacklevel=2)
-    if interrupted and not kept:
-        raise KeyboardInterrupt
     return kept, interrupted
 
 
@@ -180,7 +177,7 @@ def _descent(objective: Objective, x: Array, fitting: Fitting, tolerance: float)
     first = objective(np.clip(x, objective.low, objective.high))
     if not np.isfinite(first.cost):
         return Descent(first, first.cost, 1, "no machine")
-    return _onward(objective, first, fitting, tolerance)
+    return onward(objective, first, objective.low, objective.high, fitting.most_evaluations, tolerance)
 
 
 def onward(
@@ -216,10 +213,6 @@ def onward(
     return descend(evaluate or objective, first, box, tolerance=tolerance, most_evaluations=most_evaluations)
 
 
-def _onward(objective: Objective, first: Point, fitting: Fitting, tolerance: float) -> Descent:
-    return onward(objective, first, objective.low, objective.high, fitting.most_evaluations, tolerance)
-
-
 def _reweighed(objective: Objective, point: Point, fitting: Fitting, tolerance: float, ended: str) -> tuple[Point, str]:
     """Weights from the residual, a fit with them, and again until they stay."""
     for _ in range(ROUNDS):
@@ -231,7 +224,7 @@ def _reweighed(objective: Objective, point: Point, fitting: Fitting, tolerance: 
             break
         if ended == "interrupted":
             break
-        descent = _onward(objective, point, fitting, tolerance)
+        descent = onward(objective, point, objective.low, objective.high, fitting.most_evaluations, tolerance)
         point, ended = descent.point, descent.ended
     return point, ended
 

@@ -19,16 +19,9 @@ _COLUMNS = ("name", "start", "value", "std", "low", "high", "unit")
 
 def told(fit: Fit) -> list[str]:
     """Values with their deviations, first states, offsets, agreement of starts, noise, warnings, gaps, a line each."""
-    lines = [
-        f"{name:40s} {value:14.6g} ± {std:<10.3g} {unit}"
-        for name, value, std, unit in zip(fit.names, fit.values, fit.std, fit.units, strict=True)
-    ]
-    lines += [
-        f"{label:40s} {value:14.6g} ± {fit.states_std[label]:<10.3g} first state" for label, value in fit.states.items()
-    ]
-    lines += [
-        f"{label:40s} {value:14.6g} ± {fit.offsets_std[label]:<10.3g} offset" for label, value in fit.offsets.items()
-    ]
+    lines = [_line(*row) for row in zip(fit.names, fit.values, fit.std, fit.units, strict=True)]
+    lines += [_line(label, value, fit.states_std[label], "first state") for label, value in fit.states.items()]
+    lines += [_line(label, value, fit.offsets_std[label], "offset") for label, value in fit.offsets.items()]
     if fit.costs.size > 1:
         lines.append(f"{fit.agreeing} of {fit.costs.size} starts agree")
     lines += [f"noise of {channel}: {level:.4g}" for channel, level in fit.noise.items()]
@@ -41,6 +34,10 @@ def told(fit: Fit) -> list[str]:
         for channel, (rms, share, unit) in fit.after.items()
     ]
     return lines
+
+
+def _line(name: str, value: float, std: float, unit: str) -> str:
+    return f"{name:40s} {value:14.6g} ± {std:<10.3g} {unit}"
 
 
 def told_unseen(judged: tuple[Gaps, Gaps]) -> list[str]:

@@ -73,14 +73,16 @@ class BegunAnywhere:
 
     def begun(self, departures: Array | None) -> Self:
         """The same from other first states, which are taken for known."""
-        same = copy(self)
-        vars(same).update(departures=departures, _space=None)
-        return same
+        return self.changed(departures=departures, _space=None)
 
     def beside(self, slopes: Array) -> Self:
         """The same beside unknown first states, by which the residual has these slopes (n, k)."""
+        return self.changed(_space=basis(slopes) if slopes.shape[1] else None)
+
+    def changed(self, **attributes: object) -> Self:
+        """A copy with other attributes."""
         same = copy(self)
-        vars(same).update(_space=basis(slopes) if slopes.shape[1] else None)
+        vars(same).update(attributes)
         return same
 
     @property

@@ -1,9 +1,8 @@
-"""The balance of effort along measured motions, joint by joint, as a residual."""
+"""The inverse-dynamics residual along measured motions, joint by joint."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import Self
@@ -43,7 +42,7 @@ LONG_STEPS, ROUGH = "linearly_implicit", 1e-3
 
 
 class InverseDynamicsProblem(BegunAnywhere):
-    """Balance of effort at each joint: what the actuators deliver minus what the measured motion needs.
+    """Inverse-dynamics residual at each joint: what the actuators deliver minus what the measured motion needs.
 
     Both sides, and so the regressor's columns, pass the same zero-phase low-pass and decimation: the parallel
     filtering of the inverse dynamic identification model (M. Gautier, *Annual Reviews in Control*, 1997; A. Janot et
@@ -118,8 +117,7 @@ class InverseDynamicsProblem(BegunAnywhere):
         """The same of other records of the same lengths, filtered, counted and weighed as these are."""
         motions = self._motions(experiments, [m.cutoff for m in self.motions])
         pairs = list(zip(motions, experiments, strict=True))
-        same = copy(self)
-        vars(same).update(
+        return self.changed(
             experiments=tuple(experiments),
             motions=motions,
             expected=0.0,
@@ -127,19 +125,14 @@ class InverseDynamicsProblem(BegunAnywhere):
             _compared=tuple(self._measured(m, e) for m, e in pairs),
             _known=self._held(experiments, motions, self.integrators, self.departures),
         )
-        return same
 
     def less(self, expected: Array) -> InverseDynamicsProblem:
         """The same, less what is left of it at the true values, shape (n,)."""
-        same = copy(self)
-        same.expected = expected
-        return same
+        return self.changed(expected=expected)
 
     def side_by_side(self, workers: int) -> InverseDynamicsProblem:
         """The same, which works on so many records at a time."""
-        same = copy(self)
-        same.workers = workers
-        return same
+        return self.changed(workers=workers)
 
     @property
     def integrators(self) -> tuple[str, ...]:
@@ -167,10 +160,8 @@ class InverseDynamicsProblem(BegunAnywhere):
     def later(self) -> InverseDynamicsProblem:
         """The same, but for commands, each of which holds from the sample after its own on."""
         moved = tuple(replace(m, inputs=np.concatenate([m.inputs[:1], m.inputs[:-1]])) for m in self._whole)
-        same = copy(self)
         # What drives answered to commands at their own times is no answer to these; what the motion needs is.
-        vars(same).update(_whole=moved, _known=tuple(replace(known, commands=1) for known in self._known))
-        return same
+        return self.changed(_whole=moved, _known=tuple(replace(known, commands=1) for known in self._known))
 
     def evaluate(
         self, model: Model, theta: Array, columns: Sequence[int] = (), origin: Array | None = None
@@ -210,9 +201,8 @@ class InverseDynamicsProblem(BegunAnywhere):
 
     def begun(self, departures: Array | None) -> Self:
         """See :class:`BegunAnywhere`; by coordinates, then rates."""
-        same = super().begun(departures)
-        vars(same).update(_known=self._held(self.experiments, self.motions, self.integrators, departures))
-        return same
+        known = self._held(self.experiments, self.motions, self.integrators, departures)
+        return super().begun(departures).changed(_known=known)
 
     def open_states(self, model: Model) -> tuple[Array, int]:
         """Of joints that nobody measures, and of links that no gauge holds; see :class:`BegunAnywhere`."""

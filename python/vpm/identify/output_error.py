@@ -7,7 +7,6 @@ parameters.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import TYPE_CHECKING, Self
@@ -90,9 +89,7 @@ class OutputErrorProblem(BegunAnywhere):
 
     def with_offsets_left(self) -> Self:
         """The same with these constants in its residual."""
-        same = copy(self)
-        same.offsets = ()
-        return same
+        return self.changed(offsets=())
 
     def _left(self, values: Array) -> Array:
         """What neither offsets nor first states explain of a residual (n,) or its derivative (n, columns)."""

@@ -98,7 +98,7 @@ def beside_own(
     onward: Callable[[Model, Problem, AnyEstimate], AnyEstimate],
     ties: Mapping[str, str],
 ) -> tuple[Problem, AnyEstimate, Own | None]:
-    """The fit of a balance of effort less what it leaves of the model's own simulation, where that can be told.
+    """The fit of an inverse-dynamics residual less that of the model's own simulation, where there is one.
 
     It goes ``onward`` from the fitted model and its estimate.
     What the records do not show a correction would move without end. With it comes the last simulation, or one that is
@@ -151,7 +151,7 @@ def expected(data: Problem) -> Array | float:
 def judged_on(
     fit: Fit, model: Model, experiments: Experiment | Sequence[Experiment], *, cutoff: float | None = None
 ) -> tuple[Gaps, Gaps]:
-    """How far model and unseen records are apart before and after a fit, in the fit's own mode.
+    """How far model and validation records are apart before and after a fit, in the fit's own mode.
 
     First states that the fit found belong to its own records; here they begin as for any simulation of a log, but for
     those that are known, and for those that nobody measures along a motion: a balance is beside these.

@@ -56,20 +56,21 @@ class SampleMask:
     joints: Sequence[str]
     places: Sequence[int]
 
+    @property
+    def _largest(self) -> Array:
+        """Largest speed (joints,) of all records, but for a thousandth of their samples."""
+        speeds = [np.abs(m.velocity[m.kept][:, self.places]) for m in self.motions]
+        return np.asarray(np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0))
+
     def moving(self, model: Model) -> list[Array]:
         """For each record (n, joints): 1 where a joint moves, 0 where it stands still; all 1 if it mostly stands.
 
         Zero too where the parallel filter settles, and where a piston that moves it touches an end of its stroke.
         """
+        slow, halved = STANDSTILL_SHARE * self._largest, 2 if bends(model) else 1
         speeds = [np.abs(m.velocity[:, self.places]) for m in self.motions]
-        kept = [speed[m.kept] for speed, m in zip(speeds, self.motions, strict=True)]
-        largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in kept], axis=0)
-        masks = [
-            ~_widened(_standing(speed, STANDSTILL_SHARE * largest, _period(m) // (2 if bends(model) else 1)), m)[
-                m.retained
-            ]
-            for m, speed in zip(self.motions, speeds, strict=True)
-        ]
+        standing = [_standing(v, slow, _period(m) // halved) for v, m in zip(speeds, self.motions, strict=True)]
+        masks = [~_widened(still, m)[m.retained] for still, m in zip(standing, self.motions, strict=True)]
         moves = np.mean(np.vstack(masks), axis=0) >= LEAST_MOVING
         free = [self.free(model, record) for record in range(len(masks))]
         return [
@@ -91,12 +92,10 @@ class SampleMask:
 
     def busy(self, record: int) -> Array:
         """(n, joints): 0 where a joint is slow in the mean over ``REST_TIME``: noise must not pass for motion."""
-        speeds = [np.abs(each.velocity[each.kept][:, self.places]) for each in self.motions]
-        largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
         m = self.motions[record]
         width = max(1, round(REST_TIME / m.dt))
         mean = np.abs(uniform_filter1d(m.velocity[:, self.places], width, axis=0))
-        moving = maximum_filter1d(mean, width, axis=0) > REST_SHARE * largest
+        moving = maximum_filter1d(mean, width, axis=0) > REST_SHARE * self._largest
         busy = moving[m.retained].astype(np.float64)
         return busy if busy.mean() >= 0.5 else np.ones_like(busy)
 

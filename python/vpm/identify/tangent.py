@@ -27,7 +27,7 @@ OFF = 0.03
 
 
 class Tangent:
-    """A balance of effort whose links and drives answer as on the tangent at ``origin``, values of the parameters."""
+    """An inverse-dynamics residual with links and drives as on the tangent at ``origin``, values of the parameters."""
 
     mode = InverseDynamicsProblem.mode
 

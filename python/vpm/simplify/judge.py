@@ -64,8 +64,8 @@ class Judge:
     def fitted(self, model: Model) -> Model:
         """Model with its adjustable parameters fitted to the records it learns from.
 
-        By the balance of effort where the machine has nothing that nobody measures, which is quick; by simulation in
-        the mode it is judged in where it has.
+        By the inverse-dynamics residual where the machine has nothing that nobody measures, which is quick; by
+        simulation in the mode it is judged in where it has.
         """
         free = model.adjustable
         # Elements in sampled time were fitted as a whole, and no parameter of the machine can be fitted beside them.
