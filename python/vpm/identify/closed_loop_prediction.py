@@ -42,7 +42,7 @@ MOVED = 1e-3
 
 
 class Own(NamedTuple):
-    """What a balance leaves of simulations of its own model, shape (n,), and their noise.
+    """The residual of simulations of its own model, shape (n,), and their noise.
 
     Where these are not alike, it leaves too much more of the records: something is missing, or far from where it is.
     """
@@ -158,7 +158,7 @@ def _drawn(
 
 
 def _start(model: Model, data: InverseDynamicsProblem, record: int) -> Array:
-    """The state at the first sample; what nobody measured is where the balance has it."""
+    """The state at the first sample; what nobody measured is where the inverse dynamics has it."""
     log, m = data.experiments[record], data.motions[record]
     if tuple(m.joints) == tuple(model.joints):
         start = np.array(measured_states(model, log, model.theta, np.zeros(1, dtype=np.int64), m.cutoff, m)[0])
@@ -260,14 +260,14 @@ class Noise:
 
 
 def mirrored(draw: Sequence[tuple[Array, Array]]) -> tuple[Sequence[tuple[Array, Array]], ...]:
-    """A draw, and the same turned round: what a balance is linear in cancels from the mean of both."""
+    """A draw, and the same turned round: what a residual is linear in cancels from the mean of both."""
     return draw, [(-seen, -told) for seen, told in draw]
 
 
 def noise_of(
     model: Model, data: InverseDynamicsProblem, quiet: Sequence[Experiment], random: np.random.Generator
 ) -> Noise:
-    """The noise in the records of a balance, as a fitted model understands them.
+    """The noise in the records of a residual, as a fitted model understands them.
 
     Parameters
     ----------
@@ -299,7 +299,7 @@ def noise_of(
 
 
 def compared(data: InverseDynamicsProblem) -> tuple[str, ...]:
-    """Readings that a balance compares."""
+    """Readings that the residual compares."""
     return (*(f"{joint}.position" for joint in data.motions[0].joints), *data.shown)
 
 

@@ -117,7 +117,7 @@ def _check_offsets(model: Model, mode: str, fitting: Fitting) -> None:
 class RelativeProblem(InverseDynamicsProblem):
     """An inverse-dynamics residual, at each joint over what the drives deliver, in parts of that before the fit.
 
-    A balance gets smaller with the gain of its drives: the least sum of squares belongs to a machine without forces.
+    That gets smaller with the gain of its drives: the least sum of squares belongs to a machine without forces.
     The commands were measured, not the efforts. Their density is that of the residual times the derivative of effort by
     command, and what maximises it makes the residual least in units of the delivered effort (J. Nocedal and S. Wright,
     *Numerical Optimization*, 2nd ed., 10.4, for errors of what was measured; G. Seber and C. Wild, *Nonlinear
@@ -172,7 +172,7 @@ class RelativeProblem(InverseDynamicsProblem):
 def relative_to_drives(
     model: Model, data: InverseDynamicsProblem, free: Sequence[str], ties: Mapping[str, str]
 ) -> InverseDynamicsProblem:
-    """The balance relative to what drives deliver, if a parameter of a drive is free that nothing logged holds.
+    """The residual relative to what drives deliver, if a parameter of a drive is free that nothing logged holds.
 
     Pressures of a cylinder hold its areas and valves. A current holds no torque constant.
     """

@@ -53,12 +53,12 @@ class InverseDynamicsProblem(BegunAnywhere):
     currents, strains.
 
     Samples at which a joint stands still do not count, as long as half of them remain: friction at rest takes whatever
-    value holds the joint, which no balance can predict. Nor do those at which a piston touches an end of its stroke.
+    value holds the joint, which nothing here can predict. Nor do those at which a piston touches an end of its stroke.
 
     Parameters
     ----------
     model : Model
-        Names the joints and actuators; its parameters do not enter the balance.
+        Names the joints and actuators; its parameters do not enter the residual.
     experiments : sequence of Experiment
         Each with the position of every joint that moves by an actuator, and the command of every actuator.
     cutoff : float or sequence of float, optional
@@ -97,7 +97,7 @@ class InverseDynamicsProblem(BegunAnywhere):
         moved = model.driven_joints
         self._joints = [place for place, joint in enumerate(measured) if joint in moved] or list(range(len(measured)))
         self.joints = tuple(measured[place] for place in self._joints)
-        #: Channels beside the balance that are compared too: what shows inside of drives, strains of links.
+        #: Channels beside the efforts that are compared too: what shows inside of drives, strains of links.
         self.shown = shown_channels(model, measured, experiments)
         self._compared = tuple(self._measured(m, e) for m, e in zip(self.motions, self.experiments, strict=True))
         self._gains = self._hold_gains(model)
@@ -166,7 +166,7 @@ class InverseDynamicsProblem(BegunAnywhere):
     def evaluate(
         self, model: Model, theta: Array, columns: Sequence[int] = (), origin: Array | None = None
     ) -> tuple[Array, Array]:
-        """Residual of the balance and its derivative; see :class:`Problem`.
+        """The residual and its derivative; see :class:`Problem`.
 
         With ``origin``, values of the parameters, links bend and drives answer as on the tangent there.
         """
@@ -296,7 +296,7 @@ class InverseDynamicsProblem(BegunAnywhere):
         return position, velocity, acceleration
 
     def efforts(self, record: int) -> tuple[Block, ...]:
-        """Blocks of the balance of one record, one for each of `joints`."""
+        """Blocks of the efforts of one record, one for each of `joints`."""
         first = record * (len(self.joints) + len(self.shown))
         return self.blocks[first : first + len(self.joints)]
 

@@ -65,7 +65,7 @@ def whiteness(
     plain = untied(data)
     unseen = _of_unseen(model, plain) if isinstance(plain, InverseDynamicsProblem) else []
     groups = {
-        record.name: _of_balance(model, plain, number, checks, unseen)
+        record.name: _of_motion(model, plain, number, checks, unseen)
         if isinstance(plain, InverseDynamicsProblem)
         else _of_log(model, record, checks)
         for number, record in enumerate(records)
@@ -114,7 +114,7 @@ def _joints(model: Model, channel: str) -> tuple[str, ...]:
     return tuple(model.joints)
 
 
-def _of_balance(
+def _of_motion(
     model: Model, problem: InverseDynamicsProblem, record: int, checks: Checks, unseen: Sequence[Array]
 ) -> Groups:
     """Laws of the motion of joints, of the effort that it needs and of that which drives deliver, as they are compared.
