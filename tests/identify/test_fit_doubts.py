@@ -18,8 +18,8 @@ from vpm.experiment import Experiment
 from vpm.identify import Checks, Fit, gaps, identify, identify_inertial, ljung_box, problem
 from vpm.identify.comparison import comparison
 from vpm.identify.estimation import _linear_step
+from vpm.identify.export import told
 from vpm.identify.inertial_model import InertialModel, repaired
-from vpm.identify.words import told
 from vpm.model import Model
 from vpm.simulate import Setup
 

@@ -1,7 +1,7 @@
 """Walk a model back down: the cheapest one that still predicts the data within a tolerance.
 
 The search goes in four strides. All flexible links together are made finer, from the coarsest, until that loses next to
-nothing: what comes next is tried on that model, which is cheap, and what a glance shows to be dearer is not fitted.
+nothing: what comes next is tried on that model, which is cheap, and what is slower by a coarse timing is not fitted.
 Then each place by itself is made simpler by each of its changes. Losses and savings of single changes are added up to
 foresee those of all combinations, and the combinations that should be best are fitted, simulated and timed. From the
 best one each further change is tried while one pays.
@@ -20,9 +20,8 @@ from vpm.model import Model
 from vpm.simplify.judge import FITTING, Judge, by_the_model, reference_mode, shown
 from vpm.simplify.ladder import Ladder, Rung, pareto
 from vpm.simplify.reductions import COUPLING_TERMS, OFFERED, VELOCITY_TERMS, Reduction, reduced, reductions
-from vpm.simplify.shares import ROUNDING, deformation_share, effort_share, motions, ranked
 from vpm.simplify.surrogates import surrogates
-from vpm.simplify.terms import CURVED
+from vpm.simplify.terms import CURVED, ROUNDING, deformation_share, effort_share, motions, ranked
 from vpm.simplify.trials import ALIKE, CLOCK, NEGLIGIBLE, PRIORITY, REPEATED, Changes, Trials
 from vpm.simulate import Setup
 
@@ -108,14 +107,14 @@ def simplify(
         raise SimulationError(f"a rate of {rate:g} Hz is not possible; give a positive number")
     say = tell or (lambda _: None)
     records = as_records(experiments)
-    unseen = records if validate is None else as_records(validate)
+    validation = records if validate is None else as_records(validate)
     mode = reference_mode(model, records, against, mode)
     if against == "model":
         say("the full model as the reference")
         channels = shown(model) if channels is None else channels
-        known = {id(each): by_the_model(model, each, mode, rate, channels) for each in (*records, *unseen)}
-        records, unseen = ([known[id(each)] for each in group] for group in (records, unseen))
-    judge = Judge(model, records, unseen, rate, mode, channels)
+        known = {id(each): by_the_model(model, each, mode, rate, channels) for each in (*records, *validation)}
+        records, validation = ([known[id(each)] for each in group] for group in (records, validation))
+    judge = Judge(model, records, validation, rate, mode, channels)
     trials = Trials(model, judge, lambda changes: bool(changes) or against == "data", say, tolerance, executor)
     sites = reductions(model, surrogates(model, judge.records, mode, rate, judge.channels))
     try:
@@ -155,7 +154,7 @@ def _weigh_terms(trials: Trials, sites: Sites) -> None:
     if not terms or judge.mode not in ("free_run", "closed_loop"):
         return
     try:
-        along = motions(model, judge.unseen, judge.mode, Setup(FITTING, judge.per_sample))
+        along = motions(model, judge.validation, judge.mode, Setup(FITTING, judge.per_sample))
     except SimulationError:
         return
     for site in terms:
@@ -176,7 +175,7 @@ def _together(trials: Trials, sites: Sites, limit: float) -> Changes:
     """All links at the same coarser level: the cheapest that loses next to nothing.
 
     The coarsest come first, by the number of coordinates: they are quick to fit, and once one of them loses next to
-    nothing, a glance at the finer ones shows that they need no look.
+    nothing, a coarse timing shows that the finer ones need no look.
     """
     best: Changes = ()
     seconds = min(rung.seconds for rung in trials.attempt(()))
@@ -333,7 +332,7 @@ def _simplest(rungs: Sequence[Rung]) -> Rung:
 
 
 def _dearest(trials: Trials, sites: Sites) -> tuple[tuple[str, float], ...]:
-    """What a glance says that a step of the full model saves by the last change of each place alone, the most first."""
+    """What a step of the full model saves by the last change of each place alone, the most first."""
     full = min((r for r in trials.rungs if not r.removed), key=lambda r: r.seconds)
     setup = Setup(full.integrator, full.substeps)
     saved = ((str(changes[-1]), trials.saved(changes[-1], setup)) for changes in sites.values())

@@ -1,4 +1,4 @@
-"""Reduced models that were tried: glanced at, fitted, simulated in every way to step them that may pay, and timed."""
+"""Reduced models that were tried: coarsely timed, fitted, simulated in every way of stepping that may pay and timed."""
 
 from __future__ import annotations
 
@@ -8,16 +8,20 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vpm.budget import step_times
+from vpm.budget import commands, start_state, step_times
 from vpm.errors import ExecutorError, SimulationError, VpmError
+from vpm.experiment import Experiment
 from vpm.model import Model
-from vpm.simplify.course import Courses
 from vpm.simplify.judge import Judge
 from vpm.simplify.ladder import Rung
 from vpm.simplify.reductions import Reduction, reduced
+from vpm.simplify.replacement import commanded
 from vpm.simulate import FIXED_STEP, Setup
 from vpm.tasks import outcomes
+
+Array = NDArray[np.float64]
 
 #: Steps timed for each rung: as many as these seconds allow, within these numbers. A 99.9 % quantile needs the least.
 TIMED_SECONDS = 0.05
@@ -31,9 +35,9 @@ PAYS = 0.7
 CLOCK = 5e-7
 #: Times of steps of less than a microsecond differ by so much for no reason on a machine that does other things too.
 ALIKE = 1.3
-#: Steps of a first glance, and how much slower than another way that works one may be if it does not fit the period.
-GLANCE, SLOWER = 20, 5.0
-#: What glances at one model differ by, and medians of its steps.
+#: Steps of a coarse timing, and how much slower than another way that works one may be if it does not fit the period.
+COARSE, SLOWER = 20, 5.0
+#: What coarse timings of one model differ by, and medians of its steps.
 REPEATED = 1.05
 #: Share of the tolerance that is next to nothing, and how much slower than what loses no more than that a way may be.
 NEGLIGIBLE, SPARE = 0.2, 2.0
@@ -46,7 +50,7 @@ Changes = tuple[Reduction, ...]
 class Trials:
     """Reduced models by their changes, each tried once.
 
-    What a glance shows to be much slower than something that loses next to nothing is not fitted: it can neither be
+    What is much slower by a coarse timing than something that loses next to nothing is not fitted: it can neither be
     chosen nor be a choice that anybody would take instead.
 
     Parameters
@@ -81,15 +85,15 @@ class Trials:
         self.courses = Courses(model, judge)
         #: Why the last way that did not work did not.
         self.reason = ""
-        #: Fastest step of each model at a glance, s.
-        self._glanced: dict[frozenset[Reduction], float] = {}
+        #: Fastest step of each model by a coarse timing, s.
+        self._coarsely_timed: dict[frozenset[Reduction], float] = {}
         self._rungs: dict[frozenset[Reduction], list[Rung]] = {}
         self._models: dict[frozenset[Reduction], Model] = {}
         self._cut: set[frozenset[Reduction]] = set()
 
     @property
     def cut(self) -> int:
-        """How many reduced models were not fitted because of what a glance showed."""
+        """How many reduced models were not fitted because of a coarse timing."""
         return len(self._cut - set(self._rungs))
 
     @property
@@ -121,21 +125,21 @@ class Trials:
         ----------
         changes : tuple of Reduction
         below : float
-            Time of a period at a glance (s) from which on nobody asks for the model.
+            Coarse time of a period (s) from which on nobody asks for the model.
         """
         key, changes = frozenset(changes), _in_order(changes)
         if key not in self._rungs:
             try:
                 model = reduced(self.model, changes)
-                glances = self._glances(model)
-                self._glanced[key] = min(map(_period, glances.values()), default=0.0)
-                if changes and self._glanced[key] > min(below, self._dear()):
+                coarse = self._coarse_times(model)
+                self._coarsely_timed[key] = min(map(_period, coarse.values()), default=0.0)
+                if changes and self._coarsely_timed[key] > min(below, self._dear()):
                     self._cut.add(key)
                     return []
                 self.say(", ".join(map(str, changes)) or "the full model")
                 self._models[key] = self._fit(self._begun(model, key)) if self._refit(changes) else model
                 self._rungs[key] = []
-                self._step(changes, glances)
+                self._step(changes, coarse)
             except VpmError as error:
                 self.reason = str(error)
                 self._rungs.setdefault(key, [])
@@ -161,7 +165,7 @@ class Trials:
                 continue
             try:
                 model = reduced(self.model, changes)
-                if min(map(_period, self._glances(model).values()), default=0.0) <= min(below, self._dear()):
+                if min(map(_period, self._coarse_times(model).values()), default=0.0) <= min(below, self._dear()):
                     begun.append(self._begun(model, key))
             except VpmError:
                 continue  # the trial says why
@@ -182,8 +186,8 @@ class Trials:
         return self.judge.fitted(begun) if known is None else known
 
     def as_quick_as(self, changes: Changes) -> float:
-        """Time of a period at a glance (s) up to which a model is no dearer than one that was tried."""
-        return REPEATED * self._glanced[frozenset(changes)] + CLOCK
+        """Coarse time of a period (s) up to which a model is no dearer than one that was tried."""
+        return REPEATED * self._coarsely_timed[frozenset(changes)] + CLOCK
 
     def _begun(self, model: Model, key: frozenset[Reduction]) -> Model:
         """Model with the parameters of the fitted one that differs in the fewest changes: where its fit begins."""
@@ -194,15 +198,9 @@ class Trials:
         return model.with_parameters({name: known[name].value for name in model.adjustable if name in known})
 
     def saved(self, change: Reduction, setup: Setup) -> float:
-        """Seconds that a period of the full model takes less with one change, at a glance; none where it does not work.
-
-        Parameters
-        ----------
-        change : Reduction
-        setup : Setup
-        """
+        """Seconds of a period that one change of the full model saves, timed coarsely; none where it does not work."""
         try:
-            return self._glance(self.model, setup) - self._glance(reduced(self.model, (change,)), setup)
+            return self._coarse_time(self.model, setup) - self._coarse_time(reduced(self.model, (change,)), setup)
         except VpmError:
             return 0.0
 
@@ -223,27 +221,27 @@ class Trials:
         least = min((rung.seconds for rung in self._everything() if rung.error <= enough), default=np.inf)
         return SPARE * least + CLOCK
 
-    def _glances(self, model: Model) -> Mapping[str, tuple[int, float]]:
-        """Fewest steps in a period with which each integrator works at a glance, and seconds of one of them."""
+    def _coarse_times(self, model: Model) -> Mapping[str, tuple[int, float]]:
+        """Fewest steps in a period with which each integrator works by a coarse timing, and seconds of one of them."""
         found = {}
         for integrator in FIXED_STEP:
             for substeps in SUBSTEPS:
                 try:
-                    found[integrator] = substeps, self._glance(model, Setup(integrator, substeps)) / substeps
+                    found[integrator] = substeps, self._coarse_time(model, Setup(integrator, substeps)) / substeps
                     break
                 except SimulationError as error:
                     self.reason = str(error)
         return found
 
-    def _glance(self, model: Model, setup: Setup) -> float:
+    def _coarse_time(self, model: Model, setup: Setup) -> float:
         inputs, start = self.courses.of(model)
-        return float(np.min(step_times(model, self.judge.rate, setup, GLANCE, inputs, start=start)))
+        return float(np.min(step_times(model, self.judge.rate, setup, COARSE, inputs, start=start)))
 
-    def _step(self, changes: Changes, glances: Mapping[str, tuple[int, float]]) -> None:
+    def _step(self, changes: Changes, coarse: Mapping[str, tuple[int, float]]) -> None:
         """Every integrator with its fewest steps in a period, the quickest first; then more where they could pay."""
-        for integrator, (fewest, glance) in sorted(glances.items(), key=lambda item: _period(item[1])):
+        for integrator, (fewest, seconds) in sorted(coarse.items(), key=lambda item: _period(item[1])):
             for substeps in SUBSTEPS[SUBSTEPS.index(fewest) :]:
-                if self._is_hopeless(changes, glance * substeps):
+                if self._is_hopeless(changes, seconds * substeps):
                     break
                 # Too long a step for this integrator: perhaps a shorter one.
                 if self._add(changes, Setup(integrator, substeps)) is not None:
@@ -265,21 +263,21 @@ class Trials:
                 return
             rung = finer
 
-    def _is_hopeless(self, changes: Changes, glance: float) -> bool:
-        """Whether a way takes so much longer at a glance than one that works that none takes it.
+    def _is_hopeless(self, changes: Changes, seconds: float) -> bool:
+        """Whether a way takes so much longer by a coarse timing than one that works that none takes it.
 
         All that is within reach of the period is tried with the full model: what it errs is the measure of the others.
         """
         known, enough = self._rungs[frozenset(changes)], self._enough()
         fastest = min((rung.seconds for rung in known), default=np.inf)
-        if glance * self.judge.rate > 1.0 and glance > SLOWER * fastest:
+        if seconds * self.judge.rate > 1.0 and seconds > SLOWER * fastest:
             return True
         if not changes:
             return False
-        if glance > self._dear():
+        if seconds > self._dear():
             return True
         good = min((rung.seconds for rung in known if rung.error <= enough), default=np.inf)
-        return glance > ALIKE * good or (glance > fastest and _agree(known))
+        return seconds > ALIKE * good or (seconds > fastest and _agree(known))
 
     def _add(self, changes: Changes, setup: Setup, demanded: float = np.inf) -> Rung | None:
         """The rung of one way, if it works and its error is less than what is demanded."""
@@ -302,13 +300,7 @@ class Trials:
         return rung
 
     def timed(self, model: Model, setup: Setup) -> tuple[float, float]:
-        """Median and 99.9 % quantile of a period, s.
-
-        Parameters
-        ----------
-        model : Model
-        setup : Setup
-        """
+        """Median and 99.9 % quantile of a period, s."""
         rate, (inputs, start) = self.judge.rate, self.courses.of(model)
         times = step_times(model, rate, setup, TIMED_STEPS[0], inputs, PRIORITY, start)
         steps = int(np.clip(TIMED_SECONDS / np.median(times), *TIMED_STEPS))
@@ -317,9 +309,9 @@ class Trials:
         return float(np.median(times)), float(np.quantile(times, 0.999))
 
 
-def _period(glance: tuple[int, float]) -> float:
+def _period(step: tuple[int, float]) -> float:
     """Seconds of a period in so many steps of so many seconds."""
-    substeps, seconds = glance
+    substeps, seconds = step
     return substeps * seconds
 
 
@@ -335,3 +327,31 @@ def _agree(rungs: Sequence[Rung]) -> bool:
         first.setdefault(rung.integrator, rung.error)
     least = sorted(first.values())[:2]
     return len(least) == 2 and least[0] > PAYS * least[1]
+
+
+class Courses:
+    """Commands along the first record to judge on, worked out once for all models with the same drives.
+
+    Parameters
+    ----------
+    model : Model
+        The full one.
+    judge : Judge
+    """
+
+    def __init__(self, model: Model, judge: Judge) -> None:
+        self._full, self._judge = model, judge
+        self._known: dict[tuple[str, ...], Array] = {}
+
+    def record(self, model: Model) -> Experiment:
+        """Record that drives a model."""
+        return commanded(model, self._full, self._judge.driven)
+
+    def of(self, model: Model) -> tuple[Array, Array | None]:
+        """Inputs (N, inputs) of a model, and the state that it starts from; see `vpm.budget.start_state`."""
+        record = self.record(model)
+        kinds = tuple(model.actuator_type(name) for name in model.actuators) + model.controlled_actuators
+        if kinds not in self._known:
+            # Reduced models of the same drives get what the first of them got, which is the full model.
+            self._known[kinds] = commands(model, self._judge.rate, record)
+        return self._known[kinds], start_state(model, record)
