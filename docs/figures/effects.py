@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -230,16 +231,16 @@ INTRODUCTION = """# The catalogue of effects
 <!-- Written by docs/figures/effects.py (make figures) from vpm.catalogue.effects, a file each: change it there. -->
 
 After this page you can write every effect in a [model file](model-file.md#effects) and recognise it in a residual. A
-[diagnosis](diagnosis.md) tries these effects.
+[diagnosis](diagnosis.md) tries these effects; [the physics](physics.md#2-effects) has their limits.
 
-Each section has the law, a picture, the parameters (dotted suffix, unit, range, default) and effects that records may
-confuse with it; what discriminates two effects stands once, at the first. *Slanted* parameters shape a law whose size
-another one gives. Pictures show what the effect adds to the inverse-dynamics residual (applied less required effort) of
-one link in gravity, or of a servo-cylinder.
+Each section has the law and its [source](physics.md#sources), a picture, the parameters (dotted suffix, unit, range,
+default) and effects that records may confuse with it. What discriminates two effects stands once, at the first.
+*Slanted* parameters shape a law whose size another one gives. Pictures show what the effect adds to the
+inverse-dynamics residual (applied less required effort) of one link in gravity, or of a servo-cylinder.
 
-tau is the effort that the effect adds, q and v coordinate and velocity of the joint, u the command, x a true value, y
-its reading. Units: C is m or rad, E is N or N m, U the unit of the command, S that of the sensor. Of two defaults the
-second is for joints that turn.
+tau is the effort that the effect adds, positive along the coordinate; q and v are coordinate and velocity of the joint,
+u the command, x a true value, y its reading. Units: C is m or rad, E is N or N m, U the unit of the command, S that of
+the sensor. Of two defaults the second is for joints that turn.
 
 Effects marked *side* may sit behind the spring of a [joint_compliance](#joint_compliance) or [backlash](#backlash) of
 their joint, by `side = "link"`. There q and v include the deflection.
@@ -259,7 +260,12 @@ def page() -> str:
 
 def _section(effect: EffectType) -> list[str]:
     signature = effect.signature
-    lines = [f"## {effect.name}", "", f"At {_article(effect.site)}{_remarks(effect)}: `{effect.law}`", ""]
+    lines = [
+        f"## {effect.name}",
+        "",
+        f"At {_article(effect.site)}{_remarks(effect)}: `{effect.law}` ({source(effect)})",
+        "",
+    ]
     if effect.name in SHOWN:
         over = signature.lives_in[0].replace("_", " ")
         lines += [f"![{effect.title} over {over}](figures/effects/{effect.name}.svg)", ""]
@@ -268,6 +274,15 @@ def _section(effect: EffectType) -> list[str]:
     if effect.confused_with:
         lines += ["", _confused(effect)]
     return lines
+
+
+def source(effect: EffectType) -> str:
+    """Where the law comes from, which ends the docstring of the effect's file."""
+    text = import_module(f"vpm.catalogue.effects.{effect.name}").__doc__ or ""
+    _, found, where = text.partition("\nSource: ")
+    if not found:
+        raise ValueError(f"python/vpm/catalogue/effects/{effect.name}.py names no source; end its docstring with it")
+    return where.strip().removesuffix(".")
 
 
 def _remarks(effect: EffectType) -> str:

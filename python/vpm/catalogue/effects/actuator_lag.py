@@ -1,4 +1,7 @@
-"""Actuator lag: a drive that follows its command as a system of first order."""
+"""Actuator lag: a drive that follows its command as a system of first order.
+
+Source: Franklin et al. 2015, section 3.1.
+"""
 
 import math
 

@@ -1,4 +1,7 @@
-"""Bias force: a constant load, such as a weight on a rope."""
+"""Bias force: a constant load, such as a weight on a rope.
+
+Source: Khalil and Dombre 2002.
+"""
 
 from vpm.catalogue.kinds import EffectType, size
 from vpm.catalogue.signature import Signature

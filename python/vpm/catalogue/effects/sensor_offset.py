@@ -1,4 +1,7 @@
-"""Sensor offset: a sensor whose zero is shifted."""
+"""Sensor offset: a sensor whose zero is shifted.
+
+Source: Doebelin 2004, section 3.2.
+"""
 
 from vpm.catalogue.kinds import ANY, EffectType, nonlinear
 from vpm.catalogue.signature import Signature

@@ -1,4 +1,7 @@
-"""Valve dynamics: a spool that is slower than described."""
+"""Valve dynamics: a spool that is slower than described.
+
+Source: D'Imperio 2016, section 4.1.
+"""
 
 from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType
 from vpm.catalogue.shared import over_described
