@@ -338,14 +338,18 @@ def _plain(unit: str) -> str:
 
 def _line(effect: EffectType, parameter: EffectParameter) -> str:
     name = f"*`{parameter.name}`*" if parameter.shape else f"`{parameter.name}`"
-    words = [f"`{parameter.suffix}`", _plain(parameter.unit), *_bounds(parameter), *_default(parameter)]
-    same = [
-        other.name
+    numbers = [*_bounds(parameter), *_default(parameter)]
+    words = [f"`{parameter.suffix}`", _plain(parameter.unit)]
+    alike = [
+        (other.name, [*_bounds(one), *_default(one)])
         for other in EFFECTS.values()
-        if any((one.name, one.meaning) == (parameter.name, parameter.meaning) for one in other.parameters)
+        for one in other.parameters
+        if (one.name, one.meaning) == (parameter.name, parameter.meaning)
     ]
-    meaning = parameter.meaning if same[0] == effect.name else f"as of [{same[0]}](#{same[0]})"
-    return f"- {name} ({', '.join(words)}): {meaning}"
+    first, its_numbers = alike[0]
+    if first == effect.name:
+        return f"- {name} ({', '.join(words + numbers)}): {parameter.meaning}"
+    return f"- {name} ({', '.join(words + numbers * (numbers != its_numbers))}): as of [{first}](#{first})"
 
 
 def _bounds(parameter: EffectParameter) -> list[str]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -20,9 +21,8 @@ def tables(answers: Sequence[Answer]) -> str:
     parts = [
         _head(answers),
         "### All in all\n\n" + _summary(answers),
-        "### By machine\n\n" + _grouped(answers, "machine", lambda a: a.machine),
-        "### By effect\n\n"
-        + _grouped([a for a in answers if a.kind == "single"], "effect", lambda a: a.hidden[0].name),
+        "### By machine\n\n" + _by_machine(answers),
+        "### By effect\n\n" + _by_effect([a for a in answers if a.kind == "single"]),
         "### Hidden against named\n\n" + _confusion(answers),
         "### Errors of parameters\n\n" + _parameters(answers),
         "### Whether probabilities are true\n\n" + _probabilities(answers),
@@ -106,11 +106,10 @@ def _brief(rate: score.Rate) -> str:
     return f"{rate.hits}/{rate.count}" if rate.count else "·"
 
 
-def _grouped(answers: Sequence[Answer], title: str, group: Callable[[Answer], str]) -> str:
-    """Rates of each group; a column in which nothing was counted is left out."""
+def _by_machine(answers: Sequence[Answer]) -> str:
     rows: Rows = []
-    for name in dict.fromkeys(map(group, answers)):
-        mine = [a for a in answers if group(a) == name]
+    for name in dict.fromkeys(answer.machine for answer in answers):
+        mine = [a for a in answers if a.machine == name]
         one, nothing, outside = score.single(mine), score.without(mine), score.outside(mine)
         rows.append((
             name,
@@ -122,9 +121,18 @@ def _grouped(answers: Sequence[Answer], title: str, group: Callable[[Answer], st
             _middle(score.gap_ratios(one)),
             _middle([a.seconds for a in mine]),
         ))  # fmt: skip
-    head = (title, "top-1", "top-3", "pairs", "false alarms", "unexplained", "gap/oracle", "s")
-    keep = [k for k in range(len(head)) if k not in {3, 4, 5} or any(row[k] != "·" for row in rows)]
-    return markdown([head[k] for k in keep], [[row[k] for k in keep] for row in rows])
+    head = ("machine", "top-1", "top-3", "pairs", "false alarms", "unexplained", "gap/oracle", "s")
+    return markdown(head, rows)
+
+
+def _by_effect(answers: Sequence[Answer]) -> str:
+    """Of the solvable cases with one effect: named first, among the first three, and what is left of the gap."""
+    rows: Rows = []
+    for name in dict.fromkeys(answer.hidden[0].name for answer in answers):
+        one = score.single([a for a in answers if a.hidden[0].name == name])
+        first, third = (score.rate(one, partial(score.top, count=count)) for count in (1, 3))
+        rows.append((name, f"{_brief(first)}, {_brief(third)}, {_middle(score.gap_ratios(one))}"))
+    return "Top-1, top-3, and gap after / gap of the oracle (median):\n\n" + listed(rows)
 
 
 def _middle(values: Sequence[float] | score.Array) -> str:
@@ -173,14 +181,10 @@ def _parameters(answers: Sequence[Answer]) -> str:
         deviations = [abs(e.deviations) for e in mine if np.isfinite(e.deviations)]
         middle, _, high = score.quartiles(sizes)
         within = sum(d <= 1.96 for d in deviations)
-        rows.append((
-            f"{effect}.{parameter}",
-            f"{middle:.1f} ({high:.1f})",
-            _middle(deviations),
-            f"{within}/{len(deviations)}",
-        ))  # fmt: skip
-    head = ("parameter", "median error (upper quartile) [%]", "in deviations", "in the interval")
-    return markdown(head, rows) if rows else "No effect was named at its site."
+        size = f"{middle:.1f} ({high:.1f}), {_middle(deviations)}, {within}/{len(deviations)}"
+        rows.append((f"{effect}.{parameter}", size))
+    head = "Median (upper quartile) in %, median in deviations, and how many stand in their interval of 95 %:\n\n"
+    return head + listed(rows) if rows else "No effect was named at its site."
 
 
 def failed(answer: Answer) -> str:
