@@ -243,7 +243,7 @@ u the command, x a true value, y its reading. Units: C is m or rad, E is N or N 
 the sensor. Of two defaults the second is for joints that turn.
 
 Effects marked *side* may sit behind the spring of a [joint_compliance](#joint_compliance) or [backlash](#backlash) of
-their joint, by `side = "link"`. There q and v include the deflection.
+their joint, by `side = "link"`. There q and v include the deflection. *Ranking*: only a [ranking](ranking.md) tries it.
 """
 
 
@@ -292,7 +292,7 @@ def _remarks(effect: EffectType) -> str:
     if effect.requires:
         remarks.append(f"corrects [{effect.requires}](#{effect.requires}), which has to be there")
     if not effect.screened:
-        remarks.append("tried by rankings only" if effect.has_law else "describes what no effect explains")
+        remarks.append("*ranking*" if effect.has_law else "describes what no effect explains")
     return f" ({'; '.join(remarks)})" if remarks else ""
 
 

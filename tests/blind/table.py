@@ -140,18 +140,15 @@ def _middle(values: Sequence[float] | score.Array) -> str:
 
 
 def _confusion(answers: Sequence[Answer]) -> str:
-    """How often what was hidden was named first, and what was named in its place; solvable cases only."""
+    """What was named in place of what was hidden, beside how often it was right; solvable cases only."""
     counted = [a for a in answers if a.kind != "pairs" and (a.solvable or a.kind in {"none", "parameters"})]
     rows: Rows = []
-    sure = []
     for hidden in sorted({_hidden(a) for a in counted}, key=_last):
         named = [_first(a) for a in counted if _hidden(a) == hidden]
         wrong = [f"{name} {named.count(name)}" for name in sorted({*named} - {hidden}, key=_last)]
         if wrong:
             rows.append((hidden, ", ".join([f"right {named.count(hidden)}", *wrong])))
-        else:
-            sure.append(f"{hidden} {len(named)}")
-    return listed(rows + ([("always right", ", ".join(sure))] if sure else []))
+    return listed(rows) if rows else "Nothing is confused."
 
 
 def _last(name: str) -> tuple[bool, str]:
