@@ -267,8 +267,7 @@ def _section(effect: EffectType) -> list[str]:
         "",
     ]
     if effect.name in SHOWN:
-        over = signature.lives_in[0].replace("_", " ")
-        lines += [f"![{effect.title} over {over}](figures/effects/{effect.name}.svg)", ""]
+        lines += [f"![{effect.title}](figures/effects/{effect.name}.svg)", ""]
     lines += [f"**Excite by** {signature.excite[0].lower()}{signature.excite[1:]}.", ""]
     lines += _parameters(effect)
     if effect.confused_with:
