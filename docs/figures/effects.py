@@ -234,9 +234,9 @@ After this page you can write every effect in a [model file](model-file.md#effec
 [diagnosis](diagnosis.md) tries these effects; [the physics](physics.md#2-effects) has their limits.
 
 Each section has the law and its [source](physics.md#sources), a picture, the parameters (dotted suffix, unit, range,
-default) and effects that records may confuse with it. What discriminates two effects stands once, at the first.
-*Slanted* parameters shape a law whose size another one gives. Pictures show what the effect adds to the
-inverse-dynamics residual (applied less required effort) of one link in gravity, or of a servo-cylinder.
+default) and effects that records may confuse with it; what discriminates two stands once, at the first. *Slanted*
+parameters shape a law whose size another one gives. Pictures show what the effect adds to the inverse-dynamics residual
+of one link in gravity, or of a servo-cylinder.
 
 tau is the effort that the effect adds, positive along the coordinate; q and v are coordinate and velocity of the joint,
 u the command, x a true value, y its reading. Units: C is m or rad, E is N or N m, U the unit of the command, S that of

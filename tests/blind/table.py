@@ -206,7 +206,7 @@ def _probabilities(answers: Sequence[Answer]) -> str:
     found = reliability.rows(answers)
     if not found:
         return "No effect was named with a probability."
-    lines = listed((f"{group}, mean {stated}" if group else stated, right) for group, stated, right in found)
+    lines = listed((f"{group}, mean {stated}", right) for group, stated, right in found if group)
     return f"Mean probability of the named classes, and how often the hidden effect was in one:\n\n{lines}"
 
 

@@ -19,7 +19,7 @@ from vpm.model.schema import Document, EffectEntry
 if TYPE_CHECKING:
     from vpm.model.parameters import Parameter
 
-#: Level of a rigid beam that bends: two strain polynomials carry its first mode within 0.1 % (docs/beams.md).
+#: Level of a rigid beam that bends: two strain polynomials carry its first mode within 0.48 % (docs/beams.md).
 FLEXED = "strain(2)"
 
 
