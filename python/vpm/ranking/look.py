@@ -15,8 +15,8 @@ from vpm.discrepancy.candidates import Key
 from vpm.model import Effect
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.judgement import Judgement
-from vpm.ranking.noise_model import SURE, white_noise
-from vpm.ranking.observed import PARTS
+from vpm.ranking.noise_model import white_noise
+from vpm.ranking.settings import PARTS, SURE
 from vpm.ranking.structure import Structure, approximate
 
 Array = NDArray[np.float64]

@@ -19,20 +19,11 @@ from vpm.model import Model
 from vpm.observer import Record
 from vpm.ranking.firsts import STEP, Firsts, hidden_states
 from vpm.ranking.noise_model import NoiseModel, Parts, Structured, frequencies
-from vpm.ranking.settings import Settings
+from vpm.ranking.settings import DAMPING, PARTS, STEPS, STRETCHES, Settings
 from vpm.simulate import Setup
 from vpm.simulate.setup import AUTOMATIC
 
 Array = NDArray[np.float64]
-
-#: Damping of the error of an observer.
-DAMPING = float(np.sqrt(0.5))
-#: Fewest steps of the integrator within a sample where a joint is split: contacts and gears ring fast.
-STEPS = 4
-#: Stretches into which a record is cut.
-STRETCHES = 3
-#: Parts of a stretch, of which one is held back, the last one if nobody asks for another.
-PARTS = 3
 
 
 @dataclass(frozen=True)
