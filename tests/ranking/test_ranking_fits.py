@@ -325,7 +325,7 @@ def test_an_effect_takes_the_place_of_another_one_as_it_was_fitted() -> None:
     other = replace(structure_of(late), effects=(("input_delay", "motor"),))
     other.theta[late.index(name)] = 0.004
     other = replace(other, priors={**other.priors, name: Prior(0.0, 0.005, 0.0, np.inf)}, range_limited=(name,))
-    both = first.with_effect_of(other, ("input_delay", "motor"))
+    both = first.with_last_of(other)
     assert both.effects == (("coulomb_friction", "way"), ("input_delay", "motor"))
     assert both.values[name] == 0.004
     assert both.theta[both.model.index("way.friction.coulomb")] == 2.0

@@ -57,10 +57,10 @@ class Judgement(Storable):
         """Whether that is more than chance, and more than what laws are wrong by."""
         return not self.lacks(settings)
 
-    def is_faint(self, settings: Settings, parts: float) -> bool:
+    def is_faint(self, settings: Settings, parts: int) -> bool:
         """Whether it counts but for its score, and would if it did as well in so many parts of the record."""
         enough = replace(self, score=math.sqrt(parts) * self.score)
-        return self.score > 0.0 and not self.counts(settings) and enough.counts(settings)
+        return not self.counts(settings) and enough.counts(settings)
 
     def lacks(self, settings: Settings) -> str:
         """What is missing to that, in words; "" where it counts."""

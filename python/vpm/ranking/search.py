@@ -79,11 +79,6 @@ class Search:
                     looks = smooth
                     continue
                 before.append(frozenset(present))
-                if best is None and (pair := self._together(looks, tried)):
-                    looks, both = pair
-                    rounds += both
-                    named |= {several[0].key: several[0] for several in both}
-                    continue
                 rounds.append(self._listed(best, tried))
                 if best is None:
                     break
@@ -91,14 +86,16 @@ class Search:
                 was, looks = looks, [self._look(best.fitted)]  # known, should the next fits be interrupted
                 self.say(f"{best.label} removes {100.0 * best.judgement.removed:.3g} % of the error power")
                 looks = self._all_looks(looks[0])
-                looks, again = self._all_reconsidered((*present, best.key), looks)
-                rounds += again
-                named |= {several[0].key: several[0] for several in again}
+                for key in present:
+                    looks, several = self._reconsidered(key, looks)
+                    if several:
+                        rounds.append(several)
+                        named[several[0].key] = several[0]
                 if _is_worse(looks, was):
                     self.say(f"{best.label} does not do the work of what it makes needless")
                     looks = was
                     break
-                if present and best.key in looks[0].fitted.structure.effects:
+                if present:
                     looks = self._out_of_a_dead_end(best, looks)
         except KeyboardInterrupt:
             interrupted = True
@@ -184,16 +181,15 @@ class Search:
         counting: list[Trial] = []
         for look in (look for look in looks if look.has_room()):
             seen = self._tried(look)
-            ends = self._finished(seen)
-            tried += [*(end for end in ends if not end.counts), *seen]
-            counting += [end for end in ends if end.counts]
+            tried += seen
+            counting += [trial for trial in self._finished(seen) if trial.counts]
             if any(not trial.look.has_room(trial.fitted) for trial in counting):
                 break  # nothing could be missing beside it
         told: list[Trial] = []
         while counting:
             best, *others = weighed(counting, self.fitter)
             if best.evidence > self.settings.odds:
-                self.others[best.key] = _rivals_of(best, [*others, *tried])
+                self.others[best.key] = [trial.fitted.structure for trial in others]
                 return best, [best, *others, *told, *tried]
             # It leaves less error because it answers to noise otherwise; no sample is more probable by it.
             told.append(best)
@@ -218,7 +214,7 @@ class Search:
             view = View(trial.look.view.noise)
             fitted = self.fitter.finished(trial.fitted, view)
             ends = [fitted, *self._detours(fitted, view)] if trial.splits else [fitted]
-            return Trial.of(min(ends, key=lambda one: one.cost), trial.look, trial.key)
+            return Trial.of(min(ends, key=lambda one: one.cost), trial.look)
 
         ends = self.each("finishing", one_finished, hopeful, lambda trial: trial.label)
         return [end for end in ends if isinstance(end, Trial)]
@@ -239,36 +235,6 @@ class Search:
         except ASTRAY:
             return []
 
-    def _together(
-        self, looks: Sequence[Look], tried: Sequence[Trial]
-    ) -> tuple[list[Look], list[tuple[Ranked, ...]]] | None:
-        """Two effects more of which each counts beside the other, where none counts alone; none if there are none.
-
-        What an effect removes of a piece of record holds twice the product of what it does and of what else is missing.
-        That has either sign, so that pieces differ by what is missing, and not by chance alone. An effect that lacks
-        nothing else is taken along, to see what counts beside it and whether it counts beside that.
-        """
-        uneven = [trial for trial in tried if trial.is_uneven]
-        if not uneven or len(looks[0].fitted.structure.effects) + 2 > self.settings.effects:
-            return None
-        first, *others = weighed(uneven, self.fitter)
-        if first.evidence <= self.settings.odds:
-            return None
-        self.others[first.key] = [trial.fitted.structure for trial in others]
-        second, beside = self._round(self._all_looks(self._look(first.fitted)))
-        if second is None:
-            return None
-        for look in self._all_looks(self._look(second.fitted)):
-            with contextlib.suppress(*ASTRAY):
-                if not (counting := self._competing(first.key, look)[1]):
-                    continue
-                best, *rest = weighed(counting, self.fitter)
-                if best.evidence > self.settings.odds:
-                    self.say(f"{best.label} and {second.label} count beside each other")
-                    rounds = [self._listed(best, [best, *rest, *tried]), self._listed(second, beside)]
-                    return self._all_looks(self._look(best.fitted)), rounds
-        return None
-
     def _out_of_a_dead_end(self, last: Trial, looks: list[Look]) -> list[Look]:
         """Without the last effect, if all that it did was to help a fit of the others out of a dead end."""
         try:
@@ -281,15 +247,6 @@ class Search:
         self.say(f"no longer needed: {last.label}")
         return self._all_looks(bare)
 
-    def _all_reconsidered(self, keys: Sequence[Key], looks: list[Look]) -> tuple[list[Look], list[tuple[Ranked, ...]]]:
-        """All effects judged again, but for the last one if no other has changed: it was chosen beside these."""
-        rounds: list[tuple[Ranked, ...]] = []
-        for key in keys:
-            if key != keys[-1] or rounds:
-                looks, several = self._reconsidered(key, looks)
-                rounds += [several] if several else []
-        return looks, rounds
-
     def _reconsidered(self, key: Key, looks: list[Look]) -> tuple[list[Look], tuple[Ranked, ...]]:
         """Without an earlier effect that a later one has made needless, or with a better one in its place.
 
@@ -299,20 +256,15 @@ class Search:
         bare: list[Look] = []
         for look in looks:
             try:
-                now, counting = self._competing(key, look)
+                bare.append(self._without(key, look))
             except ASTRAY:  # it runs away without, or another one rests on it
                 return looks, ()
-            bare.append(now.look)
-            if counting:
+            now = Trial.of(look.fitted, bare[-1], key)
+            trials = (now, *self._in_its_place(bare[-1], self.others.get(key, ())))
+            if counting := [trial for trial in trials if trial.counts]:
                 return self._exchanged(now, counting, looks)
         self.say(f"no longer needed: {' at '.join(key)}")
         return self._all_looks(bare[0]), ()
-
-    def _competing(self, key: Key, look: Look) -> tuple[Trial, list[Trial]]:
-        """An effect beside all others, and what counts there, which may be that effect or what counted as well."""
-        now = Trial.of(look.fitted, self._without(key, look), key)
-        trials = (now, *self._in_its_place(now, self.others.get(key, ())))
-        return now, [trial for trial in trials if trial.counts]
 
     def _without(self, key: Key, look: Look) -> Look:
         """The same without one of its effects, fitted anew under its observer."""
@@ -326,24 +278,15 @@ class Search:
         if ordered[0].key == now.key:
             return looks, ()
         self.say(f"{ordered[0].label} does better than {now.label}")
-        self.others[ordered[0].key] = [o for o in self.others[now.key] if o.effects[-1] != ordered[0].key]
         return self._all_looks(self._look(ordered[0].fitted)), self._listed(ordered[0], ordered)
 
-    def _in_its_place(self, now: Trial, others: Sequence[Structure]) -> list[Trial]:
-        """The last effects of other structures in the place of an effect; those that leave little, fitted to the end.
-
-        Fits go on from where those of the other structures had ended: here other parameters do the work of the effect.
-        Those that cannot save half of what it saves are given up, as where proposals race.
-        """
-        look = now.look
-        view = View(look.view.noise)
-        saved = look.fitted.cost - self.fitter.cost(now.fitted.structure, now.fitted.residual, view.noise)
-        goal = look.fitted.cost - max(look.needed, self.settings.share * saved)
+    def _in_its_place(self, look: Look, others: Sequence[Structure]) -> list[Trial]:
+        """The last effects of other structures here; those that leave little, fitted to the end."""
 
         def one_fitted(other: Structure) -> Trial:
-            structure = now.fitted.structure.exchanged(now.key, other)
-            fitted = self.fitter.fitted(structure, look.fitted.observer, view, goal)
-            return Trial.of(fitted, look, other.effects[-1], ended=False)
+            structure, view = look.fitted.structure.with_last_of(other), View(look.view.noise)
+            fitted = self.fitter.fitted(structure, look.fitted.observer, view)
+            return Trial.of(fitted, look, ended=False)
 
         ends = self.each("exchanging", one_fitted, others, lambda other: " at ".join(other.effects[-1]))
         return self._finished([end for end in ends if isinstance(end, Trial)])
@@ -378,19 +321,6 @@ class Search:
             trial.rivals,
             class_probability,
         )
-
-
-def _rivals_of(best: Trial, tried: Sequence[Trial]) -> list[Structure]:
-    """What counted as well as the best effect, each effect as it left least.
-
-    What does the work of two effects leaves less than either of them alone. So all that count are kept, however much
-    they leave: beside what comes in next, one of them may leave less.
-    """
-    several: dict[Key, Structure] = {}
-    for trial in sorted(tried, key=lambda trial: trial.left):
-        if trial.counts and trial.key != best.key:
-            several.setdefault(trial.key, trial.fitted.structure)
-    return list(several.values())
 
 
 def _is_worse(now: Sequence[Look], before: Sequence[Look]) -> bool:

@@ -14,10 +14,12 @@ from vpm.catalogue.kinds import Side
 from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.place import ANYWHERE
 from vpm.model import Effect, Model
-from vpm.ranking.settings import OVERTONE
 from vpm.weighing.priors import Prior
 
 Array = NDArray[np.float64]
+
+#: Share by which periods may be off that are found in whole fractions of each other.
+OVERTONE = 0.02
 
 
 def sides_taken(model: Model, joint: str) -> set[Side]:
@@ -206,33 +208,15 @@ class Structure:
         rest = self.carried(self.model.without_effect(*key, self.side(key)))
         return replace(rest, effects=tuple(effect for effect in self.effects if effect != key))
 
-    def exchanged(self, key: Key, other: Structure) -> Structure:
-        """Another structure, as it was fitted, with the last of its effects in the place of one of these.
-
-        What else is here and was not yet there is as it is here; what is here no longer is left out.
-
-        Raises
-        ------
-        VpmError
-            An effect cannot stand there.
-        """
-        found = other
-        kept = [one for one in self.effects if one != key]
-        for gone in [one for one in other.effects[:-1] if one not in kept]:
-            found = found.without(gone)
-        for later in [one for one in kept if one not in other.effects]:
-            found = found.with_effect_of(self, later)
-        return found
-
-    def with_effect_of(self, other: Structure, key: Key) -> Structure:
-        """The same with an effect of another structure, as it is there.
+    def with_last_of(self, other: Structure) -> Structure:
+        """The same with the last effect of another structure, as it is there.
 
         Raises
         ------
         VpmError
             It cannot stand here.
         """
-        name, site = key
+        key = (name, site) = other.effects[-1]
         there = other.model.effect(name, site, other.side(key))
         places = {short: other.model.index(dotted) for short, dotted in there.parameter_names.items()}
         values = {short: float(other.theta[place]) for short, place in places.items()}

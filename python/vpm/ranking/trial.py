@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from vpm.catalogue import EFFECTS
@@ -34,11 +33,6 @@ class Trial:
     def counts(self) -> bool:
         """Whether it is shown, and does more than chance and more than what laws are wrong by."""
         return self.fitted.structure.shows(self.key) and self.judgement.counts(self.look.settings)
-
-    @property
-    def is_uneven(self) -> bool:
-        """Whether it would count if it did as well in piece after piece of the record, and does not."""
-        return self.fitted.structure.shows(self.key) and self.judgement.is_faint(self.look.settings, math.inf)
 
     @property
     def splits(self) -> bool:
