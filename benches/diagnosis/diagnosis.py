@@ -24,7 +24,6 @@ sys.path[:0] = [str(ROOT / "benches" / "peers"), str(ROOT / "tests"), str(ROOT /
 
 import vpm  # noqa: E402
 from blind import make_cases  # noqa: E402
-from markdown import table  # noqa: E402
 from model_texts import DAMPED_AXIS, changed  # noqa: E402
 from run import processor  # noqa: E402
 
@@ -33,8 +32,7 @@ BEGIN, END = "<!-- begin of make bench-diagnosis -->\n", "<!-- end of make bench
 SECTION = """## A diagnosis
 
 Written by `make bench-diagnosis` on {cpu}, {system}, {repeats} repeats, beside {load:.0f} processes of others.
-Wall time is the least of all repeats, then median and spread; CPU time is that over all threads.
-`python benches/diagnosis/diagnosis.py --write --only axis` times one machine alone.
+What was found; least wall time (median, spread), CPU time of all threads.
 
 {rows}
 """
@@ -124,9 +122,9 @@ def main() -> None:
         walls, cpu, why = timed(diagnose, options.repeats)
         found = ", ".join(f"{effect.name} at {effect.site}" for effect in why.effects) or why.verdict
         spread = f"{np.median(walls):.1f}, {max(walls) - min(walls):.1f}"
-        rows.append([name, found, f"{min(walls):.1f}", spread, f"{cpu:.1f}"])
-        print(*rows[-1], sep="; ", flush=True)
-    text = table(["records", "found", "wall, s", "median, spread", "CPU, s"], rows)
+        rows.append(f"- {name}: {found}; {min(walls):.1f} s ({spread}), {cpu:.1f} s")
+        print(rows[-1], flush=True)
+    text = "\n".join(rows)
     system = f"{platform.system()}, Python {platform.python_version()}"
     section = SECTION.format(
         cpu=processor(), system=system, repeats=options.repeats, rows=text, load=os.getloadavg()[0]

@@ -16,7 +16,6 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path[:0] = [str(ROOT / "benches" / "peers")]
 
-import markdown  # noqa: E402
 
 CALLS = 1000
 
@@ -56,8 +55,8 @@ def main() -> None:
     binary, lines = program("recursions"), []
     for algorithm in ("rnea", "crba", "aba"):
         count = (instructions(binary, algorithm, CALLS) - instructions(binary, algorithm, 0)) / CALLS
-        lines.append((algorithm, f"{count:.0f}"))
-    text = markdown.table(("call", "instructions"), lines) + "\n"
+        lines.append(f"{algorithm} {count:.0f}")
+    text = ", ".join(lines) + ".\n"
     print(text)
     if options.markdown:
         options.markdown.write_text(text, encoding="utf-8")

@@ -26,7 +26,6 @@ from vpm.narx import Narx
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "support"), str(ROOT / "benches" / "peers")]
 
-import markdown  # noqa: E402
 
 Array = NDArray[np.float64]
 Ints = NDArray[np.int32]
@@ -181,16 +180,14 @@ def main() -> None:
         compiled_ones = c_candidates(model, u, Path(folder)) | numba_candidate(model, u)
         candidates |= {name: (SAMPLES, run) for name, run in compiled_ones.items()}
         candidates |= {name: (short, run) for name, run in sysidentpy_candidate(model, u[:short]).items()}
-        rows = measure(candidates)
-    header = ("engine", "ns a step", "quartiles", "ratio", "largest difference")
-    text = markdown.table(header, rows) + "\n"
+        text = measure(candidates)
     print(text)
     if options.markdown:
         options.markdown.write_text(text, encoding="utf-8")
 
 
-def measure(candidates: dict[str, tuple[int, Callable[[], Array]]]) -> list[tuple[str, ...]]:
-    """Rows of the table."""
+def measure(candidates: dict[str, tuple[int, Callable[[], Array]]]) -> str:
+    """A line for each engine, and how far quartiles and values are apart."""
     expected = candidates["vpm, one call"][1]()
     times: dict[str, list[float]] = {}
     differences: dict[str, float] = {}
@@ -207,12 +204,16 @@ def measure(candidates: dict[str, tuple[int, Callable[[], Array]]]) -> list[tupl
             run()
             taken.append((time.perf_counter() - began) / samples * 1e9)
     base = float(np.median(times["vpm, one call"]))
-    rows = []
+    lines, spreads = [], []
     for name, taken in times.items():
         low, middle, high = np.percentile(taken, [25, 50, 75])
-        spread = f"{low:.1f} to {high:.1f}"
-        rows.append((name, f"{middle:.1f}", spread, f"{middle / base:.3g}", f"{differences[name]:.0e}"))
-    return rows
+        spreads.append((high - low) / middle)
+        lines.append(f"- {name}: {middle:.1f} ns, ratio {middle / base:.3g}\n")
+    off = max(differences.values())
+    return (
+        "".join(lines)
+        + f"\nQuartiles are up to {max(spreads):.0%} apart, values up to {off:.0e} on values of about one.\n"
+    )
 
 
 if __name__ == "__main__":

@@ -26,7 +26,6 @@ from numpy.typing import NDArray
 ROOT = Path(__file__).resolve().parent.parent.parent
 sys.path[:0] = [str(ROOT / "benches" / "peers")]
 
-import markdown  # noqa: E402
 from vpm.model import Dynamics, Model  # noqa: E402
 
 Array = NDArray[np.float64]
@@ -183,16 +182,15 @@ def main() -> None:
     if find_spec("pinocchio"):
         engines["Pinocchio"] = pinocchio_calls(*state)
         note = f"Values agree to {check(engines['vpm'], engines['Pinocchio']):.0e} of the largest."
-    lines, least = [], {}
+    lines = []
     for name in ("rnea", "crba", "aba"):
-        for engine, calls in engines.items():
-            wall, cpu = microseconds(calls[name], options.calls)
-            least[engine] = cpu
-            ratio = f"{cpu / least['vpm']:.2f}" if engine != "vpm" else ""
-            spread = f"{statistics.median(wall):.2f}, {max(wall) - min(wall):.2f}"
-            lines.append((name, engine, f"{min(wall):.2f}", spread, f"{cpu:.2f}", ratio))
-    head = ("call", "engine", "wall, us", "median, spread", "CPU, us", "ratio")
-    text = f"{markdown.table(head, lines)}\n\n{note}\n\n{record_sentence(random)}\n"
+        found = {engine: microseconds(calls[name], options.calls) for engine, calls in engines.items()}
+        told = [
+            f"{engine} {min(wall):.2f} us (median {statistics.median(wall):.2f})" for engine, (wall, _) in found.items()
+        ]
+        ratios = [f"ratio {cpu / found['vpm'][1]:.2f}" for engine, (_, cpu) in found.items() if engine != "vpm"]
+        lines.append(f"- {name}: {', '.join(told + ratios)}")
+    text = "\n".join(lines) + f"\n\n{note}\n\n{record_sentence(random)}\n"
     print(text)
     if options.markdown:
         options.markdown.write_text(text, encoding="utf-8")

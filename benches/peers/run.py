@@ -60,8 +60,8 @@ side compiled by Numba. `make chirp` repeats this table.
 
 ## A NARX model
 
-A simulation of a model of 20 terms, time of one step, on ready arrays. The difference is the largest to vpm, on
-values of about one. sysidentpy and the loop in Python run 1000 samples, the others 20 000.
+A simulation of a model of 20 terms, time of one step, on ready arrays. sysidentpy and the loop in Python run 1000
+samples, the others 20 000.
 
 {narx}
 ## A rigid arm of seven joints
@@ -69,9 +69,7 @@ values of about one. sysidentpy and the loop in Python run 1000 samples, the oth
 One call from Python, on prepared buffers and ready arrays; then a whole record in one call.
 
 {rigid_chain}
-Instructions of one call inside the core, counted by valgrind:
-
-{instruction_counts}"""
+Instructions of one call inside the core, counted by valgrind: {instruction_counts}"""
 
 
 def installed(package: str) -> str:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
@@ -230,19 +231,19 @@ INTRODUCTION = """# The catalogue of effects
 <!-- Written by docs/figures/effects.py (make figures) from vpm.catalogue.effects, a file each: change it there. -->
 
 After this page you can write every effect in a [model file](model-file.md#effects) and recognise it in a residual. A
-[diagnosis](diagnosis.md) tries these effects.
+[diagnosis](diagnosis.md) tries these effects; [the physics](physics.md#2-effects) has their limits.
 
-Each section has the law, a picture, the parameters (dotted suffix, unit, range, default) and effects that records may
-confuse with it; what discriminates two effects stands once, at the first. *Slanted* parameters shape a law whose size
-another one gives. Pictures show what the effect adds to the inverse-dynamics residual (applied less required effort) of
-one link in gravity, or of a servo-cylinder.
+Each section has the law and its [source](physics.md#sources), a picture, the parameters (dotted suffix, unit, range,
+default) and effects that records may confuse with it; what discriminates two stands once, at the first. *Slanted*
+parameters shape a law whose size another one gives. Pictures show what the effect adds to the inverse-dynamics residual
+of one link in gravity, or of a servo-cylinder.
 
-tau is the effort that the effect adds, q and v coordinate and velocity of the joint, u the command, x a true value, y
-its reading. Units: C is m or rad, E is N or N m, U the unit of the command, S that of the sensor. Of two defaults the
-second is for joints that turn.
+tau is the effort that the effect adds, positive along the coordinate; q and v are coordinate and velocity of the joint,
+u the command, x a true value, y its reading. Units: C is m or rad, E is N or N m, U the unit of the command, S that of
+the sensor. Of two defaults the second is for joints that turn.
 
 Effects marked *side* may sit behind the spring of a [joint_compliance](#joint_compliance) or [backlash](#backlash) of
-their joint, by `side = "link"`. There q and v include the deflection.
+their joint, by `side = "link"`. There q and v include the deflection. *Ranking*: only a [ranking](ranking.md) tries it.
 """
 
 
@@ -259,15 +260,28 @@ def page() -> str:
 
 def _section(effect: EffectType) -> list[str]:
     signature = effect.signature
-    lines = [f"## {effect.name}", "", f"At {_article(effect.site)}{_remarks(effect)}: `{effect.law}`", ""]
+    lines = [
+        f"## {effect.name}",
+        "",
+        f"At {_article(effect.site)}{_remarks(effect)}: `{effect.law}` ({source(effect)})",
+        "",
+    ]
     if effect.name in SHOWN:
-        over = signature.lives_in[0].replace("_", " ")
-        lines += [f"![{effect.title} over {over}](figures/effects/{effect.name}.svg)", ""]
+        lines += [f"![{effect.title}](figures/effects/{effect.name}.svg)", ""]
     lines += [f"**Excite by** {signature.excite[0].lower()}{signature.excite[1:]}.", ""]
     lines += _parameters(effect)
     if effect.confused_with:
         lines += ["", _confused(effect)]
     return lines
+
+
+def source(effect: EffectType) -> str:
+    """Where the law comes from, which ends the docstring of the effect's file."""
+    text = import_module(f"vpm.catalogue.effects.{effect.name}").__doc__ or ""
+    _, found, where = text.partition("\nSource: ")
+    if not found:
+        raise ValueError(f"python/vpm/catalogue/effects/{effect.name}.py names no source; end its docstring with it")
+    return where.strip().removesuffix(".")
 
 
 def _remarks(effect: EffectType) -> str:
@@ -277,7 +291,7 @@ def _remarks(effect: EffectType) -> str:
     if effect.requires:
         remarks.append(f"corrects [{effect.requires}](#{effect.requires}), which has to be there")
     if not effect.screened:
-        remarks.append("tried by rankings only" if effect.has_law else "describes what no effect explains")
+        remarks.append("*ranking*" if effect.has_law else "describes what no effect explains")
     return f" ({'; '.join(remarks)})" if remarks else ""
 
 
@@ -323,14 +337,18 @@ def _plain(unit: str) -> str:
 
 def _line(effect: EffectType, parameter: EffectParameter) -> str:
     name = f"*`{parameter.name}`*" if parameter.shape else f"`{parameter.name}`"
-    words = [f"`{parameter.suffix}`", _plain(parameter.unit), *_bounds(parameter), *_default(parameter)]
-    same = [
-        other.name
+    numbers = [*_bounds(parameter), *_default(parameter)]
+    words = [f"`{parameter.suffix}`", _plain(parameter.unit)]
+    alike = [
+        (other.name, [*_bounds(one), *_default(one)])
         for other in EFFECTS.values()
-        if any((one.name, one.meaning) == (parameter.name, parameter.meaning) for one in other.parameters)
+        for one in other.parameters
+        if (one.name, one.meaning) == (parameter.name, parameter.meaning)
     ]
-    meaning = parameter.meaning if same[0] == effect.name else f"as of [{same[0]}](#{same[0]})"
-    return f"- {name} ({', '.join(words)}): {meaning}"
+    first, its_numbers = alike[0]
+    if first == effect.name:
+        return f"- {name} ({', '.join(words + numbers)}): {parameter.meaning}"
+    return f"- {name} ({', '.join(words + numbers * (numbers != its_numbers))}): as of [{first}](#{first})"
 
 
 def _bounds(parameter: EffectParameter) -> list[str]:

@@ -5,7 +5,8 @@ The sentence says which (path, name, channel, time), the failing condition, the 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from difflib import SequenceMatcher, get_close_matches
 
 #: Exit code of a command after Ctrl-C, as shells have it: 128 and the number of the signal.
@@ -264,6 +265,15 @@ class MissingExtraError(VpmError, ImportError):
 
     def __reduce__(self) -> tuple[type[MissingExtraError], tuple[str, str]]:
         return type(self), (self.package, self.extra)
+
+
+@contextmanager
+def needs(package: str, extra: str) -> Iterator[None]:
+    """Where an optional package is imported inside and is not there, one sentence names the extra that brings it."""
+    try:
+        yield
+    except ImportError as error:
+        raise MissingExtraError(package, extra) from error
 
 
 def near_match(name: str, candidates: Iterable[str], *, what: str = "the choices are") -> str:

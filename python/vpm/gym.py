@@ -8,17 +8,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import MissingExtraError, SimulationError, near_match
+from vpm.errors import SimulationError, near_match, needs
 from vpm.model import Model
 from vpm.simulate import AUTOMATIC
 from vpm.stepping import Simulation
 
-try:
+with needs("gymnasium", "gym"):
     import gymnasium
     from gymnasium.vector import AutoresetMode, VectorEnv
     from gymnasium.vector.utils import batch_space
-except ImportError as error:
-    raise MissingExtraError("gymnasium", "gym") from error
 
 Array = NDArray[np.float64]
 #: Rewards (E,) of actions (E, nu) that led to observations (E, m).

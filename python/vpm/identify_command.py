@@ -98,22 +98,21 @@ def identify(
 ) -> None:
     """Fit parameters to one or several logs. Ctrl-C ends a fit and keeps the best until then."""
     from vpm.identify import Fitting
-    from vpm.identify.words import numbers, ranges
     from vpm.simulate import Setup
 
     settings = Fitting(
         channels=tuple(compare_only or ()),
         log=log,
-        bounds=ranges(bound, "--bound", "NAME=LOW:HIGH"),
+        bounds=options.ranges(bound, "--bound", "NAME=LOW:HIGH"),
         noise="given" if noise_level else noise or "spread",
-        noise_levels=numbers(noise_level, "--noise-level", "CHANNEL=STD"),
+        noise_levels=options.numbers(noise_level, "--noise-level", "CHANNEL=STD"),
         loss=loss or "squares",
         loss_scale=loss_scale,
         priors=priors,
         starts=starts,
         spread=spread,
         states=tuple(fit_state or ()),
-        known_states=numbers(known_state, "--known-state", "STATE=VALUE"),
+        known_states=options.numbers(known_state, "--known-state", "STATE=VALUE"),
         offsets=tuple(offset or ()),
         piece=piece,
         continuity=continuity,
@@ -159,9 +158,8 @@ def _fitted(
 ) -> Fit:
     """The fit, with its progress on the screen."""
     from vpm.identify import identify as fit_logs
-    from vpm.identify.words import names
 
-    ties = names(tie, "--tie", "FOLLOWER=LEADER")
+    ties = options.names(tie, "--tie", "FOLLOWER=LEADER")
     with fitting(starts) as tell:
         return fit_logs(
             machine,
@@ -179,7 +177,7 @@ def _fitted(
 def _told(fit: Fit, machine: Model, unseen: list[Experiment], cutoff: float | None) -> list[str]:
     """Print what was found, and what it leaves of unseen records."""
     from vpm.identify import judged_on
-    from vpm.identify.words import told, told_unseen
+    from vpm.identify.export import told, told_unseen
 
     give(fit=fit)
     lines = told(fit)
@@ -195,7 +193,7 @@ def _more(
     fit: Fit, records: list[Experiment], profile: list[str], replicates: int, seed: int, cutoff: float | None
 ) -> list[str]:
     """Print intervals by profile and bootstrap, as far as they are asked for."""
-    from vpm.identify.words import intervals, told_intervals
+    from vpm.identify.export import intervals, told_intervals
 
     try:
         found = intervals(fit, records, profile, replicates, seed, cutoff)
@@ -231,7 +229,7 @@ def _without(model: Model, free: list[str] | None, fixed: list[str] | None) -> l
 
 def _write(fit: Fit, out: Path, lines: list[str]) -> None:
     """The fitted model alone, or a folder with it and what tells of the fit."""
-    from vpm.identify.written import write_fit
+    from vpm.identify.export import write_fit
 
     if out.suffix == ".toml":
         fit.model.save(out)

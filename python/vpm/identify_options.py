@@ -1,4 +1,4 @@
-"""Options of ``vpm identify``: what they are called and what their help says."""
+"""Options of ``vpm identify``: what they are called, what their help says, and how their words are read."""
 
 from __future__ import annotations
 
@@ -6,6 +6,8 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from vpm.errors import IdentificationError
 
 Words = list[str] | None
 
@@ -51,3 +53,39 @@ Workers = Annotated[int, _option("Threads; 0 for one per core.")]
 Validate = Annotated[
     list[Path] | None, typer.Option(help="Record that is never fitted, on which the fit is judged; repeat.")
 ]
+
+
+def numbers(words: Words, option: str, form: str) -> dict[str, float]:
+    """Read ``NAME=NUMBER`` words of an option.; another form is an error."""
+    return {name: _number(value) for name, value in _pairs(words, option, form)}
+
+
+def ranges(words: Words, option: str, form: str) -> dict[str, tuple[float, float]]:
+    """Read ``NAME=LOW:HIGH`` words of an option.; another form is an error."""
+    found = {}
+    for name, word in _pairs(words, option, form):
+        low, sign, high = word.partition(":")
+        if not sign:
+            raise IdentificationError(f"{option} has '{word}' where a range belongs; write it as {form}")
+        found[name] = (_number(low), _number(high))
+    return found
+
+
+def names(words: Words, option: str, form: str) -> dict[str, str]:
+    """Read ``NAME=NAME`` words of an option.; another form is an error."""
+    return dict(_pairs(words, option, form))
+
+
+def _pairs(words: Words, option: str, form: str) -> list[tuple[str, str]]:
+    pairs = [word.partition("=") for word in words or []]
+    for name, sign, value in pairs:
+        if not (name and sign and value):
+            raise IdentificationError(f"{option} is '{name}{sign}{value}'; write it as {form}")
+    return [(name, value) for name, _, value in pairs]
+
+
+def _number(word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        raise IdentificationError(f"'{word}' is no number; write one like 1e-3, in SI units") from None

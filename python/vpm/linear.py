@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vpm.errors import MissingExtraError, SimulationError, near_match
+from vpm.errors import SimulationError, near_match, needs
 from vpm.results import Result
 
 if TYPE_CHECKING:
@@ -167,10 +167,8 @@ class LinearModel(Result):
         SimulationError
             The time step is not positive.
         """
-        try:
+        with needs("control", "control"):
             import control
-        except ImportError as error:
-            raise MissingExtraError("control", "control") from error
         names = {"states": self.states, "inputs": self.inputs, "outputs": self.outputs}
         plain = {kind: [name.replace(".", "_") for name in labels] for kind, labels in names.items()}
         A, B = (self.A, self.B) if time_step is None else self.sampled(time_step)

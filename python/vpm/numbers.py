@@ -9,6 +9,8 @@ from vpm.errors import VpmError
 
 #: No quantity of a machine is larger in SI units; squares and products of three are still finite numbers.
 LARGEST = 1e100
+#: Two-sided 95 % quantile of the normal distribution.
+NORMAL_95 = 1.959963984540054
 #: Said for a number that nobody knows.
 UNKNOWN = "–"
 

@@ -42,7 +42,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
 
-from vpm.errors import MissingExtraError, VpmError
+from vpm.errors import VpmError, needs
 from vpm.fields import misfit
 from vpm.files import replacing, unreadable
 from vpm.plain import plain
@@ -224,10 +224,8 @@ class Result(Storable):
             This kind of result has no table form.
         """
         columns = dict(self._frame_columns())
-        try:
+        with needs("pandas", "frames"):
             from pandas import DataFrame
-        except ImportError as error:
-            raise MissingExtraError("pandas", "frames") from error
         return DataFrame(columns)
 
     def save(self, path: str | PathLike[str]) -> Path:

@@ -1,8 +1,9 @@
-"""The tables of the proving ground, as Markdown that reads well in a console too."""
+"""What the proving ground found, as lists and tables of Markdown that read well in a console too."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -11,15 +12,17 @@ from blind.answer import Answer
 
 Rows = list[Sequence[object]]
 
+#: Said of a case whose hidden effect stands among the first three names.
+AMONG = " (hidden one among the first three)"
+
 
 def tables(answers: Sequence[Answer]) -> str:
     """All tables."""
     parts = [
         _head(answers),
         "### All in all\n\n" + _summary(answers),
-        "### By machine\n\n" + _grouped(answers, "machine", lambda a: a.machine),
-        "### By effect\n\n"
-        + _grouped([a for a in answers if a.kind == "single"], "effect", lambda a: a.hidden[0].name),
+        "### By machine\n\n" + _by_machine(answers),
+        "### By effect\n\n" + _by_effect([a for a in answers if a.kind == "single"]),
         "### Hidden against named\n\n" + _confusion(answers),
         "### Errors of parameters\n\n" + _parameters(answers),
         "### Whether probabilities are true\n\n" + _probabilities(answers),
@@ -58,33 +61,38 @@ def markdown(header: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
     return "\n".join(lines)
 
 
+def listed(rows: Iterable[Sequence[object]]) -> str:
+    """A line for each pair of what is counted and its number."""
+    return "\n".join(f"- {what}: {number}" for what, number in rows)
+
+
 def _summary(answers: Sequence[Answer]) -> str:
     one, two, outside, nothing = (pick(answers) for pick in (score.single, score.pairs, score.outside, score.without))
     first, one_by_one = [a for a in one if score.top(a, 1)], score.pairs_alone(answers)
     silent = [a for a in answers if a.kind == "single" and not a.solvable]
     shrunk = score.closed(outside)
     rows: Rows = [
-        ("solvable cases with one effect: named first (top-1)", score.rate(one, lambda a: score.top(a, 1))),
+        ("solvable cases with one effect, named first (top-1)", score.rate(one, lambda a: score.top(a, 1))),
         ("among the first three (top-3)", score.rate(one, lambda a: score.top(a, 3))),
         ("site right where named first", score.rate(first, score.in_place)),
         ("named, and nothing else beside it", score.rate(one, score.alone)),
-        ("named wrongly: another effect first", score.rate(one, lambda a: bool(a.named) and not score.top(a, 1))),
-        ("left open: nothing named", score.rate(one, lambda a: not a.named)),
-        ("solvable pairs: both named", score.rate(two, score.all_named)),
-        ("pairs of which each effect is solvable alone: both named", score.rate(one_by_one, score.all_named)),
-        ("nothing missing: false alarms", score.rate(nothing, score.alarmed)),
-        ("nothing missing: called unexplained", score.rate(nothing, score.unexplained)),
-        ("one effect too weak to be solvable: named", score.rate(silent, lambda a: score.top(a, 1))),
-        ("outside the catalogue: unexplained", score.rate(outside, score.unexplained)),
-        ("outside the catalogue: gap at least halved", f"{int(np.sum(shrunk <= 0.5))}/{len(outside)}"),
-        ("outside the catalogue: gap after / before", _spread(shrunk)),
+        ("named wrongly, another effect first", score.rate(one, lambda a: bool(a.named) and not score.top(a, 1))),
+        ("left open, nothing named", score.rate(one, lambda a: not a.named)),
+        ("solvable pairs, both named", score.rate(two, score.all_named)),
+        ("pairs of which each effect is solvable alone, both named", score.rate(one_by_one, score.all_named)),
+        ("nothing missing, false alarms", score.rate(nothing, score.alarmed)),
+        ("nothing missing, called unexplained", score.rate(nothing, score.unexplained)),
+        ("one effect too weak to be solvable, named", score.rate(silent, lambda a: score.top(a, 1))),
+        ("outside the catalogue, unexplained", score.rate(outside, score.unexplained)),
+        ("outside the catalogue, gap at least halved", f"{int(np.sum(shrunk <= 0.5))}/{len(outside)}"),
+        ("outside the catalogue, gap after / before", _spread(shrunk)),
         ("gap after / gap of the oracle, one effect", _spread(score.gap_ratios(one))),
         ("gap after / gap of the oracle, pairs", _spread(score.gap_ratios(two))),
         ("time of a diagnosis on one core [s]", _spread([a.seconds for a in answers])),
         ("diagnoses that failed", score.rate(answers, lambda a: bool(a.error))),
         ("ended by the limit of time, judged by what they knew", score.rate(answers, lambda a: a.late)),
     ]
-    return markdown(("", ""), rows)
+    return listed(rows)
 
 
 def _spread(values: Sequence[float] | score.Array) -> str:
@@ -98,40 +106,33 @@ def _brief(rate: score.Rate) -> str:
     return f"{rate.hits}/{rate.count}" if rate.count else "·"
 
 
-def _grouped(answers: Sequence[Answer], title: str, group: Callable[[Answer], str]) -> str:
+def _by_machine(answers: Sequence[Answer]) -> str:
     rows: Rows = []
-    for name in dict.fromkeys(map(group, answers)):
-        mine = [a for a in answers if group(a) == name]
+    for name in dict.fromkeys(answer.machine for answer in answers):
+        mine = [a for a in answers if a.machine == name]
         one, nothing, outside = score.single(mine), score.without(mine), score.outside(mine)
-        first = [a for a in one if score.top(a, 1)]
         rows.append((
             name,
-            len(mine),
             _brief(score.rate(one, lambda a: score.top(a, 1))),
             _brief(score.rate(one, lambda a: score.top(a, 3))),
-            _brief(score.rate(first, score.in_place)),
             _brief(score.rate(score.pairs(mine), score.all_named)),
             _brief(score.rate(nothing, score.alarmed)),
             _brief(score.rate(outside, score.unexplained)),
             _middle(score.gap_ratios(one)),
             _middle([a.seconds for a in mine]),
-            sum(bool(a.error) for a in mine),
         ))  # fmt: skip
-    head = (
-        title,
-        "cases",
-        "top-1",
-        "top-3",
-        "site",
-        "pairs",
-        "false alarms",
-        "unexplained",
-        "gap/oracle",
-        "s",
-        "failed",
-    )
-    keep = [0, 1, 2, 3, 4, *(k for k in (5, 6, 7) if any(row[k] != "·" for row in rows)), 8, 9, 10]
-    return markdown([head[k] for k in keep], [[row[k] for k in keep] for row in rows])
+    head = ("machine", "top-1", "top-3", "pairs", "false alarms", "unexplained", "gap/oracle", "s")
+    return markdown(head, rows)
+
+
+def _by_effect(answers: Sequence[Answer]) -> str:
+    """Of the solvable cases with one effect: named first, among the first three, and what is left of the gap."""
+    rows: Rows = []
+    for name in dict.fromkeys(answer.hidden[0].name for answer in answers):
+        one = score.single([a for a in answers if a.hidden[0].name == name])
+        first, third = (score.rate(one, partial(score.top, count=count)) for count in (1, 3))
+        rows.append((name, f"{_brief(first)}, {_brief(third)}, {_middle(score.gap_ratios(one))}"))
+    return "Top-1, top-3, and gap after / gap of the oracle (median):\n\n" + listed(rows)
 
 
 def _middle(values: Sequence[float] | score.Array) -> str:
@@ -139,20 +140,20 @@ def _middle(values: Sequence[float] | score.Array) -> str:
 
 
 def _confusion(answers: Sequence[Answer]) -> str:
-    """What was hidden, in rows, against what was named first, in columns; solvable cases only."""
+    """What was named in place of what was hidden, beside how often it was right; solvable cases only."""
     counted = [a for a in answers if a.kind != "pairs" and (a.solvable or a.kind in {"none", "parameters"})]
-    rows = list(dict.fromkeys(_hidden(a) for a in counted))
-    hidden, named = sorted(rows), sorted({_first(a) for a in counted})
-    names = sorted({*hidden, *named}, key=lambda n: (n in {"nothing", "failed"}, n))
-    number = {name: k for k, name in enumerate(names, 1)}
-    columns = [name for name in names if name in named]
-    table: Rows = []
-    for row in (name for name in names if name in hidden):
-        mine = [_first(a) for a in counted if _hidden(a) == row]
-        table.append((f"{number[row]} {row}", *(mine.count(c) or "·" for c in columns)))
-    legend = ", ".join(f"{number[c]} {c}" for c in columns if c not in hidden)
-    text = markdown(("hidden \\ named", *(str(number[c]) for c in columns)), table)
-    return text + (f"\n\nColumns without a row: {legend}." if legend else "")
+    rows: Rows = []
+    for hidden in sorted({_hidden(a) for a in counted}, key=_last):
+        named = [_first(a) for a in counted if _hidden(a) == hidden]
+        wrong = [f"{name} {named.count(name)}" for name in sorted({*named} - {hidden}, key=_last)]
+        if wrong:
+            rows.append((hidden, ", ".join([f"right {named.count(hidden)}", *wrong])))
+    return listed(rows) if rows else "Nothing is confused."
+
+
+def _last(name: str) -> tuple[bool, str]:
+    """Order of names; what is no effect comes last."""
+    return name in {"nothing", "failed"}, name
 
 
 def _hidden(answer: Answer) -> str:
@@ -171,22 +172,16 @@ def _first(answer: Answer) -> str:
 def _parameters(answers: Sequence[Answer]) -> str:
     found = score.parameter_errors(a for a in answers if a.solvable)
     rows: Rows = []
-    for key in dict.fromkeys((e.effect, e.parameter) for e in found):
-        mine = [e for e in found if (e.effect, e.parameter) == key]
+    for effect, parameter in dict.fromkeys((e.effect, e.parameter) for e in found):
+        mine = [e for e in found if (e.effect, e.parameter) == (effect, parameter)]
         sizes = [100.0 * abs(e.relative) for e in mine]
         deviations = [abs(e.deviations) for e in mine if np.isfinite(e.deviations)]
         middle, _, high = score.quartiles(sizes)
         within = sum(d <= 1.96 for d in deviations)
-        rows.append((
-            *key,
-            len(mine),
-            f"{middle:.1f} %",
-            f"{high:.1f} %",
-            _middle(deviations),
-            f"{within}/{len(deviations)}",
-        ))  # fmt: skip
-    head = ("effect", "parameter", "cases", "median error", "upper quartile", "in deviations", "in the interval")
-    return markdown(head, rows) if rows else "No effect was named at its site."
+        size = f"{middle:.1f} ({high:.1f}), {_middle(deviations)}, {within}/{len(deviations)}"
+        rows.append((f"{effect}.{parameter}", size))
+    head = "Median (upper quartile) in %, median in deviations, and how many stand in their interval of 95 %:\n\n"
+    return head + listed(rows) if rows else "No effect was named at its site."
 
 
 def failed(answer: Answer) -> str:
@@ -203,24 +198,30 @@ def failed(answer: Answer) -> str:
     if answer.kind == "pairs":
         return "" if score.all_named(answer) else told
     if not score.top(answer, 1):
-        return told + (" (hidden one among the first three)" if score.top(answer, 3) else "")
+        return told + (AMONG if score.top(answer, 3) else "")
     return "" if score.in_place(answer) else told
 
 
 def _probabilities(answers: Sequence[Answer]) -> str:
     found = reliability.rows(answers)
-    head = ("of the classes that were named", "probability, mean", "the hidden effect is in it")
-    return markdown(head, found) if found else "No effect was named with a probability."
+    if not found:
+        return "No effect was named with a probability."
+    lines = listed((f"{group}, mean {stated}", right) for group, stated, right in found if group)
+    return f"Mean probability of the named classes, and how often the hidden effect was in one:\n\n{lines}"
 
 
 def _failures(answers: Sequence[Answer]) -> str:
+    """Machine, seed, what was hidden how many deviations out of the noise, and the answer."""
+    several = len({a.noise_level for a in answers}) > 1
     rows: Rows = []
     for answer in answers:
         why = failed(answer)
         if why:
             hidden = ", ".join(f"{h.name} at {h.site}" for h in answer.hidden) or answer.request[0]
-            strength = f"{min(answer.strengths):.1f}" if answer.strengths else "·"
-            short = why if len(why) < 110 else why[:107] + "..."
-            rows.append((answer.machine, hidden, answer.seed, f"{answer.noise_level:g}", strength, short))
-    head = ("machine", "hidden", "seed", "noise", "strength", "answer")
-    return markdown(head, rows) if rows else "Nothing."
+            strength = f" ({min(answer.strengths):.1f})" if answer.strengths else ""
+            noise = f" noise {answer.noise_level:g}" if several else ""
+            short = why.replace(AMONG, "*")
+            short = short if len(short) < 110 else short[:107] + "..."
+            rows.append((f"{answer.machine} {answer.seed}{noise}, {hidden}{strength}", short))
+    head = "In brackets: deviations out of the noise. *: the hidden effect is among the first three names.\n\n"
+    return head + listed(rows) if rows else "Nothing."

@@ -102,11 +102,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def documented() -> dict[str, set[str]]:
     """What the page says that each command's result holds."""
     page = (ROOT / "docs" / "command_line.md").read_text(encoding="utf-8")
-    rows = re.findall(r"^\| `([a-z ]+)` \| ((?:`\w+`(?:, )?)+) \|", page, re.MULTILINE)
+    rows = re.findall(r"^- `([a-z ]+)`: ((?:`\w+`(?:, )?)+);", page, re.MULTILINE)
     return {name: set(re.findall(r"`(\w+)`", keys)) for name, keys in rows}
 
 
-def test_every_command_has_a_case_and_a_row_on_the_page() -> None:
+def test_every_command_has_a_case_and_a_line_on_the_page() -> None:
     assert sorted(CASES) == sorted(names(app))
     assert {name.split()[0] for name in CASES} == set(documented())
 

@@ -17,8 +17,8 @@ from vpm.discrepancy.noise_spectrum import noise_shapes, noise_spectrum
 from vpm.discrepancy.structure import structure
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.identify.along import Response
-from vpm.identify.answers import Memo
 from vpm.identify.drives import SLOPE_STEP
+from vpm.identify.following import Memo
 from vpm.identify.parts import carried, drives_of
 from vpm.model import Model
 

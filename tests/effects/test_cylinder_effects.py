@@ -13,8 +13,7 @@ from hydraulic_reference import AREA, RATIO, SUPPLY, TANK, VALUES
 from nightly import at_night
 from vpm.errors import IdentificationError, ModelError
 from vpm.identify import InverseDynamicsProblem, gaps
-from vpm.identify.counted import SETTLING
-from vpm.identify.stops import at_stops
+from vpm.identify.sample_mask import SETTLING, at_stops
 from vpm.initial import joint_motion, measured_states
 from vpm.model.drives.states import commanded_states
 

@@ -19,7 +19,7 @@ from vpm.experiment import Experiment
 from vpm.identify import Fit, Fitting, bootstrap, identify, problem, profile_intervals
 from vpm.identify.objective import Objective, losses_and_weights
 from vpm.identify.shooting import ShootingProblem
-from vpm.identify.solver import Point, descend
+from vpm.identify.solver import Box, Point, descend
 from vpm.model import Model
 from vpm.simulate import Setup, simulate
 
@@ -87,14 +87,11 @@ def test_descent_finds_the_bounded_minimum_of_a_known_function() -> None:
         return Point(x, float(r @ r), r, np.array([[-20.0 * x[0], 10.0], [-1.0, 0.0]]), (r, r))
 
     for top, least in ((np.inf, (1.0, 1.0)), (0.5, (0.5, 0.25))):
-        high, endless = np.array([top, np.inf]), np.full(2, np.inf)
+        high = np.array([top, np.inf])
         found = descend(
             evaluate,
             evaluate(np.array([-1.2, 1.0])),
-            np.array([-2.0, -2.0]),
-            high,
-            scale=np.ones(2),
-            reach=endless,
+            Box(np.array([-2.0, -2.0]), high, scale=np.ones(2)),
             tolerance=1e-10,
             most_evaluations=200,
         )
@@ -187,7 +184,7 @@ def test_unknown_first_states_are_found() -> None:
 def test_derivatives_by_parameters_and_first_states_match_differences(piece: float) -> None:
     model, records = wrong(), [recorded(0, n=200), recorded(1, n=150)]
     data = ShootingProblem(
-        model, records, "free_run", states=("slide.position", "slide.velocity"), piece=piece, setup=SETUP
+        model, records, "free_run", Fitting(states=("slide.position", "slide.velocity"), piece=piece), setup=SETUP
     )
     columns = [model.index(name) for name in FREE]
     first = data.first_states

@@ -19,10 +19,10 @@ from scipy.signal import lfilter
 import vpm
 from two_link_arm import GRAVITY, MODEL, Arm, record
 from vpm.errors import IdentificationError
-from vpm.identify.base_parameters import find_base
 from vpm.identify.feasibility import WEIGHT, Distance, fault, pseudo_inertia
+from vpm.identify.identifiability import find_base
 from vpm.identify.inertial_model import InertialModel, inertial_regression
-from vpm.identify.inertial_noise import score_covariance
+from vpm.identify.inertial_solve import score_covariance
 from vpm.linkages import INERTIAL_NAMES, Leg, inertial_values, with_inertial_values
 from vpm.model.standard import standard_parameters
 

@@ -16,10 +16,10 @@ from scipy.stats import f as fisher
 
 from nightly import at_night
 from vpm.identify import Checks, Fit, InverseDynamicsProblem, identify
-from vpm.identify.own_simulation import own_residual
+from vpm.identify.closed_loop_prediction import own_residual
 from vpm.identify.problem import Block
-from vpm.identify.sandwich import freedom, white_sandwich
 from vpm.identify.settings import OwnSimulation
+from vpm.identify.statistics import freedom, white_sandwich
 from vpm.identify.whiteness import explained_by, heard, powers, shifted, waves
 
 BENCHES = Path(__file__).parents[2] / "benches"

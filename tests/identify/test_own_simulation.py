@@ -17,8 +17,8 @@ from fit_machines import sines
 from vpm import Experiment, Model, Setup, Simulation, identify
 from vpm.errors import SimulationError
 from vpm.identify import Fitting, InverseDynamicsProblem, gaps, profile_intervals
+from vpm.identify.closed_loop_prediction import commands_to_draw, own_residual
 from vpm.identify.estimation import _refine
-from vpm.identify.own_simulation import commands_to_draw, own_residual
 
 Array = NDArray[np.float64]
 
@@ -243,7 +243,7 @@ def test_noise_beside_which_the_model_runs_away_leaves_the_fit(monkeypatch: pyte
         raise SimulationError("the position leaves its bounds")
 
     log = logs(1, 3)[0]
-    monkeypatch.setattr(import_module("vpm.identify.onward"), "noisy", away)
+    monkeypatch.setattr(import_module("vpm.identify.refitting"), "noisy", away)
     fit = identify(MODEL, log, free=FREE)
     assert asked
     assert np.all(np.abs(fit.values - EXPECTED) <= 5.0 * fit.std)

@@ -8,7 +8,7 @@ import pytest
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
 from vpm.identify import identify, problem
-from vpm.identify.ties import TiedProblem
+from vpm.identify.problem import TiedProblem
 from vpm.model import Model
 from vpm.simulate import Setup, simulate
 

@@ -9,7 +9,7 @@ import vpm
 from vpm.errors import ModelError
 from vpm.simplify import Ladder, reductions, simplify
 from vpm.simplify.reductions import VELOCITY_TERMS
-from vpm.simplify.shares import parts
+from vpm.simplify.terms import parts
 
 #: Two rods in a horizontal plane: masses at 0.5 m and 0.4 m from their joints, the second joint at 0.8 m.
 FIRST, SECOND, LENGTH, CENTER = 3.0, 2.0, 0.8, 0.4

@@ -49,9 +49,6 @@ QUOTED = {
     ("docs/view.md", "plays"): "the viewer plays a motion back",
 }
 
-#: Phrases of pages that are still to be replaced.
-PAGES_TO_CHANGE = {("docs/physics.md", "wind-up")}
-
 #: Names that no module has, whole or between underscores.
 MODULES = {
     *("apart", "believed", "climb", "coloured", "counted", "finer", "further", "gap", "gaps", "glance", "ladder"),
@@ -64,11 +61,6 @@ MODULES = {
 MODULES_THAT_STAY = {
     "python/vpm/climb": "the package of the public function `vpm.climb`, which needs a deprecation first",
     "crates/vpm-core/src/model/place.rs": "places bodies in the order of the tree; no parameter of an effect",
-}
-
-#: Modules that are still to be renamed.
-MODULES_TO_RENAME = {
-    f"python/vpm/identify/{name}.py" for name in ("counted", "remarks", "ties", "unseen", "words", "written")
 }
 
 #: Words that no public name has, whole or between underscores.
@@ -137,8 +129,7 @@ def public_names() -> set[str]:
 def test_pages_use_the_terms_of_the_field(page: Path) -> None:
     name = page.relative_to(ROOT).as_posix()
     found = found_in(page.read_text(encoding="utf-8"))
-    allowed = QUOTED.keys() | PAGES_TO_CHANGE
-    wrong = [f'{name}:{line}: "{phrase}" is {term}' for line, phrase, term in found if (name, phrase) not in allowed]
+    wrong = [f'{name}:{line}: "{phrase}" is {term}' for line, phrase, term in found if (name, phrase) not in QUOTED]
     assert not wrong, "\n".join(wrong)
     quoted = {phrase for place, phrase in QUOTED if place == name}
     assert quoted <= {phrase for _, phrase, _ in found}
@@ -148,7 +139,7 @@ def test_modules_are_named_by_what_they_hold() -> None:
     files = [*(ROOT / "python" / "vpm").rglob("*.py"), *(ROOT / "crates").glob("*/src/**/*.rs")]
     modules = [path.parent if path.name in {"__init__.py", "mod.rs"} else path for path in files]
     wrong = {path.relative_to(ROOT).as_posix() for path in modules if words_of(path.stem) & MODULES}
-    assert wrong - MODULES_TO_RENAME == MODULES_THAT_STAY.keys()
+    assert wrong == MODULES_THAT_STAY.keys()
 
 
 def test_public_names_use_the_terms_of_the_field() -> None:

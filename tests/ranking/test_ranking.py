@@ -20,8 +20,8 @@ from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.noise_model import Colour, NoiseModel, Structured, fitted_noise, log_student, scale_of, white_noise
-from vpm.ranking.observed import DAMPING, PARTS, Observed, Observer, observer_gain
-from vpm.ranking.settings import Settings
+from vpm.ranking.observed import Observed, Observer, observer_gain
+from vpm.ranking.settings import DAMPING, PARTS, Settings
 
 Array = NDArray[np.float64]
 

@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from second_suite import arm
 from sledge import GAIN, MASS, OIL, SLEDGE, pushed
 from vpm.catalogue import EFFECTS
 from vpm.catalogue.kinds import in_words
@@ -25,7 +26,7 @@ from vpm.ranking.extensions import Extensions
 from vpm.ranking.fit import Fitter, View, by_secant
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
-from vpm.ranking.observed import Observed, Observer
+from vpm.ranking.observed import Observed, Observer, observer_gain
 from vpm.ranking.proposals import Proposal, _seated, proposals
 from vpm.ranking.search import _is_worse
 from vpm.ranking.settings import Settings
@@ -115,6 +116,30 @@ def test_derivatives_by_what_is_known_stay_where_an_effect_does_nothing(effect: 
     scale = np.abs(plain.jacobian).max(axis=(0, 1))
     assert np.abs(more.residual - plain.residual).max() < 1e-12
     np.testing.assert_allclose(more.jacobian / scale, plain.jacobian / scale, atol=1e-9)
+
+
+def test_derivatives_without_those_of_the_matrix_miss_the_exact_ones_by_the_order_of_the_steps() -> None:
+    document = {**arm.document(arm.MACHINE.values.__getitem__, frozenset()), "effects": []}
+    model = Model.from_dict(document)
+    channels = [f"{joint}.position" for joint in model.joints]
+    time = 0.004 * np.arange(150)
+    swing = np.sin(np.outer(time, 4.0 + np.arange(6.0)))
+    gain = np.tile(observer_gain(model, channels, 3.0, 0.004, model.theta).ravel(), (len(time), 1))
+    places = [model.output_channels.index(channel) for channel in channels]
+    columns = [model.index(name) for name in ("link3.mass", "m2.gain", "m4.gain")]
+
+    def slopes(substeps: int, approximate: bool) -> Any:
+        record = (np.zeros(12), 5.0 * swing, places, 0.2 * swing, gain, 0.004, substeps)
+        how = ("linearly_implicit", columns, "zero_order", True, approximate)
+        return model.core.observe(model.theta, *record, *how)[2]
+
+    gaps = []
+    for substeps in (1, 2, 4):
+        exact = slopes(substeps, False)
+        gaps.append(np.abs((slopes(substeps, True) - exact) / np.abs(exact).max(axis=(0, 1))).max())
+    assert 1e-9 < gaps[0] < 1e-2
+    assert gaps[1] < 0.35 * gaps[0]
+    assert gaps[2] < 0.35 * gaps[1]
 
 
 def test_structures_are_compared_by_steps_whose_errors_are_small() -> None:

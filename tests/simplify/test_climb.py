@@ -10,7 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from vpm import Climb, Experiment, Model, Setup, climb, simulate
-from vpm.climb.levels import ACTUATORS, RIGID, families
+from vpm.climb.climbing import ACTUATORS, RIGID, families
 from vpm.errors import IdentificationError
 from vpm.identify import OutputErrorProblem
 

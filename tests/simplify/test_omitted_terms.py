@@ -13,7 +13,7 @@ from test_simplify_levels import ARM as FLEXIBLE
 from vpm.errors import ModelError, ValidityWarning
 from vpm.simplify import Reduction, reductions, simplify
 from vpm.simplify.reductions import COUPLING_TERMS, VELOCITY_TERMS
-from vpm.simplify.shares import deformation_share, effort_share, motions
+from vpm.simplify.terms import deformation_share, effort_share, motions
 from vpm.simulate import Setup
 
 SECOND_ORDER = Reduction("terms", "second-order", "link")

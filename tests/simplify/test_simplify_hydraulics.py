@@ -14,10 +14,9 @@ from vpm.errors import ModelError
 from vpm.simplify import Ladder, reductions, simplify
 from vpm.simplify.hydraulics import BOTH, LOAD, NO_STATE, QUASI_STATIC, SIMPLER, STATIC, simpler
 from vpm.simplify.judge import Judge, by_the_model
-from vpm.simplify.learnt import maxwell_entry, narx_entry
+from vpm.simplify.learnt import maxwell_entry, narx_entry, trained
 from vpm.simplify.replacement import commanded, replaced
 from vpm.simplify.surrogates import _learnt, _taught, surrogates
-from vpm.simplify.trained import trained
 
 Array = NDArray[np.float64]
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

@@ -107,8 +107,9 @@ converged solutions of other codes. `make validation` computes all of them and w
 [validation.csv](validation.csv) has every quantity with its unit, tolerance and source. Each one is a test
 (`tests/project/test_validation.py`; the last part in `crates/vpm-core/tests/all/validation`).
 
-*Nearest* is the quantity of a part that comes nearest to its tolerance; *allowed* is that tolerance, absolute or
-relative (*rel.*) to the reference. Sections, equations and tables are those of M. D'Imperio's PhD thesis (2016).
+Each line has a part with the number of its values, what they stand beside, and the quantity that comes nearest to its
+tolerance: its difference of the one allowed, absolute or relative (*rel.*) to the reference. Sections, equations and
+tables are those of M. D'Imperio's PhD thesis (2016).
 """
 #: Reference values that no row can stand for, each with the reason.
 _UNCOMPUTED = {
@@ -121,37 +122,29 @@ _UNCOMPUTED = {
     "`oil.compliance`, `oil.flow_gain`",
 }
 
-_SUMMARY = """
-| part | values | against | nearest | difference | allowed |
-| --- | --- | --- | --- | --- | --- |
-"""
 _PUBLISHED = """
 ## Published values
 
-| what | vpm | published | allowed | where |
-| --- | --- | --- | --- | --- |
 """
 _WITHOUT = """
 ## Reference values that are not compared
 
-| what | why |
-| --- | --- |
 """
 
 
 def page(rows: Mapping[str, list[Row]]) -> str:
     """Text of the page."""
-    lines = [_HEAD, _SUMMARY]
+    lines = [_HEAD, "\n"]
     for title, each in rows.items():
         worst, count = max(each, key=lambda one: one.error), sum(one.found.size for one in each)
-        cells = (title, str(count), ALL[title].against, f"`{worst.name}`", worst.difference, worst.allowed)
-        lines.append(_line(*cells))
+        nearest = f"`{worst.name}`, {worst.difference} of {worst.allowed}"
+        lines.append(f"- **{title}**, {count}: {ALL[title].against}; {nearest}\n")
     lines.append(_PUBLISHED)
     for found in (one for each in rows.values() for one in each if one.source.startswith("published")):
         where = found.source.removeprefix("published: ").partition(";")[0]
         reference = found.reference if found.unit == "1" else f"{found.reference} {found.unit}"
-        lines.append(_line(f"`{found.name}`", found.shown, reference, found.allowed, where))
-    return "".join([*lines, _WITHOUT, *(_line(what, why) for what, why in _UNCOMPUTED.items())])
+        lines.append(f"- `{found.name}`: {found.shown}, published {reference}, allowed {found.allowed} ({where})\n")
+    return "".join([*lines, _WITHOUT, *(f"- {what}: {why}\n" for what, why in _UNCOMPUTED.items())])
 
 
 def table(rows: Mapping[str, list[Row]]) -> str:
@@ -164,7 +157,3 @@ def table(rows: Mapping[str, list[Row]]) -> str:
             (title, r.name, r.found.size, r.shown, r.reference, r.unit, r.difference, r.allowed, r.source) for r in each
         )
     return text.getvalue()
-
-
-def _line(*cells: str) -> str:
-    return "| " + " | ".join(cells) + " |\n"

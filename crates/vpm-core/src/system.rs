@@ -4,6 +4,7 @@ mod additive;
 mod answers;
 mod call_count;
 mod connections;
+mod constant;
 mod drives;
 mod engine;
 mod following;

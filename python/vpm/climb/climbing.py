@@ -1,27 +1,39 @@
-"""The way up: at each level the new parameters first, then all; validation data decide whether it paid."""
+"""Model refinement: at each level of detail the new parameters first, then all; validation decides if it pays."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.climb.levels import Family, families
 from vpm.climb.result import Climb, Level
 from vpm.errors import IdentificationError, VpmError
 from vpm.experiment import Experiment, as_records
 from vpm.identify import Estimate, OutputErrorProblem, estimate, gain, gaps, segments
 from vpm.model import Model
+from vpm.model.beams.level import size_of
 from vpm.simulate import Setup, judging_mode
 
 Array = NDArray[np.float64]
 
-#: A level pays where it predicts validation data better by so many standard deviations, and by more than this share.
+#: A level pays where it predicts validation records better by so many standard deviations, and by more than this share.
 SURE, WORTH = 2.0, 0.02
 #: A parameter is seen at a level where the residual moves by more than this share when it changes by its own size.
 SEEN = 1e-6
+#: What the lowest level is called, and the one with what the actuators do besides following their commands.
+RIGID, ACTUATORS = "rigid", "rigid with its actuators"
+#: Families of levels that flexible links climb through, where they have fewer coordinates than the model's own.
+LINKS = (
+    ("lumped(1)", "lumped(2)", "lumped(4)"),
+    ("modal(1)", "modal(2)", "modal(3)"),
+    ("bezier(2)", "bezier(3)", "bezier(4)"),
+    ("elements(2)", "elements(4)", "elements(8)"),
+)
+#: Levels of one kind, each with its name, the coarsest first.
+Family = list[tuple[str, Model]]
 
 
 class _Remembered(OutputErrorProblem):
@@ -51,7 +63,7 @@ class _Data:
 
 @dataclass(frozen=True)
 class _Reached:
-    """A level with its residual on validation data."""
+    """A level with its residual on validation records."""
 
     level: Level
     model: Model
@@ -71,7 +83,7 @@ def climb(
     patience: int = 2,
     tell: Callable[[str], None] | None = None,
 ) -> Climb:
-    """Identify a model at each level of detail, as far up as validation data say that detail pays.
+    """Identify a model at each level of detail, as far up as validation records tell that detail pays.
 
     The levels are: rigid with ideal actuators, rigid with what the actuators do, then the flexible links from springs
     between rigid segments over modes, Bezier curves and elements to the model's own; of each kind finer ones while the
@@ -109,7 +121,7 @@ def climb(
 
     Notes
     -----
-    A level pays if its residual on validation data is smaller than that of the best level below by `SURE` standard
+    A level pays if its residual on validation records is smaller than that of the best level below by `SURE` standard
     deviations, which count how long residuals resemble themselves (`vpm.identify.gain`), and by a share of `WORTH` of
     the mean square.
     """
@@ -225,4 +237,45 @@ def _seen(machine: Model, problem: OutputErrorProblem) -> tuple[str, ...]:
 
 def _fitted(machine: Model, problem: OutputErrorProblem, free: Sequence[str]) -> tuple[Model, Estimate]:
     found = estimate(machine, problem, free)
-    return machine.with_parameters(dict(zip(found.names, map(float, found.values), strict=True))), found
+    return found.on(machine), found
+
+
+def families(model: Model) -> list[Family]:
+    """Levels that the machine can have, by kind, the simplest first, its own last.
+
+    Effects at actuators (a lag, a delay, a dead zone) are left out of the lowest one; flexible links are rigid in it.
+    Levels of links whose model would not be a valid one are skipped.
+    """
+    content = model.to_dict()
+    beams: Mapping[str, Any] = content.get("beams", {})
+    stiff = model.at(dict.fromkeys(beams, "rigid")) if beams else model
+    ideal = stiff
+    for effect in stiff.effects:
+        if effect.at in model.actuators:
+            ideal = ideal.without_effect(*effect.key)
+    found = [[(RIGID, ideal)]]
+    if len(ideal.effects) < len(stiff.effects):
+        found.append([(ACTUATORS, stiff)])
+    if not any(size_of(beam["level"], beam) for beam in beams.values()):
+        return found
+    for family in LINKS:
+        made = [(level, each) for level in family if (each := _made(model, beams, level)) is not None]
+        found += [made] if made else []
+    return [*found, [(_own(beams), model)]]
+
+
+def _made(model: Model, beams: Mapping[str, Any], level: str) -> Model | None:
+    """Model with its links at a level, each at most as fine as its own; None where nothing changes or it is invalid."""
+    finer = {name: level for name, beam in beams.items() if 0 < size_of(level, beam) < size_of(beam["level"], beam)}
+    if not finer:
+        return None
+    try:
+        made = model.at(finer)
+        _ = made.core
+    except VpmError:
+        return None
+    return made
+
+
+def _own(beams: Mapping[str, Any]) -> str:
+    return ", ".join(dict.fromkeys(str(beam["level"]) for beam in beams.values()))

@@ -1,4 +1,4 @@
-"""What a climb found: each level with its fit and its error on validation data, and where more detail stops to pay."""
+"""What a climb found: each level with its fit and its error in validation, and where more detail stops to pay."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class Level(Storable):
     values, std : dict of str to float
         All fitted parameters, SI, with standard deviations that hold for residuals whose neighbours are alike.
     errors : dict of str to float
-        Share of each measured channel that is left on validation data.
+        Share of each measured channel that is left on validation records.
     score : float
-        By how many standard deviations it predicts the validation data better than the best level below; infinite for
+        By how many standard deviations it predicts validation records better than the best level below; infinite for
         the first.
     pays : bool
         Whether that is sure and more than a trifle.

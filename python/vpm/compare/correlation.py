@@ -8,12 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.numbers import NORMAL_95
 from vpm.results import Storable
 
 Array = NDArray[np.float64]
-
-#: Two-sided 95 % quantile of the normal distribution.
-NORMAL_95 = 1.959963984540054
 
 #: Most lags that are kept.
 MOST_LAGS = 200

@@ -7,7 +7,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from vpm.errors import MissingExtraError
+from vpm.errors import needs
 from vpm.files import replacing, write_text
 
 if TYPE_CHECKING:
@@ -39,10 +39,8 @@ def write_mcap(comparison: Comparison, path: str | PathLike[str]) -> tuple[Path,
     FileError
         A file cannot be written.
     """
-    try:
+    with needs("mcap", "mcap"):
         from mcap.writer import Writer
-    except ImportError as error:
-        raise MissingExtraError("mcap", "mcap") from error
     # MCAP counts nanoseconds from zero on.
     shift = max(0.0, *(-float(each.time[0]) for each in comparison.channels), 0.0)
     with replacing(path) as beside, beside.open("wb") as stream:

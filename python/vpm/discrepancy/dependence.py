@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.identify import InverseDynamicsProblem
-from vpm.identify.statistics import NORMAL_95, robust_covariance
+from vpm.identify.statistics import robust_covariance
+from vpm.numbers import NORMAL_95
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from vpm.experiment.cutoff import HIGHEST
 from vpm.experiment.signal import UNDISTORTED_BAND
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import bends, has_own_drives
-from vpm.identify.counted import STANDSTILL_SHARE
+from vpm.identify.sample_mask import STANDSTILL_SHARE
 from vpm.model import Model
 
 #: The motion is filtered at most so many times as high as the least error of its acceleration asks for.

@@ -18,7 +18,7 @@ from vpm.discrepancy.screening import Probe
 from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.identifiability import COPY_SHARE, explained_share
-from vpm.identify.statistics import NORMAL_95
+from vpm.numbers import NORMAL_95
 
 
 def probe_beside(final: Judged, without: Judged, data: InverseDynamicsProblem, entry: Accepted, probe: Probe) -> Probe:

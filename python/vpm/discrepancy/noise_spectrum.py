@@ -18,7 +18,7 @@ from vpm.experiment import Experiment, Motion, noise_std
 from vpm.experiment.signal import RETAINED_BAND as _BAND
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import has_own_drives, respond
-from vpm.identify.answers import Following
+from vpm.identify.following import Following
 from vpm.identify.parts import moves_drives
 from vpm.model import Model
 

@@ -8,9 +8,8 @@ a hardening spring.
 from __future__ import annotations
 
 from vpm.discrepancy.confirmation import Judged
-from vpm.identify.statistics import NORMAL_95
 from vpm.model import Model, Parameter
-from vpm.numbers import short
+from vpm.numbers import NORMAL_95, short
 
 #: Parameters that move by more of their stated uncertainties than this are reported, and no effect is accepted that
 #: drives one so far.

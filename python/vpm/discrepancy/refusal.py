@@ -11,9 +11,8 @@ from vpm.discrepancy.confirmation import Trial
 from vpm.discrepancy.screening import Probe, impossible_values
 from vpm.discrepancy.structural import coupled, moved
 from vpm.identify import Gain
-from vpm.identify.statistics import NORMAL_95
 from vpm.model import Model
-from vpm.numbers import percent, short
+from vpm.numbers import NORMAL_95, percent, short
 
 #: Probability of accepting any effect by chance, shared among all candidates that are tried.
 FALSE_ALARM_LEVEL = 0.01

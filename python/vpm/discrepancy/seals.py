@@ -20,8 +20,8 @@ from vpm.discrepancy.formula import TRANSITION_SHARES
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import has_hidden
 from vpm.identify.drives import driven, first_drives
-from vpm.identify.statistics import NORMAL_95
 from vpm.model import Model
+from vpm.numbers import NORMAL_95
 
 Array = NDArray[np.float64]
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import ExcitationError, near_match
-from vpm.identify.base_parameters import find_base
+from vpm.identify.identifiability import find_base
 from vpm.model import Model
 from vpm.results import Storable
 from vpm.simulate import check_balance

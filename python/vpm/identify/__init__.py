@@ -1,8 +1,8 @@
 """Identification: parameters, their uncertainty, and what the data cannot see."""
 
-from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.comparison import FIT_MODES, problem
 from vpm.identify.estimation import Estimate, Worth, estimate
+from vpm.identify.export import write_fit
 from vpm.identify.fit import identify
 from vpm.identify.fitted import Fit
 from vpm.identify.identifiability import Combination, unseen_combinations
@@ -12,18 +12,17 @@ from vpm.identify.inertial_model import inertial_regression
 from vpm.identify.inertial_regression import InertialRegression
 from vpm.identify.input_error import InputErrorProblem
 from vpm.identify.intervals import Bootstrap, Profile, bootstrap, profile_intervals
-from vpm.identify.oil import identify_oil
+from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.identify.oil_equations import CylinderGeometry, pressures_from_force
-from vpm.identify.oil_fit import OilFit
+from vpm.identify.oil_fit import OilFit, identify_oil
 from vpm.identify.output_error import OutputErrorProblem
 from vpm.identify.prediction_error import PredictionErrorProblem
 from vpm.identify.problem import Block, Problem, gaps, segments
+from vpm.identify.refitting import judged_on
 from vpm.identify.settings import Checks, Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.statistics import Gain, gain, robust_covariance
-from vpm.identify.unseen import judged_on
 from vpm.identify.whiteness import Whiteness, ljung_box
-from vpm.identify.written import write_fit
 
 __all__ = [
     "FIT_MODES",

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from vpm.errors import CoreError, DivergedError, SimulationError
 from vpm.experiment import Experiment, Motion
-from vpm.identify.answers import Following, Pair
 from vpm.identify.drives import first_drives, picked, shown_and_efforts
+from vpm.identify.following import Following, Pair
 from vpm.identify.parts import Bending, Drives, Part, bending, carried, drives_of, whole
 from vpm.initial import whole_motion
 from vpm.model import Model
@@ -104,7 +104,7 @@ def check_along(model: Model, joints: Sequence[str]) -> None:
 
 
 def shown_channels(model: Model, joints: Sequence[str], experiments: Sequence[Experiment]) -> tuple[str, ...]:
-    """What every log holds beside the balance of effort and this machine works out along the motion, or lacks.
+    """What every log holds beside the inverse-dynamics residual and this machine works out along the motion, or lacks.
 
     It lacks the coordinates that effects would split off: where a log holds the deflection of a link or of a joint that
     the machine takes for rigid, it says zero.

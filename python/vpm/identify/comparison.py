@@ -1,28 +1,35 @@
-"""What a fit compares: the problem of a mode, with first states, pieces and ties where they are asked for."""
+"""The residual of a fit by its mode: with first states, pieces and equality constraints where they are asked for."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
-from vpm.identify.balance import InverseDynamicsProblem
+from vpm.identify.first_states import OF_PARAMETER, difference
 from vpm.identify.input_error import InputErrorProblem
-from vpm.identify.objective import AnyProblem
+from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.identify.output_error import OutputErrorProblem
 from vpm.identify.parallel import worker_count
 from vpm.identify.prediction_error import PredictionErrorProblem
-from vpm.identify.relative import relative_to_drives
+from vpm.identify.problem import Problem, tied
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem, state_channel
-from vpm.identify.ties import TiedProblem, Untied
 from vpm.model import Model
 from vpm.simulate import MODES, Setup
+
+Array = NDArray[np.float64]
 
 #: Modes of a fit: those of a simulation, the model turned round, and the model that follows the log.
 FIT_MODES = (*MODES, "input_error", "prediction_error")
 #: Those that compare outputs of a simulation.
 OUTPUT_ERROR = tuple(mode for mode in MODES if mode != "inverse_dynamics")
+#: The problems of these modes.
+Compared = InverseDynamicsProblem | OutputErrorProblem | InputErrorProblem | PredictionErrorProblem
 
 
 def problem(
@@ -35,7 +42,7 @@ def problem(
     channels: Sequence[str] | None = None,
     workers: int = 1,
     offsets: Sequence[str] = (),
-) -> Untied:
+) -> Compared:
     """Set up the residual of ``model`` against ``experiments`` in one of the modes of a fit.
 
     ``channels`` are the compared outputs of simulated modes, ``offsets`` those of them that are off by a constant in
@@ -71,7 +78,7 @@ def comparison(
     ties: Mapping[str, str] | None = None,
     fitting: Fitting | None = None,
     free: Sequence[str] = (),
-) -> AnyProblem:
+) -> Problem:
     """Set up what a fit compares.
 
     Parameters
@@ -81,36 +88,14 @@ def comparison(
     """
     chosen = fitting or Fitting()
     workers = 1 if chosen.starts > 1 else worker_count(chosen.workers or None)  # starts take the threads instead
-    channels = chosen.channels or None
     _check_offsets(model, mode, chosen)
     if chosen.states or chosen.known_states or chosen.piece > 0.0:
-        untied: AnyProblem = ShootingProblem(
-            model,
-            records,
-            mode,
-            states=chosen.states,
-            known=chosen.known_states,
-            piece=chosen.piece,
-            continuity=chosen.continuity,
-            channels=channels,
-            setup=setup,
-            workers=workers,
-            offsets=chosen.offsets,
-        )
-    else:
-        untied = problem(
-            model,
-            records,
-            mode,
-            cutoff=cutoff,
-            setup=setup,
-            channels=channels,
-            workers=workers,
-            offsets=chosen.offsets,
-        )
-        if isinstance(untied, InverseDynamicsProblem):
-            untied = relative_to_drives(model, untied, free, ties or {})
-    return TiedProblem(untied, ties) if ties and not isinstance(untied, TiedProblem) else untied
+        return tied(ShootingProblem(model, records, mode, chosen, setup=setup, workers=workers), ties or {})
+    given = {"cutoff": cutoff, "setup": setup, "channels": chosen.channels or None, "offsets": chosen.offsets}
+    data = problem(model, records, mode, workers=workers, **given)  # type: ignore[arg-type]
+    if isinstance(data, InverseDynamicsProblem):
+        data = relative_to_drives(model, data, free, ties or {})
+    return tied(data, ties or {})
 
 
 def _check_offsets(model: Model, mode: str, fitting: Fitting) -> None:
@@ -127,3 +112,72 @@ def _check_offsets(model: Model, mode: str, fitting: Fitting) -> None:
                 f'offsets: the simulation begins at what "{channel}" reads, so that has to be right; leave it out, '
                 f'or fit or state the first state "{begun[channel]}"'
             )
+
+
+class RelativeProblem(InverseDynamicsProblem):
+    """An inverse-dynamics residual, at each joint over what the drives deliver, in parts of that before the fit.
+
+    That gets smaller with the gain of its drives: the least sum of squares belongs to a machine without forces.
+    The commands were measured, not the efforts. Their density is that of the residual times the derivative of effort by
+    command, and what maximises it makes the residual least in units of the delivered effort (J. Nocedal and S. Wright,
+    *Numerical Optimization*, 2nd ed., 10.4, for errors of what was measured; G. Seber and C. Wild, *Nonlinear
+    Regression*, 2003, 2.8, for the determinant that a change of variables brings).
+
+    Parameters
+    ----------
+    data : InverseDynamicsProblem
+    drives : sequence of str
+        Parameters that change what drives deliver.
+    """
+
+    def __init__(self, data: InverseDynamicsProblem, drives: Sequence[str]) -> None:
+        vars(self).update(vars(data))
+        self._drives = tuple(drives)
+        self._before = self._strengths(data.nominal, data.nominal.theta)
+
+    def evaluate(
+        self, model: Model, theta: Array, columns: Sequence[int] = (), origin: Array | None = None
+    ) -> tuple[Array, Array]:
+        """Residual and its derivative, relative to the delivered effort; see :class:`Problem`.
+
+        So is what is expected: where all forces are larger, that is as well.
+        """
+        residual, jacobian = super().evaluate(model, theta, columns, origin)
+        residual = residual + self.expected
+        strengths = self._strengths(model, theta)
+        slopes = {
+            place: self._slope(model, theta, column) / strengths
+            for place, column in enumerate(columns)
+            if model.parameter_names[column] in self._drives
+        }
+        for record in range(len(self.motions)):
+            for joint, block in enumerate(self.efforts(record)):
+                rows, ratio = block.samples, self._before[joint] / strengths[joint]
+                residual[rows] *= ratio
+                jacobian[rows] *= ratio
+                for place, slope in slopes.items():
+                    jacobian[rows, place] -= residual[rows] * slope[joint]
+        return residual - self.expected, jacobian
+
+    def _strengths(self, model: Model, theta: Array) -> Array:
+        """Size of what drives deliver at each joint; 1 where that is nothing, as at joints without a drive."""
+        strengths = self.strengths(model, theta)
+        return np.where(strengths > 0.0, strengths, 1.0)
+
+    def _slope(self, model: Model, theta: Array, column: int) -> Array:
+        """Derivative of the strengths by one parameter."""
+        return difference(partial(self._strengths, model), theta, column, OF_PARAMETER * (abs(theta[column]) or 1.0))
+
+
+def relative_to_drives(
+    model: Model, data: InverseDynamicsProblem, free: Sequence[str], ties: Mapping[str, str]
+) -> InverseDynamicsProblem:
+    """The residual relative to what drives deliver, if a parameter of a drive is free that nothing logged holds.
+
+    Pressures of a cylinder hold its areas and valves. A current holds no torque constant.
+    """
+    moved = {*free, *(follower for follower, leader in ties.items() if leader in free)}
+    held = {channel.partition(".pressure")[0] for channel in data.shown if ".pressure" in channel}
+    drives = [name for name in model.actuators if name not in held]
+    mine = [name for name in sorted(moved) if name.partition(".")[0] in drives]
+    return RelativeProblem(data, mine) if mine else data

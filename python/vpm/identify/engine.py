@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from vpm.errors import ExecutorError, IdentificationError
-from vpm.identify.estimation import blinded
+from vpm.identify.estimation import LEAST_SCALE, Estimate, blinded, limits, touching
 from vpm.identify.identifiability import Combination, column_lengths, unseen_combinations
-from vpm.identify.objective import AnyProblem, Objective, noise_levels
+from vpm.identify.objective import Objective, noise_levels
 from vpm.identify.parallel import worker_count
-from vpm.identify.sandwich import record_groups, sandwich
+from vpm.identify.problem import Problem
 from vpm.identify.settings import Fitting
-from vpm.identify.solver import Descent, Point, descend
+from vpm.identify.solver import Box, Descent, Point, descend
+from vpm.identify.statistics import record_groups, sandwich
 from vpm.model import Model
 from vpm.sending import Parcel
 from vpm.tasks import Done, outcomes, until_interrupted
@@ -37,33 +38,26 @@ WIDE = 1e4
 FARTHEST = float(np.log(30.0))
 
 
-@dataclass(frozen=True)
-class Found:
-    """Result of the engine, as arrays over the free parameters and the first states behind them.
+@dataclass(frozen=True, kw_only=True)
+class Found(Estimate):
+    """An estimate of the engine, with first states behind the free parameters.
 
     Rows of the residual went into the fit with their ``weights``.
     """
 
-    values: Array
-    covariance: Array
-    residual: Array
-    jacobian: Array
     weights: Array
-    unseen: tuple[Combination, ...]
     states: Array
     states_std: Array
     noise: dict[str, float]
     costs: Array
     agreeing: int
-    evaluations: int
     ended: str
 
 
 def fit_problem(
     model: Model,
-    data: AnyProblem,
+    data: Problem,
     free: Sequence[str],
-    bounds: tuple[Array, Array],
     fitting: Fitting,
     *,
     tolerance: float,
@@ -78,8 +72,6 @@ def fit_problem(
     model : Model
     data : problem
     free : sequence of str
-    bounds : tuple of ndarray
-        Least and largest value of each free parameter.
     fitting : Fitting
     tolerance : float
         Relative change of parameters or cost at which to stop.
@@ -96,15 +88,21 @@ def fit_problem(
     KeyboardInterrupt
         Ctrl-C before the first start was simulated.
     """
+    bounds = limits(model, free, fitting.bounds)
     objective = Objective(model, data, free, bounds, fitting, progress)
     # Starts are compared under weights that are the same for all; losses and noise are found from the best.
     search = Objective(model, data, free, bounds, _plain(fitting), progress) if _weighs_later(fitting) else objective
     begun = starts(model, free, search, fitting) if begin is None else [search.coordinates(begin)]
     rough = 1e2 * tolerance if _weighs_later(fitting) else tolerance
-    if executor is None or len(begun) == 1:
+    if len(begun) == 1:
+        descents = [_descent(search, begun[0], fitting, rough)]
+        interrupted = descents[0].interrupted
+    elif executor is None:
         descents, interrupted = _search(search, begun, fitting, rough)
     else:
         descents, interrupted = _search_elsewhere(search, begun, fitting, rough, executor, progress)
+    if interrupted and not descents:
+        raise KeyboardInterrupt
     best = min(descents, key=lambda d: d.point.cost)
     if not np.isfinite(best.point.cost):
         raise IdentificationError(
@@ -135,14 +133,8 @@ def _search(
 ) -> tuple[list[Descent], bool]:
     """Descents that have a point, and whether Ctrl-C ended them."""
     jobs = [partial(_descent, objective, x, fitting, tolerance) for x in begun]
-    if len(jobs) == 1:
-        only = jobs[0]()
-        return [only], only.interrupted
     found, interrupted = until_interrupted(jobs, worker_count(fitting.workers or None))
-    kept = [descent for descent in found if descent is not None]
-    if interrupted and not kept:
-        raise KeyboardInterrupt
-    return kept, interrupted
+    return [descent for descent in found if descent is not None], interrupted
 
 
 def _search_elsewhere(
@@ -171,8 +163,6 @@ def _search_elsewhere(
         if not kept or not isinstance(error, ExecutorError):
             raise error
         warnings.warn(f"{error}; the fit goes on with the other starts", RuntimeWarning, stacklevel=2)
-    if interrupted and not kept:
-        raise KeyboardInterrupt
     return kept, interrupted
 
 
@@ -187,7 +177,7 @@ def _descent(objective: Objective, x: Array, fitting: Fitting, tolerance: float)
     first = objective(np.clip(x, objective.low, objective.high))
     if not np.isfinite(first.cost):
         return Descent(first, first.cost, 1, "no machine")
-    return _onward(objective, first, fitting, tolerance)
+    return onward(objective, first, objective.low, objective.high, fitting.most_evaluations, tolerance)
 
 
 def onward(
@@ -214,21 +204,13 @@ def onward(
     """
     p = len(objective.columns)
     lengths = column_lengths(first.jacobian)
-    size = np.where(objective.log, 1.0, np.maximum(np.abs(first.x[:p]), 1e-3 * np.sqrt(first.cost) / lengths[:p]))
-    return descend(
-        evaluate or objective,
-        first,
-        low,
-        high,
-        scale=np.concatenate([size, np.ones(first.x.size - p)]),
-        reach=np.concatenate([np.where(objective.log, FARTHEST, np.inf), np.full(first.x.size - p, np.inf)]),
-        tolerance=tolerance,
-        most_evaluations=most_evaluations,
+    size = np.where(
+        objective.log, 1.0, np.maximum(np.abs(first.x[:p]), LEAST_SCALE * np.sqrt(first.cost) / lengths[:p])
     )
-
-
-def _onward(objective: Objective, first: Point, fitting: Fitting, tolerance: float) -> Descent:
-    return onward(objective, first, objective.low, objective.high, fitting.most_evaluations, tolerance)
+    scale = np.concatenate([size, np.ones(first.x.size - p)])
+    reach = np.concatenate([np.where(objective.log, FARTHEST, np.inf), np.full(first.x.size - p, np.inf)])
+    box = Box(low, high, scale, reach)
+    return descend(evaluate or objective, first, box, tolerance=tolerance, most_evaluations=most_evaluations)
 
 
 def _reweighed(objective: Objective, point: Point, fitting: Fitting, tolerance: float, ended: str) -> tuple[Point, str]:
@@ -242,7 +224,7 @@ def _reweighed(objective: Objective, point: Point, fitting: Fitting, tolerance: 
             break
         if ended == "interrupted":
             break
-        descent = _onward(objective, point, fitting, tolerance)
+        descent = onward(objective, point, objective.low, objective.high, fitting.most_evaluations, tolerance)
         point, ended = descent.point, descent.ended
     return point, ended
 
@@ -294,20 +276,24 @@ def _found(objective: Objective, point: Point, free: Sequence[str], costs: Array
     covariance = _covariance(objective, point, labels, every)
     std = np.sqrt(np.diag(covariance))
     residual, jacobian = point.raw
+    values = objective.parameters(point.x)
     return Found(
-        objective.parameters(point.x),
-        covariance[:p, :p],
+        tuple(free),
+        values,
         residual,
         jacobian[:, :p] / slopes[:p],
-        _weights(point),
+        covariance[:p, :p],
         unseen,
-        point.x[p:] * objective.sizes,
-        std[p:],
-        dict(objective.noise),
-        costs,
-        agreeing,
+        touching(free, values, *objective.box),
         objective.count,
-        ended,
+        ended == "interrupted",
+        weights=_weights(point),
+        states=point.x[p:] * objective.sizes,
+        states_std=std[p:],
+        noise=dict(objective.noise),
+        costs=costs,
+        agreeing=agreeing,
+        ended=ended,
     )
 
 
@@ -320,13 +306,12 @@ def _weights(point: Point) -> Array:
 
 def _covariance(objective: Objective, point: Point, labels: Sequence[str], unseen: Sequence[Combination]) -> Array:
     """Covariance of parameters and first states: sandwich over records, with priors as what they claim to be."""
-    lengths = column_lengths(point.jacobian)
     rows, told = len(point.residual), objective.data.blocks[-1].samples.stop
     data = rows - objective.priors
     expected = point.residual.copy()
     expected[data:] = 1.0  # a prior is off by its own standard deviation, whatever it happens to be off by
     groups = record_groups(objective.data.blocks)
-    covariance = sandwich(point.jacobian / lengths, expected, groups, range(told, rows)) / np.outer(lengths, lengths)
+    covariance = sandwich(point.jacobian, expected, groups, range(told, rows))
     slopes = objective.slopes(point.x)
     covariance *= np.outer(slopes, slopes)
     return blinded(covariance, unseen, labels)

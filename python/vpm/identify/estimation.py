@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares, lsq_linear
+from scipy.optimize import lsq_linear
 
 from vpm.identify.identifiability import RANK_TOLERANCE, Combination, column_lengths, unseen_combinations
-from vpm.identify.moments import Coordinates, real_bodies
-from vpm.identify.objective import AnyProblem
+from vpm.identify.moments import AXES, PAIRS, Coordinates, real_bodies
 from vpm.identify.problem import Problem, segments
+from vpm.identify.solver import Box, Point, descend
 from vpm.identify.statistics import robust_covariance
 from vpm.model import Model
 
@@ -26,8 +26,13 @@ MOST_EVALUATIONS = 40
 PROGRESS = 0.05
 #: The same for a fit that has shown its worth: towards a bound, steps shrink with the distance and never end.
 CREEPING = 0.002
+#: Least size of a parameter that a change is compared with, in parts of what moves the residual by as much as it is.
+LEAST_SCALE = 1e-3
 #: Share by which the sum of squares may grow along a direction that the data cannot see.
 UNCHANGED = 1e-9
+
+#: Relative difference to a bound at which an estimate rests on it, and distance to one that is zero.
+TOUCHING, NEAR_ZERO = 1e-6, 1e-12
 
 #: Called after every evaluation with (evaluations so far, root mean square of the weighted residual).
 Progress = Callable[[int, float], None]
@@ -53,10 +58,16 @@ class Estimate:
         """Standard deviation of each estimate; infinite where the data cannot see it."""
         return np.sqrt(np.diag(self.covariance))
 
+    def on(self, model: Model, ties: Mapping[str, str] | None = None) -> Model:
+        """A model at these values, and at those of what follows them by ``ties``."""
+        values = dict(zip(self.names, map(float, self.values), strict=True))
+        followers = {follower: values[leader] for follower, leader in (ties or {}).items() if leader in values}
+        return model.with_parameters({**values, **followers})
+
 
 def estimate(
     model: Model,
-    data: AnyProblem | Problem,
+    data: Problem,
     free: Sequence[str],
     *,
     bounds: Mapping[str, tuple[float, float]] | None = None,
@@ -69,8 +80,8 @@ def estimate(
 ) -> Estimate:
     """Move ``free`` parameters of ``model`` until the residual of ``data`` is least.
 
-    A first step solves the problem as if it were linear (which on the inverse-dynamics regressor it mostly is); the
-    trust-region reflective method of SciPy finishes where it is not.
+    A first step solves the problem as if it were linear (which on the inverse-dynamics regressor it mostly is);
+    `vpm.identify.solver.descend` finishes where it is not.
 
     Parameters
     ----------
@@ -115,27 +126,23 @@ def estimate(
         residual, jacobian = counter(start)
         # Derivatives may leave all bounds where the motion itself does not; the best with derivatives stands then.
         if counter.best is not None and not np.all(np.isfinite(residual)):
-            start, (residual, jacobian) = counter.best
+            start, (residual, jacobian) = counter.best.x, counter.best.raw
     except (KeyboardInterrupt, _HopelessError) as reason:
         if counter.best is None:
             raise
-        start, (residual, jacobian) = counter.best
+        start, (residual, jacobian) = counter.best.x, counter.best.raw
         interrupted = isinstance(reason, KeyboardInterrupt)
         early = not interrupted
     values, jacobian = frame.parameters(start), frame.by_parameters(jacobian)
     unseen = unseen_combinations(jacobian, free)
     covariance = _covariance(data, residual, jacobian, unseen, free)
-    touching = tuple(
-        name
-        for name, x, lo, hi in zip(free, values, *box, strict=True)
-        if np.isclose(x, lo, rtol=1e-6, atol=1e-12) or np.isclose(x, hi, rtol=1e-6, atol=1e-12)
-    )
+    at_bounds = touching(free, values, *box, near=NEAR_ZERO)
     return Estimate(
-        tuple(free), values, residual, jacobian, covariance, unseen, touching, counter.count, interrupted, early
+        tuple(free), values, residual, jacobian, covariance, unseen, at_bounds, counter.count, interrupted, early
     )
 
 
-def standing(model: Model, data: AnyProblem | Problem, free: Sequence[str]) -> Estimate:
+def standing(model: Model, data: Problem, free: Sequence[str]) -> Estimate:
     """What is said of ``free`` parameters where they stand: residual, derivatives and uncertainty, nothing moved."""
     columns = [model.index(name) for name in free]
     residual, jacobian = data.evaluate(model, model.theta, columns)
@@ -176,15 +183,6 @@ class _HopelessError(Exception):
     """A fit has not reached what makes it worth its time."""
 
 
-@dataclass(frozen=True)
-class _Point:
-    """Values of the free parameters, and the residual there with its derivative, if that was asked for."""
-
-    x: Array
-    residual: Array
-    slopes: Array | None
-
-
 class _Counter:
     """Evaluates the problem at given values of the free parameters; remembers the last points and the best.
 
@@ -194,7 +192,7 @@ class _Counter:
     def __init__(
         self,
         model: Model,
-        data: AnyProblem | Problem,
+        data: Problem,
         columns: list[int],
         progress: Progress | None,
         worth: Worth | None = None,
@@ -204,22 +202,21 @@ class _Counter:
         self.model, self.data, self.columns, self.progress, self.worth = model, data, columns, progress, worth
         self.theta = model.theta.copy()
         self.count = 0
-        self._tried: _Point | None = None
-        self._whole: _Point | None = None
-        self.best: tuple[Array, tuple[Array, Array]] | None = None
-        self._least = np.inf
+        self._tried: Point | None = None
+        self._whole: Point | None = None
+        self.best: Point | None = None
         self._reached: list[float] = []
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
         known = self._whole
-        if known is not None and known.slopes is not None and np.array_equal(x, known.x):
-            return known.residual, known.slopes
+        if known is not None and np.array_equal(x, known.x):
+            return known.raw
         residual, slopes = self._evaluate(x, self.columns)
         if self._tried is None or not np.array_equal(x, self._tried.x):
             self._count(residual)
-        self._whole = _Point(x.copy(), residual, slopes)
-        if (cost := float(residual @ residual)) < self._least:
-            self._least, self.best = cost, (self._whole.x, (residual, slopes))
+        self._whole = _point(x.copy(), residual, slopes)
+        if self._whole.cost < (self.best.cost if self.best else np.inf):
+            self.best = self._whole
         return residual, slopes
 
     def residual(self, x: Array) -> Array:
@@ -228,11 +225,8 @@ class _Counter:
                 return known.residual
         residual, _ = self._evaluate(x, [])
         self._count(residual)
-        self._tried = _Point(x.copy(), residual, None)
+        self._tried = _point(x.copy(), residual, np.zeros((0, x.size)))
         return residual
-
-    def jacobian(self, x: Array) -> Array:
-        return self(x)[1]
 
     def _count(self, residual: Array) -> None:
         self.count += 1
@@ -312,31 +306,31 @@ def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance:
     # Nothing left to gain along any free direction: the problem was linear and the first step ended it.
     if np.all(np.abs(gradient[interior]) <= 1e-9 * np.sqrt(residual @ residual)):
         return start
-    inside = _strictly_inside(start, low, high)
-    if not np.all(
-        np.isfinite(counter.residual(inside))
-    ):  # a bound that the simulation does not bear, such as no friction
-        return start
-    result = least_squares(
-        counter.residual,
-        inside,
-        jac=counter.jacobian,
-        bounds=(low, high),
-        method="trf",
-        x_scale=1.0 / lengths,
-        max_nfev=most,
-        xtol=tolerance,
-        ftol=tolerance,
-        gtol=1e-12,
-    )
-    solution: Array = result.x
-    return solution if np.sum(counter.residual(solution) ** 2) <= np.sum(residual**2) else start
+
+    def tried(x: Array) -> Point:
+        return _point(x, counter.residual(x), np.zeros((0, x.size)))
+
+    def differentiated(point: Point) -> Point:
+        residual, slopes = counter(point.x)
+        return _point(point.x, residual if np.all(np.isfinite(slopes)) else np.full_like(residual, np.inf), slopes)
+
+    first = _point(start, residual, jacobian)
+    scale = np.maximum(np.abs(start), LEAST_SCALE * np.sqrt(first.cost) / lengths)
+    box = Box(low, high, scale)
+    found = descend(tried, first, box, tolerance=tolerance, most_evaluations=most, differentiate=differentiated)
+    if found.interrupted:
+        raise KeyboardInterrupt
+    return found.point.x
 
 
-def _strictly_inside(x: Array, low: Array, high: Array) -> Array:
-    """SciPy asks for a start that does not touch the bounds."""
-    width = np.where(np.isfinite(high - low), high - low, np.maximum(1.0, np.abs(x)))
-    return np.clip(x, np.where(np.isfinite(low), low + 1e-9 * width, low), high - 1e-9 * np.minimum(width, 1e300))
+def _point(x: Array, residual: Array, slopes: Array) -> Point:
+    return Point(x, float(residual @ residual), residual, slopes, (residual, slopes))
+
+
+def touching(names: Sequence[str], values: Array, low: Array, high: Array, near: float = 1e-300) -> tuple[str, ...]:
+    """Names of estimates that rest on a bound, or are as ``near`` to one that is zero."""
+    at = np.isclose(values, low, rtol=TOUCHING, atol=near) | np.isclose(values, high, rtol=TOUCHING, atol=near)
+    return tuple(name for name, rests in zip(names, at, strict=True) if rests)
 
 
 def limits(model: Model, free: Sequence[str], replaced: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
@@ -352,9 +346,9 @@ def _range(model: Model, name: str, free: Sequence[str]) -> tuple[float, float]:
     """
     parameter = model.parameters[name]
     body, _, axis = name.rpartition(".inertia.")
-    names = [f"{body}.inertia.{other}" for other in ("xx", "yy", "zz") if other != axis]
-    products = [f"{body}.inertia.{pair}" for pair in ("xy", "xz", "yz")]
-    alone = axis in {"xx", "yy", "zz"} and not any(n in free for n in (*names, *products))
+    names = [f"{body}.inertia.{other}" for other in AXES if other != axis]
+    products = [f"{body}.inertia.{pair}" for pair in PAIRS]
+    alone = axis in AXES and not any(n in free for n in (*names, *products))
     if not alone or any(model.parameters[n].value for n in products):
         return parameter.minimum, parameter.maximum
     first, second = (model.parameters[n].value for n in names)
@@ -364,7 +358,7 @@ def _range(model: Model, name: str, free: Sequence[str]) -> tuple[float, float]:
 
 
 def _covariance(
-    data: AnyProblem | Problem, residual: Array, jacobian: Array, unseen: tuple[Combination, ...], free: Sequence[str]
+    data: Problem, residual: Array, jacobian: Array, unseen: tuple[Combination, ...], free: Sequence[str]
 ) -> Array:
     """Robust covariance; infinite variance for every parameter that takes part in an unseen combination."""
     lengths = column_lengths(jacobian)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,16 +12,19 @@ from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
+from vpm.identify.closed_loop_prediction import Own
 from vpm.identify.comparison import comparison
+from vpm.identify.diagnostics import constant_channels, contradictions, lost_channels, remarks, resting
 from vpm.identify.engine import Found, fit_problem
 from vpm.identify.estimation import Estimate, Progress, blinded, estimate, limits
 from vpm.identify.fitted import Fit, fit_of
 from vpm.identify.identifiability import column_lengths
 from vpm.identify.missing import missing_effects, whiteness
 from vpm.identify.moments import on_the_border
-from vpm.identify.objective import AnyProblem
-from vpm.identify.offsets import offset_blocks, taken_by_offsets, with_offsets
-from vpm.identify.onward import (
+from vpm.identify.output_error import offset_blocks, taken_by_offsets, with_offsets
+from vpm.identify.prediction_error import PredictionErrorProblem
+from vpm.identify.problem import Problem, check_ties, untied
+from vpm.identify.refitting import (
     UNSETTLED,
     beside_first_states,
     beside_own,
@@ -31,13 +34,9 @@ from vpm.identify.onward import (
     with_first_states,
     with_noise,
 )
-from vpm.identify.own_simulation import Own
-from vpm.identify.prediction_error import PredictionErrorProblem
-from vpm.identify.remarks import constant_channels, contradictions, lost_channels, remarks, resting, touching
-from vpm.identify.sandwich import freedom, record_groups, sandwich
 from vpm.identify.settings import Checks, Fitting
 from vpm.identify.shooting import ShootingProblem
-from vpm.identify.ties import check_ties, untied
+from vpm.identify.statistics import freedom, record_groups, sandwich
 from vpm.model import Model
 from vpm.one_thread import in_one_thread
 from vpm.simulate import Setup
@@ -48,6 +47,8 @@ Array = NDArray[np.float64]
 FOLLOWING = frozenset({"inverse_dynamics", "prescribed_motion", "input_error"})
 #: Times that an observer gets gains of the values that it led to, and the move (in deviations) after which it need not.
 RENEWALS, SETTLED = 4, 0.1
+#: A first estimate, and what gives another one of other data from a model at an estimate.
+_Ways = tuple[Estimate, Callable[[Model, Problem, Estimate], Estimate]]
 
 
 @in_one_thread
@@ -127,8 +128,8 @@ def identify(
     data, found, own = beside_own(model, data, found, again, ties)
     fit = _dressed(model, data, found, before, [e.name for e in records], ties)
     fit = replace(fit, setup=setup, fitting=fitting, ties=ties)
-    if isinstance(found, _Engineered):
-        fit = with_offsets(fit, data, found.found.weights)
+    if isinstance(found, Found):
+        fit = with_offsets(fit, data, found.weights)
     fit = _judged(fit, data, found, records, checks, settled, own)
     return replace(fit, warnings=_told(model, records, data, fit, checks))
 
@@ -146,31 +147,18 @@ def _names(model: Model, free: Sequence[str] | None) -> tuple[str, ...]:
     return names
 
 
-#: A first estimate, and what gives another one of other data from a model at an estimate.
-_Ways = tuple[Estimate, Callable[[Model, AnyProblem, Estimate], Estimate]]
-
-
-def _plainly(
-    model: Model, data: AnyProblem, names: tuple[str, ...], tolerance: float, progress: Progress | None
-) -> _Ways:
+def _plainly(model: Model, data: Problem, names: tuple[str, ...], tolerance: float, progress: Progress | None) -> _Ways:
     """Least squares from the model's own values."""
 
-    def again(fitted: Model, less: AnyProblem, _: Estimate) -> Estimate:
+    def again(fitted: Model, less: Problem, _: Estimate) -> Estimate:
         return estimate(fitted, less, names, tolerance=tolerance, feasible=True)
 
     return estimate(model, data, names, tolerance=tolerance, progress=progress, feasible=True), again
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Engineered(Estimate):
-    """An estimate of the engine, with all that this found."""
-
-    found: Found
-
-
 def _by_engine(
     model: Model,
-    data: AnyProblem,
+    data: Problem,
     names: tuple[str, ...],
     fitting: Fitting,
     tolerance: float,
@@ -179,47 +167,37 @@ def _by_engine(
 ) -> _Ways:
     """A fit by the engine from all its starts; later ones begin where the last one ended."""
     check_bounds(names, fitting)
-    box = limits(model, names, fitting.bounds)
-    engine = partial(fit_problem, model, free=names, bounds=box, fitting=fitting, tolerance=tolerance)
+    engine = partial(fit_problem, model, free=names, fitting=fitting, tolerance=tolerance)
 
-    def made(found: Found) -> Estimate:
-        interrupted, at = found.ended == "interrupted", touching(names, found.values, *box)
-        what = (found.residual, found.jacobian, found.covariance, found.unseen, at, found.evaluations, interrupted)
-        return _Engineered(names, found.values, *what, found=found)
-
-    def again(_: Model, less: AnyProblem, near: Estimate) -> Estimate:
+    def again(_: Model, less: Problem, near: Estimate) -> Estimate:
         found = engine(less, begin=near.values)
         found = replace(found, evaluations=near.evaluations + found.evaluations)
         # What the starts reached, the first fit knows.
-        if isinstance(near, _Engineered):
-            found = replace(found, costs=near.found.costs, agreeing=near.found.agreeing)
-        return made(found)
+        return replace(found, costs=near.costs, agreeing=near.agreeing) if isinstance(near, Found) else found
 
-    return made(engine(data, progress=progress, executor=executor)), again
+    return engine(data, progress=progress, executor=executor), again
 
 
 def _dressed(
-    model: Model, data: AnyProblem, found: Estimate, before: Array, records: Sequence[str], ties: Mapping[str, str]
+    model: Model, data: Problem, found: Estimate, before: Array, records: Sequence[str], ties: Mapping[str, str]
 ) -> Fit:
     """An estimate as a result, with the covariance of a final one."""
-    engineered = isinstance(found, _Engineered)
-    result = found if engineered else _with_intervals(data, found)
+    result = found if isinstance(found, Found) else _with_intervals(data, found)
     fit = fit_of(model, data, replace(result, residual=result.residual + expected(data)), before, records, ties)
-    if isinstance(found, _Engineered):
-        return _with_details(fit, data, found.found)
+    if isinstance(found, Found):
+        return _with_details(fit, data, found)
     return replace(fit, evaluations=found.evaluations, ended="interrupted" if found.interrupted else "")
 
 
-def _with_intervals(data: AnyProblem, found: Estimate) -> Estimate:
+def _with_intervals(data: Problem, found: Estimate) -> Estimate:
     """The same with the covariance of a final estimate, which takes longer than that of a search."""
-    lengths = column_lengths(found.jacobian)
-    covariance = sandwich(found.jacobian / lengths, found.residual, record_groups(data.blocks))
-    return replace(found, covariance=blinded(covariance / np.outer(lengths, lengths), found.unseen, found.names))
+    covariance = sandwich(found.jacobian, found.residual, record_groups(data.blocks))
+    return replace(found, covariance=blinded(covariance, found.unseen, found.names))
 
 
 def _judged(
     fit: Fit,
-    data: AnyProblem,
+    data: Problem,
     found: Estimate,
     records: Sequence[Experiment],
     checks: Checks,
@@ -240,11 +218,11 @@ def _judged(
     # What is known beforehand no noise of records moves.
     if own is None or not own.alike or (fit.fitting and fit.fitting.priors):
         return fit
-    weights = found.found.weights if isinstance(found, _Engineered) else np.ones(len(found.residual))
+    weights = found.weights if isinstance(found, Found) else np.ones(len(found.residual))
     return with_noise(fit, data, slopes / lengths, lengths, own.noise, weights[: len(slopes)])
 
 
-def _with_own_gains(model: Model, data: AnyProblem, names: tuple[str, ...], tolerance: float) -> AnyProblem:
+def _with_own_gains(model: Model, data: Problem, names: tuple[str, ...], tolerance: float) -> Problem:
     """An observer with the gains and the noise of the values that it leads to; other problems as they are."""
     if not isinstance(data, PredictionErrorProblem):
         return data
@@ -253,7 +231,7 @@ def _with_own_gains(model: Model, data: AnyProblem, names: tuple[str, ...], tole
     for _ in range(RENEWALS):
         found = estimate(fitted, data, names, tolerance=tolerance)
         moved = np.abs(found.values - fitted.theta[columns])
-        fitted = fitted.with_parameters(dict(zip(names, map(float, found.values), strict=True)))
+        fitted = found.on(fitted)
         data = data.renewed(fitted)
         if np.all(moved[np.isfinite(found.std)] <= SETTLED * found.std[np.isfinite(found.std)]):
             break
@@ -275,7 +253,7 @@ def check_bounds(free: Sequence[str], fitting: Fitting) -> None:
             raise IdentificationError(f'bounds of "{name}" are {low:g} and {high:g}; give the lower one first')
 
 
-def _with_details(fit: Fit, data: AnyProblem, found: Found) -> Fit:
+def _with_details(fit: Fit, data: Problem, found: Found) -> Fit:
     shooting = untied(data)
     labels = shooting.labels if isinstance(shooting, ShootingProblem) else ()
     return replace(
@@ -290,7 +268,7 @@ def _with_details(fit: Fit, data: AnyProblem, found: Found) -> Fit:
     )
 
 
-def _told(model: Model, records: Sequence[Experiment], data: AnyProblem, fit: Fit, checks: Checks) -> tuple[str, ...]:
+def _told(model: Model, records: Sequence[Experiment], data: Problem, fit: Fit, checks: Checks) -> tuple[str, ...]:
     replaced = (fit.fitting or Fitting()).bounds
     box = dict(zip(fit.names, zip(*limits(model, fit.names, replaced), strict=True), strict=True))
     border = on_the_border(fit.model, fit.names)
@@ -298,21 +276,11 @@ def _told(model: Model, records: Sequence[Experiment], data: AnyProblem, fit: Fi
     told = missing_effects(fit.whiteness, checks)
     if fit.fitting is None or not fit.fitting.log or fit.fitting.priors:  # logarithms are for starts wrong by decades
         told += contradictions(model, fit, checks)
-    told += remarks(
-        fit.names,
-        fit.start,
-        fit.values,
-        fit.std,
-        fit.correlation,
-        fit.unidentifiable,
-        held,
-        data.blocks,
-        len(fit.states) + len(offset_blocks(data)),
-        taken_by_offsets(fit, data),
-    )
+    others = len(fit.states) + len(offset_blocks(data))
+    told += remarks(fit, held, data.blocks, others, taken_by_offsets(fit, data))
     told += [sentence for _, sentence in border]
     told += constant_channels(model, records, data.blocks)
-    told += lost_channels(fit.mode, fit.names, fit.after)
+    told += lost_channels(fit)
     if fit.first_states == UNSETTLED:
         told.insert(
             0,

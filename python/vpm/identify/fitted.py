@@ -13,8 +13,7 @@ from scipy.special import ndtri, stdtrit
 from vpm.errors import IdentificationError
 from vpm.identify.estimation import Estimate
 from vpm.identify.identifiability import Combination
-from vpm.identify.objective import AnyProblem
-from vpm.identify.problem import gaps
+from vpm.identify.problem import Problem, gaps
 from vpm.identify.settings import Fitting
 from vpm.identify.whiteness import Whiteness
 from vpm.model import Model
@@ -72,15 +71,15 @@ class Fit(Result):
     ended : str
         ``"converged"``, ``"evaluations"`` or ``"interrupted"``; empty for a fit without `Fitting`.
     first_states : str
-        ``"unknown"`` where nobody measured them, as those of joints without an encoder in a balance of effort, or where
-        those that the log suggests contradict the rest of it: the fit leaves them open. ``"unsettled"`` where it did
-        not find them. Empty where they hold or are fitted.
+        ``"unknown"`` where nobody measured them, as those of joints without an encoder in an inverse-dynamics residual,
+        or where those that the log suggests contradict the rest of it: the fit leaves them open. ``"unsettled"`` where
+        it did not find them. Empty where they hold or are fitted.
     departures : ndarray, shape (records, states)
         By how much unknown first states are likeliest to differ from those that the log suggests; in a balance of
         effort those of coordinates, then rates, from a rest. Empty where none are unknown.
     expected : ndarray, shape (n,)
-        What a balance of effort leaves of the model's own simulation, which was taken off. Empty where no simulation
-        stays by the records: intervals then know nothing of what filters do where friction turns round.
+        The inverse-dynamics residual of the model's own simulation, which was taken off. Empty where no
+        simulation stays by the records: intervals then know nothing of what filters do where friction turns round.
     setup, fitting, ties
         How it was done, for `profile_intervals` and `bootstrap`.
     """
@@ -163,7 +162,7 @@ class Fit(Result):
 
 def fit_of(
     model: Model,
-    data: AnyProblem,
+    data: Problem,
     result: Estimate,
     before: Array,
     experiments: Sequence[str],

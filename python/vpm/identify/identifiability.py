@@ -1,8 +1,10 @@
-"""Which combinations of parameters the data cannot see.
+"""Which combinations of parameters the data cannot see, and base parameters, which they can.
 
 With the regressor's columns scaled to equal length, a small singular value is a direction in parameter space along
-which the prediction hardly changes (G. Golub and C. Van Loan, *Matrix Computations*, 4th ed., 5.5; M. Gautier,
-*J. Robotic Systems* 8, 1991 for its use on robots).
+which the prediction hardly changes (G. Golub and C. Van Loan, *Matrix Computations*, 4th ed., 5.5). A column that is a
+sum of others adds nothing to a prediction, so that its parameter is seen only in sums with theirs (M. Gautier,
+"Numerical calculation of the base inertial parameters of robots", *J. Robotic Systems* 8, 1991; W. Khalil and E.
+Dombre, *Modeling, Identification and Control of Robots*, 2002, appendix 5).
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import qr, solve_triangular
 
 from vpm.results import Storable
 
@@ -24,6 +27,12 @@ ALIAS_SHARE = 0.98
 ALIAS_REST = 0.1
 #: ... or if they explain this share of it.
 COPY_SHARE = 0.9999
+#: Weight below which a dependent parameter is no part of a combination, on columns of equal length.
+SMALLEST_WEIGHT = 1e-6
+#: Length of a column, relative to the longest, that is nothing but rounding of terms that cancel.
+NOTHING = 1e-13
+#: Share of a column that those before it must leave, so that it is kept by preference.
+LEAST_REST = 1e-4
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -132,3 +141,107 @@ def _combination(direction: Array, lengths: Array, names: Sequence[str], value: 
     weights = direction / lengths
     first = weights[order[0]]
     return Combination(tuple(names[i] for i in order), tuple(float(weights[i] / first) for i in order), value)
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """Independent columns of a regressor.
+
+    Attributes
+    ----------
+    kept, dropped, unseen : tuple of int
+        Columns that are independent, that hang on those, and that are zero.
+    weights : ndarray, shape (kept, dropped)
+        In parameter units: what is seen in place of parameter i is ``p_i + sum_j weights_ij p_j``.
+    singular_values : ndarray, shape (columns - unseen,)
+        Of the columns scaled to equal length, relative to the largest.
+    """
+
+    kept: tuple[int, ...]
+    dropped: tuple[int, ...]
+    unseen: tuple[int, ...]
+    weights: Array
+    singular_values: Array
+
+    @property
+    def rank(self) -> int:
+        """Number of independent columns."""
+        return len(self.kept)
+
+    @property
+    def condition(self) -> float:
+        """Condition number of the independent directions, columns of equal length."""
+        return float(1.0 / self.singular_values[self.rank - 1])
+
+    @property
+    def map(self) -> Array:
+        """Matrix (rank, parameters) from parameters to base parameters."""
+        matrix = np.zeros((self.rank, self.rank + len(self.dropped) + len(self.unseen)))
+        matrix[np.arange(self.rank), list(self.kept)] = 1.0
+        matrix[:, list(self.dropped)] = self.weights
+        return matrix
+
+    def words(self, names: Sequence[str]) -> tuple[str, ...]:
+        """What each kept column stands for: ``m1 +0.31 m2``."""
+        sentences = []
+        for row, place in enumerate(self.kept):
+            terms = [
+                f"{weight:+.4g} {names[other]}"
+                for weight, other in zip(self.weights[row], self.dropped, strict=True)
+                if weight != 0.0
+            ]
+            sentences.append(" ".join([names[place], *terms]))
+        return tuple(sentences)
+
+
+def find_base(columns: Array, *, tolerance: float = RANK_TOLERANCE, prefer: Sequence[int] = ()) -> Base:
+    """Rank of a regressor by its singular values, and independent columns by QR factorisation.
+
+    Parameters
+    ----------
+    columns : ndarray, shape (n, p)
+    tolerance : float
+        Relative singular value, with columns of equal length, below which a direction counts as none.
+    prefer : sequence of int
+        Columns to be kept where there is a choice, the first of them first; without it those that are least like
+        each other (QR with column pivoting: G. Golub and C. Van Loan, *Matrix Computations*, 4th ed., 5.4).
+    """
+    lengths = column_lengths(columns)
+    norms = np.linalg.norm(columns, axis=0)
+    seen = np.flatnonzero(norms > NOTHING * norms.max(initial=0.0))
+    unseen = tuple(sorted(set(range(columns.shape[1])) - set(seen.tolist())))
+    if not seen.size:
+        return Base((), (), unseen, np.zeros((0, 0)), np.zeros(0))
+    triangle = np.asarray(np.linalg.qr(columns[:, seen] / lengths[seen], mode="r"))
+    singular = np.linalg.svd(triangle, compute_uv=False)
+    rank = int(np.sum(singular > tolerance * singular[0]))
+    order = _preferred(triangle, [int(np.flatnonzero(seen == k)[0]) for k in prefer if k in seen], rank)
+    upper = np.asarray(np.linalg.qr(triangle[:, order], mode="r"))
+    weights = solve_triangular(upper[:rank, :rank], upper[:rank, rank:])
+    weights[np.abs(weights) <= SMALLEST_WEIGHT] = 0.0
+    places = seen[order]
+    weights *= lengths[places[rank:]] / lengths[places[:rank], None]
+    kept, dropped = np.argsort(places[:rank]), np.argsort(places[rank:])
+    return Base(
+        tuple(places[:rank][kept].tolist()),
+        tuple(places[rank:][dropped].tolist()),
+        unseen,
+        weights[np.ix_(kept, dropped)],
+        singular / singular[0],
+    )
+
+
+def _preferred(triangle: Array, prefer: Sequence[int], rank: int) -> list[int]:
+    """Order of the columns, independent ones first: the preferred ones as far as they are, then by pivoting."""
+    chosen: list[int] = []
+    span = np.zeros((len(triangle), 0))
+    for column in prefer:
+        rest = triangle[:, column] - span @ (span.T @ triangle[:, column])
+        rest -= span @ (span.T @ rest)
+        if np.linalg.norm(rest) > LEAST_REST and len(chosen) < rank:
+            span = np.column_stack([span, rest / np.linalg.norm(rest)])
+            chosen.append(column)
+    others = [k for k in range(triangle.shape[1]) if k not in chosen]
+    rest = triangle[:, others] - span @ (span.T @ triangle[:, others])
+    pivots: Sequence[int] = qr(rest, mode="r", pivoting=True)[1].tolist() if others else []
+    return [*chosen, *(others[k] for k in pivots)]

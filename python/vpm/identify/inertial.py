@@ -15,14 +15,21 @@ from scipy.special import stdtrit
 
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment
-from vpm.identify.base_parameters import Base, find_base
 from vpm.identify.feasibility import faults
-from vpm.identify.identifiability import unseen_combinations
+from vpm.identify.identifiability import Base, find_base, unseen_combinations
 from vpm.identify.inertial_fit import KNOWN, TOGETHER, UNSEEN, VAGUE, InertialFit
 from vpm.identify.inertial_model import inertial_regression
-from vpm.identify.inertial_noise import channel_noise, effective_samples
 from vpm.identify.inertial_regression import InertialRegression
-from vpm.identify.inertial_solve import Solution, least_squares, solve_free, solve_physical, solve_pulled, weighted
+from vpm.identify.inertial_solve import (
+    Solution,
+    channel_noise,
+    effective_samples,
+    least_squares,
+    solve_free,
+    solve_physical,
+    solve_pulled,
+    weighted,
+)
 from vpm.model import Model
 
 Array = NDArray[np.float64]

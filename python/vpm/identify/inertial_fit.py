@@ -16,10 +16,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from vpm.experiment import Experiment
+    from vpm.identify.problem import Gaps
     from vpm.model import Model
 
 Array = NDArray[np.float64]
-Gaps = dict[str, tuple[float, float, str]]
 
 #: What data can say about a parameter.
 KNOWN, VAGUE, TOGETHER, UNSEEN = "yes", "too uncertain", "only in combination", "no"
@@ -160,7 +160,7 @@ class InertialFit(Result):
             As for `repaired`.
         """
         from vpm.experiment import as_records
-        from vpm.identify.balance import InverseDynamicsProblem
+        from vpm.identify.inverse_dynamics import InverseDynamicsProblem
         from vpm.identify.problem import gaps
 
         data = InverseDynamicsProblem(model, as_records(experiments), cutoff=cutoff)

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError, near_match
-from vpm.experiment import Experiment
-from vpm.identify.balance import InverseDynamicsProblem
+from vpm.experiment import Experiment, as_records
 from vpm.identify.feasibility import fault
 from vpm.identify.inertial_regression import InertialRegression
+from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.model.standard import OF_FILE, PLAIN, STANDARD, UNITS, of_file
 
@@ -159,7 +159,7 @@ def inertial_regression(
     SimulationError
         The model has elastic coordinates or actuators that are not ideal.
     """
-    given = [records] if isinstance(records, Experiment) else list(records)
+    given = as_records(records)
     if not given:
         raise IdentificationError("no record was given; pass at least one")
     sought = [p.name for p in model.parameters.values() if p.adjustable and not _of_body(model, p.name)]

@@ -12,17 +12,17 @@ from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, as_records
-from vpm.identify.balance import InverseDynamicsProblem
-from vpm.identify.beginning import BegunAnywhere, first_state_derivative
 from vpm.identify.engine import onward
 from vpm.identify.estimation import limits
+from vpm.identify.first_states import BegunAnywhere, first_state_derivative
+from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.identify.objective import Objective
 from vpm.identify.parallel import in_order, worker_count
-from vpm.identify.problem import Block
+from vpm.identify.problem import Block, tied, untied
 from vpm.identify.settings import Fitting
 from vpm.identify.solver import Point
-from vpm.identify.statistics import NORMAL_95, correlation_length
-from vpm.identify.ties import tied, untied
+from vpm.identify.statistics import correlation_length
+from vpm.numbers import NORMAL_95
 from vpm.results import Result
 
 if TYPE_CHECKING:
@@ -311,7 +311,7 @@ def _again(fit: Fit, experiments: Experiment | Sequence[Experiment], cutoff: flo
         plain = plain.beside(first_state_derivative(fit.model, plain))
         data = tied(plain, fit.ties)
     if fit.expected.size and isinstance(plain, InverseDynamicsProblem):
-        plain.expected = fit.expected
+        data = tied(plain.less(fit.expected), fit.ties)
     objective = Objective(begun, data, fit.names, limits(begun, fit.names, fitting.bounds), fitting)
     objective.noise = dict(fit.noise)
     states = np.array(list(fit.states.values())) / objective.sizes if fit.states else None

@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 from vpm.catalogue import effects_for_site
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
-from vpm.identify.balance import InverseDynamicsProblem
-from vpm.identify.objective import AnyProblem
-from vpm.identify.problem import FEWEST_SAMPLES, Block
+from vpm.identify.inverse_dynamics import InverseDynamicsProblem
+from vpm.identify.problem import FEWEST_SAMPLES, Block, Problem, untied
 from vpm.identify.settings import Checks
-from vpm.identify.ties import untied
 from vpm.identify.whiteness import (
     SHARPNESS,
     Whiteness,
@@ -50,7 +48,7 @@ Groups = Callable[[Sequence[str], Block], list[_Law]]
 
 
 def whiteness(
-    model: Model, records: Sequence[Experiment], data: AnyProblem, residual: Array, jacobian: Array, checks: Checks
+    model: Model, records: Sequence[Experiment], data: Problem, residual: Array, jacobian: Array, checks: Checks
 ) -> tuple[Whiteness, ...]:
     """Judge what is left of each channel of each record.
 
@@ -67,7 +65,7 @@ def whiteness(
     plain = untied(data)
     unseen = _of_unseen(model, plain) if isinstance(plain, InverseDynamicsProblem) else []
     groups = {
-        record.name: _of_balance(model, plain, number, checks, unseen)
+        record.name: _of_motion(model, plain, number, checks, unseen)
         if isinstance(plain, InverseDynamicsProblem)
         else _of_log(model, record, checks)
         for number, record in enumerate(records)
@@ -116,7 +114,7 @@ def _joints(model: Model, channel: str) -> tuple[str, ...]:
     return tuple(model.joints)
 
 
-def _of_balance(
+def _of_motion(
     model: Model, problem: InverseDynamicsProblem, record: int, checks: Checks, unseen: Sequence[Array]
 ) -> Groups:
     """Laws of the motion of joints, of the effort that it needs and of that which drives deliver, as they are compared.
@@ -185,13 +183,7 @@ def _laws(motion: Sequence[Array], efforts: Sequence[Array], checks: Checks) -> 
 
 
 def missing_effects(judged: Sequence[Whiteness], checks: Checks) -> list[str]:
-    """Sentences about channels whose residual repeats with the motion.
-
-    Parameters
-    ----------
-    judged : sequence of Whiteness
-    checks : Checks
-    """
+    """Sentences about channels whose residual repeats with the motion."""
     level = checks.level / max(1, len(judged))
     return [
         f"the residual of {one.channel} in {one.experiment} repeats with the motion, which explains "

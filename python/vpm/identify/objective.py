@@ -8,15 +8,13 @@ from threading import Lock
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.identify.problem import Block
+from vpm.identify.problem import Block, Problem, untied
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.solver import Point
-from vpm.identify.ties import TiedProblem, Untied, untied
 from vpm.model import Model
 
 Array = NDArray[np.float64]
-AnyProblem = Untied | TiedProblem
 
 #: Median of absolute values of a normal variable, in standard deviations.
 NORMAL_MEDIAN = 0.6744897501960817
@@ -45,7 +43,7 @@ class Objective:
     def __init__(
         self,
         model: Model,
-        data: AnyProblem,
+        data: Problem,
         free: Sequence[str],
         bounds: tuple[Array, Array],
         fitting: Fitting,
@@ -55,7 +53,8 @@ class Objective:
         self.columns = [model.index(name) for name in free]
         self._progress, self._lock = progress, Lock()
         self.count = 0
-        values, (low, high) = model.theta[self.columns], bounds
+        self.box = low, high = bounds
+        values = model.theta[self.columns]
         self.log = (values > 0.0) & (low >= 0.0) & fitting.log
         shooting = untied(data)
         self.shooting = shooting if isinstance(shooting, ShootingProblem) else None

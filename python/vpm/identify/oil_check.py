@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -10,7 +11,10 @@ from numpy.typing import ArrayLike, NDArray
 from vpm.errors import IdentificationError, near_match
 from vpm.identify.oil_equations import CylinderGeometry
 from vpm.identify.oil_solve import Rows, unexplained
-from vpm.identify.statistics import NORMAL_95
+from vpm.numbers import NORMAL_95
+
+if TYPE_CHECKING:
+    from vpm.identify.oil_fit import OilFit
 
 Array = NDArray[np.float64]
 
@@ -166,21 +170,10 @@ def _check_units(record: Channels, geometry: CylinderGeometry) -> None:
             )
 
 
-def check_answer(
-    names: Sequence[str],
-    values: Array,
-    covariance: Array,
-    residual: Array,
-    share: float,
-    rows: Rows,
-    rate: float,
-    *,
-    ruled: bool,
-    strict: bool,
-) -> tuple[str, ...]:
+def check_answer(fit: OilFit, rows: Rows, rate: float, *, ruled: bool, strict: bool) -> tuple[str, ...]:
     """Sentences about an answer that is not to be trusted; the first one as an error if `strict`."""
-    found = []
-    reach = NORMAL_95 * np.sqrt(np.diag(covariance))
+    found, names, values, share = [], fit.names, fit.values, fit.noise_share
+    reach = NORMAL_95 * fit.std
     why = _reason(share, rate, ruled=ruled, integral=rows.constants.shape[1] > 0)
     if np.linalg.matrix_rank(_gram(rows), tol=1e-10) < len(names):
         found.append(
@@ -204,7 +197,7 @@ def check_answer(
         raise IdentificationError(found[0], parameters=("bulk_modulus", "flow_gain"))
     if share > NOISY and rows.instruments is rows.regressors:
         found.append(f"plain least squares loses about {100.0 * share:.0f} % of 1/beta: {why}")
-    return (*found, *_left_over(rows, values, residual))
+    return (*found, *_left_over(rows, values, fit.residual))
 
 
 def _left_over(rows: Rows, values: Array, residual: Array) -> tuple[str, ...]:

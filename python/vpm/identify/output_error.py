@@ -1,24 +1,32 @@
-"""The residual of simulated outputs."""
+"""The residual of simulated outputs, and what readings are off by in each record.
+
+Gauges and load cells drift from one record to the next: a constant of its own in each record is fitted beside the
+parameters.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
+from dataclasses import replace
 from functools import partial
-from typing import Self
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment, Motion
-from vpm.identify.beginning import BegunAnywhere
-from vpm.identify.first_state import add_first_state, first_state_slopes
+from vpm.identify.first_states import BegunAnywhere, add_first_state, first_state_slopes
+from vpm.identify.identifiability import RANK_TOLERANCE, column_lengths
 from vpm.identify.parallel import in_order
-from vpm.identify.problem import FEWEST_SAMPLES, Block, less_means
+from vpm.identify.problem import FEWEST_SAMPLES, Block, Problem, less_means, tied, untied
+from vpm.identify.statistics import record_groups, sandwich
 from vpm.initial import initial_state, joint_motion
 from vpm.model import Model
 from vpm.simulate import Setup, SimulatedArrays, copied_channels, simulate_arrays, simulated_rows
+
+if TYPE_CHECKING:
+    from vpm.identify.fitted import Fit
 
 Array = NDArray[np.float64]
 
@@ -81,9 +89,7 @@ class OutputErrorProblem(BegunAnywhere):
 
     def with_offsets_left(self) -> Self:
         """The same with these constants in its residual."""
-        same = copy(self)
-        same.offsets = ()
-        return same
+        return self.changed(offsets=())
 
     def _left(self, values: Array) -> Array:
         """What neither offsets nor first states explain of a residual (n,) or its derivative (n, columns)."""
@@ -147,8 +153,8 @@ class OutputErrorProblem(BegunAnywhere):
         counted = [self._counted(experiment) for experiment in self.experiments]
         parts = list(zip(self.experiments, counted, strict=True))
         spread = {c: float(np.sqrt(np.mean([np.var(e[c][n]) for e, n in parts]))) for c in self._channels}
-        for (experiment, counts), followed in zip(parts, self._followed, strict=True):
-            rows = simulated_rows(experiment, self.mode, self._setup, followed)
+        for record, (experiment, counts) in enumerate(parts):
+            rows = self._rows(record)
             moving = counts[rows].astype(np.float64)
             for channel in self._channels:
                 weight = 1.0 / spread[channel] if spread[channel] > 0.0 else 1.0
@@ -160,6 +166,10 @@ class OutputErrorProblem(BegunAnywhere):
                 )
                 start += rows.size
         return tuple(blocks)
+
+    def _rows(self, record: int) -> NDArray[np.int64]:
+        """Rows of a log that are compared."""
+        return simulated_rows(self.experiments[record], self.mode, self._setup, self._followed[record])
 
     def _check_offsets(self) -> None:
         """Complain about offsets of channels that are not compared."""
@@ -226,3 +236,81 @@ def _check_channels(model: Model, experiments: Sequence[Experiment], channels: S
                     f'channels: "{channel}" is not in {experiment.name}, which holds {", ".join(experiment.channels)}; '
                     "leave it out"
                 )
+
+
+def offset_blocks(data: Problem) -> tuple[Block, ...]:
+    """Channels of records that a fit takes to be off by an unknown constant."""
+    plain = untied(data)
+    return plain.offset_blocks if isinstance(plain, OutputErrorProblem) else ()
+
+
+def with_offsets(fit: Fit, data: Problem, weights: Array) -> Fit:
+    """The same with offsets and their deviations, from the covariance of parameters, first states and constants.
+
+    Parameters
+    ----------
+    fit : Fit
+    data : problem
+    weights : ndarray, shape (n,)
+        With which rows went into the fit.
+    """
+    off = offset_blocks(data)
+    if not off:
+        return fit
+    residual, jacobian = _with_constants(fit, data)
+    constants = np.zeros((residual.size, len(off)))
+    for column, block in enumerate(off):
+        constants[block.samples, column] = block.weight * block.moving
+    values = constants.T @ residual / np.sum(constants**2, axis=0)
+    known = _priors(fit, jacobian.shape[1])
+    seen = _seen(np.vstack([weights[:, None] * less_means(jacobian, off), known]))
+    columns = np.column_stack([weights[:, None] * jacobian @ seen, weights[:, None] * constants])
+    columns = np.vstack([columns, np.column_stack([known @ seen, np.zeros((len(known), len(off)))])])
+    left = np.concatenate([weights * (residual - constants @ values), np.ones(len(columns) - residual.size)])
+    exact = range(data.blocks[-1].samples.stop, len(left))
+    std = np.sqrt(np.diag(sandwich(columns, left, record_groups(data.blocks), exact)))[-len(off) :]
+    labels = [f"{block.experiment}: {block.channel}" for block in off]
+    found, deviations = (dict(zip(labels, map(float, numbers), strict=True)) for numbers in (values, std))
+    return replace(fit, offsets=found, offsets_std=deviations)
+
+
+def taken_by_offsets(fit: Fit, data: Problem) -> dict[str, str]:
+    """What to say of parameters whose whole effect is a constant that offsets leave open."""
+    blind = [c.names[0] for c in fit.unidentifiable if len(c.names) == 1]
+    if not offset_blocks(data) or not blind:
+        return {}
+    slopes = _with_constants(fit, data)[1]
+    told = {}
+    for name in blind:
+        column = slopes[:, fit.names.index(name)]
+        moved = dict.fromkeys(b.channel for b in offset_blocks(data) if np.any(column[b.samples]))
+        if moved:
+            told[name] = (
+                f"{name} adds a constant to {', '.join(moved)} and does nothing else, so offsets take its place; fix "
+                "it, or leave the channel out of offsets"
+            )
+    return told
+
+
+def _with_constants(fit: Fit, data: Problem) -> tuple[Array, Array]:
+    """Residual of a fit with its offsets in it, and its derivative by parameters and first states."""
+    plain, model = untied(data), fit.model
+    whole = tied(plain.with_offsets_left() if isinstance(plain, OutputErrorProblem) else plain, fit.ties)
+    given = {"unknown": np.array(list(fit.states.values()))} if fit.states else {}
+    return whole.evaluate(model, model.theta, [model.index(name) for name in fit.names], **given)
+
+
+def _seen(slopes: Array) -> Array:
+    """Directions (p, k) in which a fit moved: in others it stayed where it was, and offsets are those beside that."""
+    lengths = column_lengths(slopes)
+    _, values, directions = np.linalg.svd(np.linalg.qr(slopes / lengths, mode="r"))
+    return np.asarray(directions[values > RANK_TOLERANCE * values[0]].T / lengths[:, None])
+
+
+def _priors(fit: Fit, columns: int) -> Array:
+    """Rows that stand for what was known of the parameters."""
+    known = [fit.model.parameters[name].uncertainty for name in fit.names]
+    rows = np.zeros((len(known), columns))
+    if fit.fitting is not None and fit.fitting.priors:
+        np.fill_diagonal(rows, [1.0 / uncertainty if uncertainty else 0.0 for uncertainty in known])
+    return rows[np.any(rows, axis=1)]

@@ -149,7 +149,7 @@ class Checks(Storable):
 
 @dataclass(frozen=True)
 class OwnSimulation:
-    """How a fit is compared with simulations of its own model, see `vpm.identify.own_simulation`.
+    """How a fit is compared with simulations of its own model, see `vpm.identify.closed_loop_prediction`.
 
     Attributes
     ----------

@@ -8,7 +8,7 @@ no fitted states the pieces are restarts.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -17,18 +17,16 @@ from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment
-from vpm.identify.first_state import add_first_state, first_state_slopes
+from vpm.identify.first_states import OF_STATE, add_first_state, difference, first_state_slopes
 from vpm.identify.output_error import OutputErrorProblem
 from vpm.identify.parallel import in_order
-from vpm.identify.problem import FEWEST_SAMPLES, Block
+from vpm.identify.problem import FEWEST_SAMPLES
+from vpm.identify.settings import Fitting
 from vpm.initial import initial_state, measured_states
 from vpm.model import Model
 from vpm.simulate import Setup, simulate_arrays, simulation_inputs
 
 Array = NDArray[np.float64]
-
-#: Share of a state's size by which it is moved to find the derivative; errors of the difference are its square.
-DIFFERENCE = 1e-5
 
 
 @dataclass(frozen=True)
@@ -54,16 +52,10 @@ class ShootingProblem(OutputErrorProblem):
     experiments : sequence of Experiment
     mode : {"free_run", "closed_loop"}
         Pieces need a free run.
-    states : sequence of str
-        Fitted first states, ``"axis.position"``; the others are as for any simulation of the log. With pieces, by
-        default all that an output shows.
-    known : mapping of str to float, optional
-        First states of whole records that are known, SI.
-    piece : float
-        Length of the pieces, s; 0 for whole records.
-    continuity : float
-        Weight of a gap, in samples of a piece.
-    channels, setup, workers, offsets
+    fitting : Fitting
+        Its first states, pieces and compared channels. With pieces, by default all states that an output shows are
+        fitted; known ones are those of whole records.
+    setup, workers
         As for `OutputErrorProblem`.
     """
 
@@ -72,36 +64,32 @@ class ShootingProblem(OutputErrorProblem):
         model: Model,
         experiments: Sequence[Experiment],
         mode: str,
+        fitting: Fitting,
         *,
-        states: Sequence[str] = (),
-        known: Mapping[str, float] | None = None,
-        piece: float = 0.0,
-        continuity: float = 10.0,
-        channels: Sequence[str] | None = None,
         setup: Setup | None = None,
         workers: int = 1,
-        offsets: Sequence[str] = (),
     ) -> None:
+        states, known, piece = fitting.states, fitting.known_states, fitting.piece
         if mode != "free_run" and (piece > 0.0 or mode != "closed_loop"):
             raise IdentificationError(
                 f"first states are fitted in the modes free_run and closed_loop, pieces in free_run, not in '{mode}'; "
                 "choose another mode or leave states and piece out"
             )
-        for name in (*states, *(known or {})):
+        for name in (*states, *known):
             if name not in model.state_names:
                 raise IdentificationError(
                     f'states: {model.name} has no state "{name}"; {near_match(name, model.state_names)}'
                 )
         if piece > 0.0 and not states:
-            states = [name for name in model.state_names if state_channel(model, name) is not None]
-        self.states = tuple(states)
+            states = tuple(name for name in model.state_names if state_channel(model, name) is not None)
+        self.states = states
         self._places = [model.state_names.index(name) for name in states]
-        self._seconds = piece
-        self._known = {model.state_names.index(name): value for name, value in (known or {}).items()}
+        self._known = {model.state_names.index(name): value for name, value in known.items()}
         self.pieces = tuple(_cut(model, e, piece) for e in experiments)
         for pieces in self.pieces:
             for place, value in self._known.items():
                 pieces.states[0, place] = value
+        channels, offsets = fitting.channels or None, fitting.offsets
         super().__init__(model, experiments, mode, channels=channels, setup=setup, workers=workers, offsets=offsets)
         self._sizes = self._state_sizes(model)
         self._gap_columns = [
@@ -114,7 +102,7 @@ class ShootingProblem(OutputErrorProblem):
         self.gap_channels = tuple(model.output_channels[column] for column, _ in self._gap_columns)
         self._gap_weights = np.array(
             [
-                np.sqrt(continuity) * (weights[c] if c in compared else 1.0 / self._sizes[place])
+                np.sqrt(fitting.continuity) * (weights[c] if c in compared else 1.0 / self._sizes[place])
                 for c, (_, place) in zip(self.gap_channels, self._gap_columns, strict=True)
             ]
         )
@@ -193,21 +181,16 @@ class ShootingProblem(OutputErrorProblem):
             states[0] = self._begun(model, experiment, theta)
         if self.states:
             states[:, self._places] = values
+        outputs_from = partial(self._outputs, model, theta, experiment, pieces, columns=[])
         outputs, by_theta = self._outputs(model, theta, experiment, pieces, states, columns)
         if len(pieces.starts) == 1:
             fixed = [*self._known, *self._places]
             slopes = first_state_slopes(partial(self._begun, model, experiment), theta, columns, fixed)
-            again = partial(self._outputs, model, theta, experiment, pieces, columns=[])
-            add_first_state(by_theta[0], lambda x: again(x[None])[0][0], states[0], slopes, theta[columns])
+            add_first_state(by_theta[0], lambda x: outputs_from(x[None])[0][0], states[0], slopes, theta[columns])
         k, p = len(self.states), len(columns)
         by_state = np.zeros((*outputs.shape, k))
         for j, (place, size) in enumerate(zip(self._places, self._sizes, strict=True)):
-            sides = []
-            for sign in (1.0, -1.0):
-                moved = states.copy()
-                moved[:, place] += sign * DIFFERENCE * size
-                sides.append(self._outputs(model, theta, experiment, pieces, moved, [])[0])
-            by_state[..., j] = (sides[0] - sides[1]) / (2.0 * DIFFERENCE * size)
+            by_state[..., j] = difference(lambda x: outputs_from(x)[0], states, np.s_[:, place], OF_STATE * size)
         channels = len(self._channels)
         mine = self.blocks[number * channels : (number + 1) * channels]
         count = len(pieces.starts)
@@ -288,22 +271,9 @@ class ShootingProblem(OutputErrorProblem):
             sizes.append(spread or float(np.max(np.abs(values))) or 1.0)
         return np.array(sizes)
 
-    def _lay_out(self, model: Model) -> tuple[Block, ...]:
-        blocks, start = [], 0
-        counted = [self._counted(experiment) for experiment in self.experiments]
-        parts = list(zip(self.experiments, counted, strict=True))
-        spread = {c: float(np.sqrt(np.mean([np.var(e[c][n]) for e, n in parts]))) for c in self._channels}
-        for (experiment, counts), pieces in zip(parts, self.pieces, strict=True):
-            rows = pieces.rows
-            for channel in self._channels:
-                weight = 1.0 / spread[channel] if spread[channel] > 0.0 else 1.0
-                scale = self._scale(channel, experiment[channel][counts])
-                samples = slice(start, start + rows.size)
-                unit, moving = model.channel_unit(channel), counts[rows].astype(np.float64)
-                times = experiment.time[rows]
-                blocks.append(Block(experiment.name, channel, unit, samples, times, scale, weight, moving))
-                start += rows.size
-        return tuple(blocks)
+    def _rows(self, record: int) -> NDArray[np.int64]:
+        """See `OutputErrorProblem`."""
+        return self.pieces[record].rows
 
 
 def state_channel(model: Model, name: str) -> str | None:

@@ -58,16 +58,33 @@ class Descent:
         return self.ended == "interrupted"
 
 
+@dataclass(frozen=True)
+class Box:
+    """Where a descent may go.
+
+    Attributes
+    ----------
+    low, high : ndarray, shape (n,)
+    scale : ndarray, shape (n,)
+        Size of each coordinate, that a change is compared with.
+    reach : ndarray, shape (n,), or float
+        Largest change of each in one step.
+    """
+
+    low: Array
+    high: Array
+    scale: Array
+    reach: Array | float = np.inf
+
+
 def descend(
     evaluate: Callable[[Array], Point],
     start: Point,
-    low: Array,
-    high: Array,
+    box: Box,
     *,
-    scale: Array,
-    reach: Array,
     tolerance: float,
     most_evaluations: int,
+    differentiate: Callable[[Point], Point] | None = None,
 ) -> Descent:
     """Least sum of losses inside a box.
 
@@ -77,27 +94,28 @@ def descend(
         The point at coordinates (n,); its cost is infinite where there is none.
     start : Point
         Inside the box.
-    low, high : ndarray, shape (n,)
-    scale : ndarray, shape (n,)
-        Size of each coordinate, that a change is compared with.
-    reach : ndarray, shape (n,)
-        Largest change of each in one step.
+    box : Box
     tolerance : float
         Relative change of the coordinates or of the cost at which to stop.
     most_evaluations : int
+    differentiate : callable, optional
+        Gives a point with its derivative where ``evaluate`` gives it without, and with an infinite cost where that has
+        none.
     """
     at, count, damping, ended = start, 0, DAMPING, "evaluations"
     try:
         while count < most_evaluations:
-            found = _step(at, low, high, reach, damping)
+            found = _step(at, box, damping)
             if found is None:
                 ended = "converged"
                 break
             step, predicted = found
             trial = evaluate(at.x + step)
             count += 1
+            if differentiate is not None and trial.cost < at.cost:
+                trial = differentiate(trial)
             actual = at.cost - trial.cost
-            small = bool(np.all(np.abs(step) <= tolerance * scale)) or predicted <= tolerance**1.5 * at.cost
+            small = bool(np.all(np.abs(step) <= tolerance * box.scale)) or predicted <= tolerance**1.5 * at.cost
             if actual > 0.0:
                 flat = actual <= tolerance * at.cost and predicted <= 10.0 * tolerance * at.cost
                 at = trial
@@ -114,8 +132,9 @@ def descend(
     return Descent(at, start.cost, count, ended)
 
 
-def _step(at: Point, low: Array, high: Array, reach: Array, damping: float) -> tuple[Array, float] | None:
+def _step(at: Point, box: Box, damping: float) -> tuple[Array, float] | None:
     """Damped step inside the box and the fall of the cost that the linear model predicts; None at a minimum."""
+    low, high, reach = box.low, box.high, np.broadcast_to(box.reach, at.x.shape)
     gradient = at.jacobian.T @ at.residual
     held = ((at.x <= low) & (gradient > 0.0)) | ((at.x >= high) & (gradient < 0.0))
     lengths = np.linalg.norm(at.jacobian, axis=0)

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from vpm.errors import DivergedError
 from vpm.identify.along import bends, has_hidden, has_own_drives, shows_drives_alone
-from vpm.identify.balance import InverseDynamicsProblem
 from vpm.identify.estimation import Estimate, Worth, estimate
+from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ OFF = 0.03
 
 
 class Tangent:
-    """A balance of effort whose links and drives answer as on the tangent at ``origin``, values of the parameters."""
+    """An inverse-dynamics residual with links and drives as on the tangent at ``origin``, values of the parameters."""
 
     mode = InverseDynamicsProblem.mode
 
@@ -85,7 +85,7 @@ def estimate_on_tangent(
         rough = estimate(at, Tangent(data, origin), free, bounds=bounds, tolerance=tolerance)
         for share in SHARES:
             values = _on_the_way(at.theta[columns], rough.values, share)
-            reached = at.with_parameters(dict(zip(free, map(float, values), strict=True)))
+            reached = replace(rough, values=values).on(at)
             residual = _residual(data, reached)
             if residual @ residual <= cost * (1.0 + OFF**2):
                 break

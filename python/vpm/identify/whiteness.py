@@ -24,9 +24,8 @@ from scipy.linalg import qr, svd
 from scipy.special import chdtrc, fdtrc
 
 from vpm.identify.identifiability import column_lengths
-from vpm.identify.inertial_noise import autoregression
 from vpm.identify.problem import FEWEST_SAMPLES
-from vpm.identify.sandwich import white_sandwich
+from vpm.identify.statistics import autoregression, white_sandwich
 from vpm.results import Storable
 
 Array = NDArray[np.float64]
@@ -101,10 +100,6 @@ def explained_by(residual: Array, fitted: Array, added: Array, counts: NDArray[n
     added : ndarray, shape (n, k)
     counts : ndarray of bool, shape (n,)
         Samples that count.
-
-    Returns
-    -------
-    share, chance : float
     """
     old = basis(np.where(counts[:, None], fitted, 0.0))
     new = basis(np.where(counts[:, None], added, 0.0), old)

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from vpm.model.parameters import Parameter
     from vpm.model.schema import Document
 
-#: Level of a rigid beam that bends: two strain polynomials carry its first mode within 0.1 % (docs/beams.md).
+#: Level of a rigid beam that bends: two strain polynomials carry its first mode within 0.48 % (docs/beams.md).
 FLEXED = "strain(2)"
 
 

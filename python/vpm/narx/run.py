@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.compare import Correlation, autocorrelation, cross_correlation
-from vpm.compare.correlation import NORMAL_95
+from vpm.numbers import NORMAL_95
 from vpm.results import Result
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from types import ModuleType
 from typing import Any
 
-from vpm.errors import MissingExtraError, OptimisationError
+from vpm.errors import OptimisationError, needs
 from vpm.model import Model
 from vpm.realtime import c_source
 
@@ -35,10 +35,8 @@ def casadi() -> ModuleType:
     MissingExtraError
         It is not installed.
     """
-    try:
+    with needs("casadi", "optimise"):
         import casadi as library
-    except ImportError as error:
-        raise MissingExtraError("casadi", "optimise") from error
     return library  # type: ignore[no-any-return, unused-ignore]
 
 

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import MissingExtraError
+from vpm.errors import needs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -79,10 +79,8 @@ RASTER = 110
 
 @contextmanager
 def _style() -> Iterator[None]:
-    try:
+    with needs("matplotlib", "plot"):
         from matplotlib.style import context
-    except ImportError as error:
-        raise MissingExtraError("matplotlib", "plot") from error
     with context(dict(_STYLE)):
         yield
 

@@ -15,14 +15,10 @@ from vpm.errors import VpmError
 from vpm.ranking.noise_model import NoiseModel, Parts, white_noise
 from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.posterior import log_volume
-from vpm.ranking.settings import Settings
+from vpm.ranking.settings import FAINT, SHARES, Settings
 from vpm.ranking.structure import Structure
 
 Array = NDArray[np.float64]
-#: Shares of a step that are tried, the largest first.
-SHARES = (1.0, 0.3, 0.08)
-#: Weight of the prior of a place in a step beside a size, see `Structure.leaning`: it leads elsewhere than it points.
-FAINT = 1e-6
 #: Residuals and derivatives that no record has; their squares are still numbers.
 RUNAWAY = 1e100
 #: What is raised of structures that the records contradict, that cannot be computed, or whose bodies are not real.

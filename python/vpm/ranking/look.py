@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -15,8 +15,8 @@ from vpm.discrepancy.candidates import Key
 from vpm.model import Effect
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.judgement import Judgement
-from vpm.ranking.noise_model import SURE, white_noise
-from vpm.ranking.observed import PARTS
+from vpm.ranking.noise_model import white_noise
+from vpm.ranking.settings import PARTS, SURE
 from vpm.ranking.structure import Structure, approximate
 
 Array = NDArray[np.float64]
@@ -69,7 +69,8 @@ class Look:
 
         None where it does most in a channel in which no effect could count any more.
         """
-        return self._gain(self._after_a_step(other.structure, *self.view.errors(other, self._fitter.observed.parts)))
+        view = View(self.view.noise, self._screened[1])
+        return self._gain(self._after_a_step(other.structure, *view.errors(other, self._fitter.observed.parts)))
 
     def gain_along(self, residual: Array) -> float:
         """What another structure, which leaves this with few steps, promises if more or less of it changes the same.
@@ -94,8 +95,21 @@ class Look:
 
     @cached_property
     def _errors(self) -> tuple[Array, Array]:
-        """Of what was found alone, with few steps of the integrator, and their slopes; all trials ask for them."""
-        return self.view.errors(self.coarse, self._fitter.observed.parts)
+        """Of what was found alone, with the cheapest steps, and their slopes; all trials ask for them."""
+        return self.view.errors(self._screened[0], self._fitter.observed.parts)
+
+    @cached_property
+    def _screened(self) -> tuple[Followed, Mapping[str, Array]]:
+        """What was found with the cheapest steps, as others are screened, and its derivatives as those of the view."""
+        observed, observer = self._fitter.observed, self.fitted.observer
+        ways = [observed.method(self.fitted.structure.model, one) for one in (observer.coarse, observer.cheapest)]
+        if ways[0] == ways[1]:
+            return self.coarse, self.view.known
+        with contextlib.suppress(*ASTRAY):
+            cheap = self._fitter.followed(self.fitted.structure, observer.cheapest, self.coarse.names)
+            slopes = self.view.noise.whitened(cheap.jacobian, observed.parts).T
+            return cheap, dict(zip(cheap.names, slopes, strict=True))
+        return self.coarse, self.view.known
 
     @cached_property
     def _alone(self) -> Array:

@@ -11,12 +11,12 @@ from scipy.fft import dct, idct
 from scipy.linalg import solve_toeplitz
 from scipy.special import gammaln
 
+from vpm.ranking.settings import LINES, PER_OCTAVE, SURE, TAILS
+
 Array = NDArray[np.float64]
 #: Stretches of samples that belong together: the records without their beginnings.
 Parts = Sequence[slice]
 
-#: Degrees of freedom of Student's density among which that of the errors is chosen; without end it is the normal one.
-TAILS = (3.0, 4.0, 6.0, 10.0, 20.0, np.inf)
 #: Turns of the fixed point by which the scale of that density is found.
 TURNS = 60
 #: Relative change of the scale at which it is found.
@@ -24,10 +24,6 @@ SAME = 1e-7
 
 #: Relative noise on the diagonal of the normal equations, so that a residual of a few lines can be predicted.
 FLOOR = 1e-9
-#: Bands in an octave of the spectrum, and fewest lines of a band.
-PER_OCTAVE, LINES = 3, 12
-#: Standard errors by which the level of a band may be higher than its lines say.
-SURE = 3.0
 
 
 @dataclass(frozen=True)

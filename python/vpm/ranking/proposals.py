@@ -119,7 +119,7 @@ def _hopeful(several: Sequence[_Extended], look: Look, fitter: Fitter, each: Sid
     """
 
     def promised(one: _Extended) -> float:
-        residual = fitter.followed(one.structure, look.fitted.observer.coarse, ()).residual
+        residual = fitter.followed(one.structure, look.fitted.observer.cheapest, ()).residual
         return look.gain_along(residual)
 
     gains = each("trying", promised, several, lambda one: f"{one.candidate.label}, {look.fitted.observer.label}")
@@ -158,7 +158,7 @@ def _screened(look: Look, several: Sequence[_Extended], fitter: Fitter, extensio
         for one in several[1:]:
             together = extensions.extended(together, one.candidate, one.start, one.side)
         names = [name for one in several for name in one.fresh(look)]
-        followed = fitter.followed(together, look.fitted.observer.coarse, names)
+        followed = fitter.followed(together, look.fitted.observer.cheapest, names)
         return [Proposal(one.structure, _gain(look, followed, one), one.candidate.neutral) for one in several]
     if len(several) == 1:
         return []  # it runs away from the records

@@ -4,7 +4,50 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from vpm.ranking.calibration import shipped
+
+# ---- what an observer is, and what of the records is fitted ------------------------------------------------------
+
+#: Damping of the error of an observer: flat up to the bandwidth, and falling off from there (S. Butterworth, 1930).
+DAMPING = float(np.sqrt(0.5))
+#: Fewest steps of the integrator within a sample where a joint is split: contacts and gears ring fast.
+STEPS = 4
+#: Stretches into which a record is cut, so that each of its phases is in what is fitted and in what is held back.
+STRETCHES = 3
+#: Parts of a stretch, of which one is held back, the last one if nobody asks for another: two thirds tell the
+#: parameters, and one third is enough for pieces to compare.
+PARTS = 3
+
+# ---- what noise is like ------------------------------------------------------------------------------------------
+
+#: Degrees of freedom of Student's density among which that of the errors is chosen; without end it is the normal one.
+TAILS = (3.0, 4.0, 6.0, 10.0, 20.0, np.inf)
+#: Bands in an octave of the spectrum, as of acoustics, and fewest lines of a band: their mean is off by 0.4 of itself.
+PER_OCTAVE, LINES = 3, 12
+#: Standard errors by which the level of a band may be higher than its lines say: chance does more once in 700 bands.
+SURE = 3.0
+
+# ---- where fits begin and how they go on -------------------------------------------------------------------------
+
+#: Shares of a step that are tried, the largest first, each about a third of the one before.
+SHARES = (1.0, 0.3, 0.08)
+#: Weight of the prior of a place in a step beside a size, see `Structure.leaning`: it leads elsewhere than it points.
+FAINT = 1e-6
+#: Share of its force by which a stop is stronger against the fastest impact, to begin with.
+LOSS = 0.1
+#: Where a place that may lie anywhere begins, as multiples of half of the way that is seen, from its middle: within the
+#: way, just outside on either side, and so far away that it pulls nearly the same everywhere.
+PLACES = (0.0, -2.0, 2.0, -8.0, 8.0)
+#: Delay that is nothing unusual, s: a few intervals of a field bus.
+DELAY = 5e-3
+
+# ---- what is another effect --------------------------------------------------------------------------------------
+
+#: Share by which periods may be off that are found in whole fractions of each other: one wave in fifty, which few
+#: ways are long enough to tell.
+OVERTONE = 0.02
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -11,12 +11,11 @@ from vpm.discrepancy.moving import is_moving
 from vpm.discrepancy.structural import moved
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
+from vpm.ranking.settings import DELAY
 from vpm.weighing.priors import FACTOR, NATURAL, NEAR, SHARE, Prior, natural_sizes
 
 Array = NDArray[np.float64]
 
-#: Delay that is nothing unusual, s: a few intervals of a field bus.
-DELAY = 5e-3
 #: Effort, speed and way of what stands, in SI units.
 LEAST = 1e-9
 

@@ -9,12 +9,8 @@ from vpm.discrepancy.candidates import Candidate
 from vpm.discrepancy.location_parameter import ANYWHERE
 from vpm.discrepancy.structural import moved
 from vpm.model import Model
+from vpm.ranking.settings import LOSS, PLACES
 from vpm.ranking.sizes import Sizes
-
-#: Share of its force by which a stop is stronger against the fastest impact, to begin with.
-LOSS = 0.1
-#: Where a place that may lie anywhere begins, as multiples of half of the way that is seen, from its middle.
-PLACES = (0.0, -2.0, 2.0, -8.0, 8.0)
 
 
 def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib import import_module
 from types import ModuleType
 
-from vpm.errors import MissingExtraError
+from vpm.errors import needs
 
 
 def finite_elements(module: str = "skfem") -> ModuleType:
@@ -16,7 +16,5 @@ def finite_elements(module: str = "skfem") -> ModuleType:
     MissingExtraError
         It is not installed.
     """
-    try:
+    with needs("meshio" if module == "meshio" else "scikit-fem", "fem"):
         return import_module(module)
-    except ImportError as error:
-        raise MissingExtraError("meshio" if module == "meshio" else "scikit-fem", "fem") from error

@@ -9,7 +9,7 @@ from os import PathLike
 from pathlib import Path
 
 from vpm.discrepancy import Diagnosis
-from vpm.errors import MissingExtraError
+from vpm.errors import needs
 from vpm.files import write_text
 from vpm.numbers import percent, short
 from vpm.report.messages import VERDICT_WORDS, estimate, last_stage, probability, refitted, step_name, took
@@ -78,10 +78,8 @@ def render_html(diagnosis: Diagnosis, ladder: Ladder | None = None) -> str:
     MissingExtraError
         jinja2 or matplotlib is not installed.
     """
-    try:
+    with needs("jinja2", "report"):
         from jinja2 import Environment
-    except ImportError as error:
-        raise MissingExtraError("jinja2", "report") from error
     environment = Environment(autoescape=True, trim_blocks=True, lstrip_blocks=True)
     environment.filters.update(percent=percent, short=short, took=took, probability=probability, step=step_name)
     environment.globals.update(estimate=estimate)

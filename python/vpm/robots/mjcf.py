@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from vpm.errors import MissingExtraError, ModelError
+from vpm.errors import ModelError, needs
 from vpm.model.joint import JointType
 from vpm.model.pose import Pose
 from vpm.robots.lumping import WORLD
@@ -34,10 +34,8 @@ def read_mjcf(markup: Markup) -> Robot:
     MissingExtraError
         MuJoCo is not there.
     """
-    try:
+    with needs("mujoco", "robots"):
         import mujoco
-    except ImportError:
-        raise MissingExtraError("mujoco", "robots") from None
     path = Path(markup.path)
     before, warnings = mujoco.get_mju_user_warning(), list[str]()
     mujoco.set_mju_user_warning(warnings.append)  # else they go to a file in the working directory

@@ -14,23 +14,12 @@ CLEARANCE = 0.02
 
 
 def hydraulic_drives(model: Model) -> tuple[str, ...]:
-    """Actuators that are servo-cylinders.
-
-    Parameters
-    ----------
-    model : Model
-    """
+    """Actuators that are servo-cylinders."""
     return tuple(name for name in model.actuators if model.actuator_type(name) == "hydraulic")
 
 
 def possible_changes(model: Model, drive: str) -> tuple[str, ...]:
-    """Changes that a servo-cylinder does not have yet.
-
-    Parameters
-    ----------
-    model : Model
-    drive : str
-    """
+    """Changes that a servo-cylinder does not have yet."""
     entry = model.to_dict()["actuators"][drive]
     static = entry["valve"].get("spool") == "static"
     have = entry["cylinder"].get("pressures", "chambers")

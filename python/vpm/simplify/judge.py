@@ -8,6 +8,7 @@ from dataclasses import replace
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, Problem, estimate, gaps
+from vpm.identify.along import SAMPLED_TYPES, has_own_drives
 from vpm.model import Model
 from vpm.one_thread import in_one_thread
 from vpm.simplify.replacement import commanded
@@ -15,12 +16,10 @@ from vpm.simulate import Setup, judging_mode, simulate
 
 #: How many steps finer the full model is simulated than the controller's period, where it is the reference.
 FINER = 2
-#: Drives in sampled time.
-SAMPLED = ("narx", "maxwell_narx")
 #: Integrator of fits: the one that is stable whatever the reduced model is like.
 FITTING = "linearly_implicit"
 #: Fits end where parameters or sum of squares move by less than this share, and after so many evaluations in any case:
-#: the remainder of both is far below a tolerance.
+#: what is left of both is far less than a tolerance asks about.
 FIT_TOLERANCE, FIT_EVALUATIONS = 1e-3, 20
 
 
@@ -54,7 +53,7 @@ class Judge:
         self.records, self.validation, self.mode, self.rate = tuple(records), tuple(validation), mode, rate
         self.channels = tuple(channels) if channels is not None else None
         self.per_sample = steps_per_sample((*self.records, *self.validation), rate)
-        self._balances = mode != "prescribed_motion" and not model.beams and _is_ideal(model)
+        self._balances = mode != "prescribed_motion" and not model.beams and not has_own_drives(model)
 
     @property
     def driven(self) -> Experiment:
@@ -67,14 +66,10 @@ class Judge:
 
         By the inverse-dynamics residual where the machine has nothing that nobody measures, which is quick; by
         simulation in the mode it is judged in where it has.
-
-        Parameters
-        ----------
-        model : Model
         """
         free = model.adjustable
         # Elements in sampled time were fitted as a whole, and no parameter of the machine can be fitted beside them.
-        if not free or any(model.actuator_type(name) in SAMPLED for name in model.actuators):
+        if not free or any(model.actuator_type(name) in SAMPLED_TYPES for name in model.actuators):
             return model
         data: Problem
         if self._balances:
@@ -85,7 +80,7 @@ class Judge:
         if found.interrupted:
             # Ctrl-C is meant for the whole search, not for this one fit.
             raise KeyboardInterrupt
-        return model.with_parameters(dict(zip(free, map(float, found.values), strict=True)))
+        return found.on(model)
 
     def errors(self, model: Model, setup: Setup) -> dict[str, float]:
         """Relative error of each channel on the records to judge on.
@@ -190,7 +185,3 @@ def reference_mode(model: Model, experiments: Sequence[Experiment], against: str
         return mode
     best = judging_mode(model, experiments)
     return "free_run" if against == "model" and best == "restarts" else best
-
-
-def _is_ideal(model: Model) -> bool:
-    return all(model.follows_command(name) for name in model.actuators)

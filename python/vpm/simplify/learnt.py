@@ -1,18 +1,29 @@
-"""Discrete-time elements from records of a drive: Maxwell and polynomial NARX, as actuators of a model file.
+"""Elements in sampled time from what a drive did: Maxwell and polynomial NARX, as actuators of a model file.
 
-The degree of an element is chosen by cross-validation among the training records.
+How rich an element is, its degree, is chosen among the records to learn from, each left out in turn. The coefficients
+of a NARX model are then found in the loop that its own forces close: one step ahead, and along a given motion, an
+element is told where the machine is. In the machine its error moves the joints, whose motion is its input, so that the
+least error of a prediction is not that of a simulation.
 """
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
+from dataclasses import replace
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import least_squares
 
 from vpm.errors import VpmError
+from vpm.experiment import Experiment
+from vpm.identify import OutputErrorProblem
+from vpm.model import Model
 from vpm.narx import MaxwellNarx, MaxwellSignals, Narx, identify, refine_maxwell
+from vpm.simplify.replacement import Replacement, commanded
+from vpm.simulate import Setup
 
 Array = NDArray[np.float64]
 #: Force that pulls the ends together (N), length (m), its rate (m/s), drive signal.
@@ -27,6 +38,12 @@ SIGNALS = MaxwellSignals(force="force", length="length", drive="drive")
 FAST = 10.0
 #: Most terms of a NARX model: each costs time.
 TERMS = 16
+#: Integrator of the simulations: the one that is stable whatever the element is like.
+STABLE = "linearly_implicit"
+#: Relative step of the differences, share of the sum of squares at which the search ends, and its most simulations.
+DIFFERENCE, ENOUGH, EVALUATIONS = 1e-6, 1e-3, 100
+#: Error where no machine is possible or its simulation fails, in parts of what is compared.
+FAILED = 1e2
 
 
 def maxwell_entry(records: Sequence[Record], step: float) -> Entry | None:
@@ -152,3 +169,57 @@ def _narx_gap(model: Narx, record: Record) -> float:
     except VpmError:
         return float("inf")
     return float(np.sqrt(np.mean(np.square(run.values - run.measured))))
+
+
+def trained(
+    model: Model, element: Replacement, records: Sequence[Experiment], mode: str, channels: Sequence[str] | None
+) -> Replacement:
+    """The element with the coefficients with which the machine moves most like the full one.
+
+    Parameters
+    ----------
+    model : Model
+        The full one.
+    element : Replacement
+        A NARX model, where the search begins; it stays what it is where the machine cannot be simulated with it.
+    records : sequence of Experiment
+        To learn from.
+    mode : {"free_run", "closed_loop"}
+    channels : sequence of str, optional
+        What is compared; by default all that the records hold.
+    """
+    entry: dict[str, Any] = json.loads(element.entry)
+    names, start = list(entry["terms"]), np.array(list(entry["terms"].values()))
+    sizes = np.abs(start)
+
+    def with_shares(shares: Array) -> Replacement:
+        terms = dict(zip(names, (float(value) for value in shares * sizes), strict=True))
+        return replace(element, entry=json.dumps({**entry, "terms": terms}))
+
+    try:
+        first = element.applied(model)
+        driven = [commanded(first, model, record) for record in records]
+        own_mode = mode if first.controlled_actuators else "free_run"
+        problem = OutputErrorProblem(first, driven, own_mode, channels=channels, setup=Setup(STABLE))
+        least, _ = problem.evaluate(first, first.theta)
+    except VpmError:
+        return element
+
+    def residual(shares: Array) -> Array:
+        try:
+            machine = with_shares(shares).applied(model)
+            return problem.evaluate(machine, machine.theta)[0]
+        except VpmError:
+            return np.full_like(least, FAILED)
+
+    # The lags of one signal are nearly alike: damped steps, scaled by the columns, go along what tells them apart.
+    found = least_squares(
+        residual,
+        np.sign(start),
+        method="lm",
+        x_scale="jac",
+        diff_step=np.array(DIFFERENCE),
+        ftol=ENOUGH,
+        max_nfev=EVALUATIONS,
+    )
+    return with_shares(found.x) if 2.0 * found.cost < float(least @ least) else element

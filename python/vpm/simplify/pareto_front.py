@@ -97,7 +97,7 @@ class Ladder(Result):
     budget : BudgetReport
         Of the chosen model: what its times are taken from.
     cut : int
-        Reduced models that were not fitted, because coarse timing showed that something quicker loses next to nothing.
+        Reduced models that were not fitted, because by a coarse timing something quicker loses next to nothing.
     """
 
     rungs: tuple[Rung, ...]
@@ -186,12 +186,7 @@ class Ladder(Result):
 
 
 def pareto(points: Sequence[tuple[float, float]]) -> list[int]:
-    """Places of the points that no other one beats in both numbers, by the first number.
-
-    Parameters
-    ----------
-    points : sequence of (float, float)
-    """
+    """Places of the points that no other one beats in both numbers, by the first number."""
     found: list[int] = []
     for place in sorted(range(len(points)), key=lambda k: points[k]):
         if not found or points[place][1] < points[found[-1]][1]:

@@ -88,13 +88,7 @@ def replaced(model: Model, drive: str, entry: str) -> Model:
 
 
 def commanded(model: Model, full: Model, record: Experiment) -> Experiment:
-    """The record with the reference of each drive that lost its controller as its command.
-
-    Parameters
-    ----------
-    model, full : Model
-    record : Experiment
-    """
+    """The record with the reference of each drive that lost its controller as its command."""
     lost = [name for name in full.controlled_actuators if name not in model.controlled_actuators]
     if not lost:
         return record

@@ -1,9 +1,10 @@
-"""Model reduction: the cheapest model that still predicts the data within a tolerance.
+"""Walk a model back down: the cheapest one that still predicts the data within a tolerance.
 
-The search has four steps. All flexible links together are refined, from the coarsest level, until the loss is next to
-nothing. Each place is then made simpler on that model by each of its changes, unless coarse timing shows no saving.
-Losses and savings of single changes are added up to predict all combinations, and the best combinations are fitted,
-simulated and timed. From the best one, single changes are tried as long as one pays.
+The search goes in four strides. All flexible links together are made finer, from the coarsest, until that loses next to
+nothing: what comes next is tried on that model, which is cheap, and what is slower by a coarse timing is not fitted.
+Then each place by itself is made simpler by each of its changes. Losses and savings of single changes are added up to
+foresee those of all combinations, and the combinations that should be best are fitted, simulated and timed. From the
+best one each further change is tried while one pays.
 """
 
 from __future__ import annotations
@@ -19,9 +20,8 @@ from vpm.model import Model
 from vpm.simplify.judge import FITTING, Judge, by_the_model, reference_mode, shown
 from vpm.simplify.pareto_front import Ladder, Rung, pareto
 from vpm.simplify.reductions import COUPLING_TERMS, OFFERED, VELOCITY_TERMS, Reduction, reduced, reductions
-from vpm.simplify.shares import ROUNDING, deformation_share, effort_share, motions, ranked
 from vpm.simplify.surrogates import surrogates
-from vpm.simplify.terms import CURVED
+from vpm.simplify.terms import CURVED, ROUNDING, deformation_share, effort_share, motions, ranked
 from vpm.simplify.trials import ALIKE, CLOCK, NEGLIGIBLE, PRIORITY, REPEATED, Changes, Trials
 from vpm.simulate import Setup
 
@@ -56,11 +56,12 @@ def simplify(
 ) -> Ladder:
     """Make a model simpler, place by place, as far as the tolerance allows, and find the cheapest way to step it.
 
-    Effects are left out, and flexible links made coarser or rigid in single deformations. Hydraulic drives get static
-    spools, one pressure, or NARX elements in their place. Coriolis and centrifugal terms, coupling across joints and
-    terms of second order of links go where their shares allow it. Every integrator of fixed steps is tried with one,
-    two and four steps in a period. The adjustable parameters of every reduced model are fitted again before it is
-    judged by simulation, so that what remains may take over what it can. Ctrl-C ends the search with what is known.
+    Effects are left out, flexible links made coarser or rigid in single deformations, spools of hydraulic drives made
+    static, their pressures one, NARX elements put in their place, Coriolis and centrifugal terms, coupling across
+    joints and terms of second order of links left out where their shares allow it, and every integrator of fixed steps
+    is tried with one, two and four steps in a period. The adjustable parameters of every reduced model are fitted again
+    before it is judged by simulation, so that what remains may take over what it can. Ctrl-C ends the search with what
+    is known.
 
     Parameters
     ----------
@@ -78,8 +79,8 @@ def simplify(
     against : {"data", "model"}
         Reference: what was measured, or what the full model does on the commands of the records.
     mode : str, optional
-        Mode of simulation to judge in; by default closed loop or multi-step predictions, see
-        `vpm.simulate.judging_mode`, and against the model a free run instead of the latter.
+        Mode of simulation to judge in; by default closed loop or restarts, see `vpm.simulate.judging_mode`, and
+        against the model free run instead of restarts.
     channels : sequence of str, optional
         What is compared; by default all measured outputs, and against the model strains, places of markers and
         pressures, or the positions of the joints where there are none.
@@ -121,7 +122,7 @@ def simplify(
         _weigh_terms(trials, sites)
         _descend(trials, sites)
     except KeyboardInterrupt:
-        if not trials.candidates:
+        if not trials.rungs:
             raise
         say("interrupted: the best of what was tried")
     return _concluded(trials, sites, share, against)
@@ -134,15 +135,15 @@ def _descend(trials: Trials, sites: Sites) -> None:
             f"{trials.model.name}: no integrator of fixed steps can simulate the records at {trials.judge.rate:g} Hz: "
             f"{trials.reason}"
         )
-    limit = min(candidate.error for candidate in full) + trials.tolerance
+    limit = min(rung.error for rung in full) + trials.tolerance
     base = _together(trials, sites, limit)
     singles = (_with(base, change) for changes in sites.values() for change in _coarser(changes, base))
     trials.ahead(singles, trials.as_quick_as(base))
     alone = {site: _alone(trials, base, changes) for site, changes in sites.items()}
     foreseen = _foreseen(trials, base, {site: _paying(found) for site, found in alone.items()}, limit)
-    trials.ahead(foreseen, _within(trials.candidates, limit).seconds)
+    trials.ahead(foreseen, _within(trials.rungs, limit).seconds)
     for changes in foreseen:
-        trials.attempt(changes, _within(trials.candidates, limit).seconds)
+        trials.attempt(changes, _within(trials.rungs, limit).seconds)
     lost = {change: added for found in alone.values() for change, (_, added) in found.items()}
     _polish(trials, sites, limit, {change for change, added in lost.items() if added > TOO_MUCH * trials.tolerance})
 
@@ -174,19 +175,19 @@ def _weigh_terms(trials: Trials, sites: Sites) -> None:
 def _together(trials: Trials, sites: Sites, limit: float) -> Changes:
     """All links at the same coarser level: the cheapest that loses next to nothing.
 
-    The coarsest come first, by the number of coordinates, because they are quick to fit. Once one of them loses next to
-    nothing, coarse timing rules out the more detailed ones.
+    The coarsest come first, by the number of coordinates: they are quick to fit, and once one of them loses next to
+    nothing, a coarse timing shows that the finer ones need no look.
     """
     best: Changes = ()
-    seconds = min(candidate.seconds for candidate in trials.attempt(()))
+    seconds = min(rung.seconds for rung in trials.attempt(()))
     levels = [changes for (kind, _), changes in sites.items() if kind == "level"]
     together = [tuple(c for each in levels for c in each if c.name == level) for level in OFFERED]
     coarsest = sorted(filter(None, together), key=lambda changes: reduced(trials.model, changes).core.n_states)
     trials.ahead(coarsest)
     for changes in coarsest:
-        candidate = trials.cheapest(changes, limit - (1.0 - NEGLIGIBLE) * trials.tolerance)
-        if candidate is not None and candidate.seconds < seconds:
-            best, seconds = changes, candidate.seconds
+        rung = trials.cheapest(changes, limit - (1.0 - NEGLIGIBLE) * trials.tolerance)
+        if rung is not None and rung.seconds < seconds:
+            best, seconds = changes, rung.seconds
     return best
 
 
@@ -198,9 +199,9 @@ def _alone(trials: Trials, base: Changes, changes: Sequence[Reduction]) -> dict[
     start, longest = _best(trials.attempt(base)), trials.as_quick_as(base)
     found: dict[Reduction, tuple[float, float]] = {}
     for change in _coarser(changes, base):
-        candidates = trials.attempt(_with(base, change), longest)
-        if candidates:
-            best = _best(candidates)
+        rungs = trials.attempt(_with(base, change), longest)
+        if rungs:
+            best = _best(rungs)
             found[change] = (start.seconds - best.seconds, best.error - start.error)
     return found
 
@@ -212,7 +213,7 @@ def _paying(found: dict[Reduction, tuple[float, float]]) -> dict[Reduction, tupl
 
 
 def _coarser(changes: Sequence[Reduction], base: Changes) -> Sequence[Reduction]:
-    """Changes of one site beyond that in the base; they come with the most detailed first."""
+    """Changes of one site beyond that in the base: they come finest first, and what is finer costs more."""
     straight = _straight(base)
     changes = [each for each in changes if not _is_idle(each, straight)]
     taken = next((each for each in base if each in changes), None)
@@ -228,13 +229,10 @@ def _is_idle(change: Reduction, straight: set[str]) -> bool:
     return change.name == "second-order" and change.at in straight
 
 
-def _best(candidates: Sequence[Rung]) -> Rung:
-    """The cheapest candidate among those whose error is near the least."""
-    least = min(candidate.error for candidate in candidates)
-    return min(
-        (candidate for candidate in candidates if candidate.error <= NEAR * least),
-        key=lambda candidate: candidate.seconds,
-    )
+def _best(rungs: Sequence[Rung]) -> Rung:
+    """The cheapest rung among those whose error is near the least."""
+    least = min(rung.error for rung in rungs)
+    return min((rung for rung in rungs if rung.error <= NEAR * least), key=lambda rung: rung.seconds)
 
 
 def _with(base: Changes, change: Reduction) -> Changes:
@@ -270,26 +268,24 @@ def _foreseen(
 def _polish(trials: Trials, sites: Sites, limit: float, hopeless: set[Reduction]) -> None:
     """From the cheapest within the limit, single changes as long as one pays."""
     while True:
-        best = _within(trials.candidates, limit)
+        best = _within(trials.rungs, limit)
         base = trials.changes_of(best)
         further = [change for changes in sites.values() for change in _coarser(changes, base) if change not in hopeless]
         trials.ahead((_with(base, change) for change in further), best.seconds)
         for change in further:
             trials.attempt(_with(base, change), best.seconds)
-        if not _within(trials.candidates, limit).seconds < SAVED * best.seconds:
+        if not _within(trials.rungs, limit).seconds < SAVED * best.seconds:
             return
 
 
-def _within(candidates: Sequence[Rung], limit: float) -> Rung:
-    return min(
-        (candidate for candidate in candidates if candidate.error <= limit), key=lambda candidate: candidate.seconds
-    )
+def _within(rungs: Sequence[Rung], limit: float) -> Rung:
+    return min((rung for rung in rungs if rung.error <= limit), key=lambda rung: rung.seconds)
 
 
 def _concluded(trials: Trials, sites: Sites, share: float, against: str) -> Ladder:
     """The choice, its steps timed once more as `vpm.budget` does."""
-    candidates, judge = trials.candidates, trials.judge
-    chosen = _simplest([candidate for candidate in candidates if candidate.loss <= trials.tolerance])
+    rungs, judge = trials.rungs, trials.judge
+    chosen = _simplest([rung for rung in rungs if rung.loss <= trials.tolerance])
     model = trials.fitted(trials.changes_of(chosen))
     report = budget(
         model,
@@ -300,14 +296,14 @@ def _concluded(trials: Trials, sites: Sites, share: float, against: str) -> Ladd
         substeps=chosen.substeps,
         experiment=trials.courses.record(model),
         priority=PRIORITY,
-        # As all candidates were timed.
+        # As all rungs were timed.
         compiled=False,
     )
-    place = candidates.index(chosen)
+    place = rungs.index(chosen)
     chosen = chosen.timed(report.quantiles["p50"], report.quantiles["p99.9"])
-    candidates[place] = chosen
+    rungs[place] = chosen
     return Ladder(
-        tuple(sorted(candidates, key=lambda candidate: candidate.seconds)),
+        tuple(sorted(rungs, key=lambda rung: rung.seconds)),
         chosen,
         report.holds,
         judge.rate,
@@ -322,27 +318,23 @@ def _concluded(trials: Trials, sites: Sites, share: float, against: str) -> Ladd
     )
 
 
-def _simplest(candidates: Sequence[Rung]) -> Rung:
+def _simplest(rungs: Sequence[Rung]) -> Rung:
     """The cheapest, or what a clock does not tell from it and has more left out, or as much and errs less."""
-    best = candidates[0]
+    best = rungs[0]
     longest = ALIKE * best.seconds + CLOCK
-    more = [
-        candidate
-        for candidate in candidates
-        if set(candidate.removed) >= set(best.removed) and candidate.seconds <= longest
-    ]
+    more = [rung for rung in rungs if set(rung.removed) >= set(best.removed) and rung.seconds <= longest]
     others = [
-        candidate
-        for candidate in candidates
-        if (len(candidate.removed), candidate.states) == (len(best.removed), best.states)
-        and candidate.seconds <= REPEATED * best.seconds
+        rung
+        for rung in rungs
+        if (len(rung.removed), rung.states) == (len(best.removed), best.states)
+        and rung.seconds <= REPEATED * best.seconds
     ]
-    return max((*more, *others), key=lambda candidate: (len(candidate.removed), -candidate.error))
+    return max((*more, *others), key=lambda rung: (len(rung.removed), -rung.error))
 
 
 def _dearest(trials: Trials, sites: Sites) -> tuple[tuple[str, float], ...]:
-    """Savings of a step by the last change of each place alone, by coarse timing, the most first."""
-    full = min((r for r in trials.candidates if not r.removed), key=lambda r: r.seconds)
+    """What a step of the full model saves by the last change of each place alone, the most first."""
+    full = min((r for r in trials.rungs if not r.removed), key=lambda r: r.seconds)
     setup = Setup(full.integrator, full.substeps)
     saved = ((str(changes[-1]), trials.saved(changes[-1], setup)) for changes in sites.values())
     return tuple(sorted(((name, gain) for name, gain in saved if gain > 0.0), key=lambda pair: -pair[1]))

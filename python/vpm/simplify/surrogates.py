@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.simplify.hydraulics import hydraulic_drives
-from vpm.simplify.learnt import maxwell_entry, narx_entry
+from vpm.simplify.learnt import maxwell_entry, narx_entry, trained
 from vpm.simplify.reductions import Reduction
 from vpm.simplify.replacement import Replacement
 from vpm.simplify.tables import tables
-from vpm.simplify.trained import trained
 from vpm.simulate import Run, simulate
 
 Array = NDArray[np.float64]

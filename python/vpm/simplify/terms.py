@@ -1,30 +1,47 @@
-"""Terms of the equations of motion that a model can do without: of a part of it, or of the whole machine.
+"""Terms of the equations of motion that a model can do without, and what they are worth along a motion.
 
-Products of rates (Coriolis, centrifugal, gyroscopic terms) belong to bodies and flexible links. Entries of the mass
-matrix couple the two sides of a joint. Terms of second order are those in the deflection of a flexible link.
+Products of rates (Coriolis, centrifugal, gyroscopic terms) are those of bodies and flexible links; entries of the mass
+matrix couple what is inward of a joint with what is beyond; terms of second order are those in the deflection of a
+flexible link. Shares of the dynamics follow D'Imperio (2016), section 2.4.2 and eq 2.109, with the sum of norms as
+denominator; see `vpm.linkages.drop_limit` for the same question over a whole workspace.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import Any
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.errors import SimulationError
+from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.model.beams.level import size_of
+from vpm.simulate import Setup, simulate_arrays
+
+if TYPE_CHECKING:
+    from vpm.simplify.reductions import Reduction
+
+Array = NDArray[np.float64]
 
 #: What all of it is called in the place of single parts.
 MACHINE = "the machine"
 #: Levels that have terms of second order apart from the others: hinges between rigid segments have not.
 CURVED = ("modal", "bezier", "deflection", "hermite", "strain", "elements")
+#: Coordinates, rates and accelerations, shape (N, n) each.
+Motion = tuple[Array, Array, Array]
+#: Samples of each record at which the shares are worked out.
+SAMPLES = 200
+#: Share that is rounding: a single joint about a fixed axis has no Coriolis and centrifugal terms.
+ROUNDING = 1e-12
+#: Sets of parts that are offered beside the whole machine: the largest, which save most.
+SETS = 3
 
 
 def removable(model: Model) -> Iterator[tuple[str, str]]:
-    """Terms that a model has, each with its place: single parts first, then the machine.
-
-    Parameters
-    ----------
-    model : Model
-    """
+    """Terms that a model has, each with its place: single parts first, then the machine."""
     content = model.to_dict()
     if content.get("velocity_terms", True):
         parts = [name for name, part in _moving(content).items() if part.get("velocity_terms", True)]
@@ -105,3 +122,161 @@ def _moving(content: Mapping[str, Any]) -> dict[str, Any]:
     bodies = {name: content["bodies"][name] for name in carried}
     beams = content.get("beams", {}).items()
     return bodies | {name: beam for name, beam in beams if size_of(beam["level"], beam) > 0}
+
+
+def motions(model: Model, records: Sequence[Experiment], mode: str, setup: Setup) -> list[Motion]:
+    """Motions of a model along records: what shares are worked out on.
+
+    Parameters
+    ----------
+    model : Model
+    records : sequence of Experiment
+        Their commands or references drive the model.
+    mode : {"free_run", "closed_loop"}
+    setup : Setup
+
+    Raises
+    ------
+    SimulationError
+        The model cannot be simulated in these steps.
+    """
+    return [_motion(model, record, mode, setup) for record in records]
+
+
+def effort_share(model: Model, reduced: Model, along: Sequence[Motion]) -> float:
+    """Share of the efforts at the joints that a reduced model leaves out, the largest of all motions.
+
+    ``X / (I + V + R)`` with root mean squares along the motion of the Euclidean norms over the joints: X what is left
+    out, V the Coriolis and centrifugal terms, I inertia times acceleration, R weight, effects and what elastic links
+    take. Along a motion the share of single states says little: it is all wherever accelerations change sign.
+
+    Parameters
+    ----------
+    model, reduced : Model
+        Of the same coordinates.
+    along : sequence of tuple
+        See `motions`.
+
+    Returns
+    -------
+    float
+        Between 0 and 1 for a part of V or I.
+    """
+    joints, found = len(model.joints), []
+    for motion in along:
+        missing = (_efforts(model, motion) - _efforts(reduced, motion))[:, :joints]
+        left_out = float(np.sqrt(np.mean(np.sum(missing**2, axis=1))))
+        whole = float(np.sum(np.sqrt(np.mean(parts(model, *motion) ** 2, axis=0))))
+        found.append(left_out / whole if left_out > 0.0 else 0.0)
+    return max(found)
+
+
+def deformation_share(model: Model, beam: str, along: Sequence[Motion]) -> float:
+    """Share of the deformation of a link that its terms of second order make, were they loads at rest.
+
+    ``sqrt(d^T K^-1 d / q^T K q)`` with mean squares along the motion: d what the terms are of the forces on the elastic
+    coordinates q, K their stiffness. Both are energies, so that neither units nor shape functions matter.
+
+    Parameters
+    ----------
+    model : Model
+    beam : str
+    along : sequence of tuple
+        See `motions`.
+    """
+    first_order = without_terms(model, "second-order", beam)
+    own = [k for k, name in enumerate(model.coordinates) if name.startswith(f"{beam}.")]
+    stiffness, found = _stiffness(model, beam), []
+    for motion in along:
+        missing = (_efforts(model, motion) - _efforts(first_order, motion))[:, own]
+        bent = motion[0][:, own]
+        energy = float(np.mean(np.sum((bent @ stiffness) * bent, axis=1)))
+        taken = float(np.mean(np.sum(missing * np.linalg.solve(stiffness, missing.T).T, axis=1)))
+        found.append(float(np.sqrt(taken / energy)) if energy > 0.0 else 0.0)
+    return max(found)
+
+
+def ranked(
+    model: Model, changes: Sequence[Reduction], share: Callable[[Model], float], limit: float
+) -> tuple[tuple[Reduction, ...], float]:
+    """Sets of parts to do without the same terms: the part that needs them least first, then the next one as well.
+
+    Parameters
+    ----------
+    model : Model
+    changes : sequence of Reduction
+        Of single parts, the last of the whole machine.
+    share : callable
+        Of a reduced model.
+    limit : float
+        Largest share that is worth a trial.
+
+    Returns
+    -------
+    tuple of Reduction, float
+        The sets within the limit, the smallest first, none if the machine has no such terms; the share of the machine.
+    """
+    *single, whole = changes
+    of_machine = share(whole.applied(model))
+    if not of_machine > ROUNDING:
+        return (), of_machine
+    found = [whole] if of_machine <= limit else []
+    # Entries of the mass matrix that are nothing along the motion cost as much as others.
+    least = -1.0 if whole.name == "coupling" else ROUNDING
+    parts, sets = [], []
+    for change in sorted(single, key=lambda each: share(each.applied(model)))[:-1]:
+        parts.append(change.at)
+        together = replace(whole, at=", ".join(parts))
+        if least < share(together.applied(model)) <= limit:
+            sets.append(together)
+    return (*sets[-SETS:], *found), of_machine
+
+
+def parts(model: Model, q: Array, v: Array, a: Array) -> Array:
+    """Norms of Coriolis and centrifugal terms, inertia terms and the rest at single states, shape (N, 3), N m.
+
+    Joints that move along a line are weighed as if a metre were a radian.
+
+    Parameters
+    ----------
+    model : Model
+    q, v, a : ndarray, shape (N, n)
+        Coordinates, rates and accelerations.
+    """
+    joints = len(model.joints)
+    rest = _efforts(without_terms(model, "velocity", MACHINE), (q, v, a))[:, :joints]
+    velocity = _efforts(model, (q, v, a))[:, :joints] - rest
+    inertia = np.array([model.mass_matrix(place) @ change for place, change in zip(q, a, strict=True)])[:, :joints]
+    return np.column_stack([np.linalg.norm(part, axis=1) for part in (velocity, inertia, rest - inertia)])
+
+
+def _efforts(model: Model, motion: Motion) -> Array:
+    return np.array([model.inverse_dynamics(*state) for state in zip(*motion, strict=True)])
+
+
+def _stiffness(model: Model, beam: str) -> Array:
+    """Elastic stiffness of a link, from what holds it deformed where it is clamped and weightless."""
+    content: dict[str, Any] = model.to_dict()
+    alone = {key: value for key, value in content["beams"][beam].items() if key not in ("at", "second_order")}
+    effects = [effect for effect in content.get("effects", []) if effect["at"] == beam]
+    clamped = Model(
+        {
+            "name": beam,
+            "gravity": [0.0, 0.0, 0.0],
+            "beams": {beam: {**alone, "parent": "world"}},
+            "effects": effects,
+        }
+    )
+    still = np.zeros(len(clamped.coordinates))
+    return np.array([clamped.inverse_dynamics(shape, still, still) for shape in np.eye(still.size)])
+
+
+def _motion(model: Model, record: Experiment, mode: str, setup: Setup) -> Motion:
+    states = simulate_arrays(model, record, mode, setup=setup).states
+    if states is None:
+        raise SimulationError(f"{mode} tells no states; choose free_run or closed_loop")
+    n = len(model.coordinates)
+    q, v = states[:, :n], states[:, n : 2 * n]
+    a = np.gradient(v, record.dt, axis=0)
+    chosen = np.unique(np.linspace(0, len(q) - 1, min(SAMPLES, len(q))).astype(int))
+    return q[chosen], v[chosen], a[chosen]

@@ -1,4 +1,4 @@
-"""Reduced models that were tried: timed coarsely, fitted, simulated with all steppings that may pay, and timed."""
+"""Reduced models that were tried: coarsely timed, fitted, simulated in every way of stepping that may pay and timed."""
 
 from __future__ import annotations
 
@@ -8,19 +8,22 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from numpy.typing import NDArray
 
-from vpm.budget import step_times
+from vpm.budget import commands, start_state, step_times
 from vpm.errors import ExecutorError, SimulationError, VpmError
+from vpm.experiment import Experiment
 from vpm.model import Model
-from vpm.simplify.course import Courses
 from vpm.simplify.judge import Judge
 from vpm.simplify.pareto_front import Rung
 from vpm.simplify.reductions import Reduction, reduced
+from vpm.simplify.replacement import commanded
 from vpm.simulate import FIXED_STEP, Setup
 from vpm.tasks import outcomes
 
-#: Steps timed for each candidate: as many as these seconds allow, within these numbers. A 99.9 % quantile needs the
-#: least.
+Array = NDArray[np.float64]
+
+#: Steps timed for each rung: as many as these seconds allow, within these numbers. A 99.9 % quantile needs the least.
 TIMED_SECONDS = 0.05
 TIMED_STEPS = (1_000, 20_000)
 #: Every integrator of fixed steps is tried with these numbers of steps in a period.
@@ -33,7 +36,7 @@ CLOCK = 5e-7
 #: Times of steps of less than a microsecond differ by so much for no reason on a machine that does other things too.
 ALIKE = 1.3
 #: Steps of a coarse timing, and how much slower than another way that works one may be if it does not fit the period.
-GLANCE, SLOWER = 20, 5.0
+COARSE, SLOWER = 20, 5.0
 #: What coarse timings of one model differ by, and medians of its steps.
 REPEATED = 1.05
 #: Share of the tolerance that is next to nothing, and how much slower than what loses no more than that a way may be.
@@ -47,7 +50,8 @@ Changes = tuple[Reduction, ...]
 class Trials:
     """Reduced models by their changes, each tried once.
 
-    A model that is much slower by coarse timing than one that loses next to nothing is not fitted: it cannot be chosen.
+    What is much slower by a coarse timing than something that loses next to nothing is not fitted: it can neither be
+    chosen nor be a choice that anybody would take instead.
 
     Parameters
     ----------
@@ -81,35 +85,35 @@ class Trials:
         self.courses = Courses(model, judge)
         #: Why the last way that did not work did not.
         self.reason = ""
-        #: Fastest step of each model by coarse timing, s.
-        self._coarse: dict[frozenset[Reduction], float] = {}
-        self._candidates: dict[frozenset[Reduction], list[Rung]] = {}
+        #: Fastest step of each model by a coarse timing, s.
+        self._coarsely_timed: dict[frozenset[Reduction], float] = {}
+        self._rungs: dict[frozenset[Reduction], list[Rung]] = {}
         self._models: dict[frozenset[Reduction], Model] = {}
         self._cut: set[frozenset[Reduction]] = set()
 
     @property
     def cut(self) -> int:
-        """How many reduced models were not fitted because of what coarse timing showed."""
-        return len(self._cut - set(self._candidates))
+        """How many reduced models were not fitted because of a coarse timing."""
+        return len(self._cut - set(self._rungs))
 
     @property
-    def candidates(self) -> list[Rung]:
-        """All candidates, cheapest first, with what they lose against the best way to step the full model."""
+    def rungs(self) -> list[Rung]:
+        """All rungs, cheapest first, with what they lose against the best way to step the full model."""
         everything, least = self._everything(), self._least()
-        return sorted((replace(r, loss=r.error - least) for r in everything), key=lambda candidate: candidate.seconds)
+        return sorted((replace(r, loss=r.error - least) for r in everything), key=lambda rung: rung.seconds)
 
     def fitted(self, changes: Changes) -> Model:
         """The model of a trial, its parameters fitted again."""
         return self._models[frozenset(changes)]
 
-    def changes_of(self, candidate: Rung) -> Changes:
-        """Changes that gave a candidate."""
-        return next(_in_order(key) for key in self._candidates if sorted(map(str, key)) == sorted(candidate.removed))
+    def changes_of(self, rung: Rung) -> Changes:
+        """Changes that gave a rung."""
+        return next(_in_order(key) for key in self._rungs if sorted(map(str, key)) == sorted(rung.removed))
 
     def cheapest(self, changes: Changes, limit: float) -> Rung | None:
-        """Cheapest candidate of these changes whose error is within a limit."""
-        good = [candidate for candidate in self.attempt(changes) if candidate.error <= limit]
-        return min(good, key=lambda candidate: candidate.seconds, default=None)
+        """Cheapest rung of these changes whose error is within a limit."""
+        good = [rung for rung in self.attempt(changes) if rung.error <= limit]
+        return min(good, key=lambda rung: rung.seconds, default=None)
 
     def attempt(self, changes: Changes, below: float = np.inf) -> Sequence[Rung]:
         """Rungs of the model with these changes: one for each way to step it that works.
@@ -121,25 +125,25 @@ class Trials:
         ----------
         changes : tuple of Reduction
         below : float
-            Time of a period by coarse timing (s) from which on nobody asks for the model.
+            Coarse time of a period (s) from which on nobody asks for the model.
         """
         key, changes = frozenset(changes), _in_order(changes)
-        if key not in self._candidates:
+        if key not in self._rungs:
             try:
                 model = reduced(self.model, changes)
-                timings = self._coarse_timings(model)
-                self._coarse[key] = min(map(_period, timings.values()), default=0.0)
-                if changes and self._coarse[key] > min(below, self._dear()):
+                coarse = self._coarse_times(model)
+                self._coarsely_timed[key] = min(map(_period, coarse.values()), default=0.0)
+                if changes and self._coarsely_timed[key] > min(below, self._dear()):
                     self._cut.add(key)
                     return []
                 self.say(", ".join(map(str, changes)) or "the full model")
                 self._models[key] = self._fit(self._begun(model, key)) if self._refit(changes) else model
-                self._candidates[key] = []
-                self._step(changes, timings)
+                self._rungs[key] = []
+                self._step(changes, coarse)
             except VpmError as error:
                 self.reason = str(error)
-                self._candidates.setdefault(key, [])
-        return self._candidates[key]
+                self._rungs.setdefault(key, [])
+        return self._rungs[key]
 
     def ahead(self, tried: Iterable[Changes], below: float = np.inf) -> None:
         """Let the executor fit models that are about to be tried, side by side; without one they are fitted in turn.
@@ -157,11 +161,11 @@ class Trials:
         begun: list[Model] = []
         for changes in map(_in_order, tried):
             key = frozenset(changes)
-            if key in self._candidates or not self._refit(changes):
+            if key in self._rungs or not self._refit(changes):
                 continue
             try:
                 model = reduced(self.model, changes)
-                if min(map(_period, self._coarse_timings(model).values()), default=0.0) <= min(below, self._dear()):
+                if min(map(_period, self._coarse_times(model).values()), default=0.0) <= min(below, self._dear()):
                     begun.append(self._begun(model, key))
             except VpmError:
                 continue  # the trial says why
@@ -170,7 +174,7 @@ class Trials:
             raise KeyboardInterrupt
         for model, done in zip(begun, found, strict=True):
             if done is None or isinstance(done.error, ExecutorError):
-                continue  # it was reported, and the trial fits the model here
+                continue  # it was told, and the trial fits the model here
             if done.error is not None and not isinstance(done.error, VpmError):
                 raise done.error
             self._fits[model] = done.value if done.error is None else done.error
@@ -182,8 +186,8 @@ class Trials:
         return self.judge.fitted(begun) if known is None else known
 
     def as_quick_as(self, changes: Changes) -> float:
-        """Time of a period by coarse timing (s) up to which a model is no dearer than one that was tried."""
-        return REPEATED * self._coarse[frozenset(changes)] + CLOCK
+        """Coarse time of a period (s) up to which a model is no dearer than one that was tried."""
+        return REPEATED * self._coarsely_timed[frozenset(changes)] + CLOCK
 
     def _begun(self, model: Model, key: frozenset[Reduction]) -> Model:
         """Model with the parameters of the fitted one that differs in the fewest changes: where its fit begins."""
@@ -194,24 +198,18 @@ class Trials:
         return model.with_parameters({name: known[name].value for name in model.adjustable if name in known})
 
     def saved(self, change: Reduction, setup: Setup) -> float:
-        """Savings of a period of the full model by one change, s, by coarse timing; none where it does not work.
-
-        Parameters
-        ----------
-        change : Reduction
-        setup : Setup
-        """
+        """Seconds of a period that one change of the full model saves, timed coarsely; none where it does not work."""
         try:
-            return self._coarse_timing(self.model, setup) - self._coarse_timing(reduced(self.model, (change,)), setup)
+            return self._coarse_time(self.model, setup) - self._coarse_time(reduced(self.model, (change,)), setup)
         except VpmError:
             return 0.0
 
     def _everything(self) -> list[Rung]:
-        return [candidate for candidates in self._candidates.values() for candidate in candidates]
+        return [rung for rungs in self._rungs.values() for rung in rungs]
 
     def _least(self) -> float:
         """Error of the full model stepped as well as it was."""
-        return min((candidate.error for candidate in self._everything() if not candidate.removed), default=0.0)
+        return min((rung.error for rung in self._everything() if not rung.removed), default=0.0)
 
     def _enough(self) -> float:
         """Error that is next to nothing: nothing more exact is looked for."""
@@ -220,71 +218,69 @@ class Trials:
     def _dear(self) -> float:
         """Time of a period from which on a way is not worth a look."""
         enough = self._enough()
-        least = min(
-            (candidate.seconds for candidate in self._everything() if candidate.error <= enough), default=np.inf
-        )
+        least = min((rung.seconds for rung in self._everything() if rung.error <= enough), default=np.inf)
         return SPARE * least + CLOCK
 
-    def _coarse_timings(self, model: Model) -> Mapping[str, tuple[int, float]]:
-        """Fewest steps in a period with which each integrator works by coarse timing, and seconds of one of them."""
+    def _coarse_times(self, model: Model) -> Mapping[str, tuple[int, float]]:
+        """Fewest steps in a period with which each integrator works by a coarse timing, and seconds of one of them."""
         found = {}
         for integrator in FIXED_STEP:
             for substeps in SUBSTEPS:
                 try:
-                    found[integrator] = substeps, self._coarse_timing(model, Setup(integrator, substeps)) / substeps
+                    found[integrator] = substeps, self._coarse_time(model, Setup(integrator, substeps)) / substeps
                     break
                 except SimulationError as error:
                     self.reason = str(error)
         return found
 
-    def _coarse_timing(self, model: Model, setup: Setup) -> float:
+    def _coarse_time(self, model: Model, setup: Setup) -> float:
         inputs, start = self.courses.of(model)
-        return float(np.min(step_times(model, self.judge.rate, setup, GLANCE, inputs, start=start)))
+        return float(np.min(step_times(model, self.judge.rate, setup, COARSE, inputs, start=start)))
 
-    def _step(self, changes: Changes, timings: Mapping[str, tuple[int, float]]) -> None:
+    def _step(self, changes: Changes, coarse: Mapping[str, tuple[int, float]]) -> None:
         """Every integrator with its fewest steps in a period, the quickest first; then more where they could pay."""
-        for integrator, (fewest, timing) in sorted(timings.items(), key=lambda item: _period(item[1])):
+        for integrator, (fewest, seconds) in sorted(coarse.items(), key=lambda item: _period(item[1])):
             for substeps in SUBSTEPS[SUBSTEPS.index(fewest) :]:
-                if self._is_hopeless(changes, timing * substeps):
+                if self._is_hopeless(changes, seconds * substeps):
                     break
                 # Too long a step for this integrator: perhaps a shorter one.
                 if self._add(changes, Setup(integrator, substeps)) is not None:
                     break
-        found = self._candidates[frozenset(changes)]
+        found = self._rungs[frozenset(changes)]
         # No steps lower the error of the model itself, which the best way shows.
-        least = min((candidate.error for candidate in found), default=0.0)
-        for first in [candidate for candidate in found if candidate.error == least or PAYS * candidate.error > least]:
+        least = min((rung.error for rung in found), default=0.0)
+        for first in [rung for rung in found if rung.error == least or PAYS * rung.error > least]:
             self._refine(changes, first)
 
-    def _refine(self, changes: Changes, candidate: Rung) -> None:
+    def _refine(self, changes: Changes, rung: Rung) -> None:
         """More and more steps in a period, as long as they pay."""
-        for substeps in SUBSTEPS[SUBSTEPS.index(candidate.substeps) + 1 :]:
-            predicted = candidate.seconds * substeps / candidate.substeps
-            if candidate.error <= self._enough() or predicted > self._dear() or predicted * self.judge.rate > 1.0:
+        for substeps in SUBSTEPS[SUBSTEPS.index(rung.substeps) + 1 :]:
+            predicted = rung.seconds * substeps / rung.substeps
+            if rung.error <= self._enough() or predicted > self._dear() or predicted * self.judge.rate > 1.0:
                 return
-            more_steps = self._add(changes, Setup(candidate.integrator, substeps), PAYS * candidate.error)
-            if more_steps is None:
+            finer = self._add(changes, Setup(rung.integrator, substeps), PAYS * rung.error)
+            if finer is None:
                 return
-            candidate = more_steps
+            rung = finer
 
-    def _is_hopeless(self, changes: Changes, timing: float) -> bool:
-        """Whether a way takes so much longer by coarse timing than one that works that none takes it.
+    def _is_hopeless(self, changes: Changes, seconds: float) -> bool:
+        """Whether a way takes so much longer by a coarse timing than one that works that none takes it.
 
         All that is within reach of the period is tried with the full model: what it errs is the measure of the others.
         """
-        known, enough = self._candidates[frozenset(changes)], self._enough()
-        fastest = min((candidate.seconds for candidate in known), default=np.inf)
-        if timing * self.judge.rate > 1.0 and timing > SLOWER * fastest:
+        known, enough = self._rungs[frozenset(changes)], self._enough()
+        fastest = min((rung.seconds for rung in known), default=np.inf)
+        if seconds * self.judge.rate > 1.0 and seconds > SLOWER * fastest:
             return True
         if not changes:
             return False
-        if timing > self._dear():
+        if seconds > self._dear():
             return True
-        good = min((candidate.seconds for candidate in known if candidate.error <= enough), default=np.inf)
-        return timing > ALIKE * good or (timing > fastest and _agree(known))
+        good = min((rung.seconds for rung in known if rung.error <= enough), default=np.inf)
+        return seconds > ALIKE * good or (seconds > fastest and _agree(known))
 
     def _add(self, changes: Changes, setup: Setup, demanded: float = np.inf) -> Rung | None:
-        """The candidate of one way to step, if it works and its error is less than what is demanded."""
+        """The rung of one way, if it works and its error is less than what is demanded."""
         key = frozenset(changes)
         model = self._models[key]
         try:
@@ -298,21 +294,13 @@ class Trials:
         except SimulationError as reason:
             self.reason = str(reason)
             return None
-        labels, states, by_channel = tuple(map(str, changes)), model.core.n_states, tuple(errors.items())
-        candidate = Rung(
-            labels, setup.integrator, setup.substeps, states, error, loudest, error, seconds, slowest, by_channel
-        )
-        self._candidates[key].append(candidate)
-        return candidate
+        labels, states, told = tuple(map(str, changes)), model.core.n_states, tuple(errors.items())
+        rung = Rung(labels, setup.integrator, setup.substeps, states, error, loudest, error, seconds, slowest, told)
+        self._rungs[key].append(rung)
+        return rung
 
     def timed(self, model: Model, setup: Setup) -> tuple[float, float]:
-        """Median and 99.9 % quantile of a period, s.
-
-        Parameters
-        ----------
-        model : Model
-        setup : Setup
-        """
+        """Median and 99.9 % quantile of a period, s."""
         rate, (inputs, start) = self.judge.rate, self.courses.of(model)
         times = step_times(model, rate, setup, TIMED_STEPS[0], inputs, PRIORITY, start)
         steps = int(np.clip(TIMED_SECONDS / np.median(times), *TIMED_STEPS))
@@ -321,9 +309,9 @@ class Trials:
         return float(np.median(times)), float(np.quantile(times, 0.999))
 
 
-def _period(timing: tuple[int, float]) -> float:
+def _period(step: tuple[int, float]) -> float:
     """Seconds of a period in so many steps of so many seconds."""
-    substeps, seconds = timing
+    substeps, seconds = step
     return substeps * seconds
 
 
@@ -332,10 +320,38 @@ def _in_order(changes: Collection[Reduction]) -> Changes:
     return tuple(sorted(changes, key=lambda change: (change.kind == "terms", str(change))))
 
 
-def _agree(candidates: Sequence[Rung]) -> bool:
+def _agree(rungs: Sequence[Rung]) -> bool:
     """Whether two integrators, each with its fewest steps that work, err alike: the error is then the model's own."""
     first: dict[str, float] = {}
-    for candidate in candidates:
-        first.setdefault(candidate.integrator, candidate.error)
+    for rung in rungs:
+        first.setdefault(rung.integrator, rung.error)
     least = sorted(first.values())[:2]
     return len(least) == 2 and least[0] > PAYS * least[1]
+
+
+class Courses:
+    """Commands along the first record to judge on, worked out once for all models with the same drives.
+
+    Parameters
+    ----------
+    model : Model
+        The full one.
+    judge : Judge
+    """
+
+    def __init__(self, model: Model, judge: Judge) -> None:
+        self._full, self._judge = model, judge
+        self._known: dict[tuple[str, ...], Array] = {}
+
+    def record(self, model: Model) -> Experiment:
+        """Record that drives a model."""
+        return commanded(model, self._full, self._judge.driven)
+
+    def of(self, model: Model) -> tuple[Array, Array | None]:
+        """Inputs (N, inputs) of a model, and the state that it starts from; see `vpm.budget.start_state`."""
+        record = self.record(model)
+        kinds = tuple(model.actuator_type(name) for name in model.actuators) + model.controlled_actuators
+        if kinds not in self._known:
+            # Reduced models of the same drives get what the first of them got, which is the full model.
+            self._known[kinds] = commands(model, self._judge.rate, record)
+        return self._known[kinds], start_state(model, record)

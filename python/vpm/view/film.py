@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import MissingExtraError, VpmError
+from vpm.errors import VpmError, needs
 from vpm.files import replacing
 from vpm.view.looks import GROUND, INK, LOOKS, SOFT, colour
 from vpm.view.mesh import mesh_of
@@ -55,11 +55,9 @@ def draw(scene: Scene, sample: int, *, dark: bool = False, size: tuple[int, int]
     MissingExtraError
         matplotlib is not installed.
     """
-    try:
+    with needs("matplotlib", "film"):
         from matplotlib.collections import PolyCollection
         from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingExtraError("matplotlib", "film") from error
     figure = Figure(figsize=(size[0] / 100, size[1] / 100), dpi=100, facecolor=colour(GROUND, dark=dark))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.set(xlim=(-1, 1), ylim=(-1, 1))
@@ -147,11 +145,9 @@ def write_film(
     if target.suffix.lower() not in ENDINGS:
         raise VpmError(f"{path} is no name of a film; give it one of the endings {', '.join(ENDINGS)}")
     samples = film_samples(scene, speed)
-    try:
+    with needs("imageio-ffmpeg", "film"):
         imageio: Any = import_module("imageio.v2")
         import_module("imageio_ffmpeg")
-    except ImportError as error:
-        raise MissingExtraError("imageio-ffmpeg", "film") from error
     gif: dict[str, Any] = {"duration": 1000.0 / RATE, "loop": 0}
     how = gif if target.suffix.lower() == ".gif" else {"fps": RATE, "macro_block_size": 2, "quality": 8}
     with replacing(path) as beside, imageio.get_writer(beside, **how) as writer:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import MissingExtraError, VpmError
+from vpm.errors import VpmError, needs
 from vpm.model import Model
 from vpm.view.build import scene_of
 from vpm.view.course import Course, resting
@@ -94,10 +94,8 @@ class Page:
     """
 
     def __init__(self, model: Model, course: Course, *, port: int | None = None, dark: bool = False) -> None:
-        try:
+        with needs("viser", "view"):
             import viser
-        except ImportError as error:
-            raise MissingExtraError("viser", "view") from error
         # A browser that opens a line and says nothing is no error of anybody.
         logging.getLogger("websockets.server").setLevel(logging.CRITICAL)
         self.model, self.course = model, course

@@ -141,7 +141,7 @@ def _weighed(
         fitted = model
         if names:
             found = estimate(model, known, names, bounds={name: (p.low, p.high) for name, p in priors.items()})
-            fitted = model.with_parameters(dict(zip(names, map(float, found.values), strict=True)))
+            fitted = found.on(model)
         data = data.renewed(fitted)
         here = (*_evidence(fitted, _Known(data, priors)), fitted)
         if here[0] <= best[0] + SETTLED:

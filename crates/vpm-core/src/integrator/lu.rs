@@ -1,5 +1,7 @@
 //! Small dense linear systems.
 
+use std::ops::Mul;
+
 use crate::scalar::Scalar;
 
 /// LU factors of a small square matrix, in buffers that are allocated once.
@@ -125,11 +127,32 @@ impl<S: Scalar> Lu<S> {
     }
 }
 
+impl Lu<f64> {
+    /// As [`Lu::solve_of`], of numbers of another kind, in room for as many of these as the matrix has rows.
+    pub(super) fn solve_numbers<T: Scalar>(&self, b: &mut [T], known: &mut [T], change: impl FnOnce(&mut [T])) {
+        let (n, columns) = (self.dim, &self.columns);
+        for (entry, &row) in known.iter_mut().zip(&self.order) {
+            *entry = b[row];
+        }
+        change(known);
+        for k in 0..n {
+            let (known, below) = known.split_at_mut(k + 1);
+            take(below, &columns[k * n + k + 1..(k + 1) * n], known[k]);
+            known[k] = known[k] * columns[k * n + k];
+        }
+        for k in (0..n).rev() {
+            let (above, known) = known.split_at_mut(k);
+            b[k] = known[0];
+            take(above, &columns[k * n..], known[0]);
+        }
+    }
+}
+
 /// Takes `factor` times a column off.
 #[inline]
-pub(super) fn take<S: Scalar>(entries: &mut [S], column: &[S], factor: S) {
+pub(super) fn take<S: Scalar + Mul<F, Output = S>, F: Copy>(entries: &mut [S], column: &[F], factor: S) {
     for (entry, &part) in entries.iter_mut().zip(column) {
-        *entry -= part * factor;
+        *entry -= factor * part;
     }
 }
 

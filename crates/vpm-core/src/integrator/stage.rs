@@ -12,6 +12,7 @@ use crate::scalar::Scalar;
 /// Law: with `A = [0, 1, 0; B, C]`, the coordinates first, `(1 - r A) [k; w] = [a; b]` is `(1 - r C - r^2 B') w = b + r B a` and
 /// `k = a + r v`, where v are the leading entries of w and B' is B below v, zero elsewhere. So a system of n coordinates and m states
 /// costs the factors of m - n rows, an eighth of the work where there is nothing but coordinates and rates.
+/// Numbers with first derivatives take the factors of the values alone: of `(1 - r A) k = b` these are `k' = (1 - r A)^-1 (b' + r A' k)`.
 /// Source: elimination by blocks, Golub & Van Loan 2013, "Matrix Computations", section 3.2.9. Checked: against the whole system.
 #[derive(Clone, Debug)]
 pub(super) struct Stage<S, L = f64> {
@@ -24,6 +25,8 @@ pub(super) struct Stage<S, L = f64> {
     missing: Vec<S>,
     /// The derivatives of a right-hand side, where they are solved for apart.
     derivatives: Vec<S>,
+    /// The same of the values, where numbers carry first derivatives.
+    values: Option<Box<Stage<f64>>>,
     coordinates: usize,
     dim: usize,
     reach: L,
@@ -39,6 +42,7 @@ impl<S: Scalar + Mul<L, Output = S>, L: Length> Stage<S, L> {
             lu: Lu::new(dim),
             missing: line.clone(),
             derivatives: line,
+            values: S::is_first_order().then(|| Box::new(Stage::new(dim))),
             coordinates: 0,
             dim,
             reach: L::default(),
@@ -53,6 +57,10 @@ impl<S: Scalar + Mul<L, Output = S>, L: Length> Stage<S, L> {
     /// Prepares `1 - reach A`, where that many coordinates lead the state.
     pub(super) fn factorise(&mut self, coordinates: usize, reach: L) {
         (self.coordinates, self.reach) = (coordinates, reach);
+        if let Some(values) = &mut self.values {
+            values.matrix.iter_mut().zip(&self.matrix).for_each(|(value, entry)| *value = entry.re());
+            return values.factorise(coordinates, (S::one() * reach).re());
+        }
         let left = self.dim - coordinates;
         if self.lu.dim() != left {
             self.lu.resize(left);
@@ -89,11 +97,19 @@ impl<S: Scalar + Mul<L, Output = S>, L: Length> Stage<S, L> {
 
     /// The largest factor of the elimination, see [`Lu::largest_factor`].
     pub(super) fn largest_factor(&self) -> S {
-        self.lu.largest_factor()
+        match &self.values {
+            Some(values) => S::from_f64(values.largest_factor()),
+            None => self.lu.largest_factor(),
+        }
     }
 
     /// Replaces `b` by the solution x of `(1 - reach A) x = b`, A the last matrix of that system.
     pub(super) fn solve(&mut self, ode: &mut impl Ode<S>, b: &mut [S]) {
+        if let Some(mut values) = self.values.take() {
+            self.solve_by(&mut values, ode, b);
+            self.values = Some(values);
+            return;
+        }
         if !ode.turns() {
             for_size!(self.lu.dim(), N => self.solve_of::<N>(b));
             return;
@@ -113,10 +129,55 @@ impl<S: Scalar + Mul<L, Output = S>, L: Length> Stage<S, L> {
         self.missing = missing;
     }
 
+    /// The same of numbers with first derivatives, by the factors of the values.
+    fn solve_by(&mut self, values: &mut Stage<f64>, ode: &mut impl Ode<S>, b: &mut [S]) {
+        let (dim, n) = (self.dim, self.coordinates);
+        let mut solution = std::mem::take(&mut values.missing);
+        solution.iter_mut().zip(&*b).for_each(|(value, entry)| *value = entry.re());
+        for_size!(values.lu.dim(), N => values.solve_of::<N>(&mut solution));
+        let mut missing = std::mem::take(&mut self.missing);
+        missing.fill(S::zero());
+        for (entry, &value) in b.iter_mut().zip(&solution) {
+            *entry = *entry - entry.re() + value;
+        }
+        if ode.turns() {
+            ode.turned(b, &mut missing);
+        }
+        for (row, (missing, entry)) in missing.iter_mut().zip(&*b).enumerate() {
+            *missing = *missing * self.reach + (*entry - entry.re());
+            if row >= n {
+                for (slope, &value) in self.matrix[row * dim..].iter().zip(&solution) {
+                    missing.add_derivatives(slope, values.reach * value);
+                }
+            }
+        }
+        values.solve_numbers(&mut missing, &mut self.derivatives);
+        for ((entry, &missing), &value) in b.iter_mut().zip(&missing).zip(&solution) {
+            *entry = missing + value;
+        }
+        (self.missing, values.missing) = (missing, solution);
+    }
+
     fn solve_of<const N: usize>(&mut self, b: &mut [S]) {
         let (coordinates, others) = b.split_at_mut(self.coordinates);
         let left = if N == 0 { others.len() } else { N };
         self.lu.solve_of::<N>(others, |others| {
+            for (&coordinate, column) in coordinates.iter().zip(self.coupling.chunks_exact(left.max(1))) {
+                take(others, column, coordinate);
+            }
+        });
+        for (coordinate, &rate) in coordinates.iter_mut().zip(&*others) {
+            *coordinate += rate * self.reach;
+        }
+    }
+}
+
+impl Stage<f64> {
+    /// As [`Stage::solve`], of numbers of another kind, in room for as many of these as there are states.
+    fn solve_numbers<T: Scalar>(&self, b: &mut [T], room: &mut [T]) {
+        let (coordinates, others) = b.split_at_mut(self.coordinates);
+        let left = others.len();
+        self.lu.solve_numbers(others, &mut room[..left], |others| {
             for (&coordinate, column) in coordinates.iter().zip(self.coupling.chunks_exact(left.max(1))) {
                 take(others, column, coordinate);
             }

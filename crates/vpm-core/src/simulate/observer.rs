@@ -51,6 +51,8 @@ pub struct Gains<'a> {
     pub gains: Table<'a>,
     /// Whether no other output than those that were measured is asked for.
     pub alone: bool,
+    /// Whether derivatives may be those of the equations to the order of the steps, where that takes less time than those of the steps.
+    pub approximate: bool,
 }
 
 impl Gains<'_> {

@@ -108,6 +108,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         if plan.gains.is_some_and(|gains| gains.is_of_motion(description.layout())) {
             system = system.seen_in_motion();
         }
+        if plan.gains.is_some_and(|gains| gains.approximate) {
+            system = system.with_approximate_derivatives();
+        }
         system.make_for(setting.stepping.method)?;
         let (dim, rows, zero) = (system.dim(), plan.horizon, S::zero());
         let bounds = Bounds::new(description, theta, system.dynamics());

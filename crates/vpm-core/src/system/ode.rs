@@ -43,6 +43,8 @@ pub struct System<S> {
     ready: bool,
     /// Whether linearly implicit steps run as a whole.
     whole: bool,
+    /// Whether derivatives of the matrices of such steps may be left out.
+    approximate: bool,
     /// What samples ask for: all outputs with the rates, or those outputs that the state alone decides.
     seen: Kind,
     /// Ball joints.
@@ -73,6 +75,7 @@ impl<S: Scalar> System<S> {
             rates: vec![S::zero(); dynamics.dim()],
             ready: false,
             whole: false,
+            approximate: false,
             seen: Kind::Sample,
             turning: Turning::new(std::iter::empty()),
             closed: vec![S::zero(); if dynamics.loops.is_some() { 2 * dynamics.coordinates() + 2 } else { 0 }],
@@ -96,6 +99,12 @@ impl<S: Scalar> System<S> {
     #[must_use]
     pub(crate) fn seen_in_motion(self) -> Self {
         Self { seen: Kind::Motion, ..self }
+    }
+
+    /// The same, whose derivatives may be those of the equations to the order of its steps where that takes less time.
+    #[must_use]
+    pub(crate) fn with_approximate_derivatives(self) -> Self {
+        Self { approximate: !Self::is_plain(), ..self }
     }
 
     /// Takes over a state as users know it: brings it into the coordinates in which the machine goes on.
@@ -198,9 +207,13 @@ impl<S: Scalar> System<S> {
     pub fn compile(&mut self, method: Method) -> std::result::Result<(), String> {
         self.ready = false;
         if !Self::is_plain() {
+            let constant = self.approximate
+                && method == Method::LinearlyImplicit
+                && self.routines.compile(&Kind::Rates).is_ok()
+                && self.routines.leave_matrices_constant().is_ok();
             // What has no code goes on operation by operation.
             let kinds = [Some(Kind::Rates), Some(self.seen.clone()), kind_of(method), self.closing()];
-            let kinds = kinds.into_iter().flatten();
+            let kinds = kinds.into_iter().flatten().filter(|kind| !constant || *kind != Kind::Prepared);
             return kinds.map(|kind| self.routines.compile(&kind)).fold(Ok(()), std::result::Result::and);
         }
         // An additive step begins with the rates of the sample before it, if that has any.

@@ -2,10 +2,11 @@
 
 use std::sync::Arc;
 
+use super::constant::Constant;
 use super::functions::{Function, Functions};
 use super::recorded::Kind;
 use crate::error::{Error, Result};
-use crate::graph::{Evaluator, Program, Work};
+use crate::graph::{Evaluator, LARGEST, Program, Work};
 use crate::integrator::Method;
 use crate::scalar::{Dual, Scalar};
 
@@ -294,12 +295,27 @@ pub(crate) struct Routines<S> {
     made: Vec<(Kind, Routine<S>)>,
     /// Which of them gave a matrix last.
     last: Option<usize>,
+    /// Gives the matrices of linearly implicit steps without their derivatives, if these may be left out.
+    constant: Option<Box<Constant>>,
 }
 
 impl<S: Scalar> Routines<S> {
     /// For the checked parameters `theta`, `inputs` holding at first.
     pub(crate) fn new(functions: Arc<Functions>, theta: &[S], inputs: Vec<S>) -> Self {
-        Self { functions, theta: theta.to_vec(), held: inputs, made: Vec::new(), last: None }
+        Self { functions, theta: theta.to_vec(), held: inputs, made: Vec::new(), last: None, constant: None }
+    }
+
+    /// Leaves the derivatives out of the matrices of linearly implicit steps from now on where there is machine code of these matrices, and
+    /// none of their derivatives; else it says why not, and goes on as before.
+    pub(crate) fn leave_matrices_constant(&mut self) -> std::result::Result<(), String> {
+        if self.has_derivatives_to_compile(&Kind::Prepared) {
+            return Err("the derivatives of the matrices have machine code".to_owned());
+        }
+        let plain = |numbers: &[S]| numbers.iter().map(Scalar::re).collect::<Vec<_>>();
+        let routines = Routines::new(self.functions.clone(), &plain(&self.theta), plain(&self.held));
+        self.constant = Some(Box::new(Constant::new(routines)?));
+        self.forget(&Kind::Prepared);
+        Ok(())
     }
 
     /// Makes the function of that kind if it is not there yet.
@@ -350,6 +366,14 @@ impl<S: Scalar> Routines<S> {
         self.get(kind).map_or(Ok(()), |routine| routine.differentiate_by(derived, &by))
     }
 
+    /// Whether the derivatives of a function by the states alone, those by parameters being few beside, are not too many to compile.
+    fn has_derivatives_to_compile(&mut self, kind: &Kind) -> bool {
+        let Some(states) = self.get(kind).map(|routine| routine.function.places.states as u32) else { return false };
+        let values: Vec<f64> = self.theta.iter().map(Scalar::re).collect();
+        let derived = self.functions.function(&Kind::Derived(Box::new(kind.clone()), (0..states).collect()), &values);
+        derived.is_ok_and(|function| function.directions.is_none() && function.often.size() <= LARGEST)
+    }
+
     /// Makes the functions of these kinds as machine code, all of them or none; or says why there is none.
     pub(crate) fn compile_all(&mut self, kinds: &[Kind]) -> std::result::Result<(), String> {
         kinds.iter().try_for_each(|kind| self.compile(kind)).inspect_err(|_| {
@@ -370,6 +394,11 @@ impl<S: Scalar> Routines<S> {
 
     /// See [`Routine::matrix`]; what cannot be made is no number.
     pub(crate) fn matrix(&mut self, kind: &Kind, x: &[S], matrix: &mut [S], width: usize, values: &mut [S]) {
+        if let Some(constant) = self.constant.as_deref_mut().filter(|_| *kind == Kind::Prepared) {
+            constant.write(x, matrix, width);
+            self.last = None;
+            return self.copy(&Kind::Rates, x, &[], values);
+        }
         match self.made(kind) {
             Some(routine) => routine.matrix(x, matrix, width, values),
             None => matrix.fill(S::from_f64(f64::NAN)),
@@ -413,6 +442,9 @@ impl<S: Scalar> Routines<S> {
     pub(crate) fn hold(&mut self, number: usize, input: S) {
         self.held[number] = input;
         self.made.iter_mut().for_each(|(_, routine)| routine.hold(number, input));
+        if let Some(constant) = &mut self.constant {
+            constant.hold(number, input.re());
+        }
     }
 }
 

@@ -1,4 +1,7 @@
-"""Actuator lag: a drive that follows its command as a system of first order."""
+"""Actuator lag: a drive that follows its command as a system of first order.
+
+Source: Franklin et al. 2015, section 3.1.
+"""
 
 import math
 
@@ -27,7 +30,7 @@ EFFECT = EffectType(
     impossible="a negative time constant would mean a drive that runs away from its command",
     confused_with={
         "joint_compliance": "both delay the motion of the link; free vibration after a stop shows the spring alone",
-        "valve_dynamics": "a lag is a pole before the spool, that is the spool itself; fast commands discriminate",
+        "valve_dynamics": "a lag is a pole before the spool, the other is the spool itself; fast commands discriminate",
         "entrained_air": "both delay the force behind the command; pressures at a loaded piston discriminate",
         "input_delay": "they agree for slow commands; steps and fast commands discriminate",
         "sensor_delay": "they agree for slow motion; steps and fast motion discriminate",

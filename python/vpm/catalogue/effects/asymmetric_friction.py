@@ -1,4 +1,7 @@
-"""Asymmetric friction: what a joint resists more in one direction than in the other."""
+"""Asymmetric friction: what a joint resists more in one direction than in the other.
+
+Source: Swevers et al. 2007.
+"""
 
 from vpm.catalogue.kinds import EffectType, size
 from vpm.catalogue.shared import SLOW_AND_FAST, transition

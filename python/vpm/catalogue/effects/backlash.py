@@ -3,6 +3,8 @@
 At a driven joint it splits the joint, as a compliance does: the joint's own coordinate stays that of the motor side,
 which is measured and on which the actuator and all other effects of the joint act. The link hangs behind a joint
 without actuator, named like the joint with ``_deflection`` after it, whose coordinate is link side minus motor side.
+
+Source: Nordin and Gutman 2002, section 2.
 """
 
 from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, shape, size

@@ -1,4 +1,7 @@
-"""Bias force: a constant load, such as a weight on a rope."""
+"""Bias force: a constant load, such as a weight on a rope.
+
+Source: Khalil and Dombre 2002.
+"""
 
 from vpm.catalogue.kinds import EffectType, size
 from vpm.catalogue.signature import Signature
@@ -15,7 +18,7 @@ EFFECT = EffectType(
         "gravity_tilt": "they agree where gravity's lever does not change; other poses discriminate",
         "coulomb_friction": "motion in one direction alone does not discriminate; motion in both directions does",
         "asymmetric_friction": (
-            "a constant load and a difference of Coulomb friction agree wherever the joint moves; only standstill and"
+            "a difference of Coulomb friction and a constant load agree wherever the joint moves; only standstill and"
             " starts from rest discriminate"
         ),
         "payload": "they agree where gravity's lever does not change; other poses or fast motion discriminate",

@@ -1,4 +1,7 @@
-"""Coulomb friction: dry surfaces resist alike at every speed."""
+"""Coulomb friction: dry surfaces resist alike at every speed.
+
+Source: Andersson et al. 2007.
+"""
 
 from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, size
 from vpm.catalogue.shared import SLOW, SLOW_AND_FAST, transition

@@ -1,4 +1,7 @@
-"""Cubic spring: a spring that stiffens over its way."""
+"""Cubic spring: a spring that stiffens over its way.
+
+Source: Nayfeh and Mook 1979, section 4.1.
+"""
 
 from vpm.catalogue.kinds import ANY, EffectType, shape, size
 from vpm.catalogue.signature import Signature

@@ -1,4 +1,7 @@
-"""Current ripple: a motor whose torque per current changes with its angle."""
+"""Current ripple: a motor whose torque per current changes with its angle.
+
+Source: Holtz and Springob 1996.
+"""
 
 from vpm.catalogue.kinds import EffectType, shape, size
 from vpm.catalogue.signature import Signature

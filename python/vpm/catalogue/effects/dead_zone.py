@@ -1,4 +1,7 @@
-"""Dead zone: small commands that a drive does not answer to."""
+"""Dead zone: small commands that a drive does not answer to.
+
+Source: Tao and Kokotovic 1996, section 2.1.
+"""
 
 from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectType, nonlinear
 from vpm.catalogue.signature import Signature

@@ -1,4 +1,7 @@
-"""Friction in proportion to the effort of one drive, as of seals under pressure."""
+"""Friction in proportion to the effort of one drive, as of seals under pressure.
+
+Source: Hamon et al. 2010.
+"""
 
 from vpm.catalogue.kinds import EffectType
 from vpm.catalogue.shared import NEGATIVE_SHARE, law_of_load, shares, transition

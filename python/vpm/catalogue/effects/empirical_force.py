@@ -2,6 +2,8 @@
 
 It keeps the range that was seen when it was fitted, and outside of it stays what it is at the edge: no polynomial runs
 away. Its coefficients are the efforts of their terms at that edge, so that they can be compared with each other.
+
+Source: data alone.
 """
 
 from dataclasses import replace

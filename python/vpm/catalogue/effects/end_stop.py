@@ -1,4 +1,7 @@
-"""End stop: the ends of the way of a joint, which push back harder in impact."""
+"""End stop: the ends of the way of a joint, which push back harder in impact.
+
+Source: Hunt and Crossley 1975.
+"""
 
 from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectType, shape, size
 from vpm.catalogue.shared import CONTACT, NEVER

@@ -1,4 +1,7 @@
-"""Entrained air: bubbles in the oil, on top of those that are described."""
+"""Entrained air: bubbles in the oil, on top of those that are described.
+
+Source: Merritt 1967, section 2-4.
+"""
 
 import math
 

@@ -1,4 +1,7 @@
-"""Gravity tilt: the whole machine does not stand level."""
+"""Gravity tilt: the whole machine does not stand level.
+
+Source: two turns of the frame of the world.
+"""
 
 import math
 

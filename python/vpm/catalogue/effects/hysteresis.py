@@ -1,4 +1,7 @@
-"""Hysteresis: friction that builds up over a way and remembers the path."""
+"""Hysteresis: friction that builds up over a way and remembers the path.
+
+Source: Ikhouane and Rodellar 2007, section 2.5; Dahl 1968.
+"""
 
 from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, shape, size
 from vpm.catalogue.signature import Signature

@@ -1,4 +1,7 @@
-"""Input delay: a drive that answers to its command after a while."""
+"""Input delay: a drive that answers to its command after a while.
+
+Source: Åström and Wittenmark 1997, section 2.3.
+"""
 
 from vpm.catalogue.kinds import EffectType
 from vpm.catalogue.shared import delay

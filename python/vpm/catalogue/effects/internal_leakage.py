@@ -1,4 +1,7 @@
-"""Internal leakage: oil that passes the piston of a cylinder, on top of what is described."""
+"""Internal leakage: oil that passes the piston of a cylinder, on top of what is described.
+
+Source: Merritt 1967; D'Imperio 2016, equation 4.11.
+"""
 
 from vpm.catalogue.kinds import EffectType
 from vpm.catalogue.shared import over_described

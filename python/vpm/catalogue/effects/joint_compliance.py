@@ -1,4 +1,7 @@
-"""Joint compliance: a drive that winds up; it splits its joint, and the link hangs behind, as with backlash."""
+"""Joint compliance: a drive that winds up; it splits its joint, and the link hangs behind, as with backlash.
+
+Source: Spong 1987, equation 2.
+"""
 
 from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectType, nonlinear, size
 from vpm.catalogue.shared import RIGID, motor_inertia

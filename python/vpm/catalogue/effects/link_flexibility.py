@@ -3,6 +3,8 @@
 A rigid body that bends is a pseudo-rigid link: a torsion spring at its root carries its first mode (L. L. Howell,
 "Compliant Mechanisms", 2001, chapter 5). A rigid beam that bends becomes elastic itself, with two strain polynomials in
 each of its components, so that strain gauges on it show it too.
+
+Source: Howell 2001, chapter 5.
 """
 
 from vpm.catalogue.kinds import NOT_NEGATIVE, POSITIVE, EffectType, nonlinear, shape

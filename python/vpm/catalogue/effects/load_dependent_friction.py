@@ -1,4 +1,7 @@
-"""Friction in proportion to the load: gears that lose a share of the effort that they pass on."""
+"""Friction in proportion to the load: gears that lose a share of the effort that they pass on.
+
+Source: Hamon et al. 2010.
+"""
 
 from vpm.catalogue.kinds import EffectType
 from vpm.catalogue.shared import NEGATIVE_SHARE, law_of_load, shares, transition

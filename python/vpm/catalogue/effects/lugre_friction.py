@@ -1,4 +1,7 @@
-"""LuGre friction: bristles that bend over short ways and slide over long ones."""
+"""LuGre friction: bristles that bend over short ways and slide over long ones.
+
+Source: Canudas de Wit et al. 1995.
+"""
 
 from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, shape, size
 from vpm.catalogue.shared import STRIBECK

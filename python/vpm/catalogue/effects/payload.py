@@ -1,4 +1,7 @@
-"""Payload: a point mass on a body or at the tip of a beam."""
+"""Payload: a point mass on a body or at the tip of a beam.
+
+Source: Featherstone 2008, equation 2.63.
+"""
 
 from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectParameter, EffectType, shape, size
 from vpm.catalogue.signature import Signature

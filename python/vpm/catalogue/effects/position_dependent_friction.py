@@ -1,4 +1,7 @@
-"""Friction that is not the same everywhere: dry friction that repeats over the way."""
+"""Friction that is not the same everywhere: dry friction that repeats over the way.
+
+Source: Armstrong-Hélouvry 1991.
+"""
 
 from vpm.catalogue.kinds import EffectType, shape, size
 from vpm.catalogue.shared import transition

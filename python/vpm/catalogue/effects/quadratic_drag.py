@@ -1,4 +1,7 @@
-"""Quadratic drag: air and churned oil resist with the square of the speed."""
+"""Quadratic drag: air and churned oil resist with the square of the speed.
+
+Source: Batchelor 1967, section 5.11.
+"""
 
 from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, size
 from vpm.catalogue.signature import Signature

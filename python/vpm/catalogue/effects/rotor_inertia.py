@@ -1,4 +1,7 @@
-"""Rotor inertia: what turns with the motor and carries no weight."""
+"""Rotor inertia: what turns with the motor and carries no weight.
+
+Source: Featherstone 2008, section 9.6.
+"""
 
 from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, size
 from vpm.catalogue.signature import Signature

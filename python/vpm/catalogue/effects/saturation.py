@@ -1,4 +1,7 @@
-"""Saturation: the largest command that a drive follows."""
+"""Saturation: the largest command that a drive follows.
+
+Source: Åström and Hägglund 2006, section 3.5.
+"""
 
 from vpm.catalogue.kinds import ABOVE_ZERO, EffectType, nonlinear
 from vpm.catalogue.shared import NEVER

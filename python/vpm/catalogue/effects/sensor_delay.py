@@ -1,4 +1,7 @@
-"""Sensor delay: a sensor that reads late."""
+"""Sensor delay: a sensor that reads late.
+
+Source: Laakso et al. 1996.
+"""
 
 from vpm.catalogue.kinds import EffectType
 from vpm.catalogue.shared import delay

@@ -1,4 +1,7 @@
-"""Sensor gain: a sensor that reads too much or too little of everything."""
+"""Sensor gain: a sensor that reads too much or too little of everything.
+
+Source: Doebelin 2004, section 3.2.
+"""
 
 from vpm.catalogue.kinds import ABOVE_ZERO, EffectType, nonlinear
 from vpm.catalogue.signature import Signature

@@ -1,4 +1,7 @@
-"""Sensor offset: a sensor whose zero is shifted."""
+"""Sensor offset: a sensor whose zero is shifted.
+
+Source: Doebelin 2004, section 3.2.
+"""
 
 from vpm.catalogue.kinds import ANY, EffectType, nonlinear
 from vpm.catalogue.signature import Signature
@@ -25,7 +28,7 @@ EFFECT = EffectType(
     confused_with={
         "gravity_tilt": "a shifted zero of an angle turns gravity for all that hangs on it; other poses discriminate",
         "bias_force": "through gravity or a spring a shifted zero acts like a load; other poses discriminate",
-        "spring": "a shifted zero and a shifted rest position agree; a reference position discriminates",
+        "spring": "a shifted rest position and a shifted zero agree; a reference position discriminates",
     },
     signature=Signature(
         ("position", "time"),

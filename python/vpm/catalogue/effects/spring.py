@@ -1,4 +1,7 @@
-"""Spring: it pulls a joint back to a place of rest, in proportion to its way."""
+"""Spring: it pulls a joint back to a place of rest, in proportion to its way.
+
+Source: Hooke's law.
+"""
 
 from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectType, shape, size
 from vpm.catalogue.signature import Signature

@@ -1,4 +1,7 @@
-"""Stribeck friction: what dry friction is larger by close to rest, where no film of oil has built up yet."""
+"""Stribeck friction: what dry friction is larger by close to rest, where no film of oil has built up yet.
+
+Source: Armstrong-Hélouvry et al. 1994, section 2.1.
+"""
 
 from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, shape, size
 from vpm.catalogue.shared import STRIBECK, transition

@@ -1,4 +1,7 @@
-"""Structural damping: of a beam that is described as elastic."""
+"""Structural damping: of a beam that is described as elastic.
+
+Source: Caughey and O'Kelly 1965.
+"""
 
 from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, nonlinear
 from vpm.catalogue.signature import Signature

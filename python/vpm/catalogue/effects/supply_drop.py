@@ -1,4 +1,7 @@
-"""Supply drop: pressure that hoses and filters take between a supply and its valves."""
+"""Supply drop: pressure that hoses and filters take between a supply and its valves.
+
+Source: Merritt 1967, sections 3-2 and 3-3.
+"""
 
 from vpm.catalogue.kinds import EffectType, shape
 from vpm.catalogue.shared import over_described

@@ -1,4 +1,7 @@
-"""Torque ripple: cogging and other loads that repeat over the way."""
+"""Torque ripple: cogging and other loads that repeat over the way.
+
+Source: Holtz and Springob 1996.
+"""
 
 from vpm.catalogue.kinds import EffectType, shape, size
 from vpm.catalogue.signature import Signature

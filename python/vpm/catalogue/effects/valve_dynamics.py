@@ -1,4 +1,7 @@
-"""Valve dynamics: a spool that is slower than described."""
+"""Valve dynamics: a spool that is slower than described.
+
+Source: D'Imperio 2016, section 4.1.
+"""
 
 from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType
 from vpm.catalogue.shared import over_described
@@ -23,7 +26,7 @@ EFFECT = EffectType(
     sentence="The spool of {at} is slower than described: {time} comes on top of the inverse of its natural frequency.",
     impossible="a negative time means a spool faster than described: correct the frequency of the valve",
     confused_with={
-        "actuator_lag": "a lag is a pole before the spool, this is the spool itself; fast commands discriminate",
+        "actuator_lag": "a lag is a pole before the spool, the other is the spool itself; fast commands discriminate",
         "input_delay": "they agree for slow commands; steps and fast commands discriminate",
         "entrained_air": "both delay the force behind the command; the spool or both pressures discriminate",
     },

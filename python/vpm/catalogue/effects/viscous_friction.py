@@ -1,4 +1,7 @@
-"""Viscous friction: oil and seals resist in proportion to the speed."""
+"""Viscous friction: oil and seals resist in proportion to the speed.
+
+Source: Armstrong-Hélouvry et al. 1994.
+"""
 
 from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType, size
 from vpm.catalogue.signature import Signature

@@ -1,4 +1,7 @@
-"""Warming friction: what a cold machine resists more, until it is warm."""
+"""Warming friction: what a cold machine resists more, until it is warm.
+
+Source: Carvalho Bittencourt and Gunnarsson 2012.
+"""
 
 from vpm.catalogue.kinds import ABOVE_ZERO, NOT_NEGATIVE, EffectType, shape, size
 from vpm.catalogue.shared import transition

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import ExperimentError, MissingExtraError
+from vpm.errors import ExperimentError, needs
 from vpm.experiment.readers.arrays import ArrayLog, shape_of_vector
 
 if TYPE_CHECKING:
@@ -69,10 +69,8 @@ class Hdf5Log(ArrayLog):
 
 
 def _opened(path: str | PathLike[str]) -> h5py.File:
-    try:
+    with needs("h5py", "hdf5"):
         import h5py
-    except ImportError as error:
-        raise MissingExtraError("h5py", "hdf5") from error
     try:
         return h5py.File(path, "r")
     except OSError as error:

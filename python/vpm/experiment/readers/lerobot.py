@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import ExperimentError, MissingExtraError
+from vpm.errors import ExperimentError, needs
 from vpm.experiment.readers.base import Log
 from vpm.experiment.table import Table
 
@@ -145,11 +145,9 @@ def _component_names(info: dict[str, Any], name: str) -> list[str]:
 
 def _table(folder: Path, columns: list[str] | None, episode: int | None = None) -> Any:  # noqa: ANN401
     """Rows of all files, or those of an episode; files hold one episode each, or several, by version."""
-    try:
+    with needs("pyarrow", "parquet"):
         import pyarrow as pa
         import pyarrow.parquet as pq
-    except ImportError as error:
-        raise MissingExtraError("pyarrow", "parquet") from error
     files = sorted((folder / "data").glob("*/*.parquet"))
     own = [file for file in files if episode is not None and file.stem == f"episode_{episode:06d}"]
     if not files:

@@ -8,7 +8,7 @@ from os import PathLike
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import ExperimentError, MissingExtraError
+from vpm.errors import ExperimentError, needs
 from vpm.experiment.readers.base import Log
 from vpm.experiment.table import Table
 
@@ -24,11 +24,9 @@ class ParquetLog(Log):
     bracketed_units = True
 
     def __init__(self, path: str | PathLike[str]) -> None:
-        try:
+        with needs("pyarrow", "parquet"):
             import pyarrow as pa
             import pyarrow.parquet as pq
-        except ImportError as error:
-            raise MissingExtraError("pyarrow", "parquet") from error
         self.path = path
         try:
             table = pq.read_table(path)

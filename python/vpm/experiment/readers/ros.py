@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import ExperimentError, MissingExtraError
+from vpm.errors import ExperimentError, MissingExtraError, needs
 from vpm.experiment.readers.base import Log
 from vpm.experiment.readers.message import Field, has_stamp, leaves, parse_field, stamp_of, value_of
 from vpm.experiment.table import Table
@@ -174,11 +174,9 @@ class BagLog(Log):
 
     @contextmanager
     def _opened(self) -> Iterator[AnyReader]:
-        try:
+        with needs("rosbags", "ros"):
             from rosbags.highlevel import AnyReader
             from rosbags.typesys import Stores, get_typestore
-        except ImportError as error:
-            raise MissingExtraError("rosbags", "ros") from error
         try:
             with AnyReader([Path(self.path)], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as bag:
                 yield bag

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import MissingExtraError, VpmError
+from vpm.errors import VpmError, needs
 from vpm.experiment.readers.clocked import TIME, ClockedLog, broken, readable_unit, silent
 from vpm.experiment.table import Table
 
@@ -138,10 +138,8 @@ class TdmsLog(ClockedLog):
 
     @contextmanager
     def _opened(self) -> Iterator[TdmsFile]:
-        try:
+        with needs("npTDMS", "tdms"):
             from nptdms import TdmsFile
-        except ImportError as error:
-            raise MissingExtraError("npTDMS", "tdms") from error
         try:
             with silent("nptdms"), Path(self.path).open("rb") as stream:
                 if stream.read(len(TAG)) != TAG:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import ExperimentError, MissingExtraError
+from vpm.errors import ExperimentError, needs
 from vpm.experiment.readers.clocked import TIME, ClockedLog, broken
 
 if TYPE_CHECKING:
@@ -78,10 +78,8 @@ class UlogLog(ClockedLog):
 
 def _parsed(path: str | PathLike[str]) -> ULog:
     """All messages of a file; its parser prints what it finds damaged, which the record's history says."""
-    try:
+    with needs("pyulog", "ulog"):
         from pyulog import ULog
-    except ImportError as error:
-        raise MissingExtraError("pyulog", "ulog") from error
     try:
         with redirect_stdout(io.StringIO()), Path(path).open("rb") as stream:
             return ULog(stream)

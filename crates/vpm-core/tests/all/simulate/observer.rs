@@ -57,7 +57,7 @@ fn observed_at(
 ) -> Run {
     let rows = inputs.len() / 2;
     let readings = Readings { channels, table: Table::new("readings", readings, rows, 2).unwrap() };
-    let gains = Gains { readings, gains: Table::new("gains", gains, rows, 10).unwrap(), alone };
+    let gains = Gains { readings, gains: Table::new("gains", gains, rows, 10).unwrap(), alone, approximate: false };
     observe(bench.setting(), &FIRST, Table::new("inputs", inputs, rows, 2).unwrap(), gains).unwrap()
 }
 
@@ -223,6 +223,7 @@ fn a_late_sensor_is_observed_as_a_late_command() {
             readings: Readings { channels: &[0], table },
             gains: Table::new("gains", &gains, rows, 2).unwrap(),
             alone: false,
+            approximate: false,
         };
         let inputs = Table::new("inputs", &command, rows, 1).unwrap();
         let run = observe(bench.setting(), &[0.0, 0.0], inputs, gains).unwrap();

@@ -6,11 +6,14 @@ first states can do to a residual is a linear space, to first order. Projected o
 parameters what it says whatever the first states are (variable projection: G. Golub and V. Pereyra, *SIAM J. Numerical
 Analysis* 10, 1973), and the covariance of the parameters is that beside unknown first states. So that first order is
 enough, the records begin where the first states are likeliest (L. Kaufman, *BIT* 15, 1975).
+
+Parameters move first states too: equilibria of flexible links, chambers at rest, sensors undone. The core
+differentiates the steps that it takes; what the first state adds comes from differences here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from copy import copy
 from typing import Self, TypeVar
 
@@ -25,9 +28,12 @@ from vpm.model import Model
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
+#: Index of one entry of an array, or of entries of all rows.
+Place = int | tuple[slice, int]
 
-#: Share of a state's size by which it is moved to find the derivative; errors of the difference are its square.
-DIFFERENCE = 1e-5
+#: Shares of a state's size, and of a parameter, by which they are moved to find a derivative; errors of the difference
+#: are the squares of these.
+OF_STATE, OF_PARAMETER = 1e-5, 1e-4
 #: Steps towards the likeliest first states, and shares of each that are tried.
 STEPS, SHARES = 8, (1.0, 0.5, 0.25, 0.125)
 #: Shares of the records from which first states are sought one after the other: what begins far from where it is taken
@@ -35,6 +41,16 @@ STEPS, SHARES = 8, (1.0, 0.5, 0.25, 0.125)
 HORIZONS = (0.125, 0.25, 0.5, 1.0)
 #: A step that lowers the sum of squares by less than this share is the last.
 SETTLED = 1e-3
+
+
+def difference(function: Callable[[Array], Array], at: Array, place: Place, step: float) -> Array:
+    """Central difference of a function by the entries ``at[place]`` of its argument, which move together."""
+    sides = []
+    for sign in (1.0, -1.0):
+        moved = at.copy()
+        moved[place] += sign * step
+        sides.append(function(moved))
+    return np.asarray((sides[0] - sides[1]) / (2.0 * step))
 
 
 class BegunAnywhere:
@@ -57,14 +73,16 @@ class BegunAnywhere:
 
     def begun(self, departures: Array | None) -> Self:
         """The same from other first states, which are taken for known."""
-        same = copy(self)
-        vars(same).update(departures=departures, _space=None)
-        return same
+        return self.changed(departures=departures, _space=None)
 
     def beside(self, slopes: Array) -> Self:
         """The same beside unknown first states, by which the residual has these slopes (n, k)."""
+        return self.changed(_space=basis(slopes) if slopes.shape[1] else None)
+
+    def changed(self, **attributes: object) -> Self:
+        """A copy with other attributes."""
         same = copy(self)
-        vars(same).update(_space=basis(slopes) if slopes.shape[1] else None)
+        vars(same).update(attributes)
         return same
 
     @property
@@ -96,12 +114,9 @@ def first_state_derivative(model: Model, data: BegunAnywhere) -> Array:
     known = _departures(data, sizes, records)
     slopes = np.zeros((data.blocks[-1].samples.stop, records, places.size))
     for column, place in enumerate(places):
-        sides = []
-        for sign in (1.0, -1.0):
-            moved = known.copy()
-            moved[:, place] += sign * DIFFERENCE * sizes[place]
-            sides.append(_residual(model, data.begun(moved)))
-        slope = (sides[0] - sides[1]) / (2.0 * DIFFERENCE * sizes[place])
+        slope = difference(
+            lambda x: _residual(model, data.begun(x)), known, np.s_[:, int(place)], OF_STATE * sizes[place]
+        )
         if not np.all(np.isfinite(slope)):
             return slopes[:, 0, :0]
         for number, block in enumerate(data.blocks):  # the blocks of one record after those of another
@@ -110,13 +125,7 @@ def first_state_derivative(model: Model, data: BegunAnywhere) -> Array:
 
 
 def begun_likeliest(model: Model, data: AnyBegun) -> AnyBegun:
-    """The problem beside unknown first states, begun where these leave least at a model's values.
-
-    Parameters
-    ----------
-    model : Model
-    data : problem
-    """
+    """The problem beside unknown first states, begun where these leave least at a model's values."""
     horizons = HORIZONS if data.departures is None else HORIZONS[-1:]
     data = data.begun(_departures(data, *data.open_states(model)))
     for share in horizons:
@@ -203,3 +212,57 @@ def matters(model: Model, data: BegunAnywhere, residual: Array, jacobian: Array,
         chances.append(chance)
         seen.append(explained_size(share, residual[rows][counts], block.weight) >= checks.visible * block.scale)
     return any(chance < checks.begun / len(chances) and shown for chance, shown in zip(chances, seen, strict=True))
+
+
+def first_state_slopes(
+    begin: Callable[[Array], Array], theta: Array, columns: Sequence[int], fixed: Sequence[int] = ()
+) -> dict[int, Array]:
+    """Derivative of the first state by parameters, for those that move it.
+
+    Parameters
+    ----------
+    begin : callable
+        First state (nx,) at parameters.
+    theta : ndarray
+    columns : sequence of int
+        Parameters in question.
+    fixed : sequence of int
+        States that nothing moves, because they are known or fitted.
+
+    Returns
+    -------
+    dict
+        ``{place in columns: derivative (nx,)}``.
+    """
+    found = {}
+    for k, column in enumerate(columns):
+        try:
+            slope = difference(begin, theta, column, OF_PARAMETER * (abs(theta[column]) or 1.0))
+        except ValueError:  # no machine, or no equilibrium there
+            continue
+        slope[list(fixed)] = 0.0
+        if np.any(slope):
+            found[k] = slope
+    return found
+
+
+def add_first_state(
+    jacobian: Array, outputs: Callable[[Array], Array], state: Array, slopes: dict[int, Array], theta: Array
+) -> None:
+    """Add what the first state does to outputs (n, channels) to their derivative (n, channels, k), in place.
+
+    Parameters
+    ----------
+    jacobian : ndarray
+    outputs : callable
+        Outputs of a simulation from a first state.
+    state : ndarray, shape (nx,)
+    slopes : dict
+        Of `first_state_slopes`.
+    theta : ndarray, shape (k,)
+        Parameters in question, for the size of the difference.
+    """
+    for k, slope in slopes.items():
+        step = OF_PARAMETER * (abs(theta[k]) or 1.0)
+        ahead, behind = (outputs(state + sign * step * slope) for sign in (1.0, -1.0))
+        jacobian[:, :, k] += (ahead - behind) / (2.0 * step)

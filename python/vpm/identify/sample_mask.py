@@ -1,18 +1,22 @@
-"""Which samples of a balance count: not those at standstill, at a stop, or where the filter settles."""
+"""Which samples of an inverse-dynamics residual count: not at standstill, at a stop, or where the filter settles.
+
+An end stop of 5e8 N/m makes 500 N out of a micrometre that an encoder is off: no effort can be predicted there. How far
+a piston is from its ends is read from the measured motion, with the noise that the filter took from it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
+from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, Motion
 from vpm.identify.along import bends
 from vpm.identify.problem import FEWEST_SAMPLES
-from vpm.identify.stops import at_stops, check_left
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -27,10 +31,14 @@ LEAST_MOVING = 0.5
 #: Retained samples at each end of a record in which the parallel filter settles: what a record that ends in motion sets
 #: off near the new Nyquist frequency falls by about two fifths from one retained sample to the next.
 SETTLING = 8
+#: A piston touches an end that it is nearer to than this many standard deviations of the noise of its place.
+STOP_DEVIATIONS = 4.0
+#: Of what needs no drive to follow the lengths of lines.
+_GEOMETRY = ("name", "gravity", "bodies", "joints", "beams", "lines")
 
 
 @dataclass(frozen=True)
-class Counted:
+class SampleMask:
     """Which samples of some records count.
 
     Attributes
@@ -48,20 +56,21 @@ class Counted:
     joints: Sequence[str]
     places: Sequence[int]
 
+    @property
+    def _largest(self) -> Array:
+        """Largest speed (joints,) of all records, but for a thousandth of their samples."""
+        speeds = [np.abs(m.velocity[m.kept][:, self.places]) for m in self.motions]
+        return np.asarray(np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0))
+
     def moving(self, model: Model) -> list[Array]:
         """For each record (n, joints): 1 where a joint moves, 0 where it stands still; all 1 if it mostly stands.
 
         Zero too where the parallel filter settles, and where a piston that moves it touches an end of its stroke.
         """
+        slow, halved = STANDSTILL_SHARE * self._largest, 2 if bends(model) else 1
         speeds = [np.abs(m.velocity[:, self.places]) for m in self.motions]
-        kept = [speed[m.kept] for speed, m in zip(speeds, self.motions, strict=True)]
-        largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in kept], axis=0)
-        masks = [
-            ~_widened(_standing(speed, STANDSTILL_SHARE * largest, _period(m) // (2 if bends(model) else 1)), m)[
-                m.retained
-            ]
-            for m, speed in zip(self.motions, speeds, strict=True)
-        ]
+        standing = [_standing(v, slow, _period(m) // halved) for v, m in zip(speeds, self.motions, strict=True)]
+        masks = [~_widened(still, m)[m.retained] for still, m in zip(standing, self.motions, strict=True)]
         moves = np.mean(np.vstack(masks), axis=0) >= LEAST_MOVING
         free = [self.free(model, record) for record in range(len(masks))]
         return [
@@ -83,12 +92,10 @@ class Counted:
 
     def busy(self, record: int) -> Array:
         """(n, joints): 0 where a joint is slow in the mean over ``REST_TIME``: noise must not pass for motion."""
-        speeds = [np.abs(each.velocity[each.kept][:, self.places]) for each in self.motions]
-        largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
         m = self.motions[record]
         width = max(1, round(REST_TIME / m.dt))
         mean = np.abs(uniform_filter1d(m.velocity[:, self.places], width, axis=0))
-        moving = maximum_filter1d(mean, width, axis=0) > REST_SHARE * largest
+        moving = maximum_filter1d(mean, width, axis=0) > REST_SHARE * self._largest
         busy = moving[m.retained].astype(np.float64)
         return busy if busy.mean() >= 0.5 else np.ones_like(busy)
 
@@ -130,3 +137,64 @@ def _widened(standing: NDArray[np.bool_], m: Motion) -> NDArray[np.bool_]:
     """Standstill with its surroundings, into which the filters carry what happens in it."""
     reach = m.decimation + max(m.decimation, round(1.0 / (m.cutoff * m.dt)))
     return np.asarray(maximum_filter1d(standing.view(np.uint8), 2 * reach + 1, axis=0).astype(np.bool_))
+
+
+def at_stops(model: Model, experiment: Experiment, m: Motion) -> Mapping[str, NDArray[np.bool_]]:
+    """For each hydraulic actuator of ``model``, shape (N,): where its piston is at an end of its stroke or beyond.
+
+    Parameters
+    ----------
+    model : Model
+    experiment : Experiment
+        Holds the position of every joint as it was read.
+    m : Motion
+        The same, filtered.
+    """
+    found = {}
+    for name, measured, filtered in _lengths(model, experiment, m):
+        stroke, drawn_in = (model.parameters[f"{name}.{key}"].value for key in ("cylinder.stroke", "retracted_length"))
+        margin = STOP_DEVIATIONS * float(np.std((measured - filtered)[m.kept]))
+        away = 0.5 * stroke - np.abs(filtered - drawn_in - 0.5 * stroke)
+        found[name] = away <= margin
+    return found
+
+
+def check_left(experiment: Experiment, joint: str, name: str, left: int, fewest: int) -> None:
+    """Complain about a record in which hardly anything happens between the ends of a stroke.
+
+    Raises
+    ------
+    IdentificationError
+    """
+    if left < fewest:
+        raise IdentificationError(
+            f"{experiment.name}: only {left} samples of {joint} are left where the piston of {name} does not touch an "
+            "end of its stroke; correct retracted_length or stroke, or record within the stroke"
+        )
+
+
+def _lengths(model: Model, experiment: Experiment, m: Motion) -> Iterator[tuple[str, Array, Array]]:
+    """Length or coordinate (N,) that each hydraulic actuator acts on, as measured and as filtered."""
+    cylinders = [name for name in model.actuators if model.actuator_type(name) == "hydraulic"]
+    raw = np.column_stack([experiment[f"{joint}.position"] for joint in m.joints]) if cylinders else m.position
+    lines = _line_lengths(model, (raw, m.position)) if any(map(model.line_of_actuator, cylinders)) else {}
+    for name in cylinders:
+        line = model.line_of_actuator(name)
+        if line is None:
+            column = m.joints.index(model.joint_of_actuator(name))
+            yield name, raw[:, column], m.position[:, column]
+        else:
+            measured, filtered = lines[line]
+            yield name, measured, filtered
+
+
+def _line_lengths(model: Model, positions: Sequence[Array]) -> dict[str, list[Array]]:
+    """Length of each line (N,) for several courses of the joints, of the same machine without its drives."""
+    content = model.to_dict()
+    bare = Model.from_dict({key: content[key] for key in _GEOMETRY if key in content})
+    still = np.zeros_like(positions[0])
+    outputs = [
+        bare.core.simulate_prescribed(bare.theta, place, still, still, 1.0, 1, "rk4", [], [])[0] for place in positions
+    ]
+    columns = {line: bare.output_channels.index(f"{line}.length") for line in bare.lines}
+    return {line: [table[:, column] for table in outputs] for line, column in columns.items()}

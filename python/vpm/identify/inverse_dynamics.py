@@ -1,9 +1,8 @@
-"""The balance of effort along measured motions, joint by joint, as a residual."""
+"""The inverse-dynamics residual along measured motions, joint by joint."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from copy import copy
 from dataclasses import replace
 from functools import partial
 from typing import Self
@@ -24,13 +23,12 @@ from vpm.identify.along import (
     respond,
     shown_channels,
 )
-from vpm.identify.answers import Following, Memo
-from vpm.identify.beginning import BegunAnywhere
-from vpm.identify.counted import Counted, settled
-from vpm.identify.gauges import gauge_gains, hold_of
+from vpm.identify.first_states import BegunAnywhere
+from vpm.identify.following import Following, Memo, gauge_gains, hold_of
 from vpm.identify.parallel import in_order
 from vpm.identify.parts import Bending
 from vpm.identify.problem import FEWEST_SAMPLES, Block
+from vpm.identify.sample_mask import SampleMask, settled
 from vpm.initial import joint_motion
 from vpm.model import Model
 from vpm.simulate import AUTOMATIC
@@ -44,7 +42,7 @@ LONG_STEPS, ROUGH = "linearly_implicit", 1e-3
 
 
 class InverseDynamicsProblem(BegunAnywhere):
-    """Balance of effort at each joint: what the actuators deliver minus what the measured motion needs.
+    """Inverse-dynamics residual at each joint: what the actuators deliver minus what the measured motion needs.
 
     Both sides, and so the regressor's columns, pass the same zero-phase low-pass and decimation: the parallel
     filtering of the inverse dynamic identification model (M. Gautier, *Annual Reviews in Control*, 1997; A. Janot et
@@ -55,12 +53,12 @@ class InverseDynamicsProblem(BegunAnywhere):
     currents, strains.
 
     Samples at which a joint stands still do not count, as long as half of them remain: friction at rest takes whatever
-    value holds the joint, which no balance can predict. Nor do those at which a piston touches an end of its stroke.
+    value holds the joint, which nothing here can predict. Nor do those at which a piston touches an end of its stroke.
 
     Parameters
     ----------
     model : Model
-        Names the joints and actuators; its parameters do not enter the balance.
+        Names the joints and actuators; its parameters do not enter the residual.
     experiments : sequence of Experiment
         Each with the position of every joint that moves by an actuator, and the command of every actuator.
     cutoff : float or sequence of float, optional
@@ -99,14 +97,14 @@ class InverseDynamicsProblem(BegunAnywhere):
         moved = model.driven_joints
         self._joints = [place for place, joint in enumerate(measured) if joint in moved] or list(range(len(measured)))
         self.joints = tuple(measured[place] for place in self._joints)
-        #: Channels beside the balance that are compared too: what shows inside of drives, strains of links.
+        #: Channels beside the efforts that are compared too: what shows inside of drives, strains of links.
         self.shown = shown_channels(model, measured, experiments)
         self._compared = tuple(self._measured(m, e) for m, e in zip(self.motions, self.experiments, strict=True))
         self._gains = self._hold_gains(model)
         self._known = self._held(self.experiments, self.motions, [integrator] * len(self.motions), None)
         self.workers = 1
         self.blocks = self._lay_out(model)
-        #: What is left at the true values, as far as that is known; see `vpm.identify.own_simulation`.
+        #: What is left at the true values, as far as that is known; see `vpm.identify.closed_loop_prediction`.
         self.expected: Array | float = 0.0
 
     def _motions(self, experiments: Sequence[Experiment], cutoffs: Sequence[float | None]) -> tuple[Motion, ...]:
@@ -119,8 +117,7 @@ class InverseDynamicsProblem(BegunAnywhere):
         """The same of other records of the same lengths, filtered, counted and weighed as these are."""
         motions = self._motions(experiments, [m.cutoff for m in self.motions])
         pairs = list(zip(motions, experiments, strict=True))
-        same = copy(self)
-        vars(same).update(
+        return self.changed(
             experiments=tuple(experiments),
             motions=motions,
             expected=0.0,
@@ -128,19 +125,14 @@ class InverseDynamicsProblem(BegunAnywhere):
             _compared=tuple(self._measured(m, e) for m, e in pairs),
             _known=self._held(experiments, motions, self.integrators, self.departures),
         )
-        return same
 
     def less(self, expected: Array) -> InverseDynamicsProblem:
         """The same, less what is left of it at the true values, shape (n,)."""
-        same = copy(self)
-        same.expected = expected
-        return same
+        return self.changed(expected=expected)
 
     def side_by_side(self, workers: int) -> InverseDynamicsProblem:
         """The same, which works on so many records at a time."""
-        same = copy(self)
-        same.workers = workers
-        return same
+        return self.changed(workers=workers)
 
     @property
     def integrators(self) -> tuple[str, ...]:
@@ -168,15 +160,13 @@ class InverseDynamicsProblem(BegunAnywhere):
     def later(self) -> InverseDynamicsProblem:
         """The same, but for commands, each of which holds from the sample after its own on."""
         moved = tuple(replace(m, inputs=np.concatenate([m.inputs[:1], m.inputs[:-1]])) for m in self._whole)
-        same = copy(self)
         # What drives answered to commands at their own times is no answer to these; what the motion needs is.
-        vars(same).update(_whole=moved, _known=tuple(replace(known, commands=1) for known in self._known))
-        return same
+        return self.changed(_whole=moved, _known=tuple(replace(known, commands=1) for known in self._known))
 
     def evaluate(
         self, model: Model, theta: Array, columns: Sequence[int] = (), origin: Array | None = None
     ) -> tuple[Array, Array]:
-        """Residual of the balance and its derivative; see :class:`Problem`.
+        """The residual and its derivative; see :class:`Problem`.
 
         With ``origin``, values of the parameters, links bend and drives answer as on the tangent there.
         """
@@ -211,9 +201,8 @@ class InverseDynamicsProblem(BegunAnywhere):
 
     def begun(self, departures: Array | None) -> Self:
         """See :class:`BegunAnywhere`; by coordinates, then rates."""
-        same = super().begun(departures)
-        vars(same).update(_known=self._held(self.experiments, self.motions, self.integrators, departures))
-        return same
+        known = self._held(self.experiments, self.motions, self.integrators, departures)
+        return super().begun(departures).changed(_known=known)
 
     def open_states(self, model: Model) -> tuple[Array, int]:
         """Of joints that nobody measures, and of links that no gauge holds; see :class:`BegunAnywhere`."""
@@ -307,7 +296,7 @@ class InverseDynamicsProblem(BegunAnywhere):
         return position, velocity, acceleration
 
     def efforts(self, record: int) -> tuple[Block, ...]:
-        """Blocks of the balance of one record, one for each of `joints`."""
+        """Blocks of the efforts of one record, one for each of `joints`."""
         first = record * (len(self.joints) + len(self.shown))
         return self.blocks[first : first + len(self.joints)]
 
@@ -338,8 +327,8 @@ class InverseDynamicsProblem(BegunAnywhere):
         Efforts are as large as what the drives deliver, and of a joint that coasts as what its inertia takes; of other
         channels, such as pressures, it is the spread.
         """
-        counted = Counted(self.experiments, self.motions, self.joints, self._joints)
-        sizes, moving = [], counted.moving(model)
+        mask = SampleMask(self.experiments, self.motions, self.joints, self._joints)
+        sizes, moving = [], mask.moving(model)
         for record, (m, experiment) in enumerate(zip(self.motions, self.experiments, strict=True)):
             _, applied, _ = self.effort(model, model.theta, record)
             if len(applied) < FEWEST_SAMPLES:
@@ -355,7 +344,7 @@ class InverseDynamicsProblem(BegunAnywhere):
             spread = np.std(self._compared[record], axis=0)
             sizes.append(np.concatenate([efforts, spread]))
             ends = settled(len(applied), m.decimation)
-            columns = [counted.of_channel(model, channel, record, ends) for channel in self.shown]
+            columns = [mask.of_channel(model, channel, record, ends) for channel in self.shown]
             moving[record] = np.column_stack([moving[record], *columns])
         return sizes, moving
 

@@ -1,8 +1,8 @@
-"""Fits that go on from one another: beside first states that nobody measured, and less what a balance always leaves."""
+"""Fits that begin from one another: beside first states, less the model's own residual, on other records."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import VpmError
-from vpm.identify.balance import InverseDynamicsProblem
-from vpm.identify.beginning import BegunAnywhere, begun_likeliest, matters
+from vpm.experiment import Experiment, as_records
+from vpm.identify.closed_loop_prediction import Noise, Own, noisy, own_residual
+from vpm.identify.comparison import comparison
 from vpm.identify.estimation import Estimate
+from vpm.identify.first_states import BegunAnywhere, begun_likeliest, matters
 from vpm.identify.fitted import Fit
 from vpm.identify.identifiability import RANK_TOLERANCE
-from vpm.identify.noise_left import Noise, noisy
-from vpm.identify.objective import AnyProblem
-from vpm.identify.own_simulation import Own, own_residual
-from vpm.identify.sandwich import pooled
+from vpm.identify.inverse_dynamics import InverseDynamicsProblem
+from vpm.identify.problem import Gaps, Problem, gaps, tied, untied
 from vpm.identify.settings import Checks, OwnSimulation
-from vpm.identify.ties import tied, untied
+from vpm.identify.statistics import pooled
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -34,7 +34,7 @@ ROUNDS, SETTLED = 8, 0.1
 UNKNOWN, UNSETTLED = "unknown", "unsettled"
 
 
-def beside_first_states(model: Model, data: AnyProblem, ties: Mapping[str, str]) -> AnyProblem:
+def beside_first_states(model: Model, data: Problem, ties: Mapping[str, str]) -> Problem:
     """A balance beside the first states of what moves along the motion that nobody measured; others as they are.
 
     Parameters
@@ -50,13 +50,13 @@ def beside_first_states(model: Model, data: AnyProblem, ties: Mapping[str, str])
     return tied(begun_likeliest(model, plain), ties)
 
 
-def unknown(data: AnyProblem) -> int:
+def unknown(data: Problem) -> int:
     """How many unknown first states a fit is beside."""
     plain = untied(data)
     return plain.unknown if isinstance(plain, BegunAnywhere) else 0
 
 
-def with_first_states(fit: Fit, data: AnyProblem, settled: bool) -> Fit:
+def with_first_states(fit: Fit, data: Problem, settled: bool) -> Fit:
     """The same with what it knows of unknown first states."""
     plain = untied(data)
     if not isinstance(plain, BegunAnywhere) or plain.departures is None:
@@ -66,17 +66,17 @@ def with_first_states(fit: Fit, data: AnyProblem, settled: bool) -> Fit:
 
 def from_anywhere(
     model: Model,
-    data: AnyProblem,
+    data: Problem,
     best: AnyEstimate,
-    onward: Callable[[Model, AnyProblem, AnyEstimate], AnyEstimate],
+    onward: Callable[[Model, Problem, AnyEstimate], AnyEstimate],
     ties: Mapping[str, str],
     checks: Checks | None = None,
-) -> tuple[AnyProblem, AnyEstimate, bool]:
+) -> tuple[Problem, AnyEstimate, bool]:
     """The fit beside unknown first states, begun again where they are likeliest at its values, and whether it settled.
 
     Where logs suggest them, they are unknown if ``checks`` find them wrong.
     """
-    plain, fitted = untied(data), _moved(model, best, ties)
+    plain, fitted = untied(data), best.on(model, ties)
     if best.interrupted or not isinstance(plain, BegunAnywhere):
         return data, best, True
     if not plain.unknown and not (checks and matters(fitted, plain, best.residual, best.jacobian, checks)):
@@ -85,7 +85,7 @@ def from_anywhere(
         before, plain = best.values, begun_likeliest(fitted, plain)
         data = tied(plain, ties)
         best = onward(fitted, data, best)
-        fitted, seen = _moved(model, best, ties), np.isfinite(best.std)
+        fitted, seen = best.on(model, ties), np.isfinite(best.std)
         if best.interrupted or np.all(np.abs(best.values - before)[seen] <= SETTLED * best.std[seen]):
             return data, best, True
     return data, best, False
@@ -93,12 +93,12 @@ def from_anywhere(
 
 def beside_own(
     model: Model,
-    data: AnyProblem,
+    data: Problem,
     best: AnyEstimate,
-    onward: Callable[[Model, AnyProblem, AnyEstimate], AnyEstimate],
+    onward: Callable[[Model, Problem, AnyEstimate], AnyEstimate],
     ties: Mapping[str, str],
-) -> tuple[AnyProblem, AnyEstimate, Own | None]:
-    """The fit of a balance of effort less what it leaves of the model's own simulation, where that can be told.
+) -> tuple[Problem, AnyEstimate, Own | None]:
+    """The fit of an inverse-dynamics residual less that of the model's own simulation, where there is one.
 
     It goes ``onward`` from the fitted model and its estimate.
     What the records do not show a correction would move without end. With it comes the last simulation, or one that is
@@ -109,7 +109,7 @@ def beside_own(
     if best.interrupted or not isinstance(plain, InverseDynamicsProblem):
         return data, best, None
     for _ in range(OwnSimulation().rounds):
-        fitted = _moved(model, best, ties)
+        fitted = best.on(model, ties)
         own = own_residual(fitted, plain)
         if own is None or not own.alike:
             last = last or own
@@ -123,7 +123,7 @@ def beside_own(
     return data, best, last
 
 
-def with_noise(fit: Fit, data: AnyProblem, jacobian: Array, lengths: Array, noise: Noise, weights: Array) -> Fit:
+def with_noise(fit: Fit, data: Problem, jacobian: Array, lengths: Array, noise: Noise, weights: Array) -> Fit:
     """The same with deviations that know how far the noise of the records moves the estimates.
 
     Columns of the jacobian are divided by their ``lengths``; rows went into the fit with their ``weights``.
@@ -142,14 +142,44 @@ def with_noise(fit: Fit, data: AnyProblem, jacobian: Array, lengths: Array, nois
     return replace(fit, std=np.sqrt(variance), freedom=decided)
 
 
-def expected(data: AnyProblem) -> Array | float:
+def expected(data: Problem) -> Array | float:
     """What was taken off the residual."""
     plain = untied(data)
     return plain.expected if isinstance(plain, InverseDynamicsProblem) else 0.0
 
 
-def _moved(model: Model, best: Estimate, ties: Mapping[str, str]) -> Model:
-    """The model at estimates, and at those of what follows them."""
-    values = dict(zip(best.names, map(float, best.values), strict=True))
-    followers = {follower: values[leader] for follower, leader in ties.items() if leader in values}
-    return model.with_parameters({**values, **followers})
+def judged_on(
+    fit: Fit, model: Model, experiments: Experiment | Sequence[Experiment], *, cutoff: float | None = None
+) -> tuple[Gaps, Gaps]:
+    """How far model and validation records are apart before and after a fit, in the fit's own mode.
+
+    First states that the fit found belong to its own records; here they begin as for any simulation of a log, but for
+    those that are known, and for those that nobody measures along a motion: a balance is beside these.
+
+    Parameters
+    ----------
+    fit : Fit
+    model : Model
+        As it was before the fit.
+    experiments : Experiment or sequence of Experiment
+    cutoff : float, optional
+        As for the fit.
+
+    Returns
+    -------
+    before, after : dict
+        ``{channel: (root mean square, share of the measured signal, unit)}``.
+
+    Raises
+    ------
+    DivergedError
+        The simulation leaves the finite numbers.
+    """
+    records = as_records(experiments)
+    fitting = fit.fitting and replace(fit.fitting, states=())
+    result = []
+    for machine in (model, fit.model):
+        data = comparison(machine, records, fit.mode, cutoff=cutoff, setup=fit.setup, fitting=fitting)
+        data = beside_first_states(machine, data, {})
+        result.append(gaps(data, data.evaluate(machine, machine.theta)[0]))
+    return result[0], result[1]

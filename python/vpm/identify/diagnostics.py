@@ -3,34 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.experiment import Experiment
-from vpm.identify.identifiability import Combination
+from vpm.identify.estimation import touching
 from vpm.identify.problem import Block
 from vpm.identify.settings import Checks
 from vpm.model import Model
 
+if TYPE_CHECKING:
+    from vpm.identify.fitted import Fit
+
 Array = NDArray[np.float64]
-
-
-class Fitted(Protocol):
-    """What sentences about estimates are made of."""
-
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Free parameters."""
-
-    @property
-    def values(self) -> Array:
-        """Estimates, shape (p,)."""
-
-    @property
-    def std(self) -> Array:
-        """Standard deviations, shape (p,)."""
 
 
 #: Correlation of two estimates beyond which they are called collinear.
@@ -39,21 +26,13 @@ COLLINEAR = 0.99
 SAMPLES_EACH = 10
 #: A parameter has not moved if it changed by less than this share, and by less than this share of its deviation.
 STILL, STILL_STD = 1e-3, 1e-3
-#: Relative difference to a bound at which an estimate rests on it.
-TOUCHING = 1e-6
 #: Distance to a bound, in deviations of the estimate, at which it rests on it all the same.
 TOUCHING_STD = 1e-3
 #: Share of a measured signal beyond which a simulation has lost it: silence would be nearer.
 LOST = 1.0
 
 
-def touching(names: Sequence[str], values: Array, low: Array, high: Array) -> tuple[str, ...]:
-    """Names of estimates that rest on a bound."""
-    near = np.isclose(values, low, rtol=TOUCHING, atol=1e-300) | np.isclose(values, high, rtol=TOUCHING, atol=1e-300)
-    return tuple(name for name, at in zip(names, near, strict=True) if at)
-
-
-def resting(fit: Fitted, box: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:
+def resting(fit: Fit, box: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:
     """Names of estimates that rest on a bound, or lie next to it by no more than a trace of their deviation."""
     low, high = (np.array([box[name][side] for name in fit.names]) for side in (0, 1))
     near = TOUCHING_STD * np.where(np.isfinite(fit.std), fit.std, 0.0)
@@ -62,7 +41,7 @@ def resting(fit: Fitted, box: Mapping[str, tuple[float, float]]) -> tuple[str, .
     return tuple(name for name, rests in zip(fit.names, at, strict=True) if rests or name in beside)
 
 
-def contradictions(model: Model, fit: Fitted, checks: Checks) -> list[str]:
+def contradictions(model: Model, fit: Fit, checks: Checks) -> list[str]:
     """Sentences about estimates that lie further from the model file than both deviations together allow."""
     told = []
     for name, value, std in zip(fit.names, fit.values, fit.std, strict=True):
@@ -80,12 +59,7 @@ def contradictions(model: Model, fit: Fitted, checks: Checks) -> list[str]:
 
 
 def remarks(
-    names: Sequence[str],
-    start: Array,
-    values: Array,
-    std: Array,
-    correlation: Array,
-    unseen: Sequence[Combination],
+    fit: Fit,
     limits: Mapping[str, tuple[float, float]],
     blocks: Sequence[Block],
     others: int = 0,
@@ -95,10 +69,7 @@ def remarks(
 
     Parameters
     ----------
-    names : sequence of str
-    start, values, std : ndarray, shape (p,)
-    correlation : ndarray, shape (p, p)
-    unseen : sequence of Combination
+    fit : Fit
     limits : mapping
         Bounds of the parameters that rest on one.
     blocks : sequence of Block
@@ -108,16 +79,17 @@ def remarks(
     reasons : mapping of str to str, optional
         Why data see nothing of a parameter, where more is known than that.
     """
+    names, correlation = fit.names, fit.correlation
     told = []
     for name, (low, high) in limits.items():
-        value = float(values[list(names).index(name)])
+        value = fit[name]
         side = "lower" if abs(value - low) <= abs(value - high) else "upper"
         told.append(f"{name} rests on its {side} bound {value:.6g}: widen it or question the model")
-    for combination in unseen:
+    for combination in fit.unidentifiable:
         alone = combination.names[0] if len(combination.names) == 1 else ""
         told.append(f"not identifiable from these data: {(reasons or {}).get(alone, combination)}")
-    blind = {name for combination in unseen for name in combination.names}
-    for name, first, value, deviation in zip(names, start, values, std, strict=True):
+    blind = {name for combination in fit.unidentifiable for name in combination.names}
+    for name, first, value, deviation in zip(names, fit.start, fit.values, fit.std, strict=True):
         moved = abs(value - first)
         if name not in limits and name not in blind and moved <= min(STILL * abs(first), STILL_STD * deviation):
             told.append(f"{name} is still at its start {first:.6g}: begin elsewhere and see whether it comes back")
@@ -149,22 +121,13 @@ def constant_channels(model: Model, records: Sequence[Experiment], blocks: Seque
     ]
 
 
-def lost_channels(mode: str, names: Sequence[str], after: Mapping[str, tuple[float, float, str]]) -> list[str]:
-    """Sentence about the output that a fitted simulation is furthest from, if it is off by more than its whole size.
-
-    Parameters
-    ----------
-    mode : str
-    names : sequence of str
-        Free parameters.
-    after : mapping
-        ``{channel: (root mean square, share of the measured signal, unit)}`` after the fit.
-    """
-    channel, share = max(((c, s) for c, (_, s, _) in after.items()), key=lambda pair: pair[1], default=("", 0.0))
-    if mode in {"inverse_dynamics", "input_error"} or not share > LOST:
+def lost_channels(fit: Fit) -> list[str]:
+    """Sentence about the output that a simulation is furthest from, if that is more than the output's whole size."""
+    channel, share = max(((c, s) for c, (_, s, _) in fit.after.items()), key=lambda pair: pair[1], default=("", 0.0))
+    if fit.mode in {"inverse_dynamics", "input_error"} or not share > LOST:
         return []
     return [
         f"{channel} is {share:.3g} times its own size off after the fit: the simulation loses the record (unstable, "
-        f"integrating, or a wrong valley), and {', '.join(names)} mean nothing; take restarts, pieces, a closed loop, "
-        "or more starts"
+        f"integrating, or a wrong valley), and {', '.join(fit.names)} mean nothing; take restarts, pieces, a closed "
+        "loop, or more starts"
     ]

@@ -1,0 +1,81 @@
+"""What derivatives of a ranking cost beside a pass without, for three machines as they are and with a gear that gives.
+
+    python benches/diagnosis/tangents.py --samples 800
+
+Times are of the processor, of passes that come again. Passes are those that screen effects; exact derivatives are those
+of the steps of a fit. The gap is the largest between both, as a share of the largest derivative of its channel.
+"""
+
+from __future__ import annotations
+
+import sys
+from argparse import ArgumentParser
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from time import process_time
+from unittest.mock import patch
+
+import numpy as np
+from numpy.typing import NDArray
+
+ROOT = Path(__file__).resolve().parent.parent.parent
+sys.path[:0] = [str(ROOT / "benches" / "peers"), str(ROOT / "tests")]
+
+from blind import make_case  # noqa: E402
+from markdown import table  # noqa: E402
+from second_suite.cases import NONE  # noqa: E402
+from second_suite.cases import make_case as make_other  # noqa: E402
+from vpm import Experiment, Model  # noqa: E402
+from vpm.ranking.observed import Observed, Observer  # noqa: E402
+from vpm.ranking.settings import Settings  # noqa: E402
+
+Array = NDArray[np.float64]
+BAND, SEED, COUNTS = 10.0, 9571, (3, 6, 16)
+
+
+def machines(samples: int) -> Iterator[tuple[str, Model, Experiment]]:
+    arm = make_other("arm", NONE, SEED)
+    arm = replace(arm, document={**arm.document, "effects": []})
+    for name, case in (
+        ("six-axis arm", arm),
+        *((name, make_case(name, "coulomb_friction", SEED)) for name in ("hydraulic_leg", "flexible_arm")),
+    ):
+        model, log = case.model(), case.train[0]
+        first = Experiment.from_arrays(
+            log.time[:samples], {channel: log[channel][:samples] for channel in log.channels}, model=model
+        )
+        yield name, model, first
+        gives = model.with_effect("joint_compliance", model.joints[0], stiffness=1e4, damping=10.0)
+        yield f"{name}, a gear gives", gives, first
+
+
+def timed(observed: Observed, model: Model, observer: Observer, columns: list[int]) -> tuple[float, Array]:
+    """Milliseconds of a pass that comes again, and its derivatives."""
+    observed.follow(model, model.theta, observer, columns)
+    begin = process_time()
+    _, slopes = observed.follow(model, model.theta, observer, columns)
+    return 1e3 * (process_time() - begin), slopes
+
+
+def main() -> None:
+    parser = ArgumentParser(description=__doc__)
+    parser.add_argument("--samples", type=int, default=800)
+    rows = []
+    for name, model, log in machines(parser.parse_args().samples):
+        observed, observer = Observed(model, [log], Settings()), Observer(BAND)
+        plain, _ = timed(observed, model, observer.coarse, [])
+        nonzero = [int(place) for place in np.flatnonzero(model.theta)]
+        for columns in (nonzero[:count] for count in COUNTS):
+            screened, slopes = timed(observed, model, observer.cheapest, columns)
+            with patch.object(Observed, "approximate", False):
+                exact, true = timed(observed, model, observer.coarse, columns)
+            sizes = np.maximum(np.abs(true).max(axis=(0, 1)), 1e-300)
+            gap = float((np.abs(slopes - true).max(axis=(0, 1)) / sizes).max())
+            times = [f"{time:.1f}" for time in (plain, exact, screened)]
+            rows.append([name, str(len(columns)), *times, f"{exact / screened:.1f}", f"{gap:.0e}"])
+    print(table(["machine", "derivatives", "without, ms", "exact, ms", "screening, ms", "ratio", "gap"], rows))
+
+
+if __name__ == "__main__":
+    main()
