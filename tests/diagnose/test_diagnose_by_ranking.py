@@ -211,7 +211,7 @@ def test_where_a_ranking_fails_a_search_names(monkeypatch: pytest.MonkeyPatch, r
     assert "runs away" in note
 
 
-def test_a_name_that_no_balance_can_carry_is_has_derivatives(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_name_that_no_balance_can_carry_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     """A load that nobody measures hangs on a lift: no balance follows the memory of a friction that warms up."""
     case = make_case("hoist", "none", 3)
     model = case.model()
