@@ -57,17 +57,17 @@ def climb(
     ] = None,
     plot: Plot = None,
 ) -> None:
-    """Identify a model level by level, as far up in detail as unseen records say that it pays."""
+    """Identify a model level by level, as far up in detail as validation records say that it pays."""
     from vpm.climb import climb as find_level
     from vpm.simulate import Setup
 
     machine, records = load_all(model, log, channels, interpolate)
-    unseen = load_all(model, validate, channels, interpolate)[1]
+    validation = load_all(model, validate, channels, interpolate)[1]
     with progress() as tell:
         found = find_level(
             machine,
             records,
-            validate=unseen,
+            validate=validation,
             mode=mode,
             channels=compare,
             setup=Setup(integrator, settling=settling),
@@ -102,7 +102,7 @@ def simplify(
     from vpm.simplify import simplify as find_cheapest
 
     machine, records = load_all(model, logs, channels, interpolate)
-    unseen = load_all(model, validate, channels, interpolate)[1] if validate else None
+    validation = load_all(model, validate, channels, interpolate)[1] if validate else None
     machine = machine if level is None else machine.at(level)
     with progress() as tell:
         ladder = find_cheapest(
@@ -111,7 +111,7 @@ def simplify(
             rate=rate,
             tolerance=tolerance,
             share=share,
-            validate=unseen,
+            validate=validation,
             against=against,
             mode=mode,
             channels=compare,

@@ -47,8 +47,10 @@ Names = Annotated[
     Literal["ranking", "search"],
     typer.Option(help="Where names come from; a ranking covers rigid machines of up to three joints, a search others."),
 ]
-Substeps = Annotated[int, typer.Option(min=1, help="Integration steps per sample, in simulations of unseen records.")]
-Horizon = Annotated[float, typer.Option(help="Length of each restart, where unseen records are simulated so, s.")]
+Substeps = Annotated[
+    int, typer.Option(min=1, help="Integration steps per sample, in simulations of validation records.")
+]
+Horizon = Annotated[float, typer.Option(help="Length of each restart, where validation records are simulated so, s.")]
 
 
 def diagnose(
@@ -70,7 +72,7 @@ def diagnose(
     horizon: Horizon = 0.25,
     workers: Workers = 0,
 ) -> None:
-    """Name the physical effect that a model is missing, with evidence on unseen data.
+    """Name the physical effect that a model is missing, with evidence on validation data.
 
     Ctrl-C ends the search and reports what is known until then.
     """
@@ -80,12 +82,12 @@ def diagnose(
 
     tried = _tried(effect, without)
     machine, records = load_all(model, logs, channels, interpolate)
-    unseen = [load_record(path, machine, channels, interpolate) for path in validate or []]
+    validation = [load_record(path, machine, channels, interpolate) for path in validate or []]
     with searching() as (tell, each):
         diagnosis = find_missing(
             machine,
             records,
-            unseen or None,
+            validation or None,
             effects=tried,
             cutoff=cutoff,
             setup=Setup(integrator, substeps, horizon, hold=hold),

@@ -11,23 +11,23 @@ from itertools import chain
 from typing import TypedDict, get_args
 
 from vpm.discrepancy.ambiguity import Rivals, listed
-from vpm.discrepancy.apart import only_where_closed
 from vpm.discrepancy.assembled import accepted_effect, classes, examined, gaps_of, of_search, step
-from vpm.discrepancy.begun import Records, data_of, nominal_of, recalibrated_of, records_of
 from vpm.discrepancy.by_ranking import observed_gaps
 from vpm.discrepancy.candidates import asked_for
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis, Empirical
+from vpm.discrepancy.discriminating_experiment import experiments as experiments_for
 from vpm.discrepancy.empirical import beside
 from vpm.discrepancy.evidence import gather
-from vpm.discrepancy.overheard import overheard
+from vpm.discrepancy.plot_samples import pictures, traces, where
+from vpm.discrepancy.preparation import Records, data_of, nominal_of, recalibrated_of, records_of
 from vpm.discrepancy.provenance import own_settings, provenance
+from vpm.discrepancy.recorded_calls import recorded
 from vpm.discrepancy.remainder import Remainder, remainder
+from vpm.discrepancy.residual_by_joint import only_where_closed
 from vpm.discrepancy.search import Search, ambiguities
-from vpm.discrepancy.shown import pictures, traces, where
 from vpm.discrepancy.side_by_side import Progress, SideBySide
-from vpm.discrepancy.telling_apart import experiments as experiments_for
 from vpm.discrepancy.verdict import is_negligible, verdict
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records
@@ -83,10 +83,10 @@ def diagnose(
 
     Logs with a wrong unit, sign, name or clock are refused, see `vpm.check_log`. The parameters that the model file
     calls uncertain are fitted first, for a wrong parameter is not a missing effect. Where links are rigid and up to
-    three joints move, a ranking of the training records names what is missing, see `vpm.rank`, and unseen records
-    decide no name. Elsewhere every effect is screened at every site by its regressor; the promising ones are refitted
-    together with the model and have to predict unseen records, both as a balance of effort and in simulation. One is
-    accepted at a time, the one with the largest unseen gain per number.
+    three joints move, a ranking of the training records names what is missing, see `vpm.rank`, and validation records
+    decide no name. Elsewhere every effect is screened at every site by its regressor; those with the largest predicted
+    gain are refitted together with the model. They have to predict validation records, by the inverse-dynamics residual
+    and in simulation. One is accepted at a time, the one with the largest validation gain per number.
 
     Parameters
     ----------
@@ -106,8 +106,9 @@ def diagnose(
     limit : int, optional
         Most effects to accept; two for each joint, but at least six, if not given.
     names : {"ranking", "search"}
-        Where names come from: from `vpm.rank` where that covers the machine and from rounds of screening on balances of
-        effort elsewhere, or from these in any case.
+        Where names come from: from `vpm.rank` where that covers the machine and from rounds of screening on
+        inverse-dynamics residuals
+         elsewhere, or from these in any case.
     check : bool
         Refuse logs with a mistake that no machine makes by itself.
     workers : int, optional
@@ -131,7 +132,7 @@ def diagnose(
     DiagnosisError
         No record was given, or an effect name or the source of names is unknown.
     ExperimentError
-        A channel is missing, or a log cannot be believed.
+        A channel is missing, or a log cannot be trusted.
     ExecutorError
         The executor does not take the diagnosis, or its worker died with it again and again.
     """
@@ -141,8 +142,8 @@ def diagnose(
     if executor is None:
         diagnosis = diagnosed(model, *given, asked, workers, tell, progress)
     else:
-        told = done_by(executor, partial(overheard, diagnosed, model, *given, asked, workers or 1), tell)
-        diagnosis = told.repeat(tell, progress)
+        done = done_by(executor, partial(recorded, diagnosed, model, *given, asked, workers or 1), tell)
+        diagnosis = done.repeat(tell, progress)
     return with_provenance(diagnosis, model, *given, asked, workers)
 
 
@@ -236,15 +237,15 @@ def _diagnosis(
     """See `diagnose`."""
     began = time.perf_counter()
     say = tell or (lambda _: None)
-    training, unseen, notes = records
+    training, validation, notes = records
     # A record cut off in the middle of a motion does not say what its controller remembers.
-    mode = "restarts" if notes else judging_mode(model, unseen)
+    mode = "restarts" if notes else judging_mode(model, validation)
     by = (names, effects, limit)
-    ranking = ranking_of(model, (training, unseen), by, setup, say, each, notes)
+    ranking = ranking_of(model, (training, validation), by, setup, say, each, notes)
     if ranking is not None and ranking.hold != setup.course:
         notes.append(FOUND_HOLD.format(hold=ranking.hold))
         setup = replace(setup, hold=ranking.hold)
-    data = data_of(model, training, unseen, mode, cutoff, setup, notes)
+    data = data_of(model, training, validation, mode, cutoff, setup, notes)
     say("comparing the nominal model with the data")
     nominal = nominal_of(model, data, notes)
     say("recalibrating the nominal parameters")
@@ -308,7 +309,7 @@ def _told(known: _Known, found: Search, mode: str, setup: Setup, each: SideBySid
     beyond = observed_gaps(known.ranking, data.training.joints) if known.ranking is not None else {}
     said = verdict(data, known.nominal, known.recalibrated, found, gap | beyond, left, rest)
     concluded = _concluded(known, found, said, gap, floor, rest)
-    say("looking for the experiment that tells effects apart")
+    say("designing discriminating experiments")
     if stopped or known.late:
         notes.append(STOPPED_LATE)
     concluded = replace(concluded, gap=concluded.gap | beyond)
@@ -327,9 +328,9 @@ def _concluded(
     word, summary, described = said
     if not described or rest is None:
         return _Concluded(word, summary, gap, found.final, None, found.accepted)
-    told = rest.best if word == "unexplained" else rest.choices[-1]
-    final, empirical = told.judged, told.told
-    accepted = found.accepted if told.base is found.final else ()
+    chosen = rest.best if word == "unexplained" else rest.choices[-1]
+    final, empirical = chosen.judged, chosen.empirical
+    accepted = found.accepted if chosen.base is found.final else ()
     if accepted:
         empirical, final = beside(found.final, empirical, final, known.data)
     gap = gaps_of(known.data, known.nominal, known.recalibrated, final, floor)
@@ -341,7 +342,7 @@ def _whole(
     known: _Known, found: Search, concluded: _Concluded, floor: dict[str, float], *, interrupted: bool
 ) -> Diagnosis:
     """The diagnosis with its evidence and pictures."""
-    data, nominal, (training, unseen, notes) = known.data, known.nominal, known.records
+    data, nominal, (training, validation, notes) = known.data, known.nominal, known.records
     final, accepted, summary = concluded.final, concluded.accepted, concluded.summary
     ambiguous = known.ambiguous if accepted else ()
     return Diagnosis(
@@ -352,17 +353,17 @@ def _whole(
         found.refused,
         found.ranking,
         listed(ambiguities(accepted), ambiguous),
-        where(known.recalibrated.model, data.unseen),
+        where(known.recalibrated.model, data.validation),
         tuple(step(data, stage) for stage in found.stages),
         tuple(e.name for e in training),
-        tuple(e.name for e in unseen),
+        tuple(e.name for e in validation),
         tuple(notes),
         final.model,
         fit_of(final.model, data.training, final.fit, nominal.fit.residual, [e.name for e in training]),
         pictures(data, nominal, known.recalibrated, final),
         time.perf_counter() - known.began,
         interrupted,
-        gather(found.final.model, [entry.key for entry in accepted if entry.side == "motor"], data.unseen, floor),
+        gather(found.final.model, [entry.key for entry in accepted if entry.side == "motor"], data.validation, floor),
         concluded.empirical,
         experiments_for(found.final, ambiguous, data.training, floor),
         classes(accepted, ambiguous),

@@ -1,4 +1,4 @@
-"""Names of what a model is missing: from a ranking of the training records, or from a search on balances of effort."""
+"""Names of missing effects: from a ranking of the training records, or from a search on inverse-dynamics residuals."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from vpm.discrepancy.ambiguity import Rivals, rivals
 from vpm.discrepancy.by_ranking import free_joints, searched, why_not_ranked
 from vpm.discrepancy.by_ranking import notes as notes_of
 from vpm.discrepancy.confirmation import Data, Judged
-from vpm.discrepancy.contacts import with_told_contacts
-from vpm.discrepancy.overlooked import overlooked
+from vpm.discrepancy.contacts import with_predicted_contacts
+from vpm.discrepancy.forward_step import forward_step
+from vpm.discrepancy.rival_discrimination import discriminated
+from vpm.discrepancy.rival_exchange import in_order, replaced, timed_again
 from vpm.discrepancy.search import Search, further, search
 from vpm.discrepancy.side_by_side import SideBySide
-from vpm.discrepancy.standing import in_order, replaced, timed_again
-from vpm.discrepancy.told_apart import told_apart
 from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -27,10 +27,10 @@ from vpm.simulate import Setup
 STOPPED = "stopped by Ctrl-C before every candidate was tried: this is what was known until then"
 #: Which way the names came.
 RANKED = "names come from a ranking of the training records"
-SEARCHED = "names come from a search on balances of effort, for {reason}"
-NOT_SEARCHED = "a search on balances of effort does not try {effects}"
+SEARCHED = "names come from a search on inverse-dynamics residuals, for {reason}"
+NOT_SEARCHED = "a search on inverse-dynamics residuals does not try {effects}"
 #: Said where names come from a search.
-UNSEEN = "the joint {joint} has no drive, so that no balance of effort sees what acts there, and nothing is said of it"
+UNSEEN = "the joint {joint} has no drive: no inverse-dynamics residual shows what acts there, and nothing is said of it"
 #: Said where an error follows a search, and what such an error is.
 FAILED = "{what} could not be computed: {error}"
 BROKEN = (ValueError, ArithmeticError, LookupError)
@@ -53,12 +53,12 @@ def ranking_of(
 ) -> Ranking | None:
     """A ranking of the training records where names are to come from one and it covers the machine.
 
-    Unseen records only say, at the end, how much of their error what was found leaves.
+    Validation records only say, at the end, how much of their error what was found leaves.
 
     ``by`` says where names come from, of which effects, and how many at most. What keeps it from that is noted.
     """
     names, effects, limit = by
-    training, unseen = records
+    training, validation = records
     if names != "ranking":
         notes.extend(_not_searched(effects, f'names="{names}" was asked for'))
         return None
@@ -69,7 +69,7 @@ def ranking_of(
             return rank(
                 model,
                 training,
-                unseen,
+                validation,
                 effects=effects,
                 settings=Settings(effects=limit),
                 setup=setup,
@@ -100,10 +100,10 @@ def named(
     _, effects, limit = by
     screened = _searchable(effects)
     if ranking is not None:
-        tell("measuring what was named on unseen records")
+        tell("measuring what was named on validation records")
         found, ambiguous = searched(ranking, recalibrated, data, Settings(effects=limit), effects)
-        told = {one.key for one in ranking.effects}
-        lost = [one for one in found.refused if (one.name, one.site) in told]
+        named = {one.key for one in ranking.effects}
+        lost = [one for one in found.refused if (one.name, one.site) in named]
         notes.extend([RANKED, *notes_of(found.accepted), *([STOPPED] if found.interrupted else [])])
         notes.extend(f"the ranking names {one.name} at {one.site}: {one.reason}" for one in lost)
         return found, ambiguous, False
@@ -126,7 +126,7 @@ def _settled(
 ) -> tuple[Search, tuple[Rivals, ...]]:
     """Names and their order when each effect has been taken out again, with what would do in its place.
 
-    Where something takes the place of an effect, or comes in beside it as runs of the model ask for it, the search goes
+    Where something takes the place of an effect, or comes in beside it as runs of the model support it, the search goes
     on beside that.
     """
     known = rivals(found.final, data, found.accepted, effects, each, found.last)
@@ -135,16 +135,16 @@ def _settled(
         if changed is found:
             changed, known = timed_again(found, known, data)
         if changed is found and not found.interrupted:
-            changed, known = told_apart(found, known, data, each)
+            changed, known = discriminated(found, known, data, each)
         if changed is found and not found.interrupted:
-            changed = overlooked(found, data, each)
+            changed = forward_step(found, data, each)
         if changed is found:
             break
         found = changed if found.interrupted else further(changed, data, effects, limit, tell, each)
         if len(found.accepted) != 1 or len(known) != 1 or found.final is not changed.final:
             known = rivals(found.final, data, found.accepted, effects, each, found.last)
     found, known = in_order(found, known)
-    return with_told_contacts(found, data, each), known
+    return with_predicted_contacts(found, data, each), known
 
 
 def until_stopped(work: Callable[[], Found], nothing: Found) -> tuple[Found, bool]:
@@ -171,10 +171,10 @@ def _not_searched(effects: Sequence[str] | None, reason: str) -> list[str]:
     left_out = [name for name in effects or () if not EFFECTS[name].screened]
     if not left_out:
         return []
-    told = ", ".join(left_out)
+    names = ", ".join(left_out)
     if not _searchable(effects):
         raise DiagnosisError(
-            f"a search on balances of effort does not try {told}, and a ranking, which does, is no way here: {reason}; "
-            "ask for other effects"
+            f"a search on inverse-dynamics residuals does not try {names}, and a ranking, which does, is no way here: "
+            f"{reason}; ask for other effects"
         )
-    return [NOT_SEARCHED.format(effects=told)]
+    return [NOT_SEARCHED.format(effects=names)]

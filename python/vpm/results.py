@@ -137,7 +137,7 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "vpm.ranking.result": ("Gap", "Ranked", "Ranking"),
     "vpm.realtime.loop": ("LoopReport",),
     "vpm.scenario.outcome": ("ScenarioRun",),
-    "vpm.simplify.ladder": ("Ladder", "Rung"),
+    "vpm.simplify.pareto_front": ("Ladder", "Rung"),
     "vpm.simplify.reductions": ("Reduction",),
     "vpm.simplify.replacement": ("Replacement",),
     "vpm.simulate.resolution": ("Resolution",),

@@ -72,7 +72,7 @@ class Answer:
     named : tuple of Named
         Accepted effects in their order.
     ranking : tuple of Named
-        Accepted effects, then the other candidates in the order of what they explain of the unseen data.
+        Accepted effects, then the other candidates in the order of what they explain of the validation data.
     rivals : tuple of str
         Names that the diagnosis says it cannot tell from an accepted one.
     nominal_gap, recalibrated_gap, gap, oracle_gap : float
@@ -210,7 +210,7 @@ def answered(case: Case, kind: str, request: Sequence[str], strengths: Sequence[
 
 
 def ranking(why: Diagnosis) -> tuple[Named, ...]:
-    """Accepted effects in their order, then other candidates: refitted ones by unseen gain, the rest as screened."""
+    """Accepted effects in their order, then other candidates: refitted ones by validation gain, others as screened."""
     order = [(e.name, e.site) for e in why.effects]
     others = [c for c in why.candidates if not c.accepted]
     tried = sorted((c for c in others if np.isfinite(c.unseen)), key=lambda c: (c.round, -c.unseen))

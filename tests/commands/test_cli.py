@@ -151,7 +151,7 @@ def test_identify_takes_the_settings_of_the_engine() -> None:
     assert "NAME=LOW:HIGH" in refused.stderr
 
 
-def test_identify_writes_a_folder_and_judges_unseen_records(tmp_path: Path) -> None:
+def test_identify_writes_a_folder_and_judges_validation_records(tmp_path: Path) -> None:
     name, folder = "shoulder.friction.viscous", tmp_path / "fitted"
     words = ("--free", name, "--free", "arm.inertia.yy", "--fix", "arm.inertia.yy", "--validate", VALIDATION)
     done = vpm("identify", MODEL, TRAIN, *words, "--out", folder, "--plot", tmp_path / "fit.svg")

@@ -160,7 +160,7 @@ FIGURES: dict[str, tuple[Callable[[], Figure], list[str]]] = {
     ),
     "candidates": (
         lambda: plot.plot_candidates(CANDIDATES),
-        ["coulomb friction at axis", "not refitted", "accepted, unseen data", "refused, unseen data"],
+        ["coulomb friction at axis", "not refitted", "accepted, validation data", "refused, validation data"],
     ),
     "ladder": (
         lambda: plot.plot_ladder([1e-6, 2e-6], [0.3, 0.1], 1),

@@ -15,7 +15,7 @@ import vpm
 from vpm.demo import MODEL, TRAIN, VALIDATION
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.numbers import percent, short
-from vpm.report.words import estimate, took
+from vpm.report.messages import estimate, took
 
 HTML, SVG = "{http://www.w3.org/1999/xhtml}", "{http://www.w3.org/2000/svg}"
 #: Most bytes of a page.
@@ -59,7 +59,7 @@ def test_one_core_and_four_find_the_same(diagnosis: vpm.Diagnosis) -> None:
     assert len({each[1] for each in screened[:count]}) > 1
 
 
-def test_each_finding_has_its_evidence_on_unseen_data(diagnosis: vpm.Diagnosis) -> None:
+def test_each_finding_has_its_evidence_on_validation_data(diagnosis: vpm.Diagnosis) -> None:
     """Dry friction: two levels over the velocity, of the size that was hidden; what is left is far smaller."""
     (evidence,) = diagnosis.evidence
     assert (evidence.effect, evidence.site) == ("coulomb_friction", "shoulder")
@@ -103,11 +103,11 @@ def test_names_of_the_model_cannot_become_markup(diagnosis: vpm.Diagnosis) -> No
     assert "<script>" not in vpm.report(hostile)._repr_html_()
 
 
-def test_page_shows_the_way_down(diagnosis: vpm.Diagnosis) -> None:
+def test_page_shows_the_model_reduction(diagnosis: vpm.Diagnosis) -> None:
     model = diagnosis.model
     ladder = vpm.simplify(model, vpm.Experiment.load(VALIDATION, model=model), tolerance=0.5)
-    assert "The way down" in vpm.report(diagnosis, ladder)._repr_html_()
-    assert "The way down" not in vpm.report(diagnosis)._repr_html_()
+    assert "Model reduction" in vpm.report(diagnosis, ladder)._repr_html_()
+    assert "Model reduction" not in vpm.report(diagnosis)._repr_html_()
 
 
 # ---- the page as a document ------------------------------------------------------------------------------------------
@@ -217,8 +217,8 @@ def test_a_value_within_its_deviation_is_called_undetermined() -> None:
 
 def test_an_effect_that_made_it_worse_is_not_said_to_take(diagnosis: vpm.Diagnosis) -> None:
     (effect,) = diagnosis.effects
-    assert took(replace(effect, gain=0.25)).startswith("took 25.00 % of the unseen mean square")
-    assert took(replace(effect, gain=-0.25)).startswith("added 25.00 % to the unseen mean square")
+    assert took(replace(effect, gain=0.25)).startswith("took 25.00 % of the validation mean square")
+    assert took(replace(effect, gain=-0.25)).startswith("added 25.00 % to the validation mean square")
 
 
 def test_page_says_where_it_comes_from(page: str, diagnosis: vpm.Diagnosis, tmp_path: Path) -> None:

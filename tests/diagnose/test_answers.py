@@ -12,8 +12,8 @@ import pytest
 from numpy.typing import NDArray
 
 from shared_cases import shared_case
-from vpm.discrepancy.coloured import noise_shapes, noise_spectrum
 from vpm.discrepancy.floor import noise_floor
+from vpm.discrepancy.noise_spectrum import noise_shapes, noise_spectrum
 from vpm.discrepancy.structure import structure
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.identify.along import Response
@@ -28,7 +28,7 @@ Exact = tuple[Model, InverseDynamicsProblem, InverseDynamicsProblem]
 
 @pytest.fixture(scope="module")
 def exact() -> Exact:
-    """A servo-cylinder of the proving ground whose model lacks nothing, with its training and unseen records."""
+    """A servo-cylinder of the proving ground whose model lacks nothing, with its training and validation records."""
     case = shared_case("servo_cylinder", "none", 1)
     model = Model.from_toml(case.true_text)
     training = InverseDynamicsProblem(model, case.train)
@@ -118,11 +118,11 @@ def test_the_derivative_by_parts_is_that_of_the_residual(exact: Exact, name: str
 
 @pytest.mark.nightly
 def test_noise_of_a_valve_is_no_structure(exact: Exact) -> None:
-    model, training, unseen = exact
-    fitted, residual = (problem.evaluate(model, model.theta)[0] for problem in (training, unseen))
-    assert not structure(model, training, unseen, fitted, residual).present
-    floor = noise_floor(model, unseen, residual, "closed_loop")
-    for channel, (size, _, _) in gaps(unseen, residual).items():
+    model, training, validation = exact
+    fitted, residual = (problem.evaluate(model, model.theta)[0] for problem in (training, validation))
+    assert not structure(model, training, validation, fitted, residual).present
+    floor = noise_floor(model, validation, residual, "closed_loop")
+    for channel, (size, _, _) in gaps(validation, residual).items():
         assert 0.75 * size < floor[channel] < 1.5 * size
 
 

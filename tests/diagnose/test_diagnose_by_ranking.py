@@ -93,7 +93,7 @@ def test_values_are_those_of_the_balance(named: vpm.Diagnosis) -> None:
 def test_what_was_tried_in_vain_is_refused_with_its_numbers(named: vpm.Diagnosis) -> None:
     reasons = {refused.name: refused.reason for refused in named.refused}
     assert reasons["spring"] == "it removes 3 % of the error power; 6 % have to go"
-    assert "promised" in reasons["torque_ripple"]
+    assert "predicted less evidence" in reasons["torque_ripple"]
     assert "empirical_force" not in reasons
     assert not {"coulomb_friction", "bias_force"} & set(reasons)
     assert [(c.name, c.round, c.accepted) for c in named.candidates if c.accepted] == [
@@ -122,7 +122,7 @@ def test_each_reason_is_one_sentence(name: str, value: float, said: str) -> None
 def test_what_is_not_told_apart_is_one_class(named: vpm.Diagnosis, tmp_path: Path) -> None:
     assert named.classes == (("coulomb_friction at axis", "spring at axis"),)
     (told,) = [a for a in named.ambiguous_with if "spring at axis" in a.others]
-    assert told.reason == "the records do not tell them apart"
+    assert told.reason == "the records do not discriminate them"
     assert [e.rival for e in named.experiments] == ["spring at axis"]
     report = json.loads(named.save_json(tmp_path / "report.json").read_text(encoding="utf-8"))
     assert report["classes"] == [["coulomb_friction at axis", "spring at axis"]]
@@ -135,9 +135,11 @@ def test_a_ranking_learns_from_the_training_records_alone(
 ) -> None:
     seen: list[list[str]] = []
 
-    def asked(_: Model, given: list[Experiment], unseen: list[Experiment], *, settings: Asked, **__: object) -> Ranking:
+    def asked(
+        _: Model, given: list[Experiment], validation: list[Experiment], *, settings: Asked, **__: object
+    ) -> Ranking:
         assert settings.effects == 3
-        seen.append([record.name for record in (*given, *unseen)])
+        seen.append([record.name for record in (*given, *validation)])
         return ranking()
 
     monkeypatch.setattr(naming, "rank", asked)
@@ -146,7 +148,7 @@ def test_a_ranking_learns_from_the_training_records_alone(
 
 
 @pytest.mark.parametrize(("after", "word"), [(0.2, "effect_found"), (1.1, "unexplained")])
-def test_names_that_leave_more_of_unseen_records_are_no_explanation(
+def test_names_that_leave_more_of_validation_records_are_no_explanation(
     after: float, word: str, monkeypatch: pytest.MonkeyPatch, records: list[Experiment]
 ) -> None:
     told = {"axis.position": seen_by_observer(1.0, after), "tip.position": seen_by_observer(0.0, 0.0)}
@@ -156,7 +158,7 @@ def test_names_that_leave_more_of_unseen_records_are_no_explanation(
     assert diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict == word
 
 
-def test_names_that_explain_unseen_records_stand_whatever_the_balance_leaves(
+def test_names_that_explain_validation_records_stand_whatever_the_balance_leaves(
     monkeypatch: pytest.MonkeyPatch, records: list[Experiment]
 ) -> None:
     """A play is hardly seen in a balance. Here only a trifle is named, and half of the gap is left there."""
@@ -209,7 +211,7 @@ def test_where_a_ranking_fails_a_search_names(monkeypatch: pytest.MonkeyPatch, r
     assert "runs away" in note
 
 
-def test_a_name_that_no_balance_can_carry_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_name_that_no_balance_can_carry_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     """A load that nobody measures hangs on a lift: no balance follows the memory of a friction that warms up."""
     case = make_case("hoist", "none", 3)
     model = case.model()
@@ -221,7 +223,7 @@ def test_a_name_that_no_balance_can_carry_is_told(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr(naming, "rank", lambda *_, **__: Ranking((one,), ((one,),), warm, model))
     why = diagnose(model, case.train, case.holdout, names="ranking", workers=1)
     (told,) = [note for note in why.notes if note.startswith("the ranking names warming_friction at lift")]
-    assert "no balance of effort can be computed" in told
+    assert "no inverse-dynamics residual can be computed" in told
 
 
 def test_machines_that_a_ranking_does_not_cover_say_why() -> None:
@@ -262,7 +264,7 @@ def test_effects_that_no_search_tries_are_asked_of_a_ranking(
     why = diagnose(
         nominal(), records[0], records[1], effects=["quadratic_drag", "coulomb_friction"], limit=1, workers=1
     )
-    assert "a search on balances of effort does not try quadratic_drag" in why.notes
+    assert "a search on inverse-dynamics residuals does not try quadratic_drag" in why.notes
     assert [effect.name for effect in why.effects] == ["coulomb_friction"]
 
 
@@ -282,7 +284,7 @@ def test_names_come_from_one_of_two_places(records: list[Experiment]) -> None:
 def test_a_parameter_without_a_derivative_along_the_motion_is_not_told_by_a_balance() -> None:
     """Behind a play two motions part ever faster, and squares of derivatives overflow."""
     columns = np.array([[1.0, 1e200, np.inf], [0.0, 1e200, 0.0]])
-    assert by_ranking._told(columns).tolist() == [True, False, False]
+    assert by_ranking._has_derivatives(columns).tolist() == [True, False, False]
 
 
 def test_what_commands_do_between_samples_is_found_and_holds_for_balances_and_runs() -> None:

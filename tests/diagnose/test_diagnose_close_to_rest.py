@@ -1,4 +1,4 @@
-"""Friction close to rest, told by runs of the model itself where a balance of effort sees too little of it."""
+"""Friction close to rest, judged by closed-loop predictions where the inverse-dynamics residual shows too little."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 
 import vpm
 from shared_cases import shared_case
-from vpm.discrepancy.own_run import as_it_is, misfit
+from vpm.discrepancy.closed_loop_prediction import misfit, predict
 from vpm.simulate import Setup
 
 CLOSE_TO_REST = "stribeck_friction"
@@ -15,7 +15,7 @@ CLOSE_TO_REST = "stribeck_friction"
 
 @pytest.mark.nightly
 def test_what_a_balance_hardly_sees_is_told_by_runs() -> None:
-    """It fades below 1.5 % of the speed: fitted to the balance, it predicts unseen efforts worse than nothing does."""
+    """It fades below 1.5 % of the speed: fitted to the residual, it predicts validation efforts worse than none."""
     case = shared_case("axis_linear", "stribeck_friction", 18)
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], names="search", workers=1)
     (found,) = why.effects
@@ -24,7 +24,7 @@ def test_what_a_balance_hardly_sees_is_told_by_runs() -> None:
     values = {p.name: p.value for p in found.parameters}
     assert values["stribeck"] == pytest.approx(true.parameters["stribeck"], rel=0.2)
     assert values["stribeck_velocity"] == pytest.approx(true.parameters["stribeck_velocity"], rel=0.1)
-    assert any("runs of the model itself" in note for note in found.notes)
+    assert any("closed-loop predictions" in note for note in found.notes)
 
 
 @pytest.mark.nightly
@@ -47,7 +47,7 @@ def test_runs_ask_for_nothing_that_is_not_there(machine: str, hidden: str, seed:
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=[CLOSE_TO_REST], names="search", workers=1)
     assert not why.effects
     (refused,) = why.refused
-    assert "runs of the model itself" in refused.reason
+    assert "closed-loop predictions" in refused.reason
 
 
 @pytest.mark.nightly
@@ -56,7 +56,7 @@ def test_known_parameters_are_no_misfit() -> None:
     case = shared_case("axis_linear", "none", 3)
     model = case.model()
     free = ("body.mass", "axis.friction.viscous")
-    run = as_it_is(model, free, case.train, Setup())
+    run = predict(model, free, case.train, Setup())
     moved = model.with_parameters({name: 1.001 * model.parameters[name].value for name in free})
     left, _ = run.problem.evaluate(moved, moved.theta)
     assert not np.allclose(left, run.left, rtol=1e-6)

@@ -9,7 +9,7 @@ from synthetic import Truth, nominal, simulate_axis
 from vpm.diagnosing import diagnose
 from vpm.discrepancy.diagnosis import RankedCandidate
 from vpm.discrepancy.floor import white_level
-from vpm.discrepancy.round import _promise
+from vpm.discrepancy.round import _by_gain
 from vpm.discrepancy.structure import structure
 from vpm.identify import InverseDynamicsProblem
 
@@ -63,8 +63,8 @@ def test_noise_is_no_structure_and_what_follows_the_effort_is() -> None:
 
 
 def test_ranking_puts_what_was_confirmed_first() -> None:
-    def entry(name: str, screened: float, unseen: float, *, accepted: bool = False) -> RankedCandidate:
-        return RankedCandidate(name, "axis", 1, screened, unseen, accepted)
+    def entry(name: str, screened: float, validation: float, *, accepted: bool = False) -> RankedCandidate:
+        return RankedCandidate(name, "axis", 1, screened, validation, accepted)
 
     ranked = [
         entry("screened", 0.9, float("nan")),
@@ -72,7 +72,7 @@ def test_ranking_puts_what_was_confirmed_first() -> None:
         entry("helps", 0.1, 0.4),
         entry("accepted", 0.2, 0.3, accepted=True),
     ]
-    assert [c.name for c in sorted(ranked, key=_promise)] == ["accepted", "helps", "screened", "hurts"]
+    assert [c.name for c in sorted(ranked, key=_by_gain)] == ["accepted", "helps", "screened", "hurts"]
 
 
 def test_a_name_that_leaves_most_open_is_no_explanation() -> None:

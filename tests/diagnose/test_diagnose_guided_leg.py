@@ -1,4 +1,4 @@
-"""A hydraulic leg on a guide that has no drive: what acts there, no balance of effort sees."""
+"""A hydraulic leg on a guide that has no drive: no inverse-dynamics residual shows what acts there."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ import pytest
 
 import vpm
 from shared_cases import shared_case
-from vpm.discrepancy.limit import seen_limit
+from vpm.discrepancy.limit import limit_start
 from vpm.identify import InverseDynamicsProblem
 
 
@@ -21,7 +21,7 @@ def test_a_limit_is_looked_for_where_the_residual_begins_to_grow_with_the_comman
     limited = model.with_effect("saturation", at="drive", limit=0.5 * largest)
     whole, _ = data.evaluate(model, model.theta)
     cut, _ = data.evaluate(limited, limited.theta)
-    assert seen_limit(data, "axis", 0, whole - cut) == pytest.approx(0.5 * largest, rel=0.05)
+    assert limit_start(data, "axis", 0, whole - cut) == pytest.approx(0.5 * largest, rel=0.05)
 
 
 @pytest.mark.nightly
@@ -29,7 +29,7 @@ def test_where_nothing_is_left_no_limit_is_seen() -> None:
     case = shared_case("axis_rotary", "none", 42)
     data = InverseDynamicsProblem(case.model(), case.train)
     residual, _ = data.evaluate(case.model(), case.model().theta)
-    assert seen_limit(data, "axis", 0, np.zeros_like(residual)) is None
+    assert limit_start(data, "axis", 0, np.zeros_like(residual)) is None
 
 
 @pytest.mark.nightly

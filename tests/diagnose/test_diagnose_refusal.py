@@ -30,7 +30,7 @@ from vpm.model import Model
 
 
 def gained() -> Gain:
-    """A gain on unseen data that nobody would doubt."""
+    """A gain on validation data that nobody would doubt."""
     return Gain(before=1.0, after=0.1, weight=1.0, score=50.0, pieces=40)
 
 
@@ -45,16 +45,16 @@ def trial(value: float) -> Trial:
             probe=SimpleNamespace(candidate=candidate),
             judged=judged,
             parameters=("encoder.gain.value",),
-            unseen=gained(),
+            validation=gained(),
             there=gained(),
             training=gained(),
             simulated=None,
             diverged="",
             away=None,
-            slow=None,
+            low_frequency=None,
             clear=True,
-            gap=NEGLIGIBLE,
-            asked=False,
+            error=NEGLIGIBLE,
+            supported=False,
         ),
     )
 
@@ -70,21 +70,21 @@ def test_a_gain_beyond_that_is_one(error: float) -> None:
     assert refuse_trial(trial(1.0 + error), Thresholds(30, 1e-3)) == ""
 
 
-@pytest.mark.parametrize(("gap", "after", "believed"), [(0.08, 0.3, True), (0.08, 0.9, False), (0.01, 0.3, False)])
-def test_a_gain_that_shows_magnified_in_a_balance_is_one(gap: float, after: float, believed: bool) -> None:
-    told = {"gap": gap, "unseen": Gain(before=1.0, after=after, weight=1.0, score=50.0, pieces=40)}
-    one = cast("Trial", SimpleNamespace(**{**vars(trial(1.0 + 0.8 * NEGLIGIBLE)), **told}))
-    assert (refuse_trial(one, Thresholds(30, 1e-3)) == "") == believed
+@pytest.mark.parametrize(("error", "after", "accepted"), [(0.08, 0.3, True), (0.08, 0.9, False), (0.01, 0.3, False)])
+def test_a_gain_that_shows_magnified_in_a_balance_is_one(error: float, after: float, accepted: bool) -> None:
+    parts = {"error": error, "validation": Gain(before=1.0, after=after, weight=1.0, score=50.0, pieces=40)}
+    one = cast("Trial", SimpleNamespace(**{**vars(trial(1.0 + 0.8 * NEGLIGIBLE)), **parts}))
+    assert (refuse_trial(one, Thresholds(30, 1e-3)) == "") == accepted
 
 
 def test_a_gain_that_explains_as_little_as_an_imitation_blames_no_instrument() -> None:
     little = Gain(before=1.0, after=0.88, weight=1.0, score=50.0, pieces=40)
-    one = cast("Trial", SimpleNamespace(**{**vars(trial(1.02)), "unseen": little, "there": little}))
+    one = cast("Trial", SimpleNamespace(**{**vars(trial(1.02)), "validation": little, "there": little}))
     assert "an instrument is blamed" in refuse_trial(one, Thresholds(30, 1e-3))
 
 
 @pytest.mark.parametrize(
-    ("way", "std", "dry", "believed"),
+    ("way", "std", "dry", "accepted"),
     [
         (1.9e-4, 6e-5, False, False),
         (1.9e-4, 5e-5, False, True),
@@ -94,7 +94,7 @@ def test_a_gain_that_explains_as_little_as_an_imitation_blames_no_instrument() -
     ],
 )
 def test_a_hysteresis_within_two_samples_is_dry_friction_unless_that_is_fitted_beside_it(
-    way: float, std: float, dry: bool, believed: bool
+    way: float, std: float, dry: bool, accepted: bool
 ) -> None:
     model = Model.load(MODEL).with_effect("hysteresis", at="shoulder", force=0.1, displacement=way)
     name = "shoulder.hysteresis.displacement"
@@ -110,29 +110,32 @@ def test_a_hysteresis_within_two_samples_is_dry_friction_unless_that_is_fitted_b
         "parameters": ("shoulder.hysteresis.force", name),
     }
     reason = refuse_trial(cast("Trial", SimpleNamespace(**{**vars(one), **held})), Thresholds(30, 1e-3))
-    assert (reason == "") == believed
-    assert believed or "between two samples" in reason
+    assert (reason == "") == accepted
+    assert accepted or "between two samples" in reason
 
 
-def beside_play(whole: Gain, slow: Gain) -> str:
-    """What is said of a trial beside a play, with these gains of the whole unseen residual and of its slow part."""
+def beside_backlash(whole: Gain, low_frequency: Gain) -> str:
+    """Reason to refuse beside a backlash, by gains of the whole validation residual and of its low frequencies."""
     one = trial(1.1)
     return refuse_trial(
-        cast("Trial", SimpleNamespace(**{**vars(one), "unseen": whole, "there": whole, "slow": slow})),
+        cast(
+            "Trial",
+            SimpleNamespace(**{**vars(one), "validation": whole, "there": whole, "low_frequency": low_frequency}),
+        ),
         Thresholds(30, 1e-3),
     )
 
 
-def test_what_helps_impacts_and_hurts_what_is_slow_is_refused_beside_a_play() -> None:
-    assert "single impacts of the play" in beside_play(gained(), Gain(1.0, 1.5, 0.3, 2.0, 20))
+def test_what_helps_impacts_and_hurts_low_frequencies_is_refused_beside_a_backlash() -> None:
+    assert "single impacts of the backlash" in beside_backlash(gained(), Gain(1.0, 1.5, 0.3, 2.0, 20))
 
 
-def test_what_is_slow_shows_an_effect_that_impacts_cover_unless_it_speaks_alone() -> None:
+def test_low_frequencies_show_an_effect_that_impacts_cover_unless_they_alone_do() -> None:
     covered = Gain(before=1.0, after=0.96, weight=0.8, score=3.0, pieces=40)
-    assert beside_play(covered, gained()) == ""
-    assert "only 7.84 %" in beside_play(covered, Gain(1.0, 0.99, 0.5, 2.0, 20))
-    assert beside_play(Gain(before=1.0, after=0.995, weight=0.5, score=3.0, pieces=40), gained())
-    assert beside_play(Gain(before=1.0, after=0.96, weight=0.5, score=1.0, pieces=40), gained())
+    assert beside_backlash(covered, gained()) == ""
+    assert "only 7.84 %" in beside_backlash(covered, Gain(1.0, 0.99, 0.5, 2.0, 20))
+    assert beside_backlash(Gain(before=1.0, after=0.995, weight=0.5, score=3.0, pieces=40), gained())
+    assert beside_backlash(Gain(before=1.0, after=0.96, weight=0.5, score=1.0, pieces=40), gained())
 
 
 @pytest.mark.parametrize(("drop", "words"), [(-63.0, "larger"), (1e-3, "only 0.10 %")])
@@ -142,7 +145,7 @@ def test_what_screening_promises_nothing_of_is_told_in_words_that_fit(drop: floa
 
 
 @pytest.mark.parametrize(
-    ("relative", "score", "beside", "believed"),
+    ("relative", "score", "beside", "accepted"),
     [
         (0.5, 9.0, 0.3, True),
         (0.15, 3.3, 0.3, False),
@@ -152,31 +155,31 @@ def test_what_screening_promises_nothing_of_is_told_in_words_that_fit(drop: floa
     ],
 )
 def test_what_leaves_no_shift_of_the_commands_is_told_from_it_by_one_sure_question(
-    relative: float, score: float, beside: float, believed: bool
+    relative: float, score: float, beside: float, accepted: bool
 ) -> None:
-    told = Gain(before=1.0, after=(1.0 - relative) ** 0.5, weight=1.0, score=score, pieces=100)
-    reason = refuse_timing(told, 0.3, Thresholds(60, 4e-3), beside=beside)
-    assert (reason == "") == believed
-    assert believed or "beside a shift of the commands by 1.2 ms" in reason
+    parts = Gain(before=1.0, after=(1.0 - relative) ** 0.5, weight=1.0, score=score, pieces=100)
+    reason = refuse_timing(parts, 0.3, Thresholds(60, 4e-3), beside=beside)
+    assert (reason == "") == accepted
+    assert accepted or "beside a shift of the commands by 1.2 ms" in reason
 
 
-@pytest.mark.parametrize(("ratio", "believed"), [(0.05, True), (2.0, True), (20.0, False)])
-def test_a_spring_that_its_damper_holds_back_winds_nothing_up(ratio: float, believed: bool) -> None:
+@pytest.mark.parametrize(("ratio", "accepted"), [(0.05, True), (2.0, True), (20.0, False)])
+def test_a_spring_that_its_damper_holds_back_winds_nothing_up(ratio: float, accepted: bool) -> None:
     """A stop or a stiffening spring outside of the catalogue is imitated by a joint that slips."""
     stiffness = 300.0
     plain = Model.load(MODEL)
     damping = 2.0 * ratio * (stiffness * moved(plain, "shoulder")) ** 0.5
     model = plain.with_effect("joint_compliance", at="shoulder", stiffness=stiffness, damping=damping)
     candidate = Candidate(EFFECTS["joint_compliance"], "shoulder", ({},))
-    told = {
+    parts = {
         "probe": SimpleNamespace(candidate=candidate),
         "judged": SimpleNamespace(model=model, bounds={}),
         "parameters": ("shoulder.compliance.stiffness", "shoulder.compliance.damping"),
     }
-    one = cast("Trial", SimpleNamespace(**{**vars(trial(1.0)), **told}))
+    one = cast("Trial", SimpleNamespace(**{**vars(trial(1.0)), **parts}))
     for reason in (refuse_trial(one, Thresholds(30, 1e-3)), impossible_trial(one, 1e-3)):
-        assert (reason == "") == believed
-        assert believed or "times the critical one" in reason
+        assert (reason == "") == accepted
+        assert accepted or "times the critical one" in reason
 
 
 def changed(before: float, after: float) -> Gain:
@@ -188,23 +191,26 @@ sizes = st.floats(1e-9, 1e9)
 
 @given(sizes, sizes, sizes, sizes)
 def test_what_is_said_of_two_numbers_goes_in_their_direction(a: float, b: float, c: float, d: float) -> None:
-    """A candidate that makes the unseen error larger: it lowers the training error only where that becomes smaller."""
+    """A candidate that raises the validation error: it lowers the training error only where that becomes smaller."""
     c, d = min(c, d), max(c, d)
     assume(1.0 - (d / c) ** 2 < 0.0)
     worse = trial(1.5)
-    vars(worse).update(training=changed(a, b), unseen=changed(c, d), there=changed(c, d))
+    vars(worse).update(training=changed(a, b), validation=changed(c, d), there=changed(c, d))
     reason = refuse_trial(worse, Thresholds(30, 1e-3))
     said = re.findall(
-        r"(lowers|raises) the (training|unseen) error by [\d.e+]+ % of its mean square \((\S+) to (\S+)\)", reason
+        r"(lowers|raises) the (training|validation) error by [\d.e+]+ % of its mean square \((\S+) to (\S+)\)", reason
     )
-    assert [where for _, where, _, _ in said] == ["training", "unseen"]
+    assert [where for _, where, _, _ in said] == ["training", "validation"]
     for word, _, before, after in said:
         assert word == "raises" or float(after) <= float(before)
         assert word == "lowers" or float(after) >= float(before)
 
 
-def test_a_little_of_the_unseen_error_is_told_with_its_direction() -> None:
-    for after, words in ((0.98, "lowers the unseen error by only 3.96 %"), (1.02, "raises the unseen error by 4.04 %")):
+def test_a_little_of_the_validation_error_is_told_with_its_direction() -> None:
+    for after, words in (
+        (0.98, "lowers the validation error by only 3.96 %"),
+        (1.02, "raises the validation error by 4.04 %"),
+    ):
         little = trial(1.5)
         vars(little).update(there=changed(1.0, after))
         assert words in refuse_trial(little, Thresholds(30, 1e-3))
@@ -212,11 +218,11 @@ def test_a_little_of_the_unseen_error_is_told_with_its_direction() -> None:
 
 def test_a_simulation_that_becomes_worse_is_told_beside_what_the_balance_says() -> None:
     for after, word, joined in ((0.9, "lowers", "but"), (1.1, "raises", "and")):
-        told = trial(1.5)
-        vars(told).update(
-            unseen=changed(1.0, after), simulated=SimpleNamespace(relative=-3.0, harm=9.0, before=1.0, after=2.0)
+        parts = trial(1.5)
+        vars(parts).update(
+            validation=changed(1.0, after), simulated=SimpleNamespace(relative=-3.0, harm=9.0, before=1.0, after=2.0)
         )
-        vars(told.judged).update(model=Model.load(MODEL))
-        said = worse_in_simulation(told)
-        assert said.startswith(f"it {word} the unseen error of the balance of effort")
+        vars(parts.judged).update(model=Model.load(MODEL))
+        said = worse_in_simulation(parts)
+        assert said.startswith(f"it {word} the validation error of the inverse-dynamics residual")
         assert f", {joined} raises that of the simulation by 300.00 % of its mean square (1 to 2)" in said

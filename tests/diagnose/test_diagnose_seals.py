@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from balances import balances
+from inverse_dynamics import inverse_dynamics_data
 from shared_cases import shared_case
 from vpm.discrepancy.confirmation import Data, Judged, judge
 from vpm.discrepancy.remainder import Remainder, remainder
@@ -18,7 +18,7 @@ PISTON = np.pi / 4.0 * 0.016**2
 def loaded(hidden: str, seed: int) -> tuple[Data, Judged, Judged, float]:
     """Records of a servo-cylinder, its model without and with a constant force beside dry friction, and the truth."""
     case = shared_case("servo_cylinder", hidden, seed)
-    model, free, data = balances(case)
+    model, free, data = inverse_dynamics_data(case)
     without = judge(model, free, data, {})
     named, own = without.model, ["axis.bias.force"]
     if "axis.friction.coulomb" not in model.parameters:
@@ -45,7 +45,7 @@ def test_pressures_tell_the_friction_of_seals(pressed: tuple[Data, Judged, Judge
     told_of = seals(without, data)
     assert told_of is not None
     assert np.isclose(told_of.share * PISTON, area, rtol=0.1)
-    assert told_of.unseen @ told_of.unseen < 0.7 * (found.unseen @ found.unseen)
+    assert told_of.validation @ told_of.validation < 0.7 * (found.validation @ found.validation)
 
 
 @pytest.mark.nightly
@@ -69,7 +69,7 @@ def test_a_constant_force_that_is_there_stays_the_explanation() -> None:
 @pytest.mark.nightly
 def test_it_is_told_at_the_right_cylinder_of_a_leg() -> None:
     case = shared_case("hydraulic_leg", "pressure_dependent_friction@knee_drive", 21)
-    model, free, data = balances(case)
+    model, free, data = inverse_dynamics_data(case)
     told_of = seals(judge(model, free, data, {}), data)
     assert told_of is not None
     assert told_of.drive == "knee_drive"

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from balances import balances
 from blind import Case
+from inverse_dynamics import inverse_dynamics_data
 from shared_cases import shared_case
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.candidates import Candidate
@@ -43,7 +43,7 @@ def test_a_refit_leaves_what_a_recalibration_without_the_effect_made_of_the_oil(
 
 @pytest.mark.nightly
 def test_a_wide_dead_zone_of_a_valve_is_found_from_there(case: Case) -> None:
-    model, free, data = balances(case)
+    model, free, data = inverse_dynamics_data(case)
     oil = model.parameters["pump.oil.bulk_modulus"].value
     without = judge(model, free, data, {"pump.oil.bulk_modulus": (oil / 2.2, 2.2 * oil)})
     trial = confirm(
@@ -51,4 +51,4 @@ def test_a_wide_dead_zone_of_a_valve_is_found_from_there(case: Case) -> None:
     )
     width = trial.judged.model.parameters["servo.dead_zone.width"].value
     assert np.isclose(width, case.truth.hidden[0].parameters["width"], rtol=0.03)
-    assert trial.unseen.relative > 0.9
+    assert trial.validation.relative > 0.9

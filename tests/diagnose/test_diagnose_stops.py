@@ -32,7 +32,7 @@ def test_nothing_that_pushes_back_gives_no_place_of_its_own() -> None:
 
 @pytest.mark.nightly
 def test_the_end_that_no_record_reached_stays_where_no_joint_comes() -> None:
-    """Moved into the way of the unseen record it would ruin what the other end explains."""
+    """Moved into the way of the validation record it would ruin what the other end explains."""
     case = shared_case("axis_rotary", "end_stop", 4)
     (hidden,) = case.truth.hidden
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=["end_stop"], workers=1)

@@ -65,7 +65,7 @@ def script(folder: str) -> ModuleType:
 
 
 def percent(diagnosis: Diagnosis, channel: str) -> tuple[float, float]:
-    """Gap on unseen data, recalibrated and at the end, in percent of the signal."""
+    """Gap on validation data, recalibrated and at the end, in percent of the signal."""
     gap = diagnosis.gap[channel]
     return 100.0 * gap.recalibrated / gap.signal, 100.0 * gap.after / gap.signal
 
@@ -121,8 +121,8 @@ def banded(name: str) -> Experiment:
 @pytest.mark.nightly
 def test_a_friction_damper_with_play_stays_unexplained() -> None:
     train = [banded(name) for name in ("0.5Hz_30lb_1.5in", "2Hz_30lb_0.5in")]
-    unseen = [banded(name) for name in ("0.5Hz_30lb_1in", "1Hz_30lb_1in")]
-    found = diagnose(press("friction damper", 1e4), train, unseen)
+    validation = [banded(name) for name in ("0.5Hz_30lb_1in", "1Hz_30lb_1in")]
+    found = diagnose(press("friction damper", 1e4), train, validation)
     assert found.verdict == "unexplained"
     recalibrated, after = percent(found, "axis.effort")
     assert after < 0.85 * recalibrated
@@ -133,7 +133,7 @@ def test_a_friction_damper_with_play_stays_unexplained() -> None:
 
 
 def crane_with(load_known: bool) -> tuple[Diagnosis, float]:
-    """Diagnosis of a cylinder with equal directions, and its gap in free run on the unseen half, unit of the log."""
+    """Diagnosis of a cylinder with equal directions, and its error in free run on the validation half."""
     crane = script("crane")
     record = crane.load(DATA / "hydraulic_crane_actuator" / "actuator.csv")
     half, second = crane.first(record, 512), record.trim(start=record.time[512])

@@ -57,7 +57,7 @@ def test_refuses_with_the_right_reasons(diagnosis: Diagnosis) -> None:
     reasons = {r.name: r.reason for r in diagnosis.refused}
     assert "negative" in reasons["stribeck_friction"]
     assert "lowers the training error" in reasons["torque_ripple"]
-    assert "raises the unseen error" in reasons["torque_ripple"]
+    assert "raises the validation error" in reasons["torque_ripple"]
 
 
 def test_force_error_by_inverse_dynamics(diagnosis: Diagnosis) -> None:
@@ -85,9 +85,18 @@ def test_asymmetry_and_bias_are_said_to_be_confusable(diagnosis: Diagnosis) -> N
 
 def test_command_line(tmp_path: Path) -> None:
     tried = [word for name in TRIED for word in ("--effect", name)]
-    unseen = DATA / "emps_pulses_test.csv"
+    validation = DATA / "emps_pulses_test.csv"
     done = vpm(
-        "diagnose", MODEL, DATA / "emps_train.csv", "--validate", unseen, *tried, "--names", "search", "--out", tmp_path
+        "diagnose",
+        MODEL,
+        DATA / "emps_train.csv",
+        "--validate",
+        validation,
+        *tried,
+        "--names",
+        "search",
+        "--out",
+        tmp_path,
     )
     assert done.returncode == 0, done.stderr
     assert "torque_ripple at axis: it lowers the training error" in done.stdout

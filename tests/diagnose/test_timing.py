@@ -52,23 +52,23 @@ def test_a_shift_within_the_interval_is_found_and_leaves_the_noise(late: float, 
     start, data = judged(late)
     timed = in_time(start, data)
     assert timed.shift == pytest.approx(shift, abs=0.03)
-    noise = NOISE * np.sqrt(0.8 / data.unseen.motions[0].decimation)
-    assert np.sqrt(np.mean(timed.unseen**2)) == pytest.approx(noise, rel=0.1)
-    assert np.sqrt(np.mean(start.unseen**2)) > 1.3 * noise
+    noise = NOISE * np.sqrt(0.8 / data.validation.motions[0].decimation)
+    assert np.sqrt(np.mean(timed.validation**2)) == pytest.approx(noise, rel=0.1)
+    assert np.sqrt(np.mean(start.validation**2)) > 1.3 * noise
 
 
 def test_a_longer_shift_is_cut_to_one_interval_and_stays_to_be_explained() -> None:
     start, data = judged(5.0)
     timed = in_time(start, data)
     assert timed.shift == 1.0
-    assert np.sqrt(np.mean(timed.unseen**2)) > 0.5 * np.sqrt(np.mean(start.unseen**2))
+    assert np.sqrt(np.mean(timed.validation**2)) > 0.5 * np.sqrt(np.mean(start.validation**2))
 
 
 def test_nothing_is_shifted_where_commands_hold_as_they_are_logged() -> None:
     start, data = judged(0.5)
     timed = in_time(start, data)
     assert timed.shift == 0.0
-    assert timed.unseen is start.unseen
+    assert timed.validation is start.validation
 
 
 def test_commands_of_a_later_problem_come_one_sample_later() -> None:

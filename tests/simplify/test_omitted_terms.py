@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 import vpm
+from test_coriolis_terms import ARM, CENTER, FIRST, LENGTH, SECOND, coriolis, swing
 from test_simplify_levels import ARM as FLEXIBLE
-from test_velocity_terms import ARM, CENTER, FIRST, LENGTH, SECOND, coriolis, swing
 from vpm.errors import ModelError, ValidityWarning
 from vpm.simplify import Reduction, reductions, simplify
 from vpm.simplify.reductions import COUPLING_TERMS, VELOCITY_TERMS

@@ -58,8 +58,8 @@ def test_leg_comes_down_within_the_tolerance_on_a_motion_that_nothing_was_fitted
 
 def test_reduced_drives_err_by_what_they_leave_out(leg: vpm.Model) -> None:
     learn = [record(leg, name) for name in ("squat", "sway")]
-    unseen = by_the_model(leg, record(leg, "pace"), "closed_loop", 1000.0, CHANNELS)
-    judge = Judge(leg, learn, [unseen], 1000.0, "closed_loop", CHANNELS)
+    validation = by_the_model(leg, record(leg, "pace"), "closed_loop", 1000.0, CHANNELS)
+    judge = Judge(leg, learn, [validation], 1000.0, "closed_loop", CHANNELS)
     setup = vpm.Setup("linearly_implicit")
 
     def error(model: vpm.Model) -> float:
@@ -176,13 +176,13 @@ def test_narx_model_is_found_from_what_it_does() -> None:
 
 
 def test_narx_model_is_trained_in_the_loop_that_it_closes(leg: vpm.Model) -> None:
-    learn, unseen = (
+    learn, validation = (
         [by_the_model(leg, record(leg, name), "closed_loop", 1000.0, CHANNELS) for name in names]
         for names in (("squat", "sway"), ("pace",))
     )
     taught = [_taught(leg, each, "closed_loop", 1000.0) for each in learn]
     element = next(each for each in _learnt(leg, "knee_drive", taught, 1e-3) if each.name == "narx")
-    judge = Judge(leg, learn, unseen, 1000.0, "closed_loop", CHANNELS)
+    judge = Judge(leg, learn, validation, 1000.0, "closed_loop", CHANNELS)
     better = trained(leg, element, learn, "closed_loop", CHANNELS)
     first, second = (max(judge.errors(each.applied(leg), vpm.Setup("rk4", 2)).values()) for each in (element, better))
     assert second < 0.8 * first
@@ -199,8 +199,8 @@ def test_servo_cylinder_may_lose_its_spool_and_a_chamber() -> None:
         return vpm.Experiment.from_arrays(time, {"servo.command": command}, model=rig, name=name)
 
     learn = [chirp("slow", 1e-3, 10.0), chirp("fast", 5e-4, 30.0)]
-    unseen = by_the_model(rig, chirp("other", 8e-4, 20.0), "free_run", 1000.0, ["axis.position"])
-    judge = Judge(rig, learn, [unseen], 1000.0, "free_run", ["axis.position"])
+    validation = by_the_model(rig, chirp("other", 8e-4, 20.0), "free_run", 1000.0, ["axis.position"])
+    judge = Judge(rig, learn, [validation], 1000.0, "free_run", ["axis.position"])
 
     def error(model: vpm.Model) -> float:
         return judge.errors(model, vpm.Setup("rk4"))["axis.position"]

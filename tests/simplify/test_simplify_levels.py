@@ -91,10 +91,10 @@ def test_the_cheapest_level_keeps_the_strain_within_the_tolerance_on_an_unseen_m
     assert chosen.states < ladder.full.states
     assert chosen.loss <= 0.05
     # By hand: the chosen model in its own steps beside the full one in finer steps.
-    unseen = record(full, (0.2, 0.05))
+    validation = record(full, (0.2, 0.05))
     steps = round(STEP * RATE) * chosen.substeps
-    simple = vpm.simulate(ladder.model, unseen, "closed_loop", integrator=chosen.integrator, substeps=steps)
-    exact = vpm.simulate(full, unseen, "closed_loop", substeps=8 * steps)
+    simple = vpm.simulate(ladder.model, validation, "closed_loop", integrator=chosen.integrator, substeps=steps)
+    exact = vpm.simulate(full, validation, "closed_loop", substeps=8 * steps)
     error = np.linalg.norm(simple["root.strain"] - exact["root.strain"]) / np.linalg.norm(exact["root.strain"])
     assert error <= 0.051
     assert error == pytest.approx(chosen.error, abs=0.005)

@@ -59,10 +59,10 @@ def test_the_chosen_model_keeps_both_strains_on_a_motion_that_the_fit_did_not_se
     assert {change.split()[0] for change in chosen.removed} >= {"strip_1", "strip_2"}
     assert chosen.states < ladder.full.states / 2
     assert chosen.seconds < ladder.full.seconds / 4
-    unseen = record(full, "fast_slow")
-    steps = round(unseen.dt * RATE) * chosen.substeps
-    simple = vpm.simulate(ladder.model, unseen, "closed_loop", integrator=chosen.integrator, substeps=steps)
-    exact = vpm.simulate(full, unseen, "closed_loop", integrator="linearly_implicit", substeps=16)
+    validation = record(full, "fast_slow")
+    steps = round(validation.dt * RATE) * chosen.substeps
+    simple = vpm.simulate(ladder.model, validation, "closed_loop", integrator=chosen.integrator, substeps=steps)
+    exact = vpm.simulate(full, validation, "closed_loop", integrator="linearly_implicit", substeps=16)
     for gauge in GAUGES:
         error = np.linalg.norm(simple[gauge] - exact[gauge]) / np.linalg.norm(exact[gauge])
         assert error <= TOLERANCE + 0.002

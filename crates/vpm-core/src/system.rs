@@ -2,9 +2,9 @@
 
 mod additive;
 mod answers;
+mod call_count;
 mod connections;
 mod constant;
-mod counted;
 mod drives;
 mod engine;
 mod following;
@@ -24,8 +24,8 @@ mod step;
 mod stiff;
 mod turning;
 
+pub(crate) use call_count::{Calls, Counted, Matrix};
 pub use connections::Connections;
-pub(crate) use counted::{Calls, Counted, Matrix};
 pub(crate) use engine::Engine;
 pub(crate) use following::Following;
 pub(crate) use functions::Recorder;

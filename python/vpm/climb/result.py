@@ -107,13 +107,13 @@ class Climb(Result):
         if self.levels[-1].name == self.top:
             end = f"the finest level that the model has; it leaves {100 * self.chosen.error:.2f} %"
         else:
-            end = f"which leaves {100 * self.chosen.error:.2f} %; more detail buys nothing that unseen data show"
+            end = f"which leaves {100 * self.chosen.error:.2f} %; more detail buys nothing that validation data show"
         return f"detail pays up to {self.top}, {end}"
 
     def __str__(self) -> str:
         """The levels and the verdict."""
         lines = [
-            f"levels on unseen data, {self.mode} (* pays):",
+            f"levels on validation data, {self.mode} (* pays):",
             *(f"  {level}" for level in self.levels),
             self.verdict,
         ]

@@ -2,9 +2,9 @@
 
 from vpm.compare.comparison import ChannelComparison, Comparison
 from vpm.compare.correlation import Correlation, autocorrelation, cross_correlation, effective_samples
+from vpm.compare.export import write_mcap
 from vpm.compare.measure import SimulatedRun, compare
 from vpm.compare.regions import Bin, Region, Where
-from vpm.compare.written import write_mcap
 
 __all__ = [
     "Bin",

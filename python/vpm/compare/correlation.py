@@ -1,4 +1,4 @@
-"""What a residual still knows: of its own past, and of the inputs."""
+"""Correlation of a residual with its own past and with inputs."""
 
 from __future__ import annotations
 

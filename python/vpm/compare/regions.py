@@ -1,4 +1,4 @@
-"""Where a residual lives: when, at which frequencies, and in which states of the machine."""
+"""Residual by region: by time, by frequency, and by state of the machine."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ TRAIN = FOLDER / "train.csv"
 """The record that the diagnosis learns from."""
 
 VALIDATION = FOLDER / "validation.csv"
-"""Another motion of the same machine, for checking on unseen data."""
+"""Another motion of the same machine, for checking on validation data."""
 
 TRUTH = FOLDER / "truth.toml"
 """The hidden effect and the true values. Only shown at the end, never read by the diagnosis."""

@@ -10,7 +10,7 @@ from vpm.discrepancy.candidates import Candidate, Key, candidates
 from vpm.discrepancy.choice import Accepted, alike
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.diagnosis import Ambiguity
-from vpm.discrepancy.finer import seen_beside
+from vpm.discrepancy.nested_model import probe_beside
 from vpm.discrepancy.refusal import LEAST_GAIN
 from vpm.discrepancy.screening import Probe, impossible_values, probe, refit_effort, screening_effort
 from vpm.discrepancy.search import Tried
@@ -20,10 +20,10 @@ from vpm.identify.along import bends
 from vpm.model import Model
 
 #: Rivals that are refitted in the place of an effect, and how many of the others that may refine it.
-SHORT_LIST, FINER = 3, 2
+SHORT_LIST, NESTED = 3, 2
 #: A rival that takes less than this share of what the effect takes from the training residual is none.
 LEAST_SHARE = 0.8
-#: A rival that leaves up to this share more of the unseen mean square predicts as well.
+#: A rival that leaves up to this share more of the validation mean square predicts as well.
 AS_GOOD = 0.05
 
 
@@ -35,7 +35,7 @@ class Rivals:
     ----------
     effect, site : str
     trials : tuple of Trial
-        Those that predict the unseen data as well.
+        Those that predict the validation data as well.
     tried : tuple of Trial
         All that were refitted in its place.
     without : Judged or None
@@ -62,7 +62,7 @@ def listed(known: Sequence[Ambiguity], found: Sequence[Rivals]) -> tuple[Ambigui
         labels = (trial.probe.candidate.label for trial in entry.trials)
         names = tuple(label for label in labels if (entry.effect, entry.site, label) not in said)
         if names:
-            reason = "put in its place and fitted, it predicts the unseen data as well"
+            reason = "put in its place and fitted, it predicts the validation data as well"
             more.append(Ambiguity(entry.effect, entry.site, names, reason))
     return (*known, *more)
 
@@ -77,8 +77,8 @@ def rivals(
 ) -> tuple[Rivals, ...]:
     """Replace each accepted effect in turn by every other that could do its work, and keep those that do it as well.
 
-    All rivals are screened on the model without the effect; the few that take nearly as much from the training
-    residual are refitted, and have to predict the unseen records as the effect does. What the ``last`` effect competed
+    All rivals are screened on the model without the effect; the few with nearly the same share of the training residual
+    are refitted. They have to predict the validation records as well as the effect. What the ``last`` effect competed
     with when it came in is not worked out again.
     """
     each = each or SideBySide(1)
@@ -102,7 +102,7 @@ def rivals(
     if last is not None:
         seen += [(e, p) for e in accepted if e.key == last.key for p in _beside(last, e)]
     places = {entry.key: without for entry, without in zip(accepted, bases, strict=True) if without is not None}
-    seen = [(e, seen_beside(final, places[e.key], data.training, e, p)) for e, p in seen if e.key in places]
+    seen = [(e, probe_beside(final, places[e.key], data.training, e, p)) for e, p in seen if e.key in places]
     refits, tried = [], list[tuple[Accepted, Trial]]()
     for entry, without in zip(accepted, bases, strict=True):
         done = {t.probe.candidate.key: t for t in known[entry.key].trials} if entry.key in known else {}
@@ -136,7 +136,7 @@ class _Job:
 
     @property
     def label(self) -> str:
-        """What is told of it."""
+        """Label in progress reports."""
         return f"{self.candidate.label} for {_label(self.entry)}"
 
 
@@ -171,7 +171,7 @@ def _could_do(model: Model, entry: Accepted, candidate: Candidate) -> bool:
 
 
 def _short_list(final: Judged, without: Judged | None, entry: Accepted, probes: Sequence[Probe]) -> list[Probe]:
-    """Rivals worth a refit: those that promise most for their numbers, and what might refine the effect most."""
+    """Rivals worth a refit: the largest predicted gains per number, and what might refine the effect most."""
     if without is None:
         return []
     taken = _power(without) - _power(final)
@@ -180,8 +180,8 @@ def _short_list(final: Judged, without: Judged | None, entry: Accepted, probes: 
     ]
     good.sort(key=lambda p: -p.score)
     own = entry.trial.probe.candidate
-    finer = [p for p in good[SHORT_LIST:] if alike(p.candidate, own)]
-    return good[:SHORT_LIST] + sorted(finer, key=lambda p: -p.drop)[:FINER]
+    nested = [p for p in good[SHORT_LIST:] if alike(p.candidate, own)]
+    return good[:SHORT_LIST] + sorted(nested, key=lambda p: -p.drop)[:NESTED]
 
 
 def _near(candidate: Candidate, entry: Accepted) -> bool:
@@ -194,10 +194,10 @@ def _near(candidate: Candidate, entry: Accepted) -> bool:
 
 
 def as_good(final: Judged, trial: Trial, data: Data) -> bool:
-    """Whether something in the place of an effect predicts the unseen data as the effect does."""
+    """Whether something in the place of an effect predicts the validation data as the effect does."""
     if not trial.clear:
         return False
-    change = gain(final.unseen, trial.judged.unseen, segments(data.unseen)).relative
+    change = gain(final.validation, trial.judged.validation, segments(data.validation)).relative
     return change > -max(AS_GOOD, LEAST_GAIN)
 
 

@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from vpm.discrepancy.ambiguity import Rivals
-from vpm.discrepancy.begun import Records
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, is_clear, weaker
 from vpm.discrepancy.diagnosis import (
@@ -19,6 +18,7 @@ from vpm.discrepancy.diagnosis import (
 )
 from vpm.discrepancy.elimination import Stage
 from vpm.discrepancy.floor import noise_floor
+from vpm.discrepancy.preparation import Records
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.structure import Structure, structure
 from vpm.discrepancy.timing import in_time
@@ -28,18 +28,18 @@ from vpm.model import Model
 from vpm.simulate import Setup
 
 #: Said of what would do in the place of an effect.
-ALIKE = "predicts the unseen data as well"
+ALIKE = "predicts the validation data as well"
 
 
 def of_search(
     model: Model, records: Records, recalibrated: Judged, found: Search, data: Data, seconds: float
 ) -> Diagnosis:
     """What a search found, where nothing after it can be computed: nobody waits for it twice."""
-    training, unseen, notes = records
+    training, validation, notes = records
     names = ", ".join(entry.label for entry in found.accepted) or "no effect"
     return Diagnosis(
         "effect_found" if found.accepted else "unexplained",
-        f"The search accepts {names} in {model.name}; what is left on unseen records could not be computed.",
+        f"The search accepts {names} in {model.name}; what is left on validation records could not be computed.",
         tuple(accepted_effect(entry, found.final) for entry in found.accepted),
         {},
         found.refused,
@@ -48,7 +48,7 @@ def of_search(
         {},
         (),
         tuple(e.name for e in training),
-        tuple(e.name for e in unseen),
+        tuple(e.name for e in validation),
         tuple(notes),
         found.final.model,
         fit_of(
@@ -67,19 +67,19 @@ def of_search(
 def gaps_of(
     data: Data, nominal: Judged, recalibrated: Judged, final: Judged, floor: dict[str, float]
 ) -> dict[str, ChannelGap]:
-    """Gap of each channel of the balance, and of the simulation, at three stages, and its noise floor."""
+    """Gap of each channel of the residual, and of the simulation, at three stages, and its noise floor."""
     judged = (nominal, recalibrated, final)
-    stages = [gaps(data.unseen, stage.unseen) for stage in judged]
+    stages = [gaps(data.validation, stage.validation) for stage in judged]
     # Of efforts as the drives of the nominal model give them: no drive may shrink them together with its error.
-    shrunk = (weaker(data.unseen, nominal, stage) for stage in (recalibrated, final))
-    factors = np.array([np.ones(len(data.unseen.joints)), *shrunk])
-    by_channel = {f"{joint}.effort": own for joint, own in zip(data.unseen.joints, factors.T, strict=True)}
+    shrunk = (weaker(data.validation, nominal, stage) for stage in (recalibrated, final))
+    factors = np.array([np.ones(len(data.validation.joints)), *shrunk])
+    by_channel = {f"{joint}.effort": own for joint, own in zip(data.validation.joints, factors.T, strict=True)}
     result = {}
     for channel, (_, _, unit) in stages[0].items():
         own = by_channel.get(channel, np.ones(len(judged)))
         before, known, after = (float(stage[channel][0] * factor) for stage, factor in zip(stages, own, strict=True))
-        signal, noise = _signal(data.unseen, channel), float(floor.get(channel, np.nan) * own[-1])
-        result[channel] = ChannelGap(before, known, after, noise, unit, signal, data.unseen.mode)
+        signal, noise = _signal(data.validation, channel), float(floor.get(channel, np.nan) * own[-1])
+        result[channel] = ChannelGap(before, known, after, noise, unit, signal, data.validation.mode)
     simulation = data.simulation
     simulated = [] if simulation is None else [gaps(simulation, j.simulated) for j in judged if j.simulated is not None]
     # A stage that ran away from the records has nothing to be compared.
@@ -96,9 +96,9 @@ def examined(
     nominal: Judged, recalibrated: Judged, data: Data, mode: str, setup: Setup, final: Judged
 ) -> tuple[dict[str, float], dict[str, ChannelGap], Structure]:
     """Noise floor of each channel, gaps at all stages, and what is left of the last one."""
-    floor = noise_floor(final.model, data.unseen, final.unseen, mode, setup)
+    floor = noise_floor(final.model, data.validation, final.validation, mode, setup)
     timed = in_time(final, data)
-    left = structure(final.model, data.training, data.unseen, timed.fitted, timed.unseen)
+    left = structure(final.model, data.training, data.validation, timed.fitted, timed.validation)
     return floor, gaps_of(data, nominal, recalibrated, final, floor), left
 
 
@@ -117,9 +117,9 @@ def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
         std = float(final.fit.std[final.free.index(dotted)]) if dotted in final.free else 0.0
         estimates.append(EffectParameterEstimate(short, dotted, parameter.value, parameter.unit, std))
     texts = {e.name: f"{e.value:.4g} {e.unit}" for e in estimates}
-    notes = [f"{alias.parameter} held: not told from {alias.partner}" for alias in entry.trial.held]
-    if entry.trial.alone:
-        notes.append("told by runs of the model itself in closed loop; a balance of effort hardly shows it")
+    notes = [f"{alias.parameter} held: not discriminated from {alias.partner}" for alias in entry.trial.held]
+    if entry.trial.from_prediction:
+        notes.append("shown by closed-loop predictions; the inverse-dynamics residual hardly shows it")
     elif not entry.ranked and not is_clear(final, tuple(e.dotted for e in estimates if e.std > 0.0)):
         notes.append("beside the effects that came later, its interval covers zero: one of them may be enough")
     return AcceptedEffect(
@@ -127,9 +127,9 @@ def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
         candidate.site,
         candidate.effect.sentence.format(at=candidate.site, **texts),
         tuple(estimates),
-        entry.trial.unseen.relative,
-        entry.trial.unseen.score,
-        (*notes, *(f"{'not told from it' if entry.ranked else ALIKE}: {rival}" for rival in entry.rivals)),
+        entry.trial.validation.relative,
+        entry.trial.validation.score,
+        (*notes, *(f"{'not discriminated from it' if entry.ranked else ALIKE}: {rival}" for rival in entry.rivals)),
         entry.probability,
         entry.evidence,
         entry.class_probability,
@@ -159,5 +159,5 @@ def step(data: Data, stage: Stage) -> Step:
         dict(zip(names, map(float, fit.std), strict=True)),
         {name: model.parameters[name].unit for name in names},
         max(share for _, share, _ in gaps(data.training, fit.residual).values()),
-        max(share for _, share, _ in gaps(data.unseen, stage.judged.unseen).values()),
+        max(share for _, share, _ in gaps(data.validation, stage.judged.validation).values()),
     )

@@ -1,4 +1,4 @@
-"""The band in which a machine works: forces that depend on its motion live there, the noise of accelerations above."""
+"""The frequency band of the motion: forces that depend on the motion are in it, noise of accelerations above."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ WHOLE = 0.9
 def motion_band(problem: InverseDynamicsProblem, model: Model) -> float:
     """Frequency in Hz below which the efforts of all records and joints have nearly all of their power.
 
-    The noise of a balance is that of twice differentiated positions and grows with the square of the frequency; what
-    follows the motion is hidden by it in a mean over all frequencies, and may stand clear of it in this band.
+    The noise of the residual comes from twice differentiated positions, so it grows with the square of the frequency.
+    In a mean over all frequencies it hides what follows the motion; in this band it may not.
     """
     found = []
     for record in range(len(problem.motions)):

@@ -1,7 +1,7 @@
-"""Names from a ranking, as a diagnosis goes on with them: refitted on balances of effort, measured on unseen records.
+"""Effects that a ranking names: refitted to the inverse-dynamics residual, and measured on validation records.
 
-A ranking says what is missing and in which order. Nothing here takes a name away or adds one, but for a machine whose
-efforts cannot be balanced with it. The values that are reported are those of a balance wherever it shows them.
+A ranking names what is missing, in order. This module changes none of its names, except on machines whose inverse
+dynamics cannot be computed with an effect. Reported values are those of the residual wherever it shows them.
 """
 
 from __future__ import annotations
@@ -81,12 +81,12 @@ def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
 
 
 def free_joints(model: Model) -> tuple[str, ...]:
-    """Joints without a drive, so that no balance of effort sees what acts there."""
+    """Joints without a drive, so that no inverse-dynamics residual shows what acts there."""
     return tuple(name for name in model.joints if name not in {*model.driven_joints, *model.added_joints})
 
 
 def observed_gaps(ranking: Ranking, balanced: Sequence[str]) -> dict[str, ChannelGap]:
-    """Errors of an observer on unseen records, of channels of joints that a balance of effort does not see."""
+    """Errors of an observer on validation records, of joints that the inverse-dynamics residual does not show."""
     joints = set(ranking.recalibrated.joints) - set(balanced)
     return {
         f"{channel} ({OBSERVED})": ChannelGap(
@@ -128,14 +128,14 @@ def searched(
             try:
                 trial = _beside(stages[-1].judged, _without(ranking.model, gone), one, data)
             except VpmError as error:
-                outside[one.key] = f"it {_removes(one)}, but no balance of effort can be computed: {error}"
+                outside[one.key] = f"it {_removes(one)}, but no inverse-dynamics residual can be computed: {error}"
                 continue
             accepted.append(Accepted(trial, one.rivals, one.evidence, one.probability, one.side, one.class_probability))
             stages.append(Stage("added", *one.key, trial.judged))
         known = _rivals(ranking, stages[-1].judged, accepted, data)
     except KeyboardInterrupt:
         interrupted = True
-    gains = {entry.key: entry.trial.unseen.relative for entry in accepted}
+    gains = {entry.key: entry.trial.validation.relative for entry in accepted}
     if ranking.rounds:
         outside |= _unpromising(ranking, stages[-1].judged, data, effects)
     refused, tried = _refused(ranking, outside, settings), _candidates(ranking, gains, settings)
@@ -160,10 +160,10 @@ def _without(model: Model, gone: Sequence[Ranked]) -> Model:
 
 
 def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
-    """An effect in a model at the values of a ranking, refitted as far as a balance of effort shows them.
+    """An effect in a model at the values of a ranking, refitted as far as an inverse-dynamics residual shows them.
 
-    A parameter moves if the balance tells it from all others at these values, and stays where it is if not. The refit
-    counts if the training records are left no more and the unseen ones are simulated no worse than by those values.
+    A parameter moves if the residual tells it from all others at these values, and stays where it is if not. The refit
+    counts if the training records are left no more and the validation ones are simulated no worse than by those values.
 
     Raises
     ------
@@ -175,9 +175,9 @@ def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
     known = tuple(_renamed(current.model, model).get(name, name) for name in current.free)
     known = tuple(name for name in known if name in model.parameters)
     residual, columns = data.training.evaluate(model, model.theta, [model.index(name) for name in (*known, *own)])
-    told = _told(columns)
-    beside, fresh = columns[:, : len(known)][:, told[: len(known)]], np.where(told, columns, 0.0)[:, len(known) :]
-    known = tuple(compress(known, told))
+    visible = _has_derivatives(columns)
+    beside, fresh = columns[:, : len(known)][:, visible[: len(known)]], np.where(visible, columns, 0.0)[:, len(known) :]
+    known = tuple(compress(known, visible))
     split = len(known)
     sizes = np.array([abs(model.parameters[name].value) or 1.0 for name in (*known, *own)])
     keep, held, blind = sort_columns(own, fresh, beside, known, residual, (sizes[:split], sizes[split:]))
@@ -189,8 +189,8 @@ def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
     return measured(current, data, probe, judged, moving, held, None, diverged)
 
 
-def _told(columns: Array) -> NDArray[np.bool_]:
-    """Whether a balance has derivatives by each parameter: what is behind a play may part from its way ever faster."""
+def _has_derivatives(columns: Array) -> NDArray[np.bool_]:
+    """Whether the residual has derivatives by each parameter; behind a backlash a motion may diverge."""
     with np.errstate(over="ignore", invalid="ignore"):
         return np.asarray(np.isfinite(np.sum(columns**2, axis=0)))
 
@@ -207,8 +207,8 @@ def _refitted(
     if _power(judged) > _power(still):
         return still, stopped
     if data.simulation is not None and judged.simulated is not None and still.simulated is not None:
-        told = gain(still.simulated, judged.simulated, segments(data.simulation))
-        if told.relative < -SETTINGS.worse and told.harm > SETTINGS.sure:
+        gained = gain(still.simulated, judged.simulated, segments(data.simulation))
+        if gained.relative < -SETTINGS.worse and gained.harm > SETTINGS.sure:
             return still, stopped
     return judged, diverged
 
@@ -276,7 +276,7 @@ def _rivals(ranking: Ranking, final: Judged, accepted: Sequence[Accepted], data:
             try:
                 trials.append(_placed(_tried(ranking, entry.key, label), final, entry, data))
             except (VpmError, StopIteration):
-                continue  # it is said, but there is no balance to plan an experiment by
+                continue  # it is said, but there is no residual to plan an experiment by
         if trials:
             found.append(Rivals(*entry.key, tuple(trials)))
     return tuple(found)
@@ -326,7 +326,7 @@ def _refused(ranking: Ranking, outside: Mapping[Key, str], settings: RankingSett
             winner = several[0] if _accepts(several, settings) else None
             last[one.key] = _Last(one, winner, winner is one)
     kept = {one.key for one in ranking.effects}
-    reasons = {**{key: _reason(told, settings) for key, told in last.items() if key not in kept}, **outside}
+    reasons = {**{key: _reason(entry, settings) for key, entry in last.items() if key not in kept}, **outside}
     return tuple(RefusedEffect(*key, reason) for key, reason in reasons.items())
 
 
@@ -334,12 +334,12 @@ def _unpromising(ranking: Ranking, final: Judged, data: Data, effects: Sequence[
     """Effects that could be there and that no round of a ranking fitted, with the reason."""
     offered = candidates(final.model, data.training, final.fit.residual, asked_for(effects), simulated=True)
     tried = {one.key for several in ranking.rounds for one in several}
-    reason = "the first step of a fit promised less evidence than others did, or too little for a fit"
+    reason = "the first step of a fit predicted less evidence than others did, or too little for a fit"
     return {candidate.key: reason for candidate in offered if candidate.key not in tried}
 
 
 def _accepts(several: Sequence[Ranked], settings: RankingSettings) -> bool:
-    """Whether the first effect of a round came in: evidence is told of effects that count, and of no others."""
+    """Whether the first effect of a round came in: only accepted effects have evidence."""
     return bool(several) and several[0].evidence > settings.odds
 
 
@@ -347,9 +347,9 @@ def _removes(one: Ranked) -> str:
     return one.judgement.words
 
 
-def _reason(told: _Last, settings: RankingSettings) -> str:
-    one, winner = told.one, told.winner
-    if told.came_in:
+def _reason(entry: _Last, settings: RankingSettings) -> str:
+    one, winner = entry.one, entry.winner
+    if entry.came_in:
         return "it is not needed any more beside what came in after it"
     if lacks := one.judgement.lacks(settings):
         return lacks
@@ -369,10 +369,10 @@ def _candidates(ranking: Ranking, gains: Mapping[Key, float], settings: RankingS
     for number, several in enumerate(ranking.rounds):
         for place, one in enumerate(several):
             accepted = place == 0 and _accepts(several, settings) and one.key in gains
-            unseen = gains[one.key] if accepted else np.nan
+            validation = gains[one.key] if accepted else np.nan
             found.append(
                 RankedCandidate(
-                    *one.key, number + 1, one.judgement.removed, unseen, accepted, one.evidence, one.probability
+                    *one.key, number + 1, one.judgement.removed, validation, accepted, one.evidence, one.probability
                 )
             )
     return tuple(found)
@@ -381,4 +381,4 @@ def _candidates(ranking: Ranking, gains: Mapping[Key, float], settings: RankingS
 def notes(accepted: Sequence[Accepted]) -> list[str]:
     """Parameters that the ranking alone knows."""
     blind = [", ".join(entry.trial.probe.invisible) for entry in accepted if entry.trial.probe.invisible]
-    return [f"{names}: as the ranking fitted it, for a balance of effort does not show it" for names in blind]
+    return [f"{names}: as the ranking fitted it, for the inverse-dynamics residual does not show it" for names in blind]

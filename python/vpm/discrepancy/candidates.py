@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from vpm.catalogue import EFFECTS, EffectType
 from vpm.catalogue.shared import SLOW
 from vpm.catalogue.traits import Seen
-from vpm.discrepancy.limit import seen_limit
+from vpm.discrepancy.limit import limit_start
 from vpm.discrepancy.structural import (
     beyond,
     logged_swing,
@@ -141,7 +141,7 @@ def candidates(
     effects : sequence of str, optional
         Restrict the search to these; to those that a diagnosis tries if not given.
     simulated : bool
-        Whether what moves unseen is simulated with the memories of effects, and not balanced.
+        Whether motion that no channel measures is simulated with the memories of effects.
     """
     return tuple(
         _candidate(effect, site, model, data, residual)
@@ -185,14 +185,14 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
         return _periodic(effect, site, data, model, residual)
     if effect.site == "body":
         return Candidate(effect, site, _payload_places(model, site))
-    return _tried(effect, site, model, seen, partial(seen_limit, data, residual=residual))
+    return _tried(effect, site, model, seen, partial(limit_start, data, residual=residual))
 
 
 def _tried(
     effect: EffectType, site: str, model: Model, seen: Excitation, limit: Callable[[str, int], float | None]
 ) -> Candidate:
     """With the start values and bounds that the catalogue gives; a ``limit`` of commands is guessed from data too."""
-    # A way that is passed between two samples cannot be told from dry friction.
+    # A way that is passed between two samples is like dry friction.
     least = min(seen.speed * seen.interval, 0.5 * seen.travel)
     grids, bounds = list[list[tuple[str, float]]](), dict[str, tuple[float, float]]()
     for tried in effect.tried:
@@ -293,9 +293,9 @@ def _excitation(data: InverseDynamicsProblem, model: Model, site: str, actuator:
 def _ripple_periods(position: Array, values: Array, fewest: float) -> list[float]:
     """Periods in position at which a residual is strongest: peaks of its least-squares periodogram.
 
-    Evenly spaced frequencies up to what the decimated samples resolve, from ``fewest`` periods per travel; what rubs
-    turns round with the motion, and is told from the rest of the machine over half a period already; N. Lomb,
-    *Astrophysics and Space Science* 39, 1976.
+    Evenly spaced frequencies up to what the decimated samples resolve, from ``fewest`` periods per travel; friction
+    changes its sign with the motion, and half a period suffices for it; N. Lomb, *Astrophysics and Space Science* 39,
+    1976.
     """
     thin = max(1, len(values) // 4000)
     position, values = position[::thin], values[::thin]

@@ -1,4 +1,4 @@
-"""Which of several believed candidates comes in: little left, few numbers, the machine before its instruments."""
+"""Choice among supported candidates: small residual, few parameters, the machine before its instruments."""
 
 from __future__ import annotations
 
@@ -12,13 +12,13 @@ from vpm.catalogue.kinds import Side
 from vpm.catalogue.traits import Late
 from vpm.discrepancy.candidates import Candidate, Key
 from vpm.discrepancy.confirmation import Data, Trial
-from vpm.discrepancy.driven import ODDS, Runs, compare_driven
-from vpm.discrepancy.own_reading import read_by_itself
+from vpm.discrepancy.reference_response import ODDS, Runs, compare_driven
 from vpm.discrepancy.refusal import LEAST_GAIN
+from vpm.discrepancy.sensor_prediction import preferred_sensor
 from vpm.discrepancy.structural import coupled
 from vpm.identify import Gain
 
-#: What comes late, and what is slow and looks late.
+#: Kinds of delay: pure delays, lags of drives, slow spools.
 KINDS: tuple[Late, ...] = ("delay", "lag", "spool")
 #: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
 SENSOR_SHARE = 0.25
@@ -65,48 +65,48 @@ class Accepted:
         return bool(np.isfinite(self.evidence))
 
 
-def choose(believed: Sequence[Trial], data: Data) -> Accepted:
+def choose(supported: Sequence[Trial], data: Data) -> Accepted:
     """The candidate that leaves least for its numbers; of those that are as good, the best simulation.
 
     One that refines another only takes its place if it leaves less than ``REFINED`` of what that leaves.
     """
-    first = min(believed, key=cost)
-    plain = [t for t in believed if _plainer(t, first)]
+    first = min(supported, key=cost)
+    plain = [t for t in supported if _plainer(t, first)]
     first = min(plain, key=cost) if plain else first
-    equals = [t for t in believed if _as_good(t, first)]
-    chosen = _late_or_slow(read_by_itself(_first_named(equals), equals, data), believed, data)
+    equals = [t for t in supported if _as_good(t, first)]
+    chosen = _delay_or_lag(preferred_sensor(_first_named(equals), equals, data), supported, data)
     return Accepted(chosen, tuple(t.probe.candidate.label for t in equals if t is not chosen))
 
 
-def _late_or_slow(chosen: Trial, believed: Sequence[Trial], data: Data) -> Trial:
-    """Of delay, lag and slow spool, where several would do: what the reference tells from the others, else the delay.
+def _delay_or_lag(chosen: Trial, supported: Sequence[Trial], data: Data) -> Trial:
+    """Of delay, lag and slow spool, where several would do: the one that the response to the reference discriminates.
 
-    A delay shifts in time; a lag does so too and weakens what is fast, which has to be seen.
+    A delay shifts in time; a lag also weakens high frequencies, which has to show. Without a result it is the delay.
     """
-    if not _late(chosen):
+    if not _kind_of_delay(chosen):
         return chosen
-    alike = [t for t in believed if _left(t) <= SAME * _left(chosen)]
-    kinds = [[t for t in alike if _late(t) == kind] for kind in KINDS]
+    alike = [t for t in supported if _left(t) <= SAME * _left(chosen)]
+    kinds = [[t for t in alike if _kind_of_delay(t) == kind] for kind in KINDS]
     rest = [min(kind, key=_evidence) for kind in kinds if kind]
     best, runs = rest.pop(0), Runs(data)
     for rival in rest:
-        told = compare_driven(rival.judged, best.judged, data, runs)
-        if told is None:
+        response = compare_driven(rival.judged, best.judged, data, runs)
+        if response is None:
             return chosen
-        if told.prefers_first(ODDS if _late(best) == "delay" else 1.0):
+        if response.prefers_first(ODDS if _kind_of_delay(best) == "delay" else 1.0):
             best = rival
     return best
 
 
-def _late(trial: Trial) -> Late:
+def _kind_of_delay(trial: Trial) -> Late:
     return trial.probe.candidate.effect.late
 
 
 def _first_named(equals: Sequence[Trial]) -> Trial:
-    """The trial with the best evidence; of several that no digit of the data parts, the first in the catalogue.
+    """The trial with the best evidence; of several identical models, the first in the catalogue.
 
-    On a single link a drive that winds up and a link that bends at its root are one and the same model, and rounding
-    would decide.
+    On a single link a drive with joint compliance and a link that bends at its root are one and the same model, and
+    rounding would decide.
     """
     best = min(map(_evidence, equals))
     tied = [t for t in equals if _evidence(t) <= best + TIE]
@@ -114,31 +114,31 @@ def _first_named(equals: Sequence[Trial]) -> Trial:
 
 
 def _left(trial: Trial) -> float:
-    """Share of the unseen mean square that a trial leaves."""
-    return _share(trial.unseen)
+    """Share of the validation mean square that a trial leaves."""
+    return _share(trial.validation)
 
 
-def _share(told: Gain) -> float:
-    return max(1.0 - told.relative, 1e-12)
+def _share(gained: Gain) -> float:
+    return max(1.0 - gained.relative, 1e-12)
 
 
 def cost(trial: Trial) -> float:
-    """Information criterion of the unseen data, see `schwarz`."""
-    return schwarz(trial.unseen, len(trial.parameters))
+    """Information criterion of the validation data, see `schwarz`."""
+    return schwarz(trial.validation, len(trial.parameters))
 
 
-def schwarz(told: Gain, numbers: int) -> float:
+def schwarz(gained: Gain, numbers: int) -> float:
     """Information criterion of G. Schwarz (*Annals of Statistics* 6, 1978) per independent piece; 0 says no change.
 
     Parameters
     ----------
-    told : Gain
+    gained : Gain
         What the numbers gain.
     numbers : int
         How many are fitted.
     """
-    pieces = max(told.pieces, 3)
-    return float(np.log(_share(told)) + numbers * np.log(pieces) / pieces)
+    pieces = max(gained.pieces, 3)
+    return float(np.log(_share(gained)) + numbers * np.log(pieces) / pieces)
 
 
 def _plainer(trial: Trial, first: Trial) -> bool:
@@ -154,14 +154,14 @@ def alike(one: Candidate, other: Candidate) -> bool:
 
 
 def _as_good(trial: Trial, first: Trial) -> bool:
-    """Whether a trial explains the unseen data as the first one does, with no more numbers."""
-    close = trial.unseen.relative >= first.unseen.relative - LEAST_GAIN and _left(trial) <= SAME * _left(first)
+    """Whether a trial explains the validation data as the first one does, with no more numbers."""
+    close = trial.validation.relative >= first.validation.relative - LEAST_GAIN and _left(trial) <= SAME * _left(first)
     return close and len(trial.parameters) <= len(first.parameters)
 
 
 def _evidence(trial: Trial) -> float:
     """Logarithm of what is left of the gap in both views; the machine is blamed before its instruments."""
-    left = np.log(max(trial.unseen.after, 1e-300) / trial.unseen.before)
+    left = np.log(max(trial.validation.after, 1e-300) / trial.validation.before)
     if trial.probe.candidate.effect.site == "sensor":
         left -= np.log(SENSOR_SHARE)
     # Errors of coupled joints cancel; see refusal.CLEAR_GAIN.

@@ -1,4 +1,4 @@
-"""The real test of a short-listed effect: refit the model with it, then predict data that were not in the fit."""
+"""The test of a short-listed effect: refit the model with it, then predict validation records."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.discrepancy.candidates import joint_at
-from vpm.discrepancy.late import gain_alone, timed_alone
+from vpm.discrepancy.closed_loop_delay import gain_in_closed_loop, timed_in_closed_loop
+from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction
+from vpm.discrepancy.low_frequency import has_impacts, low_frequency
 from vpm.discrepancy.motion_only import CREEPING, Timed, is_dry, is_late
-from vpm.discrepancy.own_run import OwnRun
 from vpm.discrepancy.screening import Alias, Baseline, Probe, size_is_clear
-from vpm.discrepancy.slow import has_impacts, slow
 from vpm.discrepancy.starting import nearer_start
 from vpm.discrepancy.structural import ends_apart
 from vpm.errors import DivergedError
@@ -45,7 +45,7 @@ FAR_AWAY = 1e3
 #: is there gains most in the first.
 FEW_EVALUATIONS = 6
 #: A refit that has lowered the training error by less than this share of its mean square in so many evaluations, and
-#: hardly goes on, is ended: ten times as much is asked of it on unseen data.
+#: hardly goes on, ends early: validation data have to show ten times as much.
 SLOW_GAIN, SLOW_EVALUATIONS = 0.01, 10
 #: Of two candidates, one that leaves so many times what the other leaves is not the one that comes in.
 HOPELESS = 10.0
@@ -57,14 +57,14 @@ class Data:
 
     Attributes
     ----------
-    training, unseen : InverseDynamicsProblem
-        Effort balance on the records that are fitted and on those that are not.
+    training, validation : InverseDynamicsProblem
+        Inverse-dynamics residual on the records that are fitted and on those that are not.
     simulation : OutputErrorProblem or None
-        Simulation of the unseen records, the second witness.
+        Simulation of the validation records, the second criterion.
     """
 
     training: InverseDynamicsProblem
-    unseen: InverseDynamicsProblem
+    validation: InverseDynamicsProblem
     simulation: OutputErrorProblem | None
 
 
@@ -75,7 +75,7 @@ class Judged:
     model: Model
     free: tuple[str, ...]
     fit: Estimate
-    unseen: Array
+    validation: Array
     simulated: Array | None
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
@@ -102,27 +102,27 @@ class Trial:
     parameters : tuple of str
         The effect's own fitted parameters.
     held : tuple of Alias
-    training, unseen : Gain
+    training, validation : Gain
         Against the model without the effect.
     simulated : Gain or None
-        The same by simulation of the unseen records, if there is one.
+        The same by simulation of the validation records, if there is one.
     away : Gain or None
-        The unseen gain away from reversals, for an effect of a drive or an instrument, or a joint that winds up, on a
-        machine with dry friction.
-    slow : Gain or None
-        The unseen gain of the slow part, where a play is in the model already; None elsewhere.
+        The validation gain away from reversals, for an effect of a drive or an instrument, or a compliant joint, on
+        a machine with dry friction.
+    low_frequency : Gain or None
+        The validation gain of the low-frequency part, where a backlash is in the model already; None elsewhere.
     diverged : str
-        Why the simulation of the unseen records stopped, or "".
+        Why the simulation of the validation records stopped, or "".
     clear : bool
         Whether the effect's size differs from zero on the training data.
-    alone : bool
-        Whether the gains are those of runs of the model itself, where a balance hardly sees them.
-    gap : float
-        Largest share of its signal that the model without the effect leaves of an unseen channel.
-    asked : bool
-        Whether runs of the model itself ask for it too, so that little that is sure is enough.
+    from_prediction : bool
+        Whether the gains are those of closed-loop predictions, where the residual hardly shows them.
+    error : float
+        Largest share of its signal that the model without the effect leaves of a validation channel.
+    supported : bool
+        Whether closed-loop predictions support it too, so that little that is sure is enough.
     here : Gain or None
-        The unseen gain of the effort on the joint where the effect acts, if nothing is lost elsewhere.
+        The validation gain of the effort on the joint where the effect acts, if nothing is lost elsewhere.
     """
 
     probe: Probe
@@ -130,26 +130,26 @@ class Trial:
     parameters: tuple[str, ...]
     held: tuple[Alias, ...]
     training: Gain
-    unseen: Gain
+    validation: Gain
     simulated: Gain | None
     away: Gain | None
     diverged: str
     clear: bool
-    slow: Gain | None = None
-    alone: bool = False
-    gap: float = 0.0
-    asked: bool = False
+    low_frequency: Gain | None = None
+    from_prediction: bool = False
+    error: float = 0.0
+    supported: bool = False
     here: Gain | None = None
 
     @property
     def there(self) -> Gain:
-        """The unseen gain where the effect does most of it: what is missing at other joints says nothing of it."""
-        return self.unseen if self.here is None else max(self.unseen, self.here, key=lambda one: one.relative)
+        """The validation gain where the effect does most of it: what is missing at other joints says nothing of it."""
+        return self.validation if self.here is None else max(self.validation, self.here, key=lambda one: one.relative)
 
     @property
     def score(self) -> float:
-        """Unseen gain per fitted number."""
-        return self.unseen.relative / max(1, len(self.parameters))
+        """Validation gain per fitted number."""
+        return self.validation.relative / max(1, len(self.parameters))
 
 
 def judge(
@@ -160,7 +160,7 @@ def judge(
     origin: Array | None = None,
     worth: Worth | None = None,
 ) -> Judged:
-    """Fit ``free`` on the training records and predict the unseen ones; see `vpm.identify.tangent` for ``origin``.
+    """Fit ``free`` on the training records and predict the validation ones; see `vpm.identify.tangent` for ``origin``.
 
     Where links bend and nothing else is worked out, the tangent at the start is taken if none is given. A fit that is
     not on a tangent of links ends early if it is not ``worth`` its time.
@@ -168,7 +168,7 @@ def judge(
     Raises
     ------
     DivergedError
-        The fitted model cannot simulate the unseen records.
+        The fitted model cannot simulate the validation records.
     """
     bounds = ends_apart(model, free, bounds)
     if origin is None and has_tangent(model, data.training):
@@ -181,30 +181,30 @@ def judge(
     else:
         fit = estimate_on_tangent(model, data.training, free, origin, bounds=bounds, tolerance=TOLERANCE, worth=worth)
     fitted = model.with_parameters(dict(zip(free, map(float, fit.values), strict=True)))
-    unseen, _ = data.unseen.evaluate(fitted, fitted.theta)
+    validation, _ = data.validation.evaluate(fitted, fitted.theta)
     simulated = None if data.simulation is None else data.simulation.evaluate(fitted, fitted.theta)[0]
-    return Judged(fitted, free, fit, unseen, simulated, bounds)
+    return Judged(fitted, free, fit, validation, simulated, bounds)
 
 
 def unmoved(
     model: Model, free: tuple[str, ...], data: Data, bounds: dict[str, tuple[float, float]]
 ) -> tuple[Judged, str]:
-    """A model as it stands, with the uncertainty of ``free``, and why it cannot simulate the unseen records, or ""."""
+    """A model as it stands, the uncertainty of ``free``, and why it cannot simulate the validation records, or ""."""
     fit = standing(model, data.training, free)
-    unseen, _ = data.unseen.evaluate(model, model.theta)
+    validation, _ = data.validation.evaluate(model, model.theta)
     simulated, stopped = None, ""
     try:
         simulated = None if data.simulation is None else data.simulation.evaluate(model, model.theta)[0]
     except DivergedError as error:
         stopped = str(error)
-    return Judged(model, free, fit, unseen, simulated, bounds), stopped
+    return Judged(model, free, fit, validation, simulated, bounds), stopped
 
 
 def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) -> Trial:
-    """Refit with the candidate, release what has become visible, and measure the gain on unseen data.
+    """Refit with the candidate, release what has become visible, and measure the gain on validation data.
 
-    ``rival`` is the sum of squares that another one leaves of the training records: one that stays above ``HOPELESS``
-    times that has no chance beside it, and its refit may end early.
+    ``rival`` is the sum of squares that another one leaves of the training records: the refit of a candidate above
+    ``HOPELESS`` times that may end early.
     """
     bounds = {**current.bounds, **_bounds(probe)}
     start = probe.model.with_parameters(_inside(probe, bounds))
@@ -224,16 +224,16 @@ def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) ->
     worth = Worth(min((1.0 - SLOW_GAIN) * cost, HOPELESS * rival), SLOW_EVALUATIONS)
     judged, diverged = judged_anyhow(start, free, data, bounds, origin, worth)
     doubtful = probe.held
-    if seen := _seen_by_now(judged, data, probe):
+    if seen := _visible_now(judged, data, probe):
         free, doubtful = (*free, *seen), tuple(alias for alias in doubtful if alias.parameter not in seen)
         origin = None if origin is None else judged.model.theta
         judged, diverged = judged_anyhow(judged.model, free, data, bounds, origin, worth)
     own = free[len(current.free) :]
-    timed, alone = _timed(current, judged, data, probe)
+    timed, prediction = _timed(current, judged, data, probe)
     if timed is not None:
         judged, diverged = judged_anyhow(judged.model, free, data, {**bounds, **timed.bounds}, origin)
     trial = measured(current, data, probe, judged, own, (*doubtful, *held), timed, diverged)
-    return _witnessed(trial, current, alone, data)
+    return _checked_by_prediction(trial, current, prediction, data)
 
 
 def finished(current: Judged, data: Data, trial: Trial) -> Trial:
@@ -255,23 +255,23 @@ def measured(
     timed: Timed | None,
     diverged: str,
 ) -> Trial:
-    """What a refit gains on all the data; of something late it counts what it gains in motion, if that was timed."""
+    """Gain of a refit on all the data; a delay counts by its gain in motion, if it was fitted there."""
     fitted = judged.fit.residual * shrinkage(data.training, current, judged)
-    unseen = judged.unseen * shrinkage(data.unseen, current, judged)
+    validation = judged.validation * shrinkage(data.validation, current, judged)
     return Trial(
         probe,
         judged,
         own,
         held,
         gain(current.fit.residual, fitted, segments(data.training)),
-        gain(current.unseen, unseen, segments(data.unseen)),
+        gain(current.validation, validation, segments(data.validation)),
         _simulated_gain(current, judged, data),
-        timed.unseen if timed is not None else _away_gain(current, judged, data.unseen, probe),
+        timed.validation if timed is not None else _away_gain(current, judged, data.validation, probe),
         diverged,
         is_clear(judged, own),
-        _slow_gain(current, unseen, data.unseen),
-        gap=max(share for _, share, _ in gaps(data.unseen, current.unseen).values()),
-        here=_where_it_acts(current, unseen, data.unseen, probe.candidate.site),
+        _low_frequency_gain(current, validation, data.validation),
+        error=max(share for _, share, _ in gaps(data.validation, current.validation).values()),
+        here=_where_it_acts(current, validation, data.validation, probe.candidate.site),
     )
 
 
@@ -283,7 +283,7 @@ def judged_anyhow(
     origin: Array | None = None,
     worth: Worth | None = None,
 ) -> tuple[Judged, str]:
-    """A fit, judged by the balance alone where it cannot simulate the unseen records, with the reason.
+    """A fit, judged by the residual alone where it cannot simulate the validation records, with the reason.
 
     One that Ctrl-C ended says nothing of a candidate.
     """
@@ -297,11 +297,11 @@ def judged_anyhow(
     return judged, reason
 
 
-def _seen_by_now(judged: Judged, data: Data, probe: Probe) -> tuple[str, ...]:
+def _visible_now(judged: Judged, data: Data, probe: Probe) -> tuple[str, ...]:
     """Parameters that looked like others where the fit began and do not where it ended.
 
-    A stiffness looks like the inertia behind it as long as neither is near its value. Of an effect that does nothing at
-    its start a doubtful parameter may stay there; any other start is a guess, and is left if the data show it at all.
+    A stiffness looks like the inertia behind it as long as neither is near its value. A doubtful parameter of an effect
+    that does nothing at its start may stay there. Any other start is a guess, so it moves if the data show it at all.
     """
     names = [alias.parameter for alias in probe.held]
     if not names:
@@ -341,8 +341,8 @@ def _origin(data: InverseDynamicsProblem, probe: Probe, start: Model) -> Array |
 def weaker(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> Array:
     """How much weaker the actuators of each joint have become, at least 1 (joints,).
 
-    An effect that swallows the command, or a gain that shrinks, leaves a small gap between two small efforts; errors
-    are compared relative to the effort, so that nothing is won that way. One drive may do so where others are stronger.
+    An effect that suppresses the command, or a gain that shrinks, leaves a small difference of two small efforts. So
+    errors are compared relative to the effort. One drive may do so where others are stronger.
     """
     after, before = (problem.strengths(one.model) for one in (judged, current))
     return np.asarray(np.maximum(1.0, before / np.maximum(after, np.maximum(1e-6 * before, 1e-300))))
@@ -359,15 +359,18 @@ def shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) 
     return factors
 
 
-def _where_it_acts(current: Judged, unseen: Array, problem: InverseDynamicsProblem, site: str) -> Gain | None:
+def _where_it_acts(current: Judged, validation: Array, problem: InverseDynamicsProblem, site: str) -> Gain | None:
     """What a refit gains of the effort on the joint where an effect acts; None without one or if something is lost."""
-    joint, lost = joint_at(current.model, site), float(unseen @ unseen) > float(current.unseen @ current.unseen)
+    joint, lost = (
+        joint_at(current.model, site),
+        float(validation @ validation) > float(current.validation @ current.validation),
+    )
     if len(problem.joints) == 1 or joint not in problem.joints or lost:
         return None
-    here = np.zeros(len(unseen))
+    here = np.zeros(len(validation))
     for record in range(len(problem.motions)):
         here[problem.efforts(record)[problem.joints.index(joint)].samples] = 1.0
-    return gain(here * current.unseen, here * unseen, segments(problem))
+    return gain(here * current.validation, here * validation, segments(problem))
 
 
 def _simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:
@@ -376,46 +379,48 @@ def _simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:
     return gain(current.simulated, judged.simulated, segments(data.simulation))
 
 
-def _slow_gain(current: Judged, unseen: Array, data: InverseDynamicsProblem) -> Gain | None:
+def _low_frequency_gain(current: Judged, validation: Array, data: InverseDynamicsProblem) -> Gain | None:
     if not has_impacts(current.model):
         return None
-    return gain(slow(data, current.unseen), slow(data, unseen), segments(data))
+    return gain(low_frequency(data, current.validation), low_frequency(data, validation), segments(data))
 
 
-def _timed(current: Judged, judged: Judged, data: Data, probe: Probe) -> tuple[Timed | None, OwnRun | None]:
-    """A late drive or instrument on a machine with dry friction, timed in motion, and the run that timed it if any."""
+def _timed(
+    current: Judged, judged: Judged, data: Data, probe: Probe
+) -> tuple[Timed | None, ClosedLoopPrediction | None]:
+    """A delay on a machine with dry friction, fitted in motion, and the prediction that fitted it, if any."""
     if not is_late(probe.candidate.effect, current.model) or has_tangent(probe.model, data.training):
         return None, None
     before, late = (current.model, current.free), (judged.model, judged.free)
-    return timed_alone(before, late, data.training, data.unseen, data.simulation, judged.bounds)
+    return timed_in_closed_loop(before, late, data.training, data.validation, data.simulation, judged.bounds)
 
 
-def _witnessed(trial: Trial, current: Judged, alone: OwnRun | None, data: Data) -> Trial:
-    """A trial; of something late that makes simulations worse those count in which each model suits its own run."""
-    if alone is None or data.simulation is None or trial.simulated is None or trial.simulated.relative >= 0.0:
+def _checked_by_prediction(trial: Trial, current: Judged, prediction: ClosedLoopPrediction | None, data: Data) -> Trial:
+    """A trial; for a delay that worsens simulations, predictions of models fitted in closed loop count instead."""
+    if prediction is None or data.simulation is None or trial.simulated is None or trial.simulated.relative >= 0.0:
         return trial
-    told = gain_alone(current.model, current.free, alone, data.simulation)
-    return trial if told is None else replace(trial, simulated=told)
+    gained = gain_in_closed_loop(current.model, current.free, prediction, data.simulation)
+    return trial if gained is None else replace(trial, simulated=gained)
 
 
 def _away_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem, probe: Probe) -> Gain | None:
     """Gain on samples at which every joint is clearly in motion.
 
-    Where a joint with dry friction turns round it sticks for a while, which no smooth law follows, and a late drive or
-    sensor imitates that, or a spring in the joint that winds up meanwhile; elsewhere they cannot.
+    At a reversal a joint with dry friction sticks for a while, which no smooth law follows. A delay or a joint
+    compliance imitates that there, and nowhere else.
     """
     imitates = probe.candidate.effect.site in {"actuator", "sensor"} or probe.candidate.effect.winds_up
     if not is_dry(current.model) or not imitates:
         return None
-    counted = np.ones(current.unseen.size)
+    counted = np.ones(current.validation.size)
     speeds = [np.abs(data.state(record)[1]) for record in range(len(data.motions))]
     largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
     for record, speed in enumerate(speeds):
-        slow = (speed < CREEPING * largest).any(axis=1)
-        near = slow | np.append(slow[1:], False) | np.insert(slow[:-1], 0, False)
+        creeping = (speed < CREEPING * largest).any(axis=1)
+        near = creeping | np.append(creeping[1:], False) | np.insert(creeping[:-1], 0, False)
         for block in data.efforts(record):
             counted[block.samples] = ~near
-    return gain(current.unseen * counted, judged.unseen * counted, segments(data))
+    return gain(current.validation * counted, judged.validation * counted, segments(data))
 
 
 def _bounds(probe: Probe) -> dict[str, tuple[float, float]]:
@@ -476,9 +481,9 @@ def _release(
 def is_clear(judged: Judged, own: tuple[str, ...]) -> bool:
     """Whether an effect's linear parameters (its size) differ from zero together, for the shape that was found.
 
-    Size and shape of a law often make up for each other (a friction close to rest that is higher and fades sooner), and
-    where there is no size, there is no shape to be uncertain of. The size of a play is its width, however hard its
-    contacts are: what is as hard as rigid has a stiffness that no data bound from above.
+    Size and shape of a law often compensate each other, such as a higher friction close to rest that fades sooner. A
+    law without size has no uncertain shape. The size of a backlash is its width, however hard its contacts are: what is
+    as hard as rigid has a stiffness that no data bound from above.
     """
     widths = {effect.parameter_names["gap"] for effect in judged.model.effects if effect.type.has_play}
     size = [n for n in own if n in widths]

@@ -1,9 +1,9 @@
-"""How hard the contacts of a play are, and what is between them: asked of runs of the model itself.
+"""Stiffness and damping of the contacts of a backlash, from closed-loop predictions of the model.
 
-Along a measured motion the flights of a link add up their errors, so that a balance of effort wants contacts that
-swallow impacts, and takes their damping for softness and for less inertia before them. In closed loop the controller
-leads a run of the model itself back to its reference after every impact: it tells hard contacts from soft ones. How
-wide the play is, and how much the contacts have to swallow, stays with the balance.
+Along a measured motion the errors of simulated flights accumulate. The inverse-dynamics residual therefore prefers
+contacts that absorb impacts, and confuses their damping with softness and with a smaller inertia before them. In closed
+loop the controller brings the model back to its reference after every impact, so hard and soft contacts differ. The
+width of the backlash and the damping of the contacts still come from the residual.
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from vpm.discrepancy.backlash import is_read_off
 from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.choice import Accepted
+from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction, fit_prediction
 from vpm.discrepancy.confirmation import Data, Judged, judge
-from vpm.discrepancy.own_run import OwnRun, own_run
-from vpm.discrepancy.play import is_read_off
 from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, WORTH_A_NAME
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.side_by_side import Failure, SideBySide
@@ -36,22 +36,22 @@ Array = NDArray[np.float64]
 CONTACTS, DAMPINGS = (10.0, 14.0, 20.0, 30.0, 45.0, 65.0), (0.03, 0.1, 0.3)
 #: So many of these are fitted to the records.
 FITTED = 2
-#: Damping ratios from which the balance is fitted again.
+#: Damping ratios from which the residual is fitted again.
 SWALLOWING = (0.3, 0.7)
 #: The beginnings of the training records that models run along last so long together, s: dozens of impacts, for a run
 #: with its derivatives takes long.
 LASTING = 6.0
 #: Records that are hardly longer are taken as they are.
 ALL = 0.9
-#: What only a run tells of a play, by short name.
+#: What only a run tells of a backlash, by short name.
 TOLD = ("stiffness", "inertia")
 
 
-def with_told_contacts(found: Search, data: Data, each: SideBySide) -> Search:
-    """The search with contacts of its plays as hard as runs of the model along the training records say.
+def with_predicted_contacts(found: Search, data: Data, each: SideBySide) -> Search:
+    """The search with contacts of its backlashes as hard as runs of the model along the training records say.
 
-    The numbers of the runs stand if with them the training records are simulated better, beyond chance, and the unseen
-    ones are neither simulated nor balanced worse.
+    The numbers of the runs stand if with them the training records are simulated better, beyond chance, and the
+    validation ones are neither simulated nor balanced worse.
     """
     final = found.final
     for entry in found.accepted:
@@ -63,13 +63,13 @@ def with_told_contacts(found: Search, data: Data, each: SideBySide) -> Search:
 
 
 def _harder(final: Judged, entry: Accepted, data: Data, each: SideBySide) -> Judged:
-    """The model with the contacts of one play as runs say, or as it is."""
+    """The model with the contacts of one backlash as runs say, or as it is."""
     if data.simulation is None or data.simulation.mode != "closed_loop":
         return final
     records, setup = beginnings(data.training.experiments), data.simulation.setup
     runs = OutputErrorProblem(final.model, records, data.simulation.mode, setup=setup)
     key, label = entry.key, entry.trial.probe.candidate.label
-    names = tuple(name for name in _told(final.model, key) if name in final.free)
+    names = tuple(name for name in _predicted_values(final.model, key) if name in final.free)
     tried = [final.model, *(with_contact(final.model, key, f, z) for f in CONTACTS for z in DAMPINGS)]
     what = "how hard contacts are: runs along the records"
     left = each(what, lambda model: runs.evaluate(model, model.theta)[0], tried, lambda _: label)
@@ -79,16 +79,16 @@ def _harder(final: Judged, entry: Accepted, data: Data, each: SideBySide) -> Jud
         return final
     fitted = each(
         what,
-        lambda model: own_run(model, final.free, records, setup),
+        lambda model: fit_prediction(model, final.free, records, setup),
         [tried[place] for place in best if place],
         lambda _: label,
     )
     better = [run for run in fitted if not isinstance(run, Failure)]
     balanced = [_balanced(final, run, names, key, ratio, data) for run in better for ratio in SWALLOWING]
-    believed = [
-        one for one in balanced if one is not None and _better(final, one, data) and _runs_better(before, one, runs)
+    supported = [
+        one for one in balanced if one is not None and _better(final, one, data) and _predicts_better(before, one, runs)
     ]
-    return min(believed, key=lambda one: float(one.fit.residual @ one.fit.residual), default=final)
+    return min(supported, key=lambda one: float(one.fit.residual @ one.fit.residual), default=final)
 
 
 def beginnings(records: Sequence[Experiment]) -> list[Experiment]:
@@ -99,8 +99,8 @@ def beginnings(records: Sequence[Experiment]) -> list[Experiment]:
     return [r if share > ALL else r.split(share)[0] for r, share in zip(records, shares, strict=True)]
 
 
-def _told(model: Model, key: Key) -> tuple[str, ...]:
-    """Parameters of a play that a run tells, by dotted name."""
+def _predicted_values(model: Model, key: Key) -> tuple[str, ...]:
+    """Parameters of a backlash that a run tells, by dotted name."""
     effect = model.effect(*key)
     return tuple(effect.parameter_names[short] for short in TOLD)
 
@@ -121,39 +121,41 @@ def _damped(model: Model, key: Key, ratio: float) -> Model:
     return model.with_parameters({names["contact_damping"]: resistance})
 
 
-def _balanced(final: Judged, run: OwnRun, names: Sequence[str], key: Key, ratio: float, data: Data) -> Judged | None:
-    """The balance fitted with what the run tells; None where that cannot be computed."""
+def _balanced(
+    final: Judged, run: ClosedLoopPrediction, names: Sequence[str], key: Key, ratio: float, data: Data
+) -> Judged | None:
+    """The residual fitted with what the run tells; None where that cannot be computed."""
     rest = tuple(name for name in final.free if name not in names)
     bounds = {name: pair for name, pair in final.bounds.items() if name in rest}
     try:
-        told = judge(_damped(run.model, key, ratio), rest, data, bounds)
-        columns = [told.model.index(name) for name in names]
-        _, slopes = data.training.evaluate(told.model, told.model.theta, columns)
+        judged = judge(_damped(run.model, key, ratio), rest, data, bounds)
+        columns = [judged.model.index(name) for name in names]
+        _, slopes = data.training.evaluate(judged.model, judged.model.theta, columns)
     except VpmError:
         return None
     fit = replace(
-        told.fit,
+        judged.fit,
         names=(*rest, *names),
-        values=np.concatenate([told.fit.values, told.model.theta[columns]]),
-        jacobian=np.column_stack([told.fit.jacobian, slopes]),
-        covariance=block_diag(told.fit.covariance, np.diag([run.estimated(name)[1] ** 2 for name in names])),
+        values=np.concatenate([judged.fit.values, judged.model.theta[columns]]),
+        jacobian=np.column_stack([judged.fit.jacobian, slopes]),
+        covariance=block_diag(judged.fit.covariance, np.diag([run.estimated(name)[1] ** 2 for name in names])),
     )
-    return replace(told, free=fit.names, fit=fit, bounds=dict(final.bounds))
+    return replace(judged, free=fit.names, fit=fit, bounds=dict(final.bounds))
 
 
-def _runs_better(before: Array, one: Judged, runs: OutputErrorProblem) -> bool:
+def _predicts_better(before: Array, one: Judged, runs: OutputErrorProblem) -> bool:
     """Whether a model simulates the training records better than what was left ``before``, beyond chance."""
     try:
         after, _ = runs.evaluate(one.model, one.model.theta)
     except VpmError:
         return False
-    told = gain(before, after, segments(runs))
-    return told.relative >= LEAST_GAIN and told.score >= NORMAL_95_ONE_SIDED
+    gained = gain(before, after, segments(runs))
+    return gained.relative >= LEAST_GAIN and gained.score >= NORMAL_95_ONE_SIDED
 
 
 def _better(final: Judged, one: Judged, data: Data) -> bool:
-    """Whether a model predicts the unseen records at least as well, in both views."""
+    """Whether a model predicts the validation records at least as well, in both views."""
     if data.simulation is None or final.simulated is None or one.simulated is None:
         return False
-    views = ((final.unseen, one.unseen, data.unseen), (final.simulated, one.simulated, data.simulation))
+    views = ((final.validation, one.validation, data.validation), (final.simulated, one.simulated, data.simulation))
     return all(gain(before, after, segments(view)).harm <= NORMAL_95_ONE_SIDED for before, after, view in views)

@@ -38,10 +38,10 @@ class Shares:
     Attributes
     ----------
     of : dict of str to float
-        Share of the mean square on unseen data by state, the largest first.
+        Share of the mean square on validation data by state, the largest first.
     alike : tuple of str
-        States whose share these data cannot tell from the largest, the largest itself among them; none if they cannot
-        tell the largest from zero.
+        States whose share these data do not discriminate from the largest, the largest itself among them; none if they
+        cannot tell the largest from zero.
     """
 
     of: dict[str, float]
@@ -50,31 +50,31 @@ class Shares:
 
 @dataclass(frozen=True)
 class Rhythm:
-    """A disturbance that repeats in time: its period in s, and the share of the unseen residual that it predicts."""
+    """A disturbance periodic in time: its period in s, and the share of the validation residual that it predicts."""
 
     period: float
     share: float
 
 
 def busiest_joint(data: Data, final: Judged) -> int:
-    """The joint whose residual on unseen data is the largest part of its effort."""
-    sums = np.zeros(len(data.unseen.joints))
-    for record in range(len(data.unseen.motions)):
-        for column, block in enumerate(data.unseen.efforts(record)):
+    """The joint whose residual on validation data is the largest part of its effort."""
+    sums = np.zeros(len(data.validation.joints))
+    for record in range(len(data.validation.motions)):
+        for column, block in enumerate(data.validation.efforts(record)):
             scale = (block.scale or 1.0) * block.weight  # of drives that are off there is no effort
-            sums[column] += float(np.sum((final.unseen[block.samples] / scale) ** 2))
+            sums[column] += float(np.sum((final.validation[block.samples] / scale) ** 2))
     return int(np.argmax(sums))
 
 
 def shares(data: Data, final: Judged, joint: int) -> Shares:
-    """Share of one joint's unseen residual that a map of each state, drawn from the training residual, predicts.
+    """Share of one joint's validation residual that a map of each state, drawn from the training residual, predicts.
 
     A map is a table of means over bins of equal count, for both directions of the motion or for each on its own. Two
     states are alike where the mean difference of the squares that they leave is within its 95 % interval, which allows
     for samples that resemble their neighbours (F. Diebold and R. Mariano, *J. Business & Econ. Statistics* 13, 1995).
     """
     sides = []
-    for problem, residual in ((data.training, final.fit.residual), (data.unseen, final.unseen)):
+    for problem, residual in ((data.training, final.fit.residual), (data.validation, final.validation)):
         sides.append((_states(problem, final, joint), _residual(problem, residual, joint)))
     (seen, target), (met, left) = sides
     found: dict[str, Array] = {}
@@ -91,10 +91,10 @@ def shares(data: Data, final: Judged, joint: int) -> Shares:
         with_direction = _share(both, left) > _share(plain, left) + DIRECTION_ADDS
         found[f"{name} and direction" if with_direction else name] = both if with_direction else plain
     best = min(found, key=lambda name: float(found[name] @ found[name]))
-    ends = np.cumsum([0, *(data.unseen.efforts(r)[joint].time.size for r in range(len(data.unseen.motions)))])
+    ends = np.cumsum([0, *(data.validation.efforts(r)[joint].time.size for r in range(len(data.validation.motions)))])
     records = [slice(int(a), int(b)) for a, b in pairwise(ends)]
-    told = not _as_good(found[best], left, records)
-    alike = {name for name in found if told and _as_good(found[best], found[name], records)}
+    clear = not _as_good(found[best], left, records)
+    alike = {name for name in found if clear and _as_good(found[best], found[name], records)}
     ranked = dict(sorted(((name, _share(rest, left)) for name, rest in found.items()), key=lambda item: -item[1]))
     return Shares(ranked, tuple(name for name in ranked if name in alike))
 
@@ -113,13 +113,13 @@ def _share(rest: Array, target: Array) -> float:
 
 
 def rhythm(data: Data, final: Judged, joint: int) -> Rhythm | None:
-    """The frequency in time that stands out of the training residual, with what it predicts of the unseen one.
+    """The frequency in time that stands out of the training residual, with what it predicts of the validation one.
 
-    The phase is free on the unseen records: nobody knows when they began in the beat of the disturbance. But a
+    The phase is free on the validation records: nobody knows when they began in the beat of the disturbance. But a
     disturbance keeps it: each half of a record has to predict the other one. Links that ring with noise have a line of
     their own, whose phase wanders within the time in which they forget.
     """
-    series = [_series(data.training, final.fit.residual, joint), _series(data.unseen, final.unseen, joint)]
+    series = [_series(data.training, final.fit.residual, joint), _series(data.validation, final.validation, joint)]
     shortest = min(time[-1] - time[0] for time, _ in series[0])
     step = max(float(np.median(np.diff(time))) for time, _ in series[0])
     frequencies = np.arange(FEWEST_PERIODS / shortest, 0.25 / step, 0.2 / shortest)

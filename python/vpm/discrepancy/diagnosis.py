@@ -54,11 +54,11 @@ class AcceptedEffect(Storable):
     parameters : tuple of EffectParameterEstimate
         In the final model, after all effects were fitted together.
     gain : float
-        Share of the unseen residual's mean square that went when it was accepted.
+        Share of the validation residual's mean square that went when it was accepted.
     score : float
         That gain in standard deviations between independent blocks.
     notes : tuple of str
-        What was held, and what it cannot be told from.
+        What was held, and what the data do not discriminate from it.
     probability : float
         That this is what was missing beside the effects before it; NaN where no ranking named it.
     evidence_nats : float
@@ -81,7 +81,7 @@ class AcceptedEffect(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class RefusedEffect(Storable):
-    """A candidate that was tried and not believed, with the reason."""
+    """A candidate that was tried and not accepted, with the reason."""
 
     name: str
     site: str
@@ -90,7 +90,7 @@ class RefusedEffect(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class RankedCandidate(Storable):
-    """A candidate in the order of promise.
+    """A candidate in the order of predicted gain.
 
     Attributes
     ----------
@@ -100,7 +100,7 @@ class RankedCandidate(Storable):
     screened : float
         Share of the training mean square that its regressor would take away; NaN in a ranking.
     unseen : float
-        Share of the unseen mean square that it took away after refitting; NaN if it was not refitted.
+        Share of the validation mean square that it took away after refitting; NaN if it was not refitted.
     accepted : bool
     evidence_nats, probability : float
         What it added to the evidence, and that it is what is missing; NaN if no ranking tried it.
@@ -118,7 +118,7 @@ class RankedCandidate(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Ambiguity(Storable):
-    """Effects that these data cannot tell from an accepted one, and why."""
+    """Effects that these data do not discriminate from an accepted one, and why."""
 
     name: str
     site: str
@@ -147,20 +147,20 @@ class Empirical(Storable):
     channel : str
         The effort whose residual was examined.
     states : dict of str to float
-        Share of its mean square on unseen data that each state predicts, the largest first.
+        Share of its mean square on validation data that each state predicts, the largest first.
     remark : str
         What runs with the time and not with the machine, in words, or "".
     formula : str
         With numbers and units, or "".
     terms : tuple of EmpiricalTerm
     before, after : float
-        Root mean square of the weighted residual on unseen data without and with the formula.
+        Root mean square of the weighted residual on validation data without and with the formula.
     sentence : str
     alike : tuple of str
-        States whose share these data cannot tell from the largest, the largest itself among them; none if they cannot
-        tell the largest from zero.
+        States whose share these data do not discriminate from the largest, the largest itself among them; none if they
+        cannot tell the largest from zero.
     predicted : float
-        Share of the mean square on unseen data that the formula, or what the remark says, predicts.
+        Share of the mean square on validation data that the formula, or what the remark says, predicts.
     """
 
     channel: str
@@ -177,7 +177,7 @@ class Empirical(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class ChannelGap(Storable):
-    """Root mean square gap of one channel on unseen data, at each stage.
+    """Root mean square gap of one channel on validation data, at each stage.
 
     Attributes
     ----------
@@ -207,7 +207,7 @@ class ChannelGap(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class ProposedExperiment(Storable):
-    """An experiment that would tell two effects apart.
+    """A discriminating experiment for two effects.
 
     Attributes
     ----------
@@ -274,7 +274,7 @@ class Step(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Picture(Storable):
-    """Samples for the plots: one joint of the first unseen record, at the retained samples.
+    """Samples for the plots: one joint of the first validation record, at the retained samples.
 
     Attributes
     ----------
@@ -300,7 +300,7 @@ class Picture(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Trace(Storable):
-    """One channel of the first unseen record, measured and simulated.
+    """One channel of the first validation record, measured and simulated.
 
     Attributes
     ----------
@@ -331,15 +331,15 @@ class Diagnosis(Result):
     summary : str
         The verdict in a sentence or two.
     effects : tuple of AcceptedEffect
-        By what each adds to the prediction of unseen data given all the others, the most first; in the order in which
-        they were found where a ranking named them.
+        By what each adds to the prediction of validation data given all the others, the most first; in the order in
+        which they were found where a ranking named them.
     gap : dict of str to ChannelGap
-        On unseen data.
+        On validation data.
     refused : tuple of RefusedEffect
     candidates : tuple of RankedCandidate
     ambiguous_with : tuple of Ambiguity
     where : dict of str to tuple of str
-        Where the residual lives before any effect was added, by channel.
+        Residual by state region before any effect was added, by channel.
     steps : tuple of Step
         The recalibrated model and the model after each effect that came in or went out again.
     training, unseen : tuple of str
@@ -356,15 +356,15 @@ class Diagnosis(Result):
     interrupted : bool
         Ctrl-C ended the search: the effects are those accepted until then, and there may be more.
     evidence : tuple of Evidence
-        For each accepted effect the residual over the state that it lives in, without it and with it.
+        For each accepted effect the residual over the state that it depends on, without it and with it.
     empirical : Empirical or None
         What is said of a residual that no effect explains.
     experiments : tuple of ProposedExperiment
-        For each pair of effects that the data cannot tell apart, the experiment that would.
+        For each pair of effects that the data do not discriminate, the discriminating experiment.
     classes : tuple of tuple of str
-        Each accepted effect that has rivals, with these, as ``effect at site``: the records do not tell them apart.
+        Each accepted effect that has rivals, with these, as ``effect at site``: the records do not discriminate them.
     traces : tuple of Trace
-        What was measured and what is simulated; none where no unseen record could be simulated.
+        What was measured and what is simulated; none where no validation record could be simulated.
     stated : dict of str to float
         Values of all parameters as the model file states them, SI.
     provenance : Provenance or None

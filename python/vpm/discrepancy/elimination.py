@@ -1,13 +1,13 @@
-"""What later effects make superfluous is dropped, and what kept candidates apart is loosened once the names stand."""
+"""Backward elimination: drops effects that later ones replace, and frees parameters that were held."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+from vpm.discrepancy.backlash import is_read_off, only_compliant
 from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, judge
-from vpm.discrepancy.play import is_read_off, only_winds_up
 from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED
 from vpm.errors import DivergedError, ModelError
 from vpm.identify import gain, segments
@@ -28,17 +28,16 @@ class Stage:
 
 
 def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
-    """Backward elimination: drop every earlier effect without which the model predicts the unseen data as well.
+    """Backward elimination: drop every earlier effect without which the model predicts the validation data as well.
 
-    Where a parameter of a later effect was held because the data show it only together with one of the earlier effect,
-    it is set free for the trial: a spring whose rest was held beside a constant force needs that force no more if it
-    may rest elsewhere. One name for what two would say is the shorter answer. So is it where a size was held, as that
-    of a difference of dry friction beside a constant force, which are one in motion: with the later effect sure, its
-    own size does that work. Where neither size has work to do beside it, these data do not tell, and both names stay.
-    What runs of the model itself told is not judged by a balance that hardly sees it.
+    A parameter of a later effect may have been held because the data show it only together with the earlier effect. It
+    is set free for the trial: a spring that may rest elsewhere needs no constant force beside it. One name for what two
+    would say is the shorter answer. The same holds for a size, such as a difference of dry friction beside a constant
+    force, which are one effect in motion. Where neither size has work to do beside it, these data do not tell, and both
+    names stay. What closed-loop predictions show is not judged by the residual, which hardly shows it.
     """
     newest = accepted[-1]
-    for entry in (one for one in accepted[:-1] if not one.trial.alone):
+    for entry in (one for one in accepted[:-1] if not one.trial.from_prediction):
         current = stages[-1].judged
         own = set(entry.trial.parameters)
         freed = {alias.parameter for other in accepted for alias in other.trial.held if alias.partner in own}
@@ -50,8 +49,8 @@ def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dro
             bounds = {name: pair for name, pair in current.bounds.items() if name in free}
             reduced = judge(model, free, data, bounds)
         except (DivergedError, ModelError):
-            continue  # without it the model cannot follow the unseen data at all, or another effect cannot stand
-        loss = gain(reduced.unseen, current.unseen, segments(data.unseen))
+            continue  # without it the model cannot follow the validation data at all, or another effect cannot stand
+        loss = gain(reduced.validation, current.validation, segments(data.validation))
         if loss.relative < LEAST_GAIN and (not renamed or _renamed(current, reduced, model, known, data)):
             accepted.remove(entry)
             accepted[:] = [_released(other, freed) for other in accepted]
@@ -62,8 +61,9 @@ def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dro
 def _renamed(current: Judged, reduced: Judged, model: Model, free: tuple[str, ...], data: Data) -> bool:
     """Whether the numbers that were set free do the work of the effect that went, and there is such work.
 
-    Without them, and without the effect, the unseen data are predicted worse, in ``model`` with ``free`` fitted; with
-    them the unseen records are simulated as well. Where there is none, as many numbers as before would tell nothing.
+    Without them, and without the effect, the validation data are predicted worse, in ``model`` with ``free`` fitted;
+    with them the validation records are simulated as well. Where there is none, as many numbers as before would tell
+    nothing.
     """
     if current.simulated is not None and reduced.simulated is not None and data.simulation is not None:
         simulated = gain(current.simulated, reduced.simulated, segments(data.simulation))
@@ -71,7 +71,7 @@ def _renamed(current: Judged, reduced: Judged, model: Model, free: tuple[str, ..
             return False
     bounds = {name: pair for name, pair in current.bounds.items() if name in free}
     bare = judge(model, free, replace(data, simulation=None), bounds)
-    work = gain(bare.unseen, reduced.unseen, segments(data.unseen))
+    work = gain(bare.validation, reduced.validation, segments(data.validation))
     return work.relative >= LEAST_GAIN and work.score >= NORMAL_95_ONE_SIDED
 
 
@@ -79,7 +79,7 @@ def without_tight_bounds(final: Judged, data: Data) -> Judged:
     """The same model fitted with more room where a transition velocity stands at its upper bound.
 
     The bound keeps dry friction apart from viscous friction while candidates compete; once the names stand, it need not
-    cut the fit short. The training records decide, and the unseen ones may not be predicted worse for it.
+    cut the fit short. The training records decide, and the validation ones may not be predicted worse for it.
     """
     bounds = dict(final.bounds)
     for name, (low, high) in final.bounds.items():
@@ -93,7 +93,7 @@ def without_tight_bounds(final: Judged, data: Data) -> Judged:
     except DivergedError:
         return final
     better = gain(final.fit.residual, refitted.fit.residual, segments(data.training)).relative > LEAST_GAIN
-    kept = gain(final.unseen, refitted.unseen, segments(data.unseen)).harm <= NORMAL_95_ONE_SIDED
+    kept = gain(final.validation, refitted.validation, segments(data.validation)).harm <= NORMAL_95_ONE_SIDED
     return refitted if better and kept else final
 
 
@@ -107,7 +107,7 @@ def _released(entry: Accepted, freed: set[str]) -> Accepted:
     return replace(entry, trial=replace(trial, held=held, parameters=(*trial.parameters, *mine)))
 
 
-def settled(best: Accepted, data: Data) -> Accepted:
+def refitted(best: Accepted, data: Data) -> Accepted:
     """What was fitted on a tangent, fitted to the end: the next round starts from it."""
     judged = best.trial.judged
     try:
@@ -118,13 +118,13 @@ def settled(best: Accepted, data: Data) -> Accepted:
 
 
 def drop_springs(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
-    """Drop plays of which a later effect has left no more than a spring."""
+    """Drop backlashes of which a later effect has left no more than a spring."""
     for entry in accepted[:]:
         current = stages[-1].judged
         name, site = entry.key
         if not is_read_off(current.model, data.training, entry.trial.probe.candidate):
             continue
-        if reason := only_winds_up(current.model, site, data.training):
+        if reason := only_compliant(current.model, site, data.training):
             model = current.model.without_effect(name, site)
             free = tuple(each for each in current.free if each in model.parameters)
             bounds = {each: pair for each, pair in current.bounds.items() if each in free}

@@ -1,4 +1,4 @@
-"""What is said where no effect explains a residual: on what it depends, and a formula that is no more than a fit."""
+"""Description of a residual that no effect explains: the states that it depends on, and an empirical formula."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vpm.errors import DivergedError
 from vpm.identify import gain, segments
 from vpm.model import Model
 
-#: Share of the unseen mean square that a formula has to take away to be put into the model.
+#: Share of the validation mean square that a formula has to take away to be put into the model.
 LEAST_GAIN = 0.1
 #: Time has to predict this much more of the residual than any state of the machine before it is named in its place.
 TIME_AHEAD = 0.1
@@ -32,10 +32,10 @@ PERIOD_RANGE = 1.15
 
 
 def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
-    """Describe what a model leaves, and add a formula for it to the model where one predicts the unseen data.
+    """Describe what a model leaves, and add a formula for it to the model where one predicts the validation data.
 
-    What runs with the time of the record, a drift or a rhythm, is told in words: as a force of the machine's state it
-    would be wrong in the next record.
+    A drift or a rhythm depends on the time of the record and is described in words: as a force of the machine's state
+    it would be wrong in the next record.
 
     Returns
     -------
@@ -44,7 +44,7 @@ def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
         With the formula in the model, or ``final`` as it was.
     """
     joint = busiest_joint(data, final)
-    channel = data.unseen.efforts(0)[joint].channel
+    channel = data.validation.efforts(0)[joint].channel
     states, beat = shares(data, final, joint), rhythm(data, final, joint)
     formula = select(final, data)
     fitted = None
@@ -52,14 +52,16 @@ def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
         fitted = _fit(formula, final, data)
         if (shorter := _without_small(formula, fitted)) != formula:
             formula, fitted = shorter, _fit(shorter, final, data)
-    told = gain(final.unseen, final.unseen if fitted is None else fitted.unseen, segments(data.unseen))
-    remark, share = _in_time(states.of, beat, told.relative)
-    if remark or formula is None or fitted is None or told.relative < LEAST_GAIN:
+    gained = gain(
+        final.validation, final.validation if fitted is None else fitted.validation, segments(data.validation)
+    )
+    remark, share = _in_time(states.of, beat, gained.relative)
+    if remark or formula is None or fitted is None or gained.relative < LEAST_GAIN:
         sentence = _say_without(channel, states, remark)
-        left = told.before
+        left = gained.before
         return Empirical(channel, states.of, remark, "", (), left, left, sentence, states.alike, share), final
     text = "; ".join(_text(formula, fitted.model, at) for at in formula.terms)
-    sentence, terms = _say(channel, states, text, told.after / told.before), _terms(formula, fitted)
+    sentence, terms = _say(channel, states, text, gained.after / gained.before), _terms(formula, fitted)
     return (
         Empirical(
             channel,
@@ -67,17 +69,17 @@ def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
             "",
             text,
             terms,
-            told.before,
-            told.after,
+            gained.before,
+            gained.after,
             sentence,
             states.alike,
-            told.relative,
+            gained.relative,
         ),
         fitted,
     )
 
 
-def beside(base: Judged, told: Empirical, joint_fit: Judged, data: Data) -> tuple[Empirical, Judged]:
+def beside(base: Judged, described: Empirical, joint_fit: Judged, data: Data) -> tuple[Empirical, Judged]:
     """The same formula beside effects that were found, which keep their numbers.
 
     What is no physics takes nothing from what is.
@@ -86,21 +88,21 @@ def beside(base: Judged, told: Empirical, joint_fit: Judged, data: Data) -> tupl
     ----------
     base : Judged
         With the effects, without the formula.
-    told : Empirical
+    described : Empirical
     joint_fit : Judged
         With the formula, all parameters fitted together.
     data : Data
     """
-    if not told.terms:
-        return told, base
-    own = tuple(term.dotted for term in told.terms)
+    if not described.terms:
+        return described, base
+    own = tuple(term.dotted for term in described.terms)
     start = joint_fit.model.with_parameters({name: base.model.parameters[name].value for name in base.free})
     fitted = _judge(start, own, data, {})
-    better = gain(base.unseen, fitted.unseen, segments(data.unseen))
-    states = Shares(told.states, told.alike)
+    better = gain(base.validation, fitted.validation, segments(data.validation))
+    states = Shares(described.states, described.alike)
     if better.relative < LEAST_GAIN:
-        sentence = _say_without(told.channel, states, "")
-        return replace(told, formula="", terms=(), after=told.before, sentence=sentence, predicted=0.0), base
+        sentence = _say_without(described.channel, states, "")
+        return replace(described, formula="", terms=(), after=described.before, sentence=sentence, predicted=0.0), base
     fit = replace(
         fitted.fit,
         names=(*base.free, *own),
@@ -111,10 +113,10 @@ def beside(base: Judged, told: Empirical, joint_fit: Judged, data: Data) -> tupl
     judged = replace(fitted, free=fit.names, fit=fit, bounds=base.bounds)
     formula = _formula_of(judged.model, own)
     text = "; ".join(_text(formula, judged.model, at) for at in formula.terms)
-    sentence = _say(told.channel, states, text, better.after / better.before)
+    sentence = _say(described.channel, states, text, better.after / better.before)
     terms = _terms(formula, judged)
     return replace(
-        told, formula=text, terms=terms, after=better.after, sentence=sentence, predicted=better.relative
+        described, formula=text, terms=terms, after=better.after, sentence=sentence, predicted=better.relative
     ), judged
 
 
@@ -214,10 +216,10 @@ def _text(formula: Formula, model: Model, joint: str) -> str:
     return f"tau = -({body}) {unit}".rstrip() + f" at {joint}" + (f", with {with_what}" if with_what else "")
 
 
-def _in_time(states: dict[str, float], beat: Rhythm | None, told: float) -> tuple[str, float]:
+def _in_time(states: dict[str, float], beat: Rhythm | None, formula_share: float) -> tuple[str, float]:
     """What runs with the time and not with the machine, and its share; empty if the formula or a state says as much."""
     time = max((share for name, share in states.items() if name.startswith("time")), default=0.0)
-    machine = max((told, *(share for name, share in states.items() if not name.startswith("time"))))
+    machine = max((formula_share, *(share for name, share in states.items() if not name.startswith("time"))))
     if beat is not None and beat.share > max(machine, time) + TIME_AHEAD:
         return (
             f"it repeats every {beat.period:.3g} s whatever the machine does ({100 * beat.share:.0f} % of it), so that "
@@ -232,32 +234,32 @@ def _in_time(states: dict[str, float], beat: Rhythm | None, told: float) -> tupl
 
 
 def _depends(states: Shares) -> str:
-    """The state that predicts most, what these data cannot tell from it, and what predicts clearly less."""
+    """The state that predicts most, states not discriminated from it, and states that predict clearly less."""
     named = [name for name, share in states.of.items() if share >= NAMED][:MOST_NAMED]
     if not named or not states.alike:
         return "no single state of the machine predicts it"
 
-    def told(names: list[str]) -> str:
+    def listed(names: list[str]) -> str:
         return ", ".join(f"{name} ({100 * states.of[name]:.0f} %)" for name in names)
 
     alike = [name for name in named[1:] if name in states.alike]
     less = [name for name in named[1:] if name not in states.alike]
-    sentence = f"it follows {told(named[:1])}"
+    sentence = f"it follows {listed(named[:1])}"
     if alike:
-        sentence += f", which these data cannot tell from {told(alike)}"
+        sentence += f", which these data do not discriminate from {listed(alike)}"
     if less:
-        sentence += f"{';' if alike else ','} less {told(less)}"
+        sentence += f"{';' if alike else ','} less {listed(less)}"
     return sentence
 
 
 def _say(channel: str, states: Shares, text: str, ratio: float) -> str:
     return (
         f"Of the residual of {channel}: {_depends(states)}. A fit, which is no physics, brings it down to "
-        f"{100 * ratio:.0f} % on unseen data and stands in the repaired model as {without_law().name}: {text}."
+        f"{100 * ratio:.0f} % on validation data and stands in the repaired model as {without_law().name}: {text}."
     )
 
 
 def _say_without(channel: str, states: Shares, remark: str) -> str:
     if remark:
         return f"Of the residual of {channel}: {remark}; no force law was made of it."
-    return f"Of the residual of {channel}: {_depends(states)}, and no short formula predicts it on unseen data."
+    return f"Of the residual of {channel}: {_depends(states)}, and no short formula predicts it on validation data."

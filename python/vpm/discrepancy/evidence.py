@@ -1,4 +1,4 @@
-"""What to show of a finding: the residual of unseen data over the state the effect lives in, without it and with it.
+"""Evidence of a finding: the validation residual over the state that the effect depends on, without it and with it.
 
 The residual "without" is that of the model with everything but the effect, all other parameters as they were fitted
 with it. So it is the residual of the repaired model plus what the effect contributes: a partial residual (W. A. Larsen
@@ -28,7 +28,7 @@ LAW_SAMPLES = 3000
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Evidence(Storable):
-    """Samples for the picture of one accepted effect, of the unseen record in which it does most.
+    """Samples for the picture of one accepted effect, of the validation record in which it does most.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ class Evidence(Storable):
 
 
 def gather(
-    model: Model, effects: Sequence[tuple[str, str]], unseen: InverseDynamicsProblem, floor: Mapping[str, float]
+    model: Model, effects: Sequence[tuple[str, str]], validation: InverseDynamicsProblem, floor: Mapping[str, float]
 ) -> tuple[Evidence, ...]:
     """Evidence of each effect that can be taken out again; one without which nothing can be computed has none.
 
@@ -77,14 +77,14 @@ def gather(
         The repaired model.
     effects : sequence of (str, str)
         Name and site of those that were accepted.
-    unseen : InverseDynamicsProblem
+    validation : InverseDynamicsProblem
     floor : mapping of str to float
         Noise floor by channel, in its unit.
     """
     found = []
     for key in effects:
         try:
-            found.append(_evidence(model, model.without_effect(*key), key, unseen, floor))
+            found.append(_evidence(model, model.without_effect(*key), key, validation, floor))
         except VpmError:  # another effect needs it, or the machine cannot be computed without it
             continue
     return tuple(found)
@@ -94,16 +94,16 @@ def _evidence(
     model: Model,
     reduced: Model,
     key: tuple[str, str],
-    unseen: InverseDynamicsProblem,
+    validation: InverseDynamicsProblem,
     floor: Mapping[str, float],
 ) -> Evidence:
-    repaired, _ = unseen.evaluate(model, model.theta)
-    without, _ = unseen.evaluate(reduced, reduced.theta)
+    repaired, _ = validation.evaluate(model, model.theta)
+    without, _ = validation.evaluate(reduced, reduced.theta)
     change = without - repaired
-    block = max(unseen.blocks, key=lambda b: float(np.sum(change[b.samples] ** 2)))
-    record = unseen.blocks.index(block) // (len(unseen.blocks) // len(unseen.experiments))
+    block = max(validation.blocks, key=lambda b: float(np.sum(change[b.samples] ** 2)))
+    record = validation.blocks.index(block) // (len(validation.blocks) // len(validation.experiments))
     counts = block.moving > 0.0
-    view = View(model, key, unseen, record, block.channel)
+    view = View(model, key, validation, record, block.channel)
     seen = view.best(change[block.samples], counts)
     if seen[0] == "command_rate":  # the rate of held samples is all steps: only the filtered one says something
         values, law = seen[3], change[block.samples] / block.weight

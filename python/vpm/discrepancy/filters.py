@@ -1,9 +1,9 @@
-"""The filters of a diagnosis: one for the states that laws are drawn over, one for the band that is compared.
+"""The filters of a diagnosis: one for the states that laws depend on, one for the band that is compared.
 
-The customary preparation filters the motion just above the band that is kept (M. Gautier, ICRA 1997). Where a joint
-turns round, so smooth a motion passes through rest sooner or later than the joint did, and dry friction, hysteresis or
-play along it part from what was measured by more than a weak effect does. What a law that is linear in the motion makes
-of noise stays at its frequency, and the band takes it out later; so states may be as quick as their noise allows.
+The customary preparation filters the motion just above the band that is kept (M. Gautier, ICRA 1997). At a reversal so
+smooth a motion passes through rest sooner or later than the joint did. Dry friction, hysteresis or backlash along it
+then err by more than a weak effect. Laws that are linear in the motion leave noise at its frequency, and the band
+removes it later. So the filter of the states may be as fast as their noise allows.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ def filters(
     Parameters
     ----------
     model : Model
-        Links that bend and drives with states of their own answer to the whole motion, with noise that rings in them:
-        for these, and where ``cutoff`` is given, the band is all that the motion filter leaves alone.
+        Flexible links and drives with states respond to the whole motion, and noise rings in them. For these, and where
+        ``cutoff`` is given, the band is that of the motion filter.
     training : InverseDynamicsProblem
         With the cut-off frequencies that suit each record.
     cutoff : float or None

@@ -1,8 +1,8 @@
-"""Flights of a link through a play along the measured motion, from one soft contact to the other.
+"""Flights of a link through a backlash along the measured motion, from one soft contact to the other.
 
-Along a motion that is measured with noise and within a band, nothing can be said of every bounce between hard contacts:
-each enlarges the error of the one before. Soft, well damped contacts forget the flight before, pass on what is slow as
-hard ones do, and so show how wide the play is, however hard it is in truth.
+Along a noisy motion within a band, single bounces between hard contacts are not predictable: each enlarges the error of
+the one before. Soft, well damped contacts forget the flight before and pass on low frequencies as hard ones do. They
+therefore show the width of the backlash, whatever the true stiffness of its contacts.
 """
 
 from __future__ import annotations
@@ -43,21 +43,21 @@ class _Course:
 def flights(
     model: Model, site: str, data: InverseDynamicsProblem, gaps: Array, frequencies: Array, dampings: Array
 ) -> Array:
-    """What plays would add to the residual of the balance, shape (n, plays).
+    """What backlashes would add to the residual, shape (n, backlashes).
 
-    Law: within the gap the link feels none of the effort that the motion passes on; beyond it a spring and a damper
-    hold it, ``y'' = pull - w^2 (y -+ gap/2) - 2 z w y'`` with ``w = 2 pi frequency`` and the damping ratio z, stepped
-    with the damping at the new velocity, which is stable up to ``w`` times the interval of 2.
-    Source: dead-zone model of Nordin and Gutman, Automatica 38(10), 2002, section 2.
+    Law: within the gap no effort is transmitted to the link. Beyond it a spring and a damper hold it, ``y'' = pull -
+    w^2 (y -+ gap/2) - 2 z w y'``, with ``w = 2 pi frequency`` and the damping ratio z. Steps take the damping at the
+    new velocity, which is stable up to ``w`` times the interval of 2. Source: dead-zone model of Nordin and Gutman,
+    Automatica 38(10), 2002, section 2.
 
     Parameters
     ----------
     model : Model
-        With the play, of any width.
+        With the backlash, of any width.
     site : str
         Its joint.
     data : InverseDynamicsProblem
-    gaps, frequencies, dampings : ndarray, shape (plays,)
+    gaps, frequencies, dampings : ndarray, shape (backlashes,)
         Widths, m or rad; Hz at which the link swings on a contact while the motor stands; damping ratios there.
     """
     added = []
@@ -69,7 +69,7 @@ def flights(
 
 
 def _course(model: Model, site: str, m: Motion) -> _Course:
-    """The measured motion with the link at rest in the play, and once more with one unit of acceleration there."""
+    """The measured motion with the link at rest in the backlash, and once more with one unit of acceleration there."""
     behind = model.joints.index(name_behind(site))
     before = [model.joints.index(joint) for joint in m.joints]
     motion = np.zeros((3, len(m.time), len(model.joints)))

@@ -1,4 +1,4 @@
-"""How small the gap could be at best: noise, and the error of the comparison itself, in the same balance."""
+"""Noise floor of the residual: noise, and the error of the comparison itself."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.discrepancy.coloured import noise_shapes, noise_spectrum, with_noise
+from vpm.discrepancy.noise_spectrum import noise_shapes, noise_spectrum, with_noise
 from vpm.errors import VpmError
 from vpm.experiment import Experiment, noise_std
 from vpm.experiment.signal import RETAINED_BAND
@@ -26,22 +26,21 @@ QUIET_SHARE = 0.4
 
 
 def noise_floor(
-    model: Model, unseen: InverseDynamicsProblem, residual: Array, mode: str, setup: Setup | None = None
+    model: Model, validation: InverseDynamicsProblem, residual: Array, mode: str, setup: Setup | None = None
 ) -> dict[str, float]:
-    """Root mean square that would remain in the balance of the right model, by channel.
+    """Root mean square that would remain in the residual of the right model, by channel.
 
-    The larger of two. The first is known beforehand: the model runs the records by itself, in closed loop where that is
-    possible, and its own log, with noise of the size estimated from the measured one, is balanced like that one; what
-    remains is noise and the error of filters and steps. Where the model cannot run them so, noise is added to the
-    measured motion once more, and what that changes is taken. The second comes from the residual: what is white in it,
-    such as the ripple of a drive that shows in no channel (see `white_level`), or what was white before a drive with
-    states summed it up (see `noise_shapes`).
+    The larger of two. The first is known beforehand. The model predicts the records, in closed loop where that is
+    possible, and noise of the measured size is added. The residual of that log is noise and the error of filters and
+    steps. Where the model cannot run them so, noise is added to the measured motion once more, and what that changes is
+    taken. The second comes from the residual: its white part, such as the ripple of a drive that no channel shows (see
+    `white_level`), or noise that was white before a drive with states integrated it (see `noise_shapes`).
 
     Parameters
     ----------
     model : Model
         The best model found.
-    unseen : InverseDynamicsProblem
+    validation : InverseDynamicsProblem
         The records it is judged on.
     residual : ndarray
         Its residual there.
@@ -51,7 +50,7 @@ def noise_floor(
     """
     generator = np.random.default_rng(SEED)
     expected: dict[str, list[tuple[float, int]]] = {}
-    for experiment, m, steps in zip(unseen.experiments, unseen.motions, unseen.integrators, strict=True):
+    for experiment, m, steps in zip(validation.experiments, validation.motions, validation.integrators, strict=True):
         balance = partial(InverseDynamicsProblem, model, cutoff=m.cutoff, band=m.band, integrator=steps)
         own = own_log(model, experiment, setup, generator) if mode == "closed_loop" else None
         change = _balance(model, balance, own) if own is not None else None
@@ -60,7 +59,7 @@ def noise_floor(
             change = clean, noisy.evaluate(model, model.theta)[0] - clean.evaluate(model, model.theta)[0]
         for channel, (rms, _, _) in gaps(*change).items():
             expected.setdefault(channel, []).append((rms**2, change[1].size))
-    white = _white(unseen, residual, noise_shapes(model, unseen))
+    white = _white(validation, residual, noise_shapes(model, validation))
     return {
         channel: max(float(np.sqrt(np.average([p for p, _ in v], weights=[n for _, n in v]))), white.get(channel, 0.0))
         for channel, v in expected.items()
@@ -81,7 +80,7 @@ def white_level(residual: Array, moving: Array, shape: Array | None = None) -> f
     moving : ndarray, shape (n,)
         1 where it counts.
     shape : ndarray, optional
-        Of noise that is coloured on its way, see `noise_shapes`; then the size of that is meant.
+        Of noise whose spectrum is not flat, see `noise_shapes`; then the size of that is meant.
     """
     n = residual.size
     count = float(np.count_nonzero(moving))

@@ -1,10 +1,10 @@
 """A sparse formula for what is left: which few terms of the library of empirical forces describe a residual.
 
-Forward selection: of all terms at all joints the one that takes most per number from the training residual comes next,
-every time together with the parameters that are free already, so that no term is credited with what a better mass
-would have done; a term stays only if it predicts parts of the training records that were left out (S. Chen, S. Billings
-and W. Luo, "Orthogonal least squares methods and their application to non-linear system identification", *Int. J.
-Control* 50, 1989, with cross-validation in place of their error reduction ratio). The unseen records take no part.
+Forward selection: of all terms at all joints the one that explains most of the training residual per number comes next.
+It is fitted together with the parameters that are free already, so that it gains nothing that a better mass would
+explain. A term stays only if it predicts parts of the training records that were left out (S. Chen, S. Billings and W.
+Luo, "Orthogonal least squares methods and their application to non-linear system identification", *Int. J. Control* 50,
+1989, with cross-validation in place of their error reduction ratio). The validation records take no part.
 """
 
 from __future__ import annotations
@@ -69,10 +69,11 @@ class Formula:
 def select(base: Judged, records: Data) -> Formula | None:
     """Choose terms for the training residual of ``base``; None if none predicts what was left out.
 
-    Of the unseen records only the range of the motion is used: within it, and no farther, the formula may be followed.
+    Of the validation records only the range of the motion is used: within it, and no farther, the formula may be
+    followed.
     """
     data = records.training
-    ranges = {joint: _ranges(base, data, records.unseen, joint) for joint in data.joints}
+    ranges = {joint: _ranges(base, data, records.validation, joint) for joint in data.joints}
     atoms = [atom for joint in data.joints for atom in _atoms(base, data, joint, ranges[joint])]
     scorer = _Folds(data, base.fit.residual, base.fit.jacobian)
     chosen: list[Atom] = []
@@ -160,13 +161,15 @@ class _Folds:
         return total
 
 
-def _ranges(base: Judged, data: InverseDynamicsProblem, unseen: InverseDynamicsProblem, joint: str) -> dict[str, float]:
+def _ranges(
+    base: Judged, data: InverseDynamicsProblem, validation: InverseDynamicsProblem, joint: str
+) -> dict[str, float]:
     """Middle and reach of the way, largest speed, and the transition velocity that suits the residual best."""
     column = data.joints.index(joint)
     states = [data.state(record) for record in range(len(data.motions))]
     position = np.concatenate([q[:, column] for q, _, _ in states])
     velocity = np.concatenate([v[:, column] for _, v, _ in states])
-    met = [unseen.state(record) for record in range(len(unseen.motions))]
+    met = [validation.state(record) for record in range(len(validation.motions))]
     ways = np.concatenate([position, *(q[:, column] for q, _, _ in met)])
     rates = np.concatenate([velocity, *(v[:, column] for _, v, _ in met)])
     low, high = float(ways.min()), float(ways.max())

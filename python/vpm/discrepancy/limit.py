@@ -1,4 +1,4 @@
-"""Where the limit of a drive is looked for: at the command from which on the drive delivers less than it is told."""
+"""Start value for the limit of a drive: the command above which the drive delivers less than commanded."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 LIMITS, BEYOND_MOST, BEYOND_LEAST = 30, 0.5, 3
 
 
-def seen_limit(data: InverseDynamicsProblem, joint: str, actuator: int, residual: Array) -> float | None:
+def limit_start(data: InverseDynamicsProblem, joint: str, actuator: int, residual: Array) -> float | None:
     """Limit beyond which the command itself, cut off there, takes most of a residual.
 
     A limited drive leaves what the command has too much, which is a ramp in the command with the slope of the gain.

@@ -1,10 +1,9 @@
-"""Late drives and instruments, timed on samples at which every joint is clearly in motion.
+"""Delays of drives and instruments, fitted to samples at which every joint is clearly in motion.
 
-Where a joint with dry friction turns round it sticks for a while, and filtered samples do not say when it lets go: what
-is left of the balance there is several times what is left elsewhere, and it is late by itself. A time fitted to all
-samples comes out too long for it (twice the true delay of a stiff axis is usual), long enough to make its simulation
-worse. In clear motion friction is as smooth as the rest, so a time is fitted there, and kept within what that says when
-all the other parameters are fitted to all samples.
+At a reversal a joint with dry friction sticks for a while, and filtered samples do not show when it breaks away. The
+residual there is several times as large as elsewhere, and looks like a delay. A delay fitted to all samples is often
+twice the true one on a stiff axis, which makes the simulation worse. In clear motion friction is smooth. So the delay
+is fitted there, and held within that estimate while all other parameters are fitted to all samples.
 """
 
 from __future__ import annotations
@@ -36,7 +35,7 @@ TOLERANCE = 1e-6
 
 
 class InMotion:
-    """A balance of effort of which only samples count at which every joint is clearly in motion."""
+    """An inverse-dynamics residual of which only samples count at which every joint is clearly in motion."""
 
     mode = InverseDynamicsProblem.mode
 
@@ -57,12 +56,12 @@ class Timed:
     ----------
     bounds : dict
         Of its own parameters, by dotted name.
-    unseen : Gain
-        On unseen samples in motion, against the model without it that was fitted to the same samples.
+    validation : Gain
+        On validation samples in motion, against the model without it that was fitted to the same samples.
     """
 
     bounds: Mapping[str, tuple[float, float]]
-    unseen: Gain
+    validation: Gain
 
 
 def is_dry(model: Model) -> bool:
@@ -71,7 +70,7 @@ def is_dry(model: Model) -> bool:
 
 
 def is_late(effect: EffectType, model: Model) -> bool:
-    """Whether an effect comes late in a model that can stick, so that it has to be timed where nothing does."""
+    """Whether an effect is a delay in a model that can stick, so that it is fitted in motion only."""
     return effect.shifts and is_dry(model)
 
 
@@ -81,9 +80,9 @@ def in_motion(problem: InverseDynamicsProblem) -> Array:
     largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
     counted = np.zeros(sum(block.time.size for block in problem.blocks))
     for record, (m, speed) in enumerate(zip(problem.motions, speeds, strict=True)):
-        slow = (speed < CREEPING * largest).any(axis=1)
+        creeping = (speed < CREEPING * largest).any(axis=1)
         reach = m.decimation + round(1.0 / (m.cutoff * m.dt))
-        near = maximum_filter1d(slow.view(np.uint8), 2 * reach + 1)[m.retained] > 0
+        near = maximum_filter1d(creeping.view(np.uint8), 2 * reach + 1)[m.retained] > 0
         for block in problem.efforts(record):
             counted[block.samples] = ~near
     return counted
@@ -93,20 +92,20 @@ def timed_in_motion(
     current: tuple[Model, Sequence[str]],
     late: tuple[Model, Sequence[str]],
     training: InverseDynamicsProblem,
-    unseen: InverseDynamicsProblem,
+    validation: InverseDynamicsProblem,
     bounds: Mapping[str, tuple[float, float]],
 ) -> Timed | None:
-    """Fit a model without a late effect and with it to the samples in motion; None where those are too few.
+    """Fit a model without a delay and with it to the samples in motion; None where those are too few.
 
     Parameters
     ----------
     current, late : (Model, sequence of str)
         Without the effect and with it, each with its free parameters; those that only ``late`` has are the effect's.
-    training, unseen : InverseDynamicsProblem
+    training, validation : InverseDynamicsProblem
     bounds : mapping
         Bounds of free parameters that replace those of the models.
     """
-    fitted, predicted = InMotion(training), InMotion(unseen)
+    fitted, predicted = InMotion(training), InMotion(validation)
     own = [name for name in late[1] if name not in current[1]]
     if np.count_nonzero(fitted.counted) < FEWEST * (len(late[1]) + 1) or not np.any(predicted.counted):
         return None
@@ -121,7 +120,7 @@ def timed_in_motion(
     if not np.all(np.isfinite([s for _, s in spread.values()])):
         return None
     near = {name: _near(late[0], name, *spread[name], bounds) for name in own}
-    return Timed(near, gain(left[0], left[1], segments(unseen)))
+    return Timed(near, gain(left[0], left[1], segments(validation)))
 
 
 def _near(
@@ -133,7 +132,7 @@ def _near(
 
 
 def _shown(model: Model, free: Sequence[str], problem: InMotion, own: Sequence[str]) -> list[str]:
-    """Free parameters that show themselves in motion, and those of the late effect."""
+    """Free parameters that samples in motion show, and those of the delay."""
     columns = [model.index(name) for name in free]
     _, whole = problem.data.evaluate(model, model.theta, columns)
     shares = np.sum((problem.counted[:, None] * whole) ** 2, axis=0) / column_lengths(whole) ** 2

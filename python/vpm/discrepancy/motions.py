@@ -9,7 +9,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.discrepancy.seen import Seen
+from vpm.discrepancy.excitation_range import ExcitationRange
 from vpm.excitation import Excitation, JointLimits, chirp, multisine, trapezoid
 
 Array = NDArray[np.float64]
@@ -42,14 +42,14 @@ class Motion:
         return self.excitation.time_step
 
 
-def designs(seen: Seen) -> list[Callable[[], Motion]]:
+def designs(seen: ExcitationRange) -> list[Callable[[], Motion]]:
     """Designs to choose from; each raises `ExcitationError` if it does not fit into the limits."""
     ways = [partial(_way, seen, share) for share in SPEEDS]
     waves = [partial(design, seen, share) for share in AMPLITUDES for design in (_chirp, _multisine)]
     return [*ways, *waves]
 
 
-def _way(seen: Seen, share: float) -> Motion:
+def _way(seen: ExcitationRange, share: float) -> Motion:
     """Back and forth with constant speeds and rests; a slow one over as much of the way as the time allows."""
     speed = share * seen.speed
     middle, half = 0.5 * (seen.low + seen.high), 0.5 * WITHIN * (seen.high - seen.low)
@@ -63,7 +63,7 @@ def _way(seen: Seen, share: float) -> Motion:
     return _motion(seen, made, numbers, *motion)
 
 
-def _chirp(seen: Seen, share: float) -> Motion:
+def _chirp(seen: ExcitationRange, share: float) -> Motion:
     middle, amplitude = 0.5 * (seen.low + seen.high), 0.5 * WITHIN * share * (seen.high - seen.low)
     fastest = _fastest(seen, amplitude)
     first = max(0.1 * fastest, 2.0 / DURATION)
@@ -81,7 +81,7 @@ def _chirp(seen: Seen, share: float) -> Motion:
     return _from_position(seen, made, {**numbers, "duration": DURATION})
 
 
-def _multisine(seen: Seen, share: float) -> Motion:
+def _multisine(seen: ExcitationRange, share: float) -> Motion:
     middle, amplitude = 0.5 * (seen.low + seen.high), 0.5 * WITHIN * share * (seen.high - seen.low)
     fastest = max(_fastest(seen, amplitude), 3.0 / DURATION)
     made = multisine(
@@ -99,25 +99,25 @@ def _multisine(seen: Seen, share: float) -> Motion:
     )
 
 
-def _fastest(seen: Seen, amplitude: float) -> float:
+def _fastest(seen: ExcitationRange, amplitude: float) -> float:
     """Frequency in Hz at which a sine of this amplitude reaches the speed or the acceleration that was seen."""
     return min(seen.speed / amplitude, float(np.sqrt(seen.acceleration / amplitude))) / (2.0 * np.pi)
 
 
-def _step(seen: Seen, duration: float) -> float:
+def _step(seen: ExcitationRange, duration: float) -> float:
     """Time step of the records, or a whole multiple of it that keeps the samples few; a whole part of a second."""
     step = max(seen.time_step, duration / MOST_SAMPLES)
     return 1.0 / max(1, int(1.0 / step))
 
 
-def _from_position(seen: Seen, made: Excitation, numbers: Mapping[str, float | str]) -> Motion:
+def _from_position(seen: ExcitationRange, made: Excitation, numbers: Mapping[str, float | str]) -> Motion:
     position = made[f"{seen.joint}.position"]
     velocity = np.gradient(position, made.time_step)
     return _motion(seen, made, numbers, position, velocity, np.gradient(velocity, made.time_step))
 
 
 def _motion(
-    seen: Seen,
+    seen: ExcitationRange,
     made: Excitation,
     numbers: Mapping[str, float | str],
     position: Array,

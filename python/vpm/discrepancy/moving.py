@@ -1,4 +1,4 @@
-"""Whether records show what the machine does: channels that stand still although it moves."""
+"""Checks that records show the motion: channels that stand still although the machine moves."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def check_moving(model: Model, records: Sequence[Experiment]) -> None:
     if measured and not any(is_moving(record, channel) for record, channel in measured):
         names = ", ".join(dict.fromkeys(record.name for record, _ in measured))
         raise DiagnosisError(
-            f"no joint moves in {names}: {_standing(*measured[0])}, and any effect explains that; "
+            f"no joint moves in {names}: {_constant(*measured[0])}, and any effect explains that; "
             "check that its column is the right one, or record a motion"
         )
     check_stuck(model, records)
@@ -69,8 +69,8 @@ def _check_record(model: Model, record: Experiment) -> None:
         if np.isfinite(way) and way > _step(record, channel) and _changes(run[channel]):
             held = "describe its joint as fixed" if channel.endswith(".position") else "leave that channel out"
             raise DiagnosisError(
-                f"{record.name}: {_standing(record, channel)}, and the model moves it by "
-                f"{_told(record, channel, way, 3)}; check that its column is the right one, or {held}"
+                f"{record.name}: {_constant(record, channel)}, and the model moves it by "
+                f"{_value(record, channel, way, 3)}; check that its column is the right one, or {held}"
             )
 
 
@@ -81,11 +81,11 @@ def _step(record: Experiment, channel: str) -> float:
     return max(own, *alike) / STEPS
 
 
-def _standing(record: Experiment, channel: str) -> str:
-    return f"{channel} is {_told(record, channel, float(record[channel][0]), 6)} all the time"
+def _constant(record: Experiment, channel: str) -> str:
+    return f"{channel} is {_value(record, channel, float(record[channel][0]), 6)} all the time"
 
 
-def _told(record: Experiment, channel: str, value: float, digits: int) -> str:
+def _value(record: Experiment, channel: str, value: float, digits: int) -> str:
     unit = record.unit(channel)
     return f"{value + 0.0:.{digits}g}" + ("" if unit == "1" else f" {unit}")
 

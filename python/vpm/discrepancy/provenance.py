@@ -60,7 +60,7 @@ class Provenance(Storable):
 def provenance(
     model: Model,
     fitted: Sequence[Experiment],
-    unseen: Sequence[Experiment],
+    validation: Sequence[Experiment],
     command: str,
     settings: Mapping[str, tuple[object, object]],
 ) -> Provenance:
@@ -69,17 +69,17 @@ def provenance(
     Parameters
     ----------
     model : Model
-    fitted, unseen : sequence of Experiment
+    fitted, validation : sequence of Experiment
     command : str
     settings : mapping of str to (object, object)
         Value and default of each.
     """
     text = model.to_toml().encode()
     sources = [Source("model", model.name, model.path or "", _checksum(model.path, text))]
-    for role, records in (("fitted", fitted), ("unseen", unseen)):
+    for role, records in (("fitted", fitted), ("unseen", validation)):
         sources += [Source(role, e.name, e.path or "", _checksum(e.path, _numbers(e))) for e in records]
-    told = {name: repr(value) for name, (value, default) in settings.items() if value != default}
-    return Provenance(vpm_version(), f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC", command, tuple(sources), told)
+    changed = {name: repr(value) for name, (value, default) in settings.items() if value != default}
+    return Provenance(vpm_version(), f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC", command, tuple(sources), changed)
 
 
 def own_settings(given: object, name: str) -> dict[str, tuple[object, object]]:

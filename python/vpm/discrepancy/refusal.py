@@ -1,4 +1,4 @@
-"""Why a candidate is not believed, in words with numbers."""
+"""Why a candidate is not accepted, in words with numbers."""
 
 from __future__ import annotations
 
@@ -16,23 +16,24 @@ from vpm.numbers import NORMAL_95, percent, short
 
 #: Probability of accepting any effect by chance, shared among all candidates that are tried.
 FALSE_ALARM_LEVEL = 0.01
-#: Drop of the unseen mean square below which an effect is not worth its name.
+#: Drop of the validation mean square below which an effect is not worth its name.
 LEAST_GAIN = 0.02
-#: The same for an effect that is to be believed: what sticks and creeps leaves more than that to imitate.
+#: The same for an effect that is to be accepted: what sticks and creeps leaves more than that to imitate.
 WORTH_A_NAME = 0.1
 #: Below this drop most of the residual is something else, which the effect might merely imitate: the evidence then has
 #: to be this many times as strong.
 MODEST_GAIN, MODEST_FACTOR = 0.3, 3.0
-#: From this drop on, the balance of effort decides alone on a machine of several joints: with two effects missing, the
-#: simulation of a machine that has one of them may well be worse, because errors of coupled joints had cancelled.
+#: From this drop on, the inverse-dynamics residual decides alone on a machine of several joints. With two effects
+#: missing, adding one may worsen the simulation, because errors of coupled joints had cancelled.
 CLEAR_GAIN = 0.5
-#: A delay or lag that the times of samples leave open is named from this drop on: what explains most of what was left
-#: is worth telling, be it the drive that is late or the record. Below it, sampling explains it as well.
+#: A delay or lag that the times of samples leave open is named from this drop on: it matters whether the delay is that
+#: of the drive or of the record. Below it, sampling explains it as well.
 MOST_OF_IT = 0.5
 #: Neither a residual nor an error of an instrument's gain means anything below this share of the signal: links are
 #: cut into pieces and gauges calibrated to no better.
 NEGLIGIBLE = 0.005
-#: An error of an instrument shows so many times as large in a balance that it is more than an error of the model there.
+#: An error of an instrument shows so many times as large in the residual that it is more than an error of the model
+#: there.
 MAGNIFIED = 4.0
 #: One-sided 95 % quantile of the normal distribution: a simulation that is worse by less is worse by chance.
 NORMAL_95_ONE_SIDED = 1.6448536269514722
@@ -60,17 +61,17 @@ class Thresholds:
     interval: float
 
     def score(self, pieces: int) -> float:
-        """Least standard deviations of unseen gain, by Student's t with one degree of freedom less than pieces."""
+        """Least standard deviations of validation gain, by Student's t with one degree of freedom less than pieces."""
         return float(stdtrit(max(1, pieces - 1), 1.0 - FALSE_ALARM_LEVEL / max(1, self.candidates)))
 
-    def needed(self, unseen: Gain, *, asked: bool = False) -> float:
-        """Standard deviations that a gain has to have: more where most of the residual stays and no run asks for it."""
-        modest = unseen.relative < MODEST_GAIN and not asked
-        return self.score(unseen.pieces) * (MODEST_FACTOR if modest else 1.0)
+    def needed(self, validation: Gain, *, supported: bool = False) -> float:
+        """Standard deviations that a gain has to have: more where most of the residual stays and no run supports it."""
+        modest = validation.relative < MODEST_GAIN and not supported
+        return self.score(validation.pieces) * (MODEST_FACTOR if modest else 1.0)
 
-    def met(self, unseen: Gain) -> bool:
+    def met(self, validation: Gain) -> bool:
         """Whether a gain is worth a name, and sure."""
-        return unseen.relative >= WORTH_A_NAME and unseen.score >= self.needed(unseen)
+        return validation.relative >= WORTH_A_NAME and validation.score >= self.needed(validation)
 
 
 def refuse_probe(probe: Probe) -> str:
@@ -78,7 +79,7 @@ def refuse_probe(probe: Probe) -> str:
     if not probe.free:
         if probe.held:
             partners = ", ".join(dict.fromkeys(alias.partner for alias in probe.held))
-            return f"these data cannot tell it from {partners}"
+            return f"these data do not discriminate it from {partners}"
         return "it has no influence on these data"
     if probe.drop < 0.0:
         return "it would make the training error larger wherever it was tried"
@@ -117,24 +118,24 @@ def refuse_ringing(share: float, trial: Trial) -> str:
 
     ``share`` of the mean square of noise alone goes with that, by simulation.
     """
-    rest = trial.unseen.relative - max(share, 0.0)
+    rest = trial.validation.relative - max(share, 0.0)
     if rest >= WORTH_A_NAME:
         return ""
     noise = "lower" if share >= 0.0 else "raise"
     return (
-        f"it {_moves('the unseen error', trial.unseen)}; it would {noise} noise of the measured motion alone, which "
-        f"rings in the links, by {percent(abs(share))} of its mean square"
+        f"it {_moves('the validation error', trial.validation)}; it would {noise} noise of the measured motion alone, "
+        f"which rings in the links, by {percent(abs(share))} of its mean square"
     )
 
 
 def explains_most(trial: Trial) -> bool:
-    """Whether what is late explains so much that it is named even where the times of samples would leave it open.
+    """Whether a delay explains so much that it is named even where the times of samples leave it open.
 
     Where there are peers on its clock, a shift of all commands tells what is physics.
     """
     candidate = trial.probe.candidate
     late = bool(candidate.effect.late) and not has_peers(trial.judged.model, candidate.site)
-    return late and trial.unseen.relative >= MOST_OF_IT
+    return late and trial.validation.relative >= MOST_OF_IT
 
 
 def refuse_timing(timed: Gain, shift: float, thresholds: Thresholds, *, beside: float) -> str:
@@ -148,15 +149,16 @@ def refuse_timing(timed: Gain, shift: float, thresholds: Thresholds, *, beside: 
         How much later commands hold without the candidate, in sampling intervals.
     thresholds : Thresholds
     beside : float
-        The same with it. Where beside the candidate no shift matters, and beside the shift the candidate does, the two
-        are one finding with two names: that is one question, and the data answer it if they are sure at all.
+        The same with it. The shift and the candidate are one finding with two names if beside the candidate no shift
+        matters, and beside the shift the candidate does. That is one question, and the data answer it if they are
+        clear.
     """
     encompasses = beside == 0.0 and timed.relative >= LEAST_GAIN
     if thresholds.met(timed) or (encompasses and timed.score >= replace(thresholds, candidates=1).score(timed.pieces)):
         return ""
     return (
         f"beside a shift of the commands by {1e3 * shift * thresholds.interval:.2g} ms, within the sampling interval, "
-        f"it {_moves('the unseen error', timed, 'only ')}"
+        f"it {_moves('the validation error', timed, 'only ')}"
     )
 
 
@@ -170,14 +172,13 @@ def _impossible(probe: Probe, name: str) -> str:
 def _too_short(trial: Trial, interval: float) -> str:
     """A delay or lag below one sampling interval that explains little is as well a matter of how commands are logged.
 
-    The hold is that of all commands: where one of several drives, or of several joints' instruments, is late and the
-    others are not, `refuse_timing` judges it beside a shift of them all, if it explains more than an imitation would:
-    instruments are read one after the other, and links are cut into pieces. The time of a lossy link is no delay: it
-    is a share of its stiffness.
+    The hold is that of all commands. Where one of several drives or instruments has a delay and the others have none,
+    `refuse_timing` judges it beside a shift of them all, if it explains more than an imitation would. The time of a
+    lossy link is no delay: it is a share of its stiffness.
     """
     model = trial.judged.model
     site = trial.probe.candidate.effect.site
-    peers = has_peers(model, trial.probe.candidate.site) and trial.unseen.relative >= MODEST_GAIN
+    peers = has_peers(model, trial.probe.candidate.site) and trial.validation.relative >= MODEST_GAIN
     if site in {"link", "body", "beam"} or peers or explains_most(trial):
         return ""
     for name in trial.parameters:
@@ -185,8 +186,8 @@ def _too_short(trial: Trial, interval: float) -> str:
         if parameter.unit == "s" and parameter.value < interval:
             return (
                 f"{name} comes out as {1e3 * parameter.value:.3g} ms, less than the sampling interval of "
-                f"{1e3 * interval:.3g} ms, and {_moves('the unseen error', trial.unseen)}: "
-                "so little cannot be told from the sampling itself"
+                f"{1e3 * interval:.3g} ms, and {_moves('the validation error', trial.validation)}: "
+                "so little is not discriminated from the sampling itself"
             )
     return ""
 
@@ -200,9 +201,9 @@ def has_peers(model: Model, site: str) -> bool:
 def _no_way(trial: Trial) -> str:
     """A hysteresis that turns round within the way of one sample is dry friction, as far as the data can see.
 
-    So is one within the way of two, unless its way is clearly longer than that of one. Where the joint's dry friction
-    is fitted beside it and it explains most of what that leaves, the data have told the two apart: joints turn round
-    slowly, and take many samples for a way that they pass in one at full speed.
+    So is one within the way of two, unless its way is clearly longer than that of one. If the joint's dry friction is
+    fitted beside it and it explains most of the remaining error, the data discriminate the two: joints reverse slowly,
+    over many samples.
     """
     candidate, bounds = trial.probe.candidate, trial.judged.bounds
     way = next((tried.parameter for tried in candidate.effect.tried if tried.sampled), None)
@@ -214,17 +215,17 @@ def _no_way(trial: Trial) -> str:
     fit = trial.judged.fit
     std = float(fit.std[fit.names.index(name)]) if name in fit.names else 0.0
     clear = parameter.value - NORMAL_95_ONE_SIDED * std > 1.001 * least
-    beside_dry = f"{candidate.site}.friction.coulomb" in trial.judged.free and trial.unseen.relative >= CLEAR_GAIN
+    beside_dry = f"{candidate.site}.friction.coulomb" in trial.judged.free and trial.validation.relative >= CLEAR_GAIN
     if clear or parameter.value > (1.001 if beside_dry else SAMPLED) * least:
         return ""
     return (
         f"{parameter_text(trial.judged.model, name, std)}, and the joint passes {least:.3g} "
-        f"{parameter.unit} between two samples: what builds up within two of them cannot be told from dry friction"
+        f"{parameter.unit} between two samples: what builds up within two of them is like dry friction"
     )
 
 
 def _creeps(trial: Trial) -> str:
-    """A spring in series that its damper holds back does not wind up: it slips as a fluid coupling does."""
+    """A spring in series that its damper holds back does not deflect: it slips as a fluid coupling does."""
     candidate, model = trial.probe.candidate, trial.judged.model
     if not candidate.effect.winds_up:
         return ""
@@ -235,7 +236,7 @@ def _creeps(trial: Trial) -> str:
         return ""
     return (
         f"its damping is {ratio:.3g} times the critical one, and it needs {damping / stiffness:.3g} s to come back: "
-        "that is no spring that winds up"
+        "that is no compliant spring"
     )
 
 
@@ -246,13 +247,13 @@ def _trifling_gain(trial: Trial) -> str:
     """
     if not trial.probe.candidate.effect.scales:
         return ""
-    name, drop = trial.parameters[0], trial.unseen.relative
+    name, drop = trial.parameters[0], trial.validation.relative
     value = trial.judged.model.parameters[name].value
     if reason := _trifling_size(trial):
         return reason
-    if trial.slow is None and 0.0 <= drop < MODEST_GAIN:
+    if trial.low_frequency is None and 0.0 <= drop < MODEST_GAIN:
         return (
-            f"{name} comes out as {value:.4g} and {_moves('the unseen error', trial.unseen, 'only ')}: "
+            f"{name} comes out as {value:.4g} and {_moves('the validation error', trial.validation, 'only ')}: "
             "an instrument is blamed where it explains more than an imitation would"
         )
     return ""
@@ -261,28 +262,28 @@ def _trifling_gain(trial: Trial) -> str:
 def _trifling_size(trial: Trial) -> str:
     """An instrument's gain that is none.
 
-    Where an effort is the small difference of large readings, as of the pressures on both sides of a piston, a gain
-    that is hardly wrong leaves a gap that is not small: one that explains most of such a gap is believed.
+    An effort may be the small difference of large readings, as of the pressures on both sides of a piston. A small
+    error of a gain then leaves a large error of the effort; a gain that explains most of it is accepted.
     """
     if not trial.probe.candidate.effect.scales:
         return ""
     name = trial.parameters[0]
     value = trial.judged.model.parameters[name].value
-    magnified = trial.unseen.relative >= CLEAR_GAIN and trial.gap > MAGNIFIED * abs(value - 1.0)
+    magnified = trial.validation.relative >= CLEAR_GAIN and trial.error > MAGNIFIED * abs(value - 1.0)
     if abs(value - 1.0) >= NEGLIGIBLE or magnified:
         return ""
     return (
-        f"{name} comes out as {value:.4g}: less than {percent(NEGLIGIBLE)} of the signal is no error "
-        "to be told from that of the model"
+        f"{name} comes out as {value:.4g}: less than {percent(NEGLIGIBLE)} of the signal is no more "
+        "than an error of the model"
     )
 
 
 def _only_training(trial: Trial) -> str:
-    seen, unseen = trial.training, trial.unseen
-    if unseen.relative >= 0.0:
+    seen, validation = trial.training, trial.validation
+    if validation.relative >= 0.0:
         return ""
     joined = "and" if seen.relative < 0.0 else "but"
-    return f"it {_moves('the training error', seen)}, {joined} {_moves('the unseen error', unseen)}"
+    return f"it {_moves('the training error', seen)}, {joined} {_moves('the validation error', validation)}"
 
 
 def _not_clear(trial: Trial) -> str:
@@ -297,34 +298,34 @@ def _not_clear(trial: Trial) -> str:
 
 
 def _only_impacts(trial: Trial) -> str:
-    """Beside a play: a law that is right helps what is slow as well, where impacts hardly show."""
-    if trial.slow is None or trial.slow.relative >= -LEAST_GAIN:
+    """Beside a backlash: a right law also helps low frequencies, where impacts hardly show."""
+    if trial.low_frequency is None or trial.low_frequency.relative >= -LEAST_GAIN:
         return ""
     return (
-        f"it {_moves('the unseen error', trial.unseen)} and {_moves('its slow part', trial.slow)}: "
-        "it makes up for single impacts of the play"
+        f"it {_moves('the validation error', trial.validation)} and "
+        f"{_moves('its low-frequency part', trial.low_frequency)}: it makes up for single impacts of the backlash"
     )
 
 
-def slow_shows_it(trial: Trial, thresholds: Thresholds) -> bool:
-    """Whether what is slow shows an effect that single impacts of a play cover, and does not speak alone."""
-    unseen, sure = trial.unseen, NORMAL_95_ONE_SIDED
-    whole = unseen.relative >= LEAST_GAIN and unseen.score >= sure
-    return trial.slow is not None and whole and thresholds.met(trial.slow)
+def low_frequency_shows_it(trial: Trial, thresholds: Thresholds) -> bool:
+    """Whether low frequencies, and not they alone, show an effect that single impacts of a backlash cover."""
+    validation, sure = trial.validation, NORMAL_95_ONE_SIDED
+    whole = validation.relative >= LEAST_GAIN and validation.score >= sure
+    return trial.low_frequency is not None and whole and thresholds.met(trial.low_frequency)
 
 
 def _too_little(trial: Trial, thresholds: Thresholds) -> str:
-    unseen = trial.there
-    if slow_shows_it(trial, thresholds):
+    validation = trial.there
+    if low_frequency_shows_it(trial, thresholds):
         return ""
-    if unseen.relative < WORTH_A_NAME:
-        return f"it {_moves('the unseen error', unseen, 'only ')}"
-    needed = thresholds.needed(unseen, asked=trial.asked)
-    if unseen.score < needed:
+    if validation.relative < WORTH_A_NAME:
+        return f"it {_moves('the validation error', validation, 'only ')}"
+    needed = thresholds.needed(validation, supported=trial.supported)
+    if validation.score < needed:
         return (
-            f"its gain of {percent(unseen.relative)} on unseen data is {unseen.score:.1f} standard deviations over "
-            f"{unseen.pieces} independent pieces, and {needed:.1f} are needed when {thresholds.candidates} candidates "
-            "are tried"
+            f"its gain of {percent(validation.relative)} on validation data is {validation.score:.1f} standard "
+            f"deviations over {validation.pieces} independent pieces, and {needed:.1f} are needed "
+            f"when {thresholds.candidates} candidates are tried"
         )
     return ""
 
@@ -333,23 +334,23 @@ def _only_reversals(trial: Trial) -> str:
     if trial.away is None or trial.away.relative >= LEAST_GAIN:
         return ""
     return (
-        "it lowers the unseen error only where a joint with dry friction turns round and sticks for a while; elsewhere "
-        f"it {_moves('that', trial.away, 'only ')}"
+        "it lowers the validation error only where a joint with dry friction turns round and sticks for a while; "
+        f"elsewhere it {_moves('that', trial.away, 'only ')}"
     )
 
 
 def worse_in_simulation(trial: Trial) -> str:
-    """Why the second witness speaks against a trial, or ""."""
+    """Why the simulation speaks against a trial, or ""."""
     if trial.diverged:
-        return f"with it the simulation of the unseen record fails: {trial.diverged}"
+        return f"with it the simulation of the validation record fails: {trial.diverged}"
     simulated = trial.simulated
-    decided = coupled(trial.judged.model) and trial.unseen.relative >= CLEAR_GAIN
+    decided = coupled(trial.judged.model) and trial.validation.relative >= CLEAR_GAIN
     if simulated is None or decided or simulated.harm <= NORMAL_95_ONE_SIDED:
         return ""
     if simulated.relative < -LEAST_GAIN:
-        joined = "and" if trial.unseen.relative < 0.0 else "but"
+        joined = "and" if trial.validation.relative < 0.0 else "but"
         return (
-            f"it {_moves('the unseen error of the balance of effort', trial.unseen)}, {joined} "
+            f"it {_moves('the validation error of the inverse-dynamics residual', trial.validation)}, {joined} "
             f"{_moves('that of the simulation', simulated)}, {simulated.harm:.1f} standard deviations"
         )
     return ""
@@ -362,7 +363,7 @@ def parameter_text(model: Model, name: str, std: float) -> str:
 
 
 def _moves(what: str, change: Gain, little: str = "") -> str:
-    """``lowers the unseen error by 3.00 % of its mean square (0.2 to 0.197)``, or raises it, as its numbers say."""
+    """``lowers the validation error by 3.00 % of its mean square (0.2 to 0.197)``, or raises it, as its numbers say."""
     numbers = f"of its mean square ({short(change.before)} to {short(change.after)})"
     if change.relative < 0.0:
         return f"raises {what} by {percent(-change.relative)} {numbers}"

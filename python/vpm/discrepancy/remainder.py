@@ -1,8 +1,8 @@
-"""What effects leave: whether it repeats on unseen records, and how much of the gap they are the explanation of.
+"""The residual after all effects: whether it repeats on validation records, and the share that effects explain.
 
-The floor of the noise is an estimate, and a residual need not stand far above it to be no noise. So a fit without
-physics is put beside the effects: what it predicts of records that it never saw, physics would predict too. Effects
-that leave much of what a mere fit finds were only the nearest of the catalogue.
+The noise floor is an estimate, and a residual close to it may still not be noise. So an empirical fit is compared with
+the effects: what it predicts of validation records, the right physics would predict too. Effects that leave much of
+what such a fit explains were only the nearest ones of the catalogue.
 """
 
 from __future__ import annotations
@@ -38,13 +38,13 @@ class Described:
     """A model, what is said of its residual, and the model with the formula for it."""
 
     base: Judged
-    told: Empirical
+    empirical: Empirical
     judged: Judged
 
 
 @dataclass(frozen=True)
 class Remainder:
-    """What the model with all accepted effects leaves of the unseen records.
+    """What the model with all accepted effects leaves of the validation records.
 
     Attributes
     ----------
@@ -56,8 +56,8 @@ class Remainder:
         Share that the effects leave of the mean square that a fit finds in the recalibrated residual; 0 where nothing
         repeats.
     instead : bool
-        Whether a fit in the place of the effects, with no more numbers, leaves less than ``HALF`` of what they leave,
-        or friction of seals, which is one number of physics, surely less than they do.
+        Whether a fit in the place of the effects, with no more numbers, leaves less than ``HALF`` of their error; or
+        whether friction of seals, a single number, clearly leaves less.
     seals : Seals or None
         That friction, if it does.
     """
@@ -72,7 +72,7 @@ class Remainder:
     def best(self) -> Described:
         """The description that leaves least, the one with fewer effects if it is hardly worse."""
         *first, last = self.choices
-        return first[0] if first and last.told.after >= CLEARLY * first[0].told.after else last
+        return first[0] if first and last.empirical.after >= CLEARLY * first[0].empirical.after else last
 
 
 def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float, workers: int = 1) -> Remainder:
@@ -96,11 +96,11 @@ def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float, 
     pressed = None if recalibrated is final else view.pressed(recalibrated, left)
     if not any(clear):
         return Remainder(choices, repeats=pressed is not None, open=0.0, instead=pressed is not None, seals=pressed)
-    power, whole = _power(in_time(final, data).unseen), _power(_before(recalibrated, final, data))
+    power, whole = _power(in_time(final, data).validation), _power(_before(recalibrated, final, data))
     least = min(view.leaves(choice) for choice, better in zip(choices, clear, strict=True) if better)
     share = np.clip((power - least) / max(whole - least, 1e-300), 0.0, 1.0)
     plain = len(choices[0].judged.free) <= len(final.free)
-    instead = recalibrated is not final and clear[0] and plain and not choices[0].told.remark
+    instead = recalibrated is not final and clear[0] and plain and not choices[0].empirical.remark
     instead = instead and _power(view(choices[0].judged)) < HALF * _power(left)
     instead = instead or pressed is not None
     return Remainder(choices, repeats=True, open=float(share), instead=instead, seals=pressed)
@@ -114,7 +114,7 @@ def _before(recalibrated: Judged, final: Judged, data: Data) -> Array:
     """What the recalibrated model leaves, less a shift within the sampling interval unless that is what was named."""
     known = {effect.key for effect in recalibrated.model.effects}
     late = any(effect.type.shifts and effect.key not in known for effect in final.model.effects)
-    return recalibrated.unseen if late else in_time(recalibrated, data).unseen
+    return recalibrated.validation if late else in_time(recalibrated, data).validation
 
 
 def _power(values: Array) -> float:
@@ -123,7 +123,7 @@ def _power(values: Array) -> float:
 
 @dataclass(frozen=True)
 class _View:
-    """Unseen residuals in the band of the motion, with what the times of samples leave open."""
+    """Validation residuals in the band of the motion, with what the times of samples leave open."""
 
     data: Data
     frequency: float
@@ -131,29 +131,29 @@ class _View:
 
     def __call__(self, judged: Judged) -> Array:
         """Residual of a model."""
-        return below(self.data.unseen, in_time(judged, self.data).unseen, self.frequency)
+        return below(self.data.validation, in_time(judged, self.data).validation, self.frequency)
 
     def clearly_better(self, choice: Described, left: Array) -> bool:
         """Whether a description predicts more than the effects do, as surely as an effect has to."""
-        if choice.told.remark:
+        if choice.empirical.remark:
             own = self(choice.base)
             return _power(own) - self._said(choice, own) < (1.0 - WORTH_A_NAME) * _power(left)
-        return self.thresholds.met(gain(left, self(choice.judged), segments(self.data.unseen)))
+        return self.thresholds.met(gain(left, self(choice.judged), segments(self.data.validation)))
 
     def pressed(self, recalibrated: Judged, left: Array) -> Seals | None:
         """Friction of seals that predicts more in the place of the effects than they do, as surely as one has to."""
         found = seals(recalibrated, self.data)
         if found is None:
             return None
-        alone = below(self.data.unseen, found.unseen, self.frequency)
-        return found if self.thresholds.met(gain(left, alone, segments(self.data.unseen))) else None
+        alone = below(self.data.validation, found.validation, self.frequency)
+        return found if self.thresholds.met(gain(left, alone, segments(self.data.validation))) else None
 
     def leaves(self, choice: Described) -> float:
         """Sum of squares over all frequencies that a description leaves."""
-        own = in_time(choice.judged, self.data).unseen
-        return _power(own) - self._said(choice, own) if choice.told.remark else _power(own)
+        own = in_time(choice.judged, self.data).validation
+        return _power(own) - self._said(choice, own) if choice.empirical.remark else _power(own)
 
     def _said(self, choice: Described, own: Array) -> float:
         """What a remark predicts of a residual: of the effort that it speaks of, and of nothing else."""
-        blocks = (block for block in self.data.unseen.blocks if block.channel == choice.told.channel)
-        return choice.told.predicted * sum(_power(own[block.samples]) for block in blocks)
+        blocks = (block for block in self.data.validation.blocks if block.channel == choice.empirical.channel)
+        return choice.empirical.predicted * sum(_power(own[block.samples]) for block in blocks)

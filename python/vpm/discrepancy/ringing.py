@@ -1,7 +1,6 @@
-"""Noise of a measured motion that rings in links that bend: it is not white in the balance, and no physics is missing.
+"""Noise of a measured motion that rings in flexible links: not white in the residual, and no missing physics.
 
-How much of it there is, the model's own simulation says, with noise like that of the records; see
-`vpm.discrepancy.floor`.
+Its size follows from simulations of the model with noise like that of the records; see `vpm.discrepancy.floor`.
 """
 
 from __future__ import annotations
@@ -22,22 +21,22 @@ Array = NDArray[np.float64]
 NOISE_ONLY = 1.2
 
 
-def noise_alone(model: Model, data: Data, unseen: Array) -> bool:
-    """Whether links bend and the ``unseen`` residual is no more than the noise that rings in them."""
+def noise_alone(model: Model, data: Data, validation: Array) -> bool:
+    """Whether links bend and the ``validation`` residual is no more than the noise that rings in them."""
     if not bends(model) or data.simulation is None:
         return False
     allowed = _ringing(model, data)
-    return all(gap <= NOISE_ONLY * allowed[name] for name, (gap, _, _) in gaps(data.unseen, unseen).items())
+    return all(gap <= NOISE_ONLY * allowed[name] for name, (gap, _, _) in gaps(data.validation, validation).items())
 
 
 def only_ringing(current: Judged, data: Data, trial: Trial) -> str:
-    """Why a trial that would be believed only damps what noise makes ring, or ""."""
+    """Why a trial that would be accepted only damps what noise makes ring, or ""."""
     if data.simulation is None or not bends(current.model) or not trial.probe.candidate.effect.damps:
         return ""
     before, after = _ringing(current.model, data), _ringing(trial.judged.model, data)
-    weights = {block.channel: block.weight**2 for block in data.unseen.blocks}
+    weights = {block.channel: block.weight**2 for block in data.validation.blocks}
     alone = [sum(weight * ringing[name] ** 2 for name, weight in weights.items()) for ringing in (before, after)]
-    # One record of noise that rings in a narrow band may be twice as large as another: its share is what can be told.
+    # One record of noise that rings in a narrow band may be twice as large as another: only its share is known.
     return refuse_ringing(1.0 - alone[1] / alone[0], trial)
 
 
@@ -45,5 +44,5 @@ def _ringing(model: Model, data: Data) -> dict[str, float]:
     """Root mean square that noise of the records leaves of a model's own simulation, by channel."""
     if data.simulation is None:
         return {}
-    nothing = np.zeros(data.unseen.blocks[-1].samples.stop)
-    return noise_floor(model, data.unseen, nothing, data.simulation.mode, data.simulation.setup)
+    nothing = np.zeros(data.validation.blocks[-1].samples.stop)
+    return noise_floor(model, data.validation, nothing, data.simulation.mode, data.simulation.setup)

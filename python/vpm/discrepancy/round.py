@@ -1,4 +1,4 @@
-"""One round of the search: screen every candidate, refit with the most promising, believe or refuse each."""
+"""One round of the search: screen every candidate, refit with the most promising, accept or refuse each."""
 
 from __future__ import annotations
 
@@ -9,37 +9,37 @@ from functools import cached_property, partial
 import numpy as np
 
 from vpm.catalogue import EFFECTS
+from vpm.discrepancy.backlash import is_read_off, only_compliant
 from vpm.discrepancy.candidates import Candidate, Key, candidates, joint_at, left_out
 from vpm.discrepancy.choice import Accepted, choose
+from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, finished
 from vpm.discrepancy.diagnosis import RankedCandidate
+from vpm.discrepancy.friction_near_rest import is_supported, judged_by_prediction, needs_prediction, prediction_without
+from vpm.discrepancy.low_frequency import low_frequency
 from vpm.discrepancy.motion_only import in_motion, is_late
-from vpm.discrepancy.own_run import OwnRun
-from vpm.discrepancy.play import is_read_off, only_winds_up
 from vpm.discrepancy.refusal import (
     CLEAR_GAIN,
     Thresholds,
     explains_most,
+    low_frequency_shows_it,
     refuse_probe,
     refuse_timing,
     refuse_trial,
-    slow_shows_it,
     worse_in_simulation,
 )
 from vpm.discrepancy.ringing import NOISE_ONLY, noise_alone, only_ringing
 from vpm.discrepancy.screening import Probe, prepare, probe, refit_effort, screening_effort
 from vpm.discrepancy.short_list import SHORT_LIST, most_promising, same_models
 from vpm.discrepancy.side_by_side import Failure, SideBySide
-from vpm.discrepancy.slow import slow
-from vpm.discrepancy.sticking import asks_for, asks_runs, run_without, told_by_runs
 from vpm.discrepancy.structure import structure
 from vpm.discrepancy.timing import InTime, in_time
 from vpm.identify import gain, segments
 from vpm.identify.along import bends, has_own_drives
 from vpm.identify.tangent import drives_on_tangent
 
-#: Where links bend already, the noise of the measured motion rings in them: a spring more has to promise this share of
-#: the residual, and only the best is refitted.
+#: Where links bend already, the noise of the measured motion rings in them: another spring needs this predicted gain as
+#: a share of the residual. Only the best is refitted.
 RINGING, FEW = 0.2, 1
 
 #: Called with a sentence on what is being done.
@@ -55,19 +55,19 @@ class Round:
         self.refused: dict[Key, str] = {}
         self._ranking: dict[Key, RankedCandidate] = {}
         self._promising: list[Probe] = []
-        self._believed: list[Trial] = []
+        self._supported: list[Trial] = []
         self.probes: list[Probe] = []
         self.trials: list[Trial] = []
 
     def done(self) -> bool:
         """Whether what is left is noise alone, as far as links that bend make it ring."""
-        return noise_alone(self.current.model, self.data, self.timed.unseen)
+        return noise_alone(self.current.model, self.data, self.timed.validation)
 
     def light(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
         """The best of the candidates whose regressor follows from the measured motion alone."""
         self.screen(effects, without, heavy=False)
         if self._promising and self._promising[0].candidate.effect.has_play:
-            # What winds up passes for play, and has to compete with it.
+            # What is compliant passes for backlash, and has to compete with it.
             light = self._promising
             self.screen(effects, without, heavy=True)
             self._promising = sorted((*light, *self._promising), key=lambda p: -p.score)
@@ -77,12 +77,12 @@ class Round:
     def heavy(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
         """The best of those with a motion of their own, tried where more than noise is left to explain.
 
-        A spring that swings within the whole band leaves what is as white as noise: of rigid machines one that promises
-        much of the residual is refitted all the same.
+        A spring that swings within the whole band leaves a residual as white as noise. On rigid machines, one with a
+        large predicted gain is refitted all the same.
         """
         model = self.current.model
-        left = structure(model, self.data.training, self.data.unseen, self.timed.fitted, self.timed.unseen)
-        quiet = not left.present and left.coloured <= NOISE_ONLY
+        left = structure(model, self.data.training, self.data.validation, self.timed.fitted, self.timed.validation)
+        quiet = not left.present and left.above_white <= NOISE_ONLY
         if (quiet and self._takes_long()) or self.done():
             return None
         self.screen(effects, without, heavy=True)
@@ -91,29 +91,31 @@ class Round:
         self.confirm()
         return self.best()
 
-    def alone(self, without: set[Key]) -> Accepted | None:
-        """The best of what acts close to rest, which runs of the model itself show where the balance shows nothing."""
-        asked = [p for p in self.probes if p.candidate.key not in without and asks_runs(self.current, self.data, p)]
-        before = self.alone_run if asked else None
+    def by_prediction(self, without: set[Key]) -> Accepted | None:
+        """The best of the effects close to rest that closed-loop predictions show and the residual does not."""
+        tried = [
+            p for p in self.probes if p.candidate.key not in without and needs_prediction(self.current, self.data, p)
+        ]
+        before = self.prediction if tried else None
         if before is None:
             return None
-        self.tell(f"round {self.number}: running with {', '.join(p.candidate.label for p in asked)}")
-        ask = partial(told_by_runs, self.current, self.data, before, self.thresholds())
-        answers = self.each(f"round {self.number}: running", ask, asked, lambda p: p.candidate.label, refit_effort)
-        for one, answer in zip(asked, answers, strict=True):
+        self.tell(f"round {self.number}: running with {', '.join(p.candidate.label for p in tried)}")
+        ask = partial(judged_by_prediction, self.current, self.data, before, self.thresholds())
+        answers = self.each(f"round {self.number}: running", ask, tried, lambda p: p.candidate.label, refit_effort)
+        for one, answer in zip(tried, answers, strict=True):
             if not isinstance(answer, Trial):
                 self.refused[one.candidate.key] = answer.reason if isinstance(answer, Failure) else answer
-        believed = [answer for answer in answers if isinstance(answer, Trial)]
-        if not believed:
+        supported = [answer for answer in answers if isinstance(answer, Trial)]
+        if not supported:
             return None
-        best = Accepted(max(believed, key=lambda trial: trial.unseen.score), ())
+        best = Accepted(max(supported, key=lambda trial: trial.validation.score), ())
         self.refused.pop(best.key, None)
-        self._ranking[best.key] = replace(self._ranking[best.key], unseen=best.trial.unseen.relative)
+        self._ranking[best.key] = replace(self._ranking[best.key], unseen=best.trial.validation.relative)
         self.mark(best.key)
         return best
 
     def again(self, several: set[Key]) -> Accepted | None:
-        """The best of a few that were believed before another one came in, if any still is."""
+        """The best of a few that were accepted before another one came in, if any still is."""
         self.screen([name for name, _ in several], set(), heavy=False, only=several)
         self.confirm()
         return self.best()
@@ -124,15 +126,15 @@ class Round:
         return max(len(self._ranking), self._chosen_from)
 
     def elsewhere(self, best: Accepted) -> set[Key]:
-        """What is believed, too, at other joints than what comes in, and has no motion of its own."""
+        """What is accepted, too, at other joints than what comes in, and has no motion of its own."""
         model = self.current.model
         here = joint_at(model, best.key[1])
-        believed = [trial.probe.candidate for trial in self._believed]
-        light = [one for one in believed if not self._is_heavy(one) and joint_at(model, one.site)]
+        supported = [trial.probe.candidate for trial in self._supported]
+        light = [one for one in supported if not self._is_heavy(one) and joint_at(model, one.site)]
         return {one.key for one in light if here and joint_at(model, one.site) != here}
 
     def weak(self, best: Accepted) -> bool:
-        """Whether what would come in leaves most of the unseen gap, so that it may only imitate what moves by itself.
+        """Whether the best candidate leaves most of the validation error, so that it may only imitate a hidden motion.
 
         A motion that nobody measures shows in the efforts of all joints, in part as any of several lighter effects
         would: what explains little has to compete with it. Where links bend already, or drives have states, its probes
@@ -183,8 +185,8 @@ class Round:
     def _is_heavy(self, candidate: Candidate) -> bool:
         """Whether it adds a motion that nobody measures, which has to be simulated for every probe.
 
-        Where the log holds that motion, it is evidence like any. So is the bending of a rigid beam beside others that
-        bend, and a play between links that do not, which its flights tell at once: light effects would only imitate
+        Where the log holds that motion, it is evidence like any. The same holds for bending of a rigid beam beside
+        flexible ones, and for a backlash between rigid links, which its flights show: light effects would only imitate
         them.
         """
         model, motion = self.current.model, candidate.effect.motion
@@ -196,17 +198,17 @@ class Round:
         return bool(motion) and not logged & set(self.data.training.shown)
 
     def confirm(self) -> None:
-        """Refit with the most promising ones and judge them on unseen data."""
+        """Refit with the most promising ones and judge them on validation data."""
         short_list = most_promising(self._promising)
         if short_list:
             self.tell(f"round {self.number}: refitting with {', '.join(p.candidate.label for p in short_list)}")
         twins = same_models(short_list)
         self._refit([one for one in short_list if one.candidate.key not in twins])
-        believed = {trial.probe.candidate.key for trial in self._believed}
-        again = [one for one in short_list if twins.get(one.candidate.key) in believed]
+        supported = {trial.probe.candidate.key for trial in self._supported}
+        again = [one for one in short_list if twins.get(one.candidate.key) in supported]
         self._refit(again)
-        if any(EFFECTS[name].late for name, _ in believed):
-            # Which of them it is no promise tells, so that all of its kind compete with it.
+        if any(EFFECTS[name].late for name, _ in supported):
+            # Predicted gains do not discriminate delays, so that all of them compete.
             kin = [one for one in self._promising if one.candidate.effect.late]
             kin = [one for one in kin if one not in short_list]
             self._refit(kin)
@@ -223,14 +225,14 @@ class Round:
             )
 
     def _refit(self, short_list: Sequence[Probe]) -> None:
-        """Refit with each of some candidates, and believe or refuse it."""
+        """Refit with each of some candidates, and accept or refuse it."""
         if drives_on_tangent(self.current.model, self.data.training) and len(short_list) > 1:
-            # What one of them explains tells which of the others are worth more than a glance.
+            # What one of them explains tells which of the others are worth a refit.
             first = max(short_list, key=lambda p: p.drop)
-            believed = len(self._believed)
+            supported = len(self._supported)
             self._tried([first], np.inf)
             rest = [one for one in short_list if one is not first]
-            left = [float(t.judged.fit.residual @ t.judged.fit.residual) for t in self._believed[believed:]]
+            left = [float(t.judged.fit.residual @ t.judged.fit.residual) for t in self._supported[supported:]]
             self._tried(rest, min(left, default=np.inf))
         else:
             self._tried(short_list, np.inf)
@@ -246,17 +248,17 @@ class Round:
             if isinstance(trial, Failure):
                 self.refused[key] = trial.reason
                 continue
-            self._ranking[key] = replace(self._ranking[key], unseen=trial.unseen.relative)
+            self._ranking[key] = replace(self._ranking[key], unseen=trial.validation.relative)
             self.trials.append(trial)
             if reason := self._refused(trial, thresholds):
                 self.refused[key] = reason
             else:
-                self._believed.append(trial)
+                self._supported.append(trial)
 
     def _confirmed(self, one: Probe, rival: float) -> Trial:
-        """A trial; of a play between soft contacts that does not simulate, that between hard ones if it does better.
+        """A trial; a backlash with soft contacts that does not simulate gives way to hard ones if these do better.
 
-        The balance hardly tells how hard the contacts are, for errors of the flights add up between lively ones.
+        The residual hardly tells how hard the contacts are, for errors of the flights add up between lively ones.
         """
         trial = confirm(self.current, self.data, one, rival)
         if not is_read_off(self.current.model, self.data.training, one.candidate) or not worse_in_simulation(trial):
@@ -266,7 +268,7 @@ class Round:
         return trial if worse_in_simulation(harder) else harder
 
     def thresholds(self) -> Thresholds:
-        """What is asked of an effect when so many have been tried."""
+        """Thresholds for an effect when so many have been tried."""
         return Thresholds(self.tried * self.number, min(m.dt for m in self.data.training.motions))
 
     @cached_property
@@ -275,76 +277,76 @@ class Round:
         return in_time(self.current, self.data)
 
     def _refused(self, trial: Trial, thresholds: Thresholds) -> str:
-        """Why a trial is not believed, or ""."""
+        """Why a trial is not accepted, or ""."""
         candidate = trial.probe.candidate
         reason = refuse_trial(trial, thresholds) or self._only_timing(trial, thresholds)
-        if reason and self._run_asks(trial, thresholds):
+        if reason and self._is_predicted(trial, thresholds):
             reason = ""
         if not reason and is_read_off(self.current.model, self.data.training, candidate):
-            reason = only_winds_up(trial.judged.model, candidate.site, self.data.training)
+            reason = only_compliant(trial.judged.model, candidate.site, self.data.training)
         return reason or only_ringing(self.current, self.data, trial)
 
-    def _run_asks(self, trial: Trial, thresholds: Thresholds) -> bool:
-        """Whether something late gains little and surely, and runs of the model itself along unseen records ask for it.
+    def _is_predicted(self, trial: Trial, thresholds: Thresholds) -> bool:
+        """Whether a delay gains little and surely, and closed-loop predictions of validation records support it.
 
-        What sticks is late in a balance of effort, and so imitates it, but not in a run; nor does a run know or mind to
-        which of two samples a command was logged.
+        Stiction imitates a delay in an inverse-dynamics residual, but not in a prediction. A prediction also does not
+        depend on the sample to which a command was logged.
         """
         late = is_late(trial.probe.candidate.effect, trial.judged.model) and not self._takes_long()
-        if not late or refuse_trial(replace(trial, asked=True), thresholds) or self.alone_run is None:
+        if not late or refuse_trial(replace(trial, supported=True), thresholds) or self.prediction is None:
             return False
-        return asks_for(self.alone_run, trial, self.data, thresholds)
+        return is_supported(self.prediction, trial, self.data, thresholds)
 
     @cached_property
-    def alone_run(self) -> OwnRun | None:
+    def prediction(self) -> ClosedLoopPrediction | None:
         """The model at hand, run along the training records by itself."""
-        return run_without(self.current, self.data)
+        return prediction_without(self.current, self.data)
 
     def _only_timing(self, trial: Trial, thresholds: Thresholds) -> str:
-        """Why a trial that would be believed does no more than a shift of the commands does, or ""."""
+        """Why a trial that would be accepted does no more than a shift of the commands does, or ""."""
         if self.timed.shift == 0.0 or explains_most(trial):
             return ""
-        told = in_time(trial.judged, self.data)
-        before, unseen = self.timed.unseen, told.unseen
-        if slow_shows_it(trial, thresholds):
-            before, unseen = (slow(self.data.unseen, each) for each in (before, unseen))
+        shifted = in_time(trial.judged, self.data)
+        before, validation = self.timed.validation, shifted.validation
+        if low_frequency_shows_it(trial, thresholds):
+            before, validation = (low_frequency(self.data.validation, each) for each in (before, validation))
         if is_late(trial.probe.candidate.effect, trial.judged.model):
-            # What sticks is late by itself, with a shift as without: what is late is judged where nothing sticks.
-            before, unseen = (in_motion(self.data.unseen) * each for each in (before, unseen))
-        timed = gain(before, unseen, segments(self.data.unseen))
-        return refuse_timing(timed, self.timed.shift, thresholds, beside=told.shift)
+            # Stiction looks like a delay, with a shift as without, so delays are judged in motion only.
+            before, validation = (in_motion(self.data.validation) * each for each in (before, validation))
+        timed = gain(before, validation, segments(self.data.validation))
+        return refuse_timing(timed, self.timed.shift, thresholds, beside=shifted.shift)
 
     def best(self) -> Accepted | None:
-        """The one that comes in, if any is believed; fitted to the end it has to stand as it did before."""
-        while self._believed:
-            best = choose(self._believed, self.data)
+        """The one that comes in, if any is accepted; fitted to the end it has to stand as it did before."""
+        while self._supported:
+            best = choose(self._supported, self.data)
             whole = finished(self.current, self.data, best.trial)
             if whole is best.trial:
                 self.mark(best.key)
                 return best
-            place = next(n for n, trial in enumerate(self._believed) if trial is best.trial)
+            place = next(n for n, trial in enumerate(self._supported) if trial is best.trial)
             if reason := self._refused(whole, self.thresholds()):
                 self.refused[best.key] = reason
-                del self._believed[place]
+                del self._supported[place]
             else:
-                self._believed[place] = whole
+                self._supported[place] = whole
         return None
 
     def mark(self, accepted: Key) -> None:
         """Note in the ranking what comes in."""
-        for key, told in self._ranking.items():
-            self._ranking[key] = replace(told, accepted=key == accepted)
+        for key, entry in self._ranking.items():
+            self._ranking[key] = replace(entry, accepted=key == accepted)
 
     def after(self, judged: Judged) -> Round:
         """The round that follows if ``judged`` is the model at hand."""
         return Round(judged, self.data, self.number + 1, self.tell, self.each)
 
     def ranked(self) -> list[RankedCandidate]:
-        """Candidates of this round: what was accepted, what helped on unseen data, then by what screening promises."""
-        return sorted(self._ranking.values(), key=_promise)
+        """Candidates of this round: what was accepted, what helped on validation data, then by predicted gain."""
+        return sorted(self._ranking.values(), key=_by_gain)
 
 
-def _promise(candidate: RankedCandidate) -> tuple[int, float]:
+def _by_gain(candidate: RankedCandidate) -> tuple[int, float]:
     """Sorts a ranking."""
     if candidate.accepted:
         return 0, 0.0

@@ -1,7 +1,7 @@
-"""Cheap look at every candidate: the share of the training residual that its regressor would take away.
+"""Screening of candidates: the share of the training residual that the regressor of each explains.
 
-For each candidate the parameters that are already free and the new ones are moved together in one linearised step, so
-that a candidate is never credited with what a better value of a known parameter would have done.
+For each candidate one linearised step moves the free parameters and the new ones together. So a candidate gains nothing
+that a better value of a known parameter would explain.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from vpm.discrepancy.backlash import is_read_off, near_prior, read_off
 from vpm.discrepancy.candidates import Candidate
 from vpm.discrepancy.first_step import is_outside, linear_step, softened, step_without
-from vpm.discrepancy.place import free_place
-from vpm.discrepancy.play import believed, is_read_off, read_off
+from vpm.discrepancy.joint_compliance import best_start, is_searched
+from vpm.discrepancy.location_parameter import free_location
 from vpm.discrepancy.structural import LOSSES, in_series
-from vpm.discrepancy.winding import best_start, is_looked_for
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import bends
 from vpm.identify.identifiability import closest_column, is_alias
@@ -51,7 +51,7 @@ class Probe:
     free : tuple of str
         Dotted names of the effect's parameters that the data can see.
     held : tuple of Alias
-        Those that they cannot tell from others.
+        Those that they do not discriminate from others.
     invisible : tuple of str
         Those without any influence at the start values.
     values, std : dict
@@ -123,13 +123,13 @@ def _short(model: Model, candidate: Candidate, name: str) -> str:
 def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *, hard: bool = False) -> Probe:
     """Try all start values of a candidate and keep the best, a possible one before an impossible one.
 
-    A play that is read off the motion has one start, with the contacts that suit it or ``hard`` ones.
+    A backlash that is read off the motion has one start, with the contacts that suit it or ``hard`` ones.
     """
     if is_read_off(base.model, data, candidate):
-        base = replace(base, model=believed(base.model, data.nominal, base.free))
+        base = replace(base, model=near_prior(base.model, data.nominal, base.free))
         start = read_off(base.model, base.free, data, candidate, hard=hard)
         return _probe_start(base, data, start, still=True)
-    if (found := _looked_for(base, data, candidate)) is not None:
+    if (found := _searched(base, data, candidate)) is not None:
         return found
     probes = [_probe_start(base, data, candidate, start) for start in candidate.starts]
     best = max(probes, key=lambda p: p.drop)
@@ -141,9 +141,9 @@ def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *,
     return best
 
 
-def _looked_for(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe | None:
-    """A drive that winds up, as it stands at the best of its starts; None where none of them leaves less."""
-    if not is_looked_for(base.model, data, candidate):
+def _searched(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe | None:
+    """A drive with joint compliance, as it stands at the best of its starts; None where none of them leaves less."""
+    if not is_searched(base.model, data, candidate):
         return None
     start = best_start(base.model, base.jacobian, data, candidate)
     found = None if start is None else _probe_start(base, data, candidate, start, still=True)
@@ -151,7 +151,7 @@ def _looked_for(base: Baseline, data: InverseDynamicsProblem, candidate: Candida
 
 
 def screening_effort(candidate: Candidate) -> float:
-    """Guess of the time that `probe` takes, in starts that do nothing: a play is searched by its flights."""
+    """Guess of the time that `probe` takes, in starts that do nothing: a backlash is searched by its flights."""
     searched = 50.0 if candidate.effect.has_play else 0.0
     return searched + len(candidate.starts) * (1.0 if candidate.neutral else 2.0)
 
@@ -201,7 +201,7 @@ def _probe_start(
         all_columns = [model.index(name) for name in base.free] + columns
         residual, jacobian = data.evaluate(model, model.theta, all_columns)
         known, fresh = jacobian[:, : len(base.free)], jacobian[:, len(base.free) :]
-    place = free_place(data, model, candidate, added, fresh)
+    place = free_location(data, model, candidate, added, fresh)
     if place is not None:
         fresh[:, place.where] = place.column
     keep, held, invisible = sort_columns(
@@ -242,10 +242,10 @@ def _stepped(
 ) -> tuple[Array, Array, float]:
     """Step of the known parameters and those of a candidate, see `linear_step`; some of them stay where they are.
 
-    What a bound holds stays there: beyond it, it would seem to explain what no fit can. A loss of a spring in series
-    that comes out negative stays at its ``start``: it shows with the square of the compliance, so that a step from a
-    start which is clearly stiffer or softer has it wrong, down to its sign. A refit finds it; whether there is a spring
-    at all, its stiffness tells.
+    What a bound holds stays there: beyond it, it would seem to explain what no fit can. A negative loss of a spring in
+    series stays at its ``start``. It depends on the square of the compliance, so a step from a clearly stiffer or
+    softer start gives a wrong value, even a wrong sign. A refit finds it; whether there is a spring at all, its
+    stiffness tells.
     """
     values, std, left = linear_step(data, jacobian, residual)
     held = [i for i, name in enumerate(base.free) if base.pushed.get(name, 0) * values[i] > 0.0]

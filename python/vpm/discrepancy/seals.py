@@ -2,8 +2,8 @@
 
 An asymmetric cylinder has other pressures on its way out than on its way back, so that such friction looks like a dry
 one and a constant force beside it. The sum of the logged pressures tells more than the direction: it changes with the
-load and at each reversal. One number, the share of the piston's area that seals would press with, is fitted together
-with all that is free in the model without any effect, and what is left is compared with what the effects leave.
+load and at each reversal. One number, the share of the piston's area that presses the seals, is fitted together with
+the free parameters of the model without any effect. Its residual is compared with that of the effects.
 """
 
 from __future__ import annotations
@@ -38,22 +38,23 @@ class Seals:
     drive : str
     share, std : float
         Of the piston's area that the seals press with, friction coefficient and all.
-    fitted, unseen : ndarray
-        Residuals on training and unseen records.
+    fitted, validation : ndarray
+        Residuals on training and validation records.
     """
 
     drive: str
     share: float
     std: float
     fitted: Array
-    unseen: Array
+    validation: Array
 
     @property
     def sentence(self) -> str:
         """What it says of the machine."""
         return (
             f"Friction of the seals of {self.drive} that grows with the pressures in its chambers, by "
-            f"{self.share:.3g} ± {self.std:.2g} of the piston's area times their sum, predicts the unseen data better."
+            f"{self.share:.3g} ± {self.std:.2g} of the piston's area times their sum, predicts the validation data "
+            "better."
         )
 
 
@@ -69,12 +70,12 @@ def seals(base: Judged, data: Data) -> Seals | None:
     drives = _pressed(base.model, data.training)
     if not drives:
         return None
-    _, slopes = data.unseen.evaluate(base.model, base.model.theta, [base.model.index(name) for name in base.free])
+    _, slopes = data.validation.evaluate(base.model, base.model.theta, [base.model.index(name) for name in base.free])
     found = []
     for drive in drives:
-        seen, met = (_strokes(problem, drive) for problem in (data.training, data.unseen))
+        seen, met = (_strokes(problem, drive) for problem in (data.training, data.validation))
         for bend in _bends(base.model, data.training, drive, seen):
-            columns = (_column(data.training, seen, bend), _column(data.unseen, met, bend))
+            columns = (_column(data.training, seen, bend), _column(data.validation, met, bend))
             one = _fitted(base, data, drive, columns, slopes)
             if one.share > NORMAL_95 * one.std:
                 found.append(one)
@@ -148,10 +149,10 @@ def _column(problem: InverseDynamicsProblem, strokes: Sequence[_Stroke], bend: f
 def _fitted(base: Judged, data: Data, drive: str, columns: tuple[Array, Array], slopes: Array) -> Seals:
     """One step of everything that is free, beside the size of the friction, in which the effort is linear.
 
-    ``slopes`` are those of the unseen residual by what is free.
+    ``slopes`` are those of the validation residual by what is free.
     """
     known = base.fit.jacobian
     step, std, _ = linear_step(data.training, np.column_stack([known, columns[0]]), base.fit.residual)
     seen = base.fit.residual + known @ step[:-1] + step[-1] * columns[0]
-    met = base.unseen + slopes @ step[:-1] + step[-1] * columns[1]
+    met = base.validation + slopes @ step[:-1] + step[-1] * columns[1]
     return Seals(drive, float(step[-1]), float(std[-1]), seen, met)

@@ -1,4 +1,4 @@
-"""The search: round after round, accept at most one effect and drop what is not needed any more."""
+"""The search: each round accepts at most one effect and drops what is not needed any more."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged, Trial
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
-from vpm.discrepancy.elimination import Stage, drop_replaced, drop_springs, settled, without_tight_bounds
+from vpm.discrepancy.effect_pair import Pair, together
+from vpm.discrepancy.elimination import Stage, drop_replaced, drop_springs, refitted, without_tight_bounds
 from vpm.discrepancy.round import Round, Tell
 from vpm.discrepancy.screening import Probe
 from vpm.discrepancy.side_by_side import SideBySide
-from vpm.discrepancy.together import Pair, together
 from vpm.identify.tangent import has_tangent
 from vpm.model import Model
 
@@ -51,8 +51,8 @@ class Search:
     """Outcome of the whole search, or of what was done of it when Ctrl-C was pressed.
 
     ``last`` is given if nothing has changed since the last effect came in; ``over`` is the last round, if it accepted
-    nothing. ``left`` is told by a ranking: by joint the share of the error power of unseen records that effects leave;
-    ``ranked`` is its model, and ``within_laws`` whether it leaves less than laws are wrong by.
+    nothing. ``left`` comes from a ranking: by joint the share of the error power of validation records that effects
+    leave; ``ranked`` is its model, and ``within_laws`` whether it leaves less than laws are wrong by.
     """
 
     stages: tuple[Stage, ...]
@@ -81,7 +81,7 @@ class Search:
 def search(
     start: Judged, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: SideBySide
 ) -> Search:
-    """Add effects one at a time, and drop earlier ones that later ones replace, until none is believed any more."""
+    """Add effects one at a time, and drop earlier ones that later ones replace, until none is accepted any more."""
     found = Search((Stage("recalibrated", "", "", start),), (), (), (), start.fit.interrupted)
     return found if found.interrupted else further(found, data, effects, limit, tell, each)
 
@@ -101,7 +101,7 @@ def further(
     over = Over()
     interrupted = False
     first = 1 + max((candidate.round for candidate in ranking), default=0)
-    waiting, tried = set[Key](), 0  # what was believed at other joints, too, when the last effect came in, of how many
+    waiting, tried = set[Key](), 0  # what was accepted at other joints, too, when the last effect came in, of how many
     for number in range(first, 2 * limit + 2):
         outcome = Round(stages[-1].judged, data, number, tell, each, tried)
         best, pair, again = None, None, False
@@ -128,7 +128,7 @@ def further(
             over = Over(tuple(outcome.probes), tuple(outcome.trials))
             break
         if has_tangent(best.trial.judged.model, data.training):
-            best = settled(best, data)
+            best = refitted(best, data)
         # Beside the first of a pair, and in a round of a few, little else was tried.
         known = Tried(best.key, outcome.current, tuple(outcome.probes), tuple(outcome.trials))
         last = known if pair is None and not again else None
@@ -163,7 +163,7 @@ def _whole(
     if best is None or outcome.weak(best):
         best = outcome.heavy(effects, without) or best
     pair = together(outcome, best, outcome.data, effects, without) if several else None
-    return best or (outcome.alone(without) if pair is None else None), pair
+    return best or (outcome.by_prediction(without) if pair is None else None), pair
 
 
 def _loosened(stage: Stage, data: Data) -> tuple[Stage, bool]:
@@ -177,13 +177,13 @@ def _listed(refused: dict[Key, str]) -> tuple[RefusedEffect, ...]:
 
 
 def ambiguities(accepted: Sequence[Accepted]) -> tuple[Ambiguity, ...]:
-    """What the data cannot tell from each accepted effect: rivals in its round, and parameters held for its sake."""
+    """What is not discriminated from each accepted effect: rivals in its round, and parameters held beside it."""
     found = []
     for entry in accepted:
         candidate = entry.trial.probe.candidate
         if entry.rivals:
-            reason = "they predict the unseen data equally well"
-            reason = "the records do not tell them apart" if entry.ranked else reason
+            reason = "they predict the validation data equally well"
+            reason = "the records do not discriminate them" if entry.ranked else reason
             found.append(Ambiguity(candidate.effect.name, candidate.site, entry.rivals, reason))
         for alias in entry.trial.held:
             reason = f"{alias.parameter} was held at its start: these data show it only together with {alias.partner}"

@@ -1,4 +1,4 @@
-"""Which candidates of a round are refitted, and which of them are one model under two names."""
+"""Candidates of a round to be refitted, and candidates that are one model under two names."""
 
 from __future__ import annotations
 
@@ -7,19 +7,19 @@ from collections.abc import Sequence
 from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.screening import Probe
 
-#: Candidates refitted in one round: those that promise most for their numbers, and those that promise most of all.
-#: Without the latter, several names of one regressor, as a constant force and a tilted world, crowd out a law of two
-#: numbers that takes more than any of them.
+#: Candidates refitted in one round: those that have the largest predicted gain for their numbers, and those that have
+#: the largest predicted gain of all. Without the latter, several names of one regressor, as a constant force and a
+#: tilted world, crowd out a law of two numbers that takes more than any of them.
 SHORT_LIST, RICHEST = 7, 2
-#: Share by which what screening promises of two candidates may differ by rounding alone.
+#: Share by which the gain that screening predicts of two candidates may differ by rounding alone.
 TWIN = 1e-6
 
 
 def same_models(short_list: Sequence[Probe]) -> dict[Key, Key]:
     """Candidates with a motion of their own that are an earlier one by another name, with that one.
 
-    A rigid link that bends at its root is a drive that winds up: no digit of what screening says parts the two. Refits
-    of such machines take long, so that one of each pair has to be enough where it is refused.
+    A rigid link that bends at its root is a drive with joint compliance: no digit of what screening says parts the two.
+    Refits of such machines take long, so that one of each pair has to be enough where it is refused.
     """
     found: dict[Key, Key] = {}
     for place, one in enumerate(short_list):

@@ -1,4 +1,4 @@
-"""Candidates side by side on all cores, told one by one, in an order that does not depend on the number of cores."""
+"""Candidates in parallel on all cores, reported in an order that does not depend on the number of cores."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class SideBySide:
-    """How many candidates are worked on at a time, and who is told.
+    """How many candidates are computed at a time, and where progress is reported.
 
     Attributes
     ----------

@@ -1,8 +1,8 @@
-"""Where the refit of a candidate begins: at what the recalibration left of known parameters, or at what the file says.
+"""Start values for the refit of a candidate: the recalibrated parameters, or those of the model file.
 
-A drive with states of its own sums up what its command does. Without an effect of that command a recalibration can only
-make the drive answer less, with oil that is soft and a valve that hardly opens, up to the bounds of what is believed.
-From there the true values of both lie behind a ridge once the effect is there, while those of the file are near.
+A drive with states integrates its command. Without an effect of that command, a recalibration can only weaken the
+drive: it softens the oil and closes the valve, up to the bounds of the prior. From there the true values lie behind a
+ridge once the effect is present, while the values of the file are near.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
-"""Start values of effects that bend, wind up or stop what is described as rigid and free.
+"""Start values of effects that add compliance or stops to what is described as rigid and free.
 
-A spring between two masses shows by its resonance, so that stiffnesses are tried at a grid of frequencies.
+A spring between two masses shows by its resonance, so stiffnesses are tried at a grid of frequencies.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ FREQUENCIES = (3.0, 8.0, 20.0, 50.0)
 LOOSE, CONTACT = 0.05, 0.1
 #: Slowest of these in a fit, Hz: a softer spring holds nothing.
 SLOWEST = 0.5
-#: Frequency of the contacts of play, Hz, and widths of it tried, as shares of the half travel.
+#: Frequency of the contacts of backlash, Hz, and widths of it tried, as shares of the half travel.
 CONTACT_FREQUENCY = 50.0
 GAP_SHARES = (5e-4, 3e-3, 1.5e-2)
 #: Places of a stop, as shares of the half travel from its middle.
@@ -47,7 +47,7 @@ Bounds = Mapping[str, tuple[float, float]]
 def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
     """Sites of an effect but those where it cannot show: links that bend already, damping of rigid beams.
 
-    Play is looked for where an actuator drives the joint; elsewhere it needs a joint of its own. Effects of joints may
+    A backlash is tried where an actuator drives the joint; elsewhere it needs a joint of its own. Effects of joints may
     be on the motor side of a transmission too, but for those of links.
     """
     sites = model.sites(effect.site)
@@ -76,9 +76,9 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
 def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str], *, simulated: bool = False) -> str:
     """Why a model with one effect more could not be built, or balanced along the ``measured`` joints, or "".
 
-    A motion with joints that nobody measures is integrated, and there no effect carries its memory along; but it does
-    on the motor side of a joint that is split where that is measured, see `vpm.identify.parts.bending`, and where all
-    is ``simulated``.
+    A motion with joints that no channel measures is integrated, and there effects with a memory are refused. They work
+    on the motor side of a split joint where that is measured, see `vpm.identify.parts.bending`, and where all is
+    ``simulated``.
     """
     remembering = [f"{entry.type.title} at {entry.at}" for entry in model.effects if entry.type.memory]
     split_off = {model.joint_behind(entry.at) for entry in model.effects if entry.type.splits}
@@ -86,11 +86,11 @@ def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str],
     lone = alone and not has_own_drives(model) and not any(entry.type.rotor for entry in model.effects)
     known = simulated or lone
     if effect.memory and tuple(model.joints) != tuple(measured) and not known:
-        return "its memory cannot be balanced beside what moves unseen in this model"
+        return "its memory cannot be balanced beside joints in this model that no channel measures"
     if not effect.motion:
         return ""
     if remembering and not (known and effect.splits):
-        return f"what moves unseen cannot be balanced beside the memory of the {remembering[0]}"
+        return f"a joint that no channel measures cannot be balanced beside the memory of the {remembering[0]}"
     split = [(entry.name, entry.at) for entry in model.effects if entry.type.motion]
     whole = model
     for key in split:
@@ -190,8 +190,8 @@ def softest(model: Model, site: str) -> float:
 def stop_starts(position: Array, residual: Array, middle: float, travel: float, least: float) -> tuple[Starts, Bounds]:
     """The same for the ends of a way: one end, or both where either side looks like one.
 
-    A stop pushes back over the last bit of the way, so the residual (applied - required) there grows from its place on,
-    outwards; the places on either side are those at which such a ramp takes most of it.
+    A stop pushes back over the last part of the travel, so the residual (applied - required) grows outwards from its
+    position. The positions on either side are those at which such a ramp explains most of it.
 
     Parameters
     ----------

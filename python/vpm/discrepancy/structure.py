@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.discrepancy.coloured import noise_shapes, noise_spectrum
 from vpm.discrepancy.floor import QUIET_SHARE, white_level
+from vpm.discrepancy.noise_spectrum import noise_shapes, noise_spectrum
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.model import Model
 
@@ -18,15 +18,15 @@ Array = NDArray[np.float64]
 BINS = 8
 #: One sample in so many is taken for independent of the others.
 THINNED = 2
-#: Share of the unseen residual that a state map must predict, and share of its power in the lowest tenth of the
-#: band (a tenth for white noise), before it counts as structured.
+#: A residual is structured above this share that a state map predicts, or this share of its power in the lowest tenth
+#: of the band (a tenth for white noise).
 PREDICTED_SHARE = 0.1
-SLOW_SHARE = 0.5
-#: So many times what is white in it, it is coloured.
-COLOURED = 1.6
-#: Strains and what else shows of hidden motion sum up the noise of what feeds them, which colours them about so much.
+LOW_FREQUENCY_SHARE = 0.5
+#: A residual of so many times its white part is not white.
+ABOVE_WHITE = 1.6
+#: Strains and other signs of hidden motion integrate noise, which raises them above their white part about so much.
 DRIFTING = 1.5
-#: So many times the relative gap of the training records, that of the unseen ones holds something they never showed.
+#: Validation records with so many times the relative error of the training records hold something new.
 NEW = 4.0
 #: From so many standard deviations of the rank correlation between the two on, its size grows with that of the effort.
 GROWING = 4.0
@@ -39,22 +39,22 @@ class Structure:
     Attributes
     ----------
     predicted : float
-        Share of the unseen residual's mean square that a map of position, velocity, acceleration and effort, drawn from
-        the training residual, predicts.
-    slow : float
+        Share of the validation residual's mean square that a map of position, velocity, acceleration and effort, drawn
+        from the training residual, predicts.
+    low_frequency : float
         Share of its power in the lowest tenth of the retained band.
-    coloured : float
-        How many times the residual is larger than what is white in it, on the records where it is least so.
+    above_white : float
+        Ratio of the residual to its white part, on the records where that is smaller.
     growing : float
         Rank correlation of its size with that of the effort, in standard deviations: noise of sensors and drives does
-        not know how hard the drive works.
+        not depend on the effort.
     new : float
-        Relative gap on unseen records over that on training records.
+        Relative gap on validation records over that on training records.
     """
 
     predicted: float
-    slow: float
-    coloured: float
+    low_frequency: float
+    above_white: float
     growing: float
     new: float
 
@@ -62,30 +62,32 @@ class Structure:
     def present(self) -> bool:
         """Whether the residual is more than noise."""
         follows = self.predicted > PREDICTED_SHARE or self.growing > GROWING
-        return follows or self.slow > SLOW_SHARE or self.coloured > COLOURED or self.new > NEW
+        return follows or self.low_frequency > LOW_FREQUENCY_SHARE or self.above_white > ABOVE_WHITE or self.new > NEW
 
 
 def structure(
     model: Model,
     training: InverseDynamicsProblem,
-    unseen: InverseDynamicsProblem,
+    validation: InverseDynamicsProblem,
     fitted: Array,
     residual: Array,
 ) -> Structure:
-    """Examine the residuals of a fitted model on training and unseen data."""
-    seen_shapes, unseen_shapes = noise_shapes(model, training), noise_shapes(model, unseen)
+    """Examine the residuals of a fitted model on training and validation data."""
+    training_shapes, validation_shapes = noise_shapes(model, training), noise_shapes(model, validation)
     joints = range(len(training.joints))
-    predicted = max(_predicted(model, training, unseen, fitted, residual, joint) for joint in joints)
-    blocks = zip(unseen.blocks, unseen_shapes, strict=True)
-    slow = float(np.mean([_slow_share(residual[block.samples], shape) for block, shape in blocks]))
-    coloured = min(_coloured(training, fitted, seen_shapes), _coloured(unseen, residual, unseen_shapes))
-    growing = min(_growing(model, training, fitted), _growing(model, unseen, residual))
-    seen, fresh = gaps(training, fitted), gaps(unseen, residual)
-    new = max(fresh[c][1] / seen[c][1] if seen[c][1] > 0.0 else 0.0 for c in fresh)
-    return Structure(predicted, slow, coloured, growing, new)
+    predicted = max(_predicted(model, training, validation, fitted, residual, joint) for joint in joints)
+    blocks = zip(validation.blocks, validation_shapes, strict=True)
+    low_frequency = float(np.mean([_low_frequency_share(residual[block.samples], shape) for block, shape in blocks]))
+    above_white = min(
+        _above_white(training, fitted, training_shapes), _above_white(validation, residual, validation_shapes)
+    )
+    growing = min(_growing(model, training, fitted), _growing(model, validation, residual))
+    known, fresh = gaps(training, fitted), gaps(validation, residual)
+    new = max(fresh[c][1] / known[c][1] if known[c][1] > 0.0 else 0.0 for c in fresh)
+    return Structure(predicted, low_frequency, above_white, growing, new)
 
 
-def _coloured(problem: InverseDynamicsProblem, residual: Array, shapes: tuple[Array | None, ...]) -> float:
+def _above_white(problem: InverseDynamicsProblem, residual: Array, shapes: tuple[Array | None, ...]) -> float:
     """Largest ratio of any channel between its residual and the noise in it."""
     ratios = []
     for channel in dict.fromkeys(block.channel for block in problem.blocks):
@@ -119,18 +121,19 @@ def _growing(model: Model, problem: InverseDynamicsProblem, residual: Array) -> 
 def _predicted(
     model: Model,
     training: InverseDynamicsProblem,
-    unseen: InverseDynamicsProblem,
+    validation: InverseDynamicsProblem,
     fitted: Array,
     residual: Array,
     j: int,
 ) -> float:
     """Cross-validated share of one joint's residual that bins of its state explain."""
     states = [
-        np.vstack([_state(model, problem, r, j) for r in range(len(problem.motions))]) for problem in (training, unseen)
+        np.vstack([_state(model, problem, r, j) for r in range(len(problem.motions))])
+        for problem in (training, validation)
     ]
     targets = [
         np.concatenate([values[problem.efforts(r)[j].samples] for r in range(len(problem.motions))])
-        for problem, values in ((training, fitted), (unseen, residual))
+        for problem, values in ((training, fitted), (validation, residual))
     ]
     edges = [np.quantile(column, np.linspace(0, 1, BINS + 1)[1:-1]) for column in states[0].T]
     features = [_features(state, edges, states[0]) for state in states]
@@ -159,7 +162,7 @@ def _features(state: Array, edges: list[Array], reference: Array) -> Array:
     return np.column_stack([*columns, further, against]).astype(np.float64)
 
 
-def _slow_share(residual: Array, shape: Array | None) -> float:
+def _low_frequency_share(residual: Array, shape: Array | None) -> float:
     power = np.abs(np.fft.rfft(residual)) ** 2
     if shape is not None:
         power = power / noise_spectrum(residual, shape, QUIET_SHARE)

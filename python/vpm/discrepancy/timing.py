@@ -1,7 +1,7 @@
-"""What the times of samples leave open: commands may hold up to one sampling interval earlier or later than is said.
+"""Uncertain times of samples: commands may hold up to one sampling interval earlier or later than stated.
 
-Whether a logged command is the one that holds from its sample on, the mean over the interval, or the one that held
-until then, no log says. What a shift by no more than that explains is no physics that is missing.
+A logged command may hold from its sample on, until its sample, or as the mean over the interval; the log does not tell.
+What a shift within one interval explains is therefore no missing physics.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from vpm.identify.identifiability import column_lengths
 
 Array = NDArray[np.float64]
 
-#: A shift matters if it takes so much of the mean square of the residual, on training and on unseen records.
+#: A shift matters if it takes so much of the mean square of the residual, on training and on validation records.
 MATTERS = 0.02
 
 
@@ -27,20 +27,20 @@ class InTime:
 
     Attributes
     ----------
-    fitted, unseen : ndarray
-        Residuals on training and unseen records.
+    fitted, validation : ndarray
+        Residuals on training and validation records.
     shift : float
         How much later the commands hold, in sampling intervals; 0 where a shift does not matter.
     """
 
     fitted: Array
-    unseen: Array
+    validation: Array
     shift: float
 
 
 def in_time(judged: Judged, data: Data) -> InTime:
     """Residuals with the best shift of the commands, to first order; free parameters move with it."""
-    as_it_is = InTime(judged.fit.residual, judged.unseen, 0.0)
+    predict = InTime(judged.fit.residual, judged.validation, 0.0)
     model = judged.model
     later, _ = data.training.later().evaluate(model, model.theta)
     own = judged.fit.residual
@@ -50,18 +50,18 @@ def in_time(judged: Judged, data: Data) -> InTime:
     rest = change + known @ step
     power = float(rest @ rest)
     if power <= 1e-20 * float(change @ change):
-        return as_it_is
+        return predict
     shift = float(np.clip(-(rest @ own) / power, -1.0, 1.0))
     fitted = own + shift * rest
     if gain(own, fitted, segments(data.training)).relative < MATTERS:
-        return as_it_is
+        return predict
     columns = [model.index(name) for name in judged.free]
-    own_unseen, slopes = data.unseen.evaluate(model, model.theta, columns)
-    later_unseen, _ = data.unseen.later().evaluate(model, model.theta)
-    unseen = own_unseen + shift * (later_unseen - own_unseen + slopes @ step)
-    if gain(own_unseen, unseen, segments(data.unseen)).relative < MATTERS:
-        return as_it_is
-    return InTime(fitted, unseen, shift)
+    own_validation, slopes = data.validation.evaluate(model, model.theta, columns)
+    later_validation, _ = data.validation.later().evaluate(model, model.theta)
+    validation = own_validation + shift * (later_validation - own_validation + slopes @ step)
+    if gain(own_validation, validation, segments(data.validation)).relative < MATTERS:
+        return predict
+    return InTime(fitted, validation, shift)
 
 
 def _step(jacobian: Array, residual: Array) -> Array:

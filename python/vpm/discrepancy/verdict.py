@@ -7,13 +7,13 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import ndtri
 
-from vpm.discrepancy.apart import FLOOR_FACTOR, MOSTLY_OPEN, Joints
-from vpm.discrepancy.beliefs import driven_away
 from vpm.discrepancy.candidates import joint_at
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap
+from vpm.discrepancy.prior_departure import driven_away
 from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN, MOST_OF_IT, NEGLIGIBLE
 from vpm.discrepancy.remainder import Remainder
+from vpm.discrepancy.residual_by_joint import FLOOR_FACTOR, MOSTLY_OPEN, Joints
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.structure import Structure
 from vpm.identify import gain, segments
@@ -26,7 +26,7 @@ _OPEN = " What is left at {joints} is structured, and no effect of the catalogue
 
 
 def main_gaps(gap: Mapping[str, ChannelGap]) -> list[ChannelGap]:
-    """Those of the balance."""
+    """Those of the residual."""
     return [g for g in gap.values() if g.mode == "inverse_dynamics"]
 
 
@@ -75,7 +75,7 @@ def verdict(
     structured = left.present and _above([g for g in main if not _is_nothing(g)]) > FLOOR_FACTOR
     remaining = structured or (rest is not None and rest.repeats and not small) or bool(still)
     remaining = remaining and not found.within_laws
-    worst = max(beside if beside and _is_unseen(found, data) else main + beside, key=_clear_of_noise)
+    worst = max(beside if beside and _is_unmeasured(found, data) else main + beside, key=_clear_of_noise)
     numbers = _stages(worst)
     names = ", then ".join(e.trial.probe.candidate.label for e in found.accepted)
     share_left = (worst.after / worst.recalibrated) ** 2 if worst.recalibrated > 0.0 else 0.0
@@ -84,7 +84,7 @@ def verdict(
         return (
             "unexplained",
             "Only together with values that the model file rules out do effects of the catalogue explain the gap: with "
-            f"{names}, {_farthest(away)}. Error on unseen data: {numbers}, {_percent(worst.after, worst)} after.",
+            f"{names}, {_farthest(away)}. Error on validation data: {numbers}, {_percent(worst.after, worst)} after.",
             True,
         )
     observed = min(found.left.values(), default=np.nan)
@@ -99,13 +99,13 @@ def verdict(
             "unexplained",
             f"The residual is structured and {above:.2g} times the noise floor. The effects of the catalogue that come "
             f"closest, {names}, {leave}: they are not the explanation. "
-            f"Error on unseen data: {numbers}, {_percent(worst.after, worst)} after.",
+            f"Error on validation data: {numbers}, {_percent(worst.after, worst)} after.",
             True,
         )
     if found.accepted:
         return (
             "effect_found",
-            f"Missing: {names}. Error on unseen data: {numbers}, {_percent(worst.after, worst)} after."
+            f"Missing: {names}. Error on validation data: {numbers}, {_percent(worst.after, worst)} after."
             + (_OPEN.format(joints=", ".join(joints.open)) if apart else _REST if remaining else ""),
             remaining,
         )
@@ -113,7 +113,7 @@ def verdict(
         return (
             "unexplained",
             f"The residual is structured and {above:.2g} times the noise floor, and no effect of the catalogue "
-            f"explains it. Error on unseen data: {numbers}.",
+            f"explains it. Error on validation data: {numbers}.",
             True,
         )
     return (*_nothing_missing(data, nominal, recalibrated, (main, beside), worst), False)
@@ -127,18 +127,18 @@ def _is_worse_than_none(gap: ChannelGap) -> bool:
 def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], observed: float) -> bool:
     """Whether named effects leave most of a measured effort where they act, or more than a model without any force.
 
-    No noise excuses that: the floor of a drive that gives next to nothing is as large as its effort. A play is hard to
-    balance: where little is left of what an observer sees, that says more.
+    No noise excuses that: the floor of a drive that gives next to nothing is as large as its effort. A backlash is hard
+    to balance: where little is left of what an observer sees, that says more.
     """
     if observed <= MOSTLY_OPEN and any(effect.type.has_play for effect in found.final.model.effects):
         return False
-    told = [gap[channel] for joint in _joints(found) if (channel := f"{joint}.effort") in gap]
-    most = any(g.after**2 > MOST_OF_IT * g.signal**2 for g in told)
+    efforts = [gap[channel] for joint in _joints(found) if (channel := f"{joint}.effort") in gap]
+    most = any(g.after**2 > MOST_OF_IT * g.signal**2 for g in efforts)
     return most or any(map(_is_worse_than_none, main_gaps(gap)))
 
 
-def _is_unseen(found: Search, data: Data) -> bool:
-    """Whether all that was named acts at joints that a balance does not see."""
+def _is_unmeasured(found: Search, data: Data) -> bool:
+    """Whether all that was named acts at joints that the residual does not see."""
     at = _joints(found)
     return bool(at) and not at & {*data.training.joints, ""}
 
@@ -160,15 +160,15 @@ def _is_described_better(rest: Remainder | None) -> bool:
 
 
 def _is_explanation(found: Search, observed: float, mostly_open: bool) -> bool:
-    """Whether what was found explains the gap, where a balance of effort is said to leave it mostly open or not.
+    """Whether what was found explains the gap, where the residual is said to leave it mostly open or not.
 
-    A machine that an observer keeps beside unseen records tells it where it is clear: effects that leave little in the
-    channel ``observed`` best are the explanation of what is missing there, those that leave more than all none.
+    The error of an observer along validation records decides where it is clear. Effects that leave little in the
+    channel ``observed`` best are the explanation there; those that leave more than there was are none.
     """
     if found.within_laws:
         return True
     if np.isnan(observed):
-        return _told_by_runs(found) or not mostly_open
+        return _shown_by_predictions(found) or not mostly_open
     return observed <= MOSTLY_OPEN or (observed < 1.0 and not mostly_open)
 
 
@@ -178,26 +178,28 @@ def _farthest(away: Mapping[str, float]) -> str:
     return f"{name} would be off by {times:.1f} times its stated uncertainty"
 
 
-def _told_by_runs(found: Search) -> bool:
-    """Whether runs of the model itself told all that was accepted, and it explains most of what they had left.
+def _shown_by_predictions(found: Search) -> bool:
+    """Whether all accepted effects come from closed-loop predictions, and explain most of their error.
 
-    What a balance of effort hardly sees may leave as much of it as there was, and be the explanation.
+    What the inverse-dynamics residual hardly shows may leave as much of it as there was, and be the explanation.
     """
-    return all(entry.trial.alone and entry.trial.unseen.relative >= MOST_OF_IT for entry in found.accepted)
+    return all(
+        entry.trial.from_prediction and entry.trial.validation.relative >= MOST_OF_IT for entry in found.accepted
+    )
 
 
 def _nothing_missing(
     data: Data,
     nominal: Judged,
     recalibrated: Judged,
-    told: tuple[list[ChannelGap], list[ChannelGap]],
+    both: tuple[list[ChannelGap], list[ChannelGap]],
     worst: ChannelGap,
 ) -> tuple[str, str]:
-    """Of gaps of the balance, and of an observer of joints that it does not see."""
-    (main, beside), numbers = told, _stages(worst)
+    """Of gaps of the residual, and of an observer of joints that it does not see."""
+    (main, beside), numbers = both, _stages(worst)
     small = max(g.before / g.signal if g.signal > 0.0 else 0.0 for g in main) <= NEGLIGIBLE
     agrees = small or max((g.before / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main) <= FLOOR_FACTOR
-    better = gain(nominal.unseen, recalibrated.unseen, segments(data.unseen))
+    better = gain(nominal.validation, recalibrated.validation, segments(data.validation))
     balanced = not agrees and better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL))
     if balanced or any(_was_closed(g) for g in beside):
         closed = max(main + beside, key=_closed)
@@ -205,9 +207,10 @@ def _nothing_missing(
             numbers = f"{_stages(closed)}; in another channel it grew, {numbers}"
         return (
             "parameters_only",
-            f"Nothing is missing: other values of the known parameters close the gap. Error on unseen data: {numbers}.",
+            "Nothing is missing: other values of the known parameters close the gap. "
+            f"Error on validation data: {numbers}.",
         )
-    return "no_disagreement", f"The nominal model agrees with the data. Error on unseen data: {numbers}."
+    return "no_disagreement", f"The nominal model agrees with the data. Error on validation data: {numbers}."
 
 
 def _was_closed(gap: ChannelGap) -> bool:

@@ -1,4 +1,4 @@
-"""States of a record as seen from the site of an effect: what its residual can be drawn over."""
+"""States of a record at the site of an effect, over which its residual is drawn."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vpm.model import Model
 Array = NDArray[np.float64]
 
 #: Axis, words, unit and values at each sample.
-Seen = tuple[str, str, str, Array]
+ExcitationRange = tuple[str, str, str, Array]
 
 #: Bins over a state in which the part of an effect is measured that the state explains.
 BINS = 40
@@ -54,9 +54,9 @@ class View:
         """The same on all samples, without the filter of the residual."""
         return replace(self, fine=True)
 
-    def best(self, part: Array, counts: NDArray[np.bool_]) -> Seen:
+    def best(self, part: Array, counts: NDArray[np.bool_]) -> ExcitationRange:
         """The axis of the effect's signature that explains most of ``part``; the earlier one if it hardly matters."""
-        best: Seen | None = None
+        best: ExcitationRange | None = None
         most = 0.0
         entry = EFFECTS.get(self.key[0])
         for axis in (entry.signature if entry is not None else signature_of(self.key[0])).lives_in:

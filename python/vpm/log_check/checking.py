@@ -76,8 +76,8 @@ def check_log(
     findings: list[Finding] = []
     shares: dict[str, float] = {}
     for record in as_records(experiments):
-        told, left = check.of(record, model.channel_table if table is None else table)
-        findings += told
+        odd, left = check.of(record, model.channel_table if table is None else table)
+        findings += odd
         for name, share in left.by_channel.items():
             shares[name] = max(share, shares.get(name, 0.0))
     return LogCheck(tuple(sorted(_together(findings), key=lambda one: not one.mistake)), shares)
@@ -105,8 +105,10 @@ def refuse_mistakes(
     except (VpmError, ArithmeticError):
         return ()
     if found.mistakes:
-        told = ". ".join(str(one) for one in found.mistakes)
-        raise ExperimentError(f"{told}. Nothing is concluded from such a log; to do it anyway, leave out its check")
+        sentences = ". ".join(str(one) for one in found.mistakes)
+        raise ExperimentError(
+            f"{sentences}. Nothing is concluded from such a log; to do it anyway, leave out its check"
+        )
     return found.findings
 
 
@@ -138,13 +140,13 @@ class _Check:
         for correction, related in wrong_scales(model, whole, units, self.settings):
             found.append(_of_related(correction, related, units, correction.entries(table), record.name))
         tangent = self.judge.tangent(part, left)
-        if tangent is not None and (unseen := self.judge.unseen(tangent)):
-            stretches.append(_of_parameters(unseen, record.name))
+        if tangent is not None and (undetermined := self.judge.undetermined(tangent)):
+            stretches.append(_of_parameters(undetermined, record.name))
         return [*found, *stretches], left
 
 
 def _beginning(record: Experiment, outputs: Sequence[str], settings: Settings) -> Experiment:
-    """The beginning of the motion of a record, from rest if it begins so: no observer knows what swings unseen."""
+    """The beginning of the motion of a record, from rest if it begins so: no observer knows unmeasured oscillations."""
     fewest, most = settings.samples
     speeds = np.zeros(len(record))
     for name in outputs:
@@ -232,8 +234,8 @@ def _evidence(found: Explanation, place: str) -> str:
     return f"of {place} the model leaves {left} unexplained as it is, and {then} with {corrected}"
 
 
-def _of_parameters(unseen: Sequence[str], record: str) -> Finding:
-    sentence = f"the beginning of its motion says next to nothing of {', '.join(unseen)}"
+def _of_parameters(undetermined: Sequence[str], record: str) -> Finding:
+    sentence = f"the beginning of its motion says next to nothing of {', '.join(undetermined)}"
     return Finding("unseen", (), (record,), sentence, "fit other parameters, or move the machine so that they matter")
 
 

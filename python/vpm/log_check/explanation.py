@@ -1,4 +1,4 @@
-"""The mistake of a channel table that explains what a model leaves of a record, if one does."""
+"""The mistake of a channel table that explains the error of a model on a record, if one does."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ class Explainer:
         return self._mirrored(found, used)
 
     def _mirrored(self, found: Explanation, used: Sequence[str]) -> Explanation:
-        """With the other side of a delay: that some channels are late, or all others early, no log can tell apart."""
+        """With the other side of a delay: some channels late is the same in a log as all others early."""
         correction = found.correction
         others = tuple(name for name in used if name not in correction.channels)
         if others not in {one.channels for one in delays(self.model, used, self.settings)} or not correction.delay:
@@ -223,10 +223,10 @@ class Explainer:
     def _late(
         self, part: Experiment, used: Sequence[str], tangent: Tangent | None, left: Shares, known: float
     ) -> list[_Trial]:
-        """The few delays that promise to leave least if parameters give way: friction looks much like a delay.
+        """The few delays that are predicted to leave least if parameters give way: friction looks much like a delay.
 
-        From fitted values, else from those of the model: a long delay drives fitted ones far away. They have to promise
-        about as little as the best correction that is ``known``.
+        From fitted values, else from those of the model: a long delay drives fitted ones far away. They have to be
+        predicted to leave about as little as the best correction that is ``known``.
         """
         some = left.above(self.settings.negligible)
         corrections = self._about(delays(self.model, used, self.settings), some, left)
@@ -234,32 +234,32 @@ class Explainer:
         for at in (tangent, None):
             if (near := at or self.judge.tangent(part, self.judge.measured(part), FORCES)) is None:
                 continue
-            promised = partial(self._promised, part=part, tangent=near)
-            few = self._few(self.each("trying", promised, corrections, self._words), left, known)
-            settle = partial(self._settled, part=part, tangent=near, left=left)
-            settled = [one for one in self.each("refining", settle, few, self._words) if not isinstance(one, Failure)]
-            found += [one for one in settled if abs(one.correction.delay) > least]
+            predicted = partial(self._predicted, part=part, tangent=near)
+            few = self._few(self.each("trying", predicted, corrections, self._words), left, known)
+            fit = partial(self._fitted, part=part, tangent=near, left=left)
+            fitted = [one for one in self.each("refining", fit, few, self._words) if not isinstance(one, Failure)]
+            found += [one for one in fitted if abs(one.correction.delay) > least]
             # A fit beside a delay that came to nothing is one without, and may have gone on to a better end.
-            without = [one.after for one in settled if abs(one.correction.delay) <= least]
+            without = [one.after for one in fitted if abs(one.correction.delay) <= least]
             left = min([left, *without], key=lambda shares: shares.cost)
             found = [one._replace(before=left) for one in found]
             if self._known(found) < math.inf or known < math.inf or not left.above(self.settings.harmless):
                 break
         return found
 
-    def _promised(self, correction: Correction, part: Experiment, tangent: Tangent) -> tuple[Correction, Shares]:
-        """A delay by which a tangent promises to leave least, by secants: what is left is not linear in a long one."""
+    def _predicted(self, correction: Correction, part: Experiment, tangent: Tangent) -> tuple[Correction, Shares]:
+        """The delay for which a tangent predicts the least error, by secants: errors are not linear in long ones."""
         shares = tangent.shares
         for _ in range(self.settings.rounds):
             corrected = correction.applied(part)
             there = self.judge.measured(corrected, tangent.shares.values)
             if there.residual is None:
                 return correction, there
-            shares, share = tangent.promised(corrected, part, there.residual)
+            shares, share = tangent.predicted(corrected, part, there.residual)
             delay = self._possible(share * correction.delay)
             if abs(delay) <= self.settings.held * part.dt:
                 return correction, tangent.shares
-            near = abs(delay - correction.delay) < self.settings.settled * part.dt
+            near = abs(delay - correction.delay) < self.settings.delay_tolerance * part.dt
             correction = replace(correction, delay=delay)
             if near:
                 break
@@ -279,13 +279,13 @@ class Explainer:
                 hopeful.append(correction)
         return hopeful[: self.settings.finalists]
 
-    def _settled(self, correction: Correction, part: Experiment, tangent: Tangent, left: Shares) -> _Trial:
+    def _fitted(self, correction: Correction, part: Experiment, tangent: Tangent, left: Shares) -> _Trial:
         """A delay with what is left before and after it is corrected, fitted with the parameters and all forces."""
-        finer, after = self.judge.late(part, correction, tangent)
-        return _Trial(finer, left, after)
+        refined, after = self.judge.fit_delay(part, correction, tangent)
+        return _Trial(refined, left, after)
 
     def _possible(self, delay: float) -> float:
-        return float(np.clip(delay, -self.settings.latest, self.settings.latest))
+        return float(np.clip(delay, -self.settings.longest_delay, self.settings.longest_delay))
 
     def _explains(self, correction: Correction, before: Shares, after: Shares, count: int = 1) -> bool:
         """Whether a correction explains what a model leaves, or by which values it leaves nothing.

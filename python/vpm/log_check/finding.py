@@ -25,7 +25,7 @@ class Finding(Storable):
     repair : str
         What to do about it.
     mistake : bool
-        No machine does that by itself: nothing that follows from the log can be believed.
+        No machine does that by itself: nothing that follows from the log can be trusted.
     factor : float
         By which the values have to be multiplied.
     delay : float
@@ -67,8 +67,8 @@ class LogCheck(Result):
     findings : tuple of Finding
         Mistakes first.
     shares : dict of str to float
-        What the model leaves of each channel when its uncertain parameters and friction are fitted and every mistake
-        is corrected, in the worst record, as a share of the error power of free masses: 0 explains it, 1 nothing of it.
+        Error of the model in each channel of the worst record, with uncertain parameters and friction fitted and every
+        mistake corrected, as a share of the error power of free masses: 0 explains all, 1 nothing.
     """
 
     findings: tuple[Finding, ...]

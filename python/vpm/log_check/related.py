@@ -1,4 +1,4 @@
-"""Channels that another one tells: references by what follows them, accelerations by the motion."""
+"""Channels that follow from another one: references from measured channels, accelerations from the motion."""
 
 from __future__ import annotations
 
@@ -25,25 +25,25 @@ class Related:
     Attributes
     ----------
     channel, teller : str
-    values, told : ndarray, shape (N,)
+    values, expected : ndarray, shape (N,)
         What the channel holds, and what it should.
     """
 
     channel: str
     teller: str
     values: Array
-    told: Array
+    expected: Array
 
     def error(self, factor: float = 1.0) -> float:
         """Mean square of what ``factor`` times the channel is off, as a share of the variance of what tells it."""
-        moved = float(np.var(self.told))
-        return float(np.mean((factor * self.values - self.told) ** 2)) / moved if moved > 0.0 else 0.0
+        moved = float(np.var(self.expected))
+        return float(np.mean((factor * self.values - self.expected) ** 2)) / moved if moved > 0.0 else 0.0
 
     @property
     def least(self) -> float:
         """What the best of all factors leaves, see `error`."""
         power = float(np.mean(self.values**2))
-        return self.error(float(np.mean(self.values * self.told)) / power) if power > 0.0 else self.error()
+        return self.error(float(np.mean(self.values * self.expected)) / power) if power > 0.0 else self.error()
 
 
 def wrong_scales(
@@ -94,5 +94,5 @@ def _accelerations(model: Model, record: Experiment) -> Iterator[Related]:
         if len(record) <= 4 * edge:
             continue
         rate = differentiate(lowpass(record[position], record.rate, cutoff), record.dt)
-        told, values = differentiate(rate, record.dt), lowpass(record[acceleration], record.rate, cutoff)
-        yield Related(acceleration, f"the second derivative of {position}", values[inside], told[inside])
+        expected, values = differentiate(rate, record.dt), lowpass(record[acceleration], record.rate, cutoff)
+        yield Related(acceleration, f"the second derivative of {position}", values[inside], expected[inside])

@@ -26,7 +26,7 @@ class Settings:
     samples : tuple of int
         Fewest and most samples of that stretch.
     fewest : int
-        Fewest samples of which a noise can be told.
+        Fewest samples from which a noise is estimated.
     judged : int
         Fewest samples of a record that say anything of units and clocks.
     doubtful : float
@@ -71,15 +71,15 @@ class Settings:
         Factor, or its inverse, from which on a wrong scale is no fault of a machine.
     delays : tuple of float
         Delays of channels that are tried, s: by these the change of what is left is taken as linear.
-    latest : float
-        Longest delay that is told, s.
+    longest_delay : float
+        Longest delay that is reported, s.
     held : float
         Delays of fewer samples are how commands are held from one sample to the next.
     harmless : float
-        Share of a channel that harms no conclusion. A delay that leaves no more is told, but is no mistake; of such
+        Share of a channel that harms no conclusion. A delay that leaves no more is reported, but is no mistake; of such
         ones no two are tried.
-    settled : float
-        A delay is as the record has it when it moves by less, in samples, while it is looked for.
+    delay_tolerance : float
+        A search for a delay ends when the delay moves by less, in samples.
     stuck : int
         Samples of one value, in a channel with noise, that no sensor gives by chance.
     jump : float
@@ -98,10 +98,10 @@ class Settings:
         Two octaves have the same noise if its powers differ by less than this factor.
     digits : float
         Noise of fewer roundings of a floating-point number is none.
-    unseen : float
+    undetermined : float
         A record does not show a parameter if it leaves more than this share of its stated uncertainty.
     coarse : float
-        Resolution, as a share of the range of a channel, from which on it is told.
+        Resolution, as a share of the range of a channel, from which on it is reported.
     """
 
     band: float = 1.0
@@ -133,10 +133,10 @@ class Settings:
     rounds: int = 3
     smallest: float = 2.0
     delays: tuple[float, ...] = (0.01, 0.05)
-    latest: float = 0.1
+    longest_delay: float = 0.1
     held: float = 0.75
     harmless: float = 1e-3
-    settled: float = 0.1
+    delay_tolerance: float = 0.1
     stuck: int = 20
     jump: float = 3.0
     clipped: float = 0.01
@@ -146,5 +146,5 @@ class Settings:
     filtered: float = 0.05
     level: float = 2.0
     digits: float = 8e3
-    unseen: float = 0.9
+    undetermined: float = 0.9
     coarse: float = 0.01

@@ -1,4 +1,4 @@
-"""What a model leaves of a record, as a share of what masses leave on which nothing acts."""
+"""Error of a model on a record, as a share of the error of masses without forces."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vpm.catalogue.effects import BUILT_IN
 from vpm.experiment import Experiment
 from vpm.initial import initial_state
 from vpm.log_check.correction import Correction
-from vpm.log_check.late import Late, with_delay, without_delay
+from vpm.log_check.delay import Delayed, with_delay, without_delay
 from vpm.log_check.settings import Settings
 from vpm.model import Model
 from vpm.observer import measured_outputs
@@ -43,7 +43,7 @@ PIECES = 200
 
 @dataclass(frozen=True, eq=False)
 class Shares:
-    """What is left of each channel, between 0 and 1: nobody has to believe a model that leaves more than nothing does.
+    """What is left of each channel, between 0 and 1: a model that leaves more than no model is not used.
 
     A share does not depend on the scale of its channel, so that records in other units can be compared by it.
 
@@ -153,10 +153,10 @@ class Judge:
         except ASTRAY:
             return self.measured(record)
         shares = self._shares(observed, found.residual, observer, found.structure.theta)
-        return self._believed(shares, found.structure)
+        return self._with_departure(shares, found.structure)
 
     def tangent(self, record: Experiment, at: Shares, forces: Collection[str] = FRICTION) -> Tangent | None:
-        """How what is left changes with the parameters, about some values of them; None where that cannot be told."""
+        """Change of the error with the parameters, about some values of them; None where that cannot be computed."""
         if at.residual is None:
             return None
         observer, structure = self._observer(record), replace(self._structure(record, forces), theta=at.values)
@@ -194,28 +194,28 @@ class Judge:
         seen = _seen(observed)
         kept[seen] = (slopes.reshape(len(sizes), -1, slopes.shape[1]) * sizes).transpose(1, 0, 2)
         shares = self._shares(observed, fitted.residual, observer, fitted.structure.theta)
-        return Tangent(fitted.structure, fitted.residual, kept, self._believed(shares, fitted.structure))
+        return Tangent(fitted.structure, fitted.residual, kept, self._with_departure(shares, fitted.structure))
 
-    def late(self, record: Experiment, correction: Correction, tangent: Tangent) -> tuple[Correction, Shares]:
+    def fit_delay(self, record: Experiment, correction: Correction, tangent: Tangent) -> tuple[Correction, Shares]:
         """A delay that is fitted with the parameters and all forces, from the values of a tangent without it."""
-        observer, latest = self._observer(record), self.settings.latest
-        structure = with_delay(tangent.structure, correction.delay, latest)
+        observer, longest_delay = self._observer(record), self.settings.longest_delay
+        structure = with_delay(tangent.structure, correction.delay, longest_delay)
         try:
-            whole = Late(self.model, record, correction, latest, self._ranking(record), self.setup)
+            whole = Delayed(self.model, record, correction, longest_delay, self._ranking(record), self.setup)
             observed = whole.whole()
             residual, slope = observed.follow(self.model, structure.theta, observer, [len(self.model.theta)])
             known = tangent.slopes[whole.cut : whole.cut + len(residual)]
-            start = Tangent(structure, residual, np.concatenate([known, slope * latest], axis=2), tangent.shares)
+            start = Tangent(structure, residual, np.concatenate([known, slope * longest_delay], axis=2), tangent.shares)
             view = View(white_noise(residual, observed.parts))
             found, _ = Fitter(observed, observed.settings).moved(start.followed(observer), view, anew=True)
         except ASTRAY:
             return correction, self._lost(record, tangent.shares.values)
         *values, delay = found.structure.theta.tolist()
-        finer = replace(correction, delay=delay)
-        shares = self.measured(finer.applied(record), np.array(values))
-        return finer, self._believed(shares, without_delay(found.structure))
+        refined = replace(correction, delay=delay)
+        shares = self.measured(refined.applied(record), np.array(values))
+        return refined, self._with_departure(shares, without_delay(found.structure))
 
-    def _believed(self, shares: Shares, structure: Structure) -> Shares:
+    def _with_departure(self, shares: Shares, structure: Structure) -> Shares:
         """With how far the parameters of the model are from what its file states."""
         from scipy.stats import chi2  # slow to import, and seldom needed
 
@@ -226,10 +226,10 @@ class Judge:
         chance = float(chi2.sf(2.0 * unlikely, max(len(own), 1)))
         return replace(shares, far=own.get(farthest, 0.0), farthest=farthest, unlikely=unlikely, chance=chance)
 
-    def unseen(self, tangent: Tangent) -> list[str]:
+    def undetermined(self, tangent: Tangent) -> list[str]:
         """Uncertain parameters of the model of which a record says next to nothing."""
-        told = zip(tangent.structure.priors, tangent.deviations.tolist(), strict=True)
-        return [name for name, left in told if left > self.settings.unseen and not self._is_added(name)]
+        deviations = zip(tangent.structure.priors, tangent.deviations.tolist(), strict=True)
+        return [name for name, left in deviations if left > self.settings.undetermined and not self._is_added(name)]
 
     def of_sensor(self, correction: Correction, record: Experiment, before: Shares) -> Shares | None:
         """What a correction of sensors that do not draw the model leaves; None where it takes another run."""
@@ -304,8 +304,8 @@ class Judge:
         drawn, seen = observed.drawn(observer.band), _seen(observed)
         free = np.sum(np.where(np.any(drawn != 0.0, axis=0), drawn, observed.motion)[seen] ** 2, axis=0)
         with np.errstate(all="ignore"):
-            told = map(_share, np.sum(residual[seen] ** 2, axis=0).tolist(), free.tolist())
-        shares = dict(zip(observed.records[0].channels, told, strict=True))
+            errors = map(_share, np.sum(residual[seen] ** 2, axis=0).tolist(), free.tolist())
+        shares = dict(zip(observed.records[0].channels, errors, strict=True))
         return Shares(shares, values, residual, free, seen, floor=self.settings.negligible)
 
     def _lost(self, record: Experiment, values: Array) -> Shares:
@@ -347,7 +347,7 @@ class Tangent:
         spread = np.diag(np.linalg.pinv(normal * np.outer(sizes, sizes), hermitian=True))
         return np.asarray(sizes * np.sqrt(np.maximum(spread, 0.0)))
 
-    def promised(self, corrected: Experiment, record: Experiment, residual: Array) -> tuple[Shares, float]:
+    def predicted(self, corrected: Experiment, record: Experiment, residual: Array) -> tuple[Shares, float]:
         """What is left if more or less of a correction is done and all parameters give way, and how much of it that is.
 
         ``residual`` is what the same values of the parameters leave of the corrected record.
@@ -363,8 +363,8 @@ class Tangent:
         move = -np.linalg.solve(normal, pull)
         left = (before.ravel() + columns @ move).reshape(before.shape) * sizes
         scale = self.shares.free * len(kept) / len(self.shares.seen)
-        told = map(_share, np.sum(left**2, axis=0).tolist(), scale.tolist())
-        return replace(self.shares, by_channel=dict(zip(self.shares.by_channel, told, strict=True))), float(move[-1])
+        errors = map(_share, np.sum(left**2, axis=0).tolist(), scale.tolist())
+        return replace(self.shares, by_channel=dict(zip(self.shares.by_channel, errors, strict=True))), float(move[-1])
 
     def _weighed(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
         """Slopes in sizes of what is left of each channel, sample by sample and channel by channel, and these sizes."""

@@ -1,4 +1,4 @@
-"""What can be seen in a channel by itself: stretches that stand still, values cut off, spikes, coarse steps."""
+"""Faults within one channel: stretches that stand still, clipped values, spikes, coarse steps."""
 
 from __future__ import annotations
 

@@ -69,7 +69,7 @@ class CandidateLike(Protocol):
 
     @property
     def unseen(self) -> float:
-        """Share of the unseen mean square that it took; may be NaN."""
+        """Share of the validation mean square that it took; may be NaN."""
 
     @property
     def accepted(self) -> bool:
@@ -174,7 +174,7 @@ def plot_candidates(candidates: Sequence[CandidateLike]) -> Figure:
     axis.axvline(0.0, color=INK, linewidth=0.8)
     _name_rows(axis, [f"{c.name.replace('_', ' ')} at {c.site}" for c in chosen])
     axis.set_xlabel("share of the residual's mean square that goes [%]")
-    kinds = {"screened, training data": LINE, "accepted, unseen data": GREEN, "refused, unseen data": ORANGE}
+    kinds = {"screened, training data": LINE, "accepted, validation data": GREEN, "refused, validation data": ORANGE}
     _legend_above(axis, [Patch(color=color, label=text) for text, color in kinds.items()])
     return figure
 
@@ -282,11 +282,11 @@ class Climbed(Protocol):
 
     @property
     def error(self) -> float:
-        """Share of the signal that is left on unseen data."""
+        """Share of the signal that is left on validation data."""
 
     @property
     def pays(self) -> bool:
-        """Whether unseen data say that it is better."""
+        """Whether validation data say that it is better."""
 
     @property
     def values(self) -> Mapping[str, float]:
@@ -299,7 +299,7 @@ class Climbed(Protocol):
 
 @styled
 def plot_climb(levels: Sequence[Climbed], top: str) -> Figure:
-    """Draw the error on unseen data against the level of detail, and below it how each parameter moved.
+    """Draw the error on validation data against the level of detail, and below it how each parameter moved.
 
     Parameters
     ----------
@@ -316,7 +316,7 @@ def plot_climb(levels: Sequence[Climbed], top: str) -> Figure:
         marker, size = ("D", 8) if level.name == top else ("o", 6)
         above.plot(place, error, marker, color=BLUE if level.pays else SOFT, markersize=size)
     above.set_yscale("log")
-    above.set_ylabel("error on unseen\ndata [%]")
+    above.set_ylabel("error on validation\ndata [%]")
     last = next(level for level in levels if level.name == top)
     for name, value in last.values.items():
         held = [k for k, level in enumerate(levels) if name in level.values]

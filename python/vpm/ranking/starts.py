@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from vpm.discrepancy.candidates import Candidate
-from vpm.discrepancy.place import ANYWHERE
+from vpm.discrepancy.location_parameter import ANYWHERE
 from vpm.discrepancy.structural import moved
 from vpm.model import Model
 from vpm.ranking.settings import LOSS, PLACES

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from vpm.catalogue.kinds import Side
 from vpm.discrepancy.candidates import Key
-from vpm.discrepancy.place import ANYWHERE
+from vpm.discrepancy.location_parameter import ANYWHERE
 from vpm.model import Effect, Model
 from vpm.weighing.priors import Prior
 

@@ -12,8 +12,8 @@ from vpm.discrepancy import Diagnosis
 from vpm.errors import needs
 from vpm.files import write_text
 from vpm.numbers import percent, short
+from vpm.report.messages import VERDICT_WORDS, estimate, last_stage, probability, refitted, step_name, took
 from vpm.report.pictures import Drawn, drawn, finding, pictures, within
-from vpm.report.words import VERDICT_WORDS, estimate, last_stage, probability, refitted, step_name, took
 from vpm.simplify import Ladder
 
 #: Characters of a page beside the words of its pictures, so that it stays below a megabyte.
@@ -24,7 +24,7 @@ ROWS = 300
 
 @dataclass(frozen=True)
 class Report:
-    """A diagnosis, and the way down if there is one, as a page.
+    """A diagnosis, and a model reduction if there is one, as a page.
 
     Attributes
     ----------
@@ -97,16 +97,16 @@ def render_html(diagnosis: Diagnosis, ladder: Ladder | None = None) -> str:
             refitted=refitted(diagnosis),
             last_stage=last_stage(diagnosis),
             ladder=ladder,
-            way_down=_way_down(ladder) if ladder is not None else None,
+            reduction=_reduction(ladder) if ladder is not None else None,
         )
 
     return page(*within(ROOM - len(page((), ())), pictures(diagnosis)))
 
 
-def _way_down(ladder: Ladder) -> Drawn:
+def _reduction(ladder: Ladder) -> Drawn:
     chosen = ladder.chosen
     words = (
         f"Error against the time of a step for {len(ladder.rungs)} models; the chosen one has an error of "
         f"{percent(chosen.error)} at {short(1e6 * chosen.seconds)} µs."
     )
-    return drawn("picture-ladder", "The way down", "Error against the time of a step", words, ladder.plot())
+    return drawn("picture-ladder", "Model reduction", "Error against the time of a step", words, ladder.plot())

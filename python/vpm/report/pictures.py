@@ -26,7 +26,7 @@ from vpm.plot.findings import (
     plot_traces,
 )
 from vpm.plot.signals import amplitude_density
-from vpm.report.words import last_stage
+from vpm.report.messages import last_stage
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -60,7 +60,7 @@ class Drawn:
 
 
 def drawn(anchor: str, title: str, caption: str, words: str, figure: Figure, *, joint: bool = False) -> Drawn:
-    """A picture with words, which say what is to be seen."""
+    """A picture with words, which describe it."""
     return Drawn(anchor, title, caption, figure_to_svg(figure, words), joint)
 
 
@@ -94,7 +94,7 @@ def finding(evidence: Evidence, number: int) -> Drawn:
     )
     caption = (
         f"{title}, which was never fitted. What it looks like: {looks[0].lower()}{looks[1:]}. Points: residual of "
-        f"{evidence.channel} at the samples that count, without the effect (all other parameters as fitted with it) "
+        f"{evidence.channel} at the samples used, without the effect (all other parameters as fitted with it) "
         f"and with it. Black: the fitted law{law}. {sizes}"
     )
     words = f"Residual of {evidence.channel} over {evidence.name}, without and with {title}. {sizes}"
@@ -104,7 +104,7 @@ def finding(evidence: Evidence, number: int) -> Drawn:
 def _gaps(d: Diagnosis) -> Iterator[Drawn]:
     if not d.gap:
         return
-    title = "Error on unseen data at each stage"
+    title = "Error on validation data at each stage"
     parts = []
     for channel, gap in d.gap.items():
         floor = "" if isnan(gap.noise_floor) else f", noise floor {percent(gap.share(gap.noise_floor))}"
@@ -158,7 +158,7 @@ def _joint(p: Picture, number: int, last: str) -> Iterator[Drawn]:
     yield drawn(
         f"picture-{number}-time",
         f"{name}: over time",
-        f"First unseen record: effort as measured and as the model needs it, {' and '.join(stages)}; below, the "
+        f"First validation record: effort as measured and as the model needs it, {' and '.join(stages)}; below, the "
         f"residual.{masked}",
         f"Effort and residual of {p.channel} over {short(float(p.time[0]))} to {short(float(p.time[-1]))} s. Residual, "
         f"root mean square: {sizes}; largest at the end {short(float(p.after[worst]))} {p.unit} at "
@@ -174,7 +174,7 @@ def _joint(p: Picture, number: int, last: str) -> Iterator[Drawn]:
     yield drawn(
         f"picture-{number}-state",
         f"{name}: against velocity and position",
-        "Points: samples that count. Lines: means, of forward and of backward motion apart, so that a step at zero "
+        "Points: samples used. Lines: means of forward and of backward motion, so that a step at zero "
         "velocity stays one.",
         f"Residual of {p.channel} against velocity and position. Mean residual, {means}.",
         plot_joint_over_state(p, stages),
@@ -205,7 +205,7 @@ def _noise(p: Picture, stages: Mapping[str, Array], number: int, name: str) -> I
         f"picture-{number}-noise",
         f"{name}: what is left",
         "Left: correlation with its own past, and the band that holds 95 % of it for white noise. Right: spectra, over "
-        "stretches of samples that count.",
+        "stretches of samples used.",
         words,
         plot_joint_noise(stages, (lags, values, band), rate, p.unit),
         joint=True,
@@ -219,7 +219,7 @@ def _candidates(d: Diagnosis) -> Iterator[Drawn]:
     for c in drawn_candidates(d.candidates):
         what = "accepted" if c.accepted else "not refitted" if isnan(c.unseen) else "refused"
         shares = [f"{percent(c.screened)} screened"] * (not isnan(c.screened))
-        shares += [f"{percent(c.unseen)} on unseen data"] * (not isnan(c.unseen))
+        shares += [f"{percent(c.unseen)} on validation data"] * (not isnan(c.unseen))
         parts.append(f"{c.name} at {c.site}, {what}: {', '.join(shares) or 'no share known'}.")
     words = f"Bars of the share of the mean square that each candidate takes away. {' '.join(parts)}"
     caption = "Share of the residual's mean square that goes with each candidate; a bar to the left: it grows."
@@ -242,7 +242,7 @@ def _parameters(d: Diagnosis) -> Iterator[Drawn]:
     yield drawn("picture-parameters", "Fitted parameters", caption, f"Fitted: {words}.", figure)
     if len(fit.names) > 1:
         title = "Correlation of the fitted parameters"
-        caption = "Near 1 or −1, the data show two parameters hardly apart; an empty row is one that they do not show."
+        caption = "Near 1 or −1, the data hardly separate two parameters; an empty row is one that they do not show."
         picture = plot_parameter_correlation(fit.names, fit.correlation)
         yield drawn("picture-correlation", title, caption, _pairs(fit.names, fit.correlation), picture)
 
@@ -252,8 +252,8 @@ def _pairs(names: Sequence[str], correlation: Array) -> str:
     first, second = np.triu_indices(len(names), 1)
     values = correlation[first, second]
     order = [k for k in np.argsort(-np.abs(np.nan_to_num(values))) if np.isfinite(values[k])][:5]
-    told = "; ".join(f"{names[first[k]]} and {names[second[k]]} {values[k]:.2f}" for k in order)
-    return f"Matrix of {len(names)} parameters. The largest correlations: {told or 'none is known'}."
+    listed = "; ".join(f"{names[first[k]]} and {names[second[k]]} {values[k]:.2f}" for k in order)
+    return f"Matrix of {len(names)} parameters. The largest correlations: {listed or 'none is known'}."
 
 
 def _rms(values: Array) -> float:

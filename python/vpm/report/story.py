@@ -1,4 +1,4 @@
-"""The diagnosis told in a terminal."""
+"""The diagnosis as text in a terminal."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from vpm.discrepancy import ChannelGap, Diagnosis
 from vpm.numbers import percent, short
-from vpm.report.words import VERDICT_WORDS, estimate, probability, step_name, took
+from vpm.report.messages import VERDICT_WORDS, estimate, probability, step_name, took
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -47,12 +47,12 @@ def _effects(d: Diagnosis) -> list[str]:
 
 def _steps(d: Diagnosis) -> list[str]:
     rows = [f"  {step_name(step):44s} {percent(step.unseen_error):>10s}" for step in d.steps]
-    return ["error on unseen data, in the order in which the model changed (share of the measured effort):", *rows]
+    return ["error on validation data, in the order in which the model changed (share of the measured effort):", *rows]
 
 
 def _gaps(d: Diagnosis) -> list[str]:
     head = f"  {'channel':34s} {'before':>11s} {'recalibrated':>13s} {'after':>11s} {'noise floor':>12s}"
-    lines = ["gap on unseen data (root mean square):", head]
+    lines = ["gap on validation data (root mean square):", head]
     for channel, gap in d.gap.items():
         numbers = f"{_cell(gap.before)} {_cell(gap.recalibrated, 13)} {_cell(gap.after)} {_floor(gap)}"
         shares = f"{_share(gap.before, gap)} {_share(gap.recalibrated, gap, 13)} {_share(gap.after, gap)}"
@@ -67,9 +67,9 @@ def _refused(d: Diagnosis) -> list[str]:
 
 def _ambiguous(d: Diagnosis) -> list[str]:
     lines = [f"  {a.name} at {a.site} and {', '.join(a.others)}: {a.reason}" for a in d.ambiguous_with]
-    told = [f"  {experiment.sentence}" for experiment in d.experiments]
-    head = ["these data cannot tell apart:", *lines] if lines else []
-    return [*head, *(["experiments that would:", *told] if told else [])]
+    listed = [f"  {experiment.sentence}" for experiment in d.experiments]
+    head = ["these data do not discriminate:", *lines] if lines else []
+    return [*head, *(["experiments that would:", *listed] if listed else [])]
 
 
 def _where(d: Diagnosis) -> list[str]:

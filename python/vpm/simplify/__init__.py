@@ -1,6 +1,6 @@
-"""Walk a model back down: the cheapest one that still predicts the data within a tolerance."""
+"""Model reduction: the cheapest model that still predicts the data within a tolerance."""
 
-from vpm.simplify.ladder import Ladder, Rung
+from vpm.simplify.pareto_front import Ladder, Rung
 from vpm.simplify.reductions import Reduction, reduced, reductions
 from vpm.simplify.search import simplify
 

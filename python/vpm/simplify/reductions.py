@@ -44,14 +44,14 @@ class Reduction(Storable):
     Attributes
     ----------
     kind : {"effect", "level", "component", "drive", "terms"}
-        An effect that is left out, a coarser level of a flexible link, a deformation of a link that is held rigid, a
-        hydraulic drive with fewer states, terms of the equations of motion that are left out.
+        An effect left out, a coarser level of a flexible link, a deformation held rigid, a hydraulic drive with fewer
+        states, or terms of the equations of motion left out.
     name : str
         Effect, level, component, change of a drive, see `vpm.simplify.hydraulics`, or of terms ``"velocity"`` (products
         of rates), ``"coupling"`` (entries of the mass matrix across joints), ``"second-order"`` (in the deflection).
     at : str
-        Site of the effect, flexible link, drive; of velocity terms bodies and links, of coupling joints, with commas
-        between them, or ``"the machine"``.
+        Site of the effect, flexible link, drive; of Coriolis and centrifugal terms bodies and links, of coupling
+        joints, with commas between them, or ``"the machine"``.
     side : {"motor", "link"}
         Of an effect at a joint with a compliance or backlash.
     """

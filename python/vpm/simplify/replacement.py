@@ -37,7 +37,7 @@ class Replacement(Reduction):
     entry: str = ""
 
     def __str__(self) -> str:
-        """Words for a rung."""
+        """Label of a candidate."""
         return f"{self.at} as {self.name}"
 
     def applied(self, model: Model) -> Model:

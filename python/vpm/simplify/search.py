@@ -18,7 +18,7 @@ from vpm.errors import SimulationError
 from vpm.experiment import Experiment, as_records
 from vpm.model import Model
 from vpm.simplify.judge import FITTING, Judge, by_the_model, reference_mode, shown
-from vpm.simplify.ladder import Ladder, Rung, pareto
+from vpm.simplify.pareto_front import Ladder, Rung, pareto
 from vpm.simplify.reductions import COUPLING_TERMS, OFFERED, VELOCITY_TERMS, Reduction, reduced, reductions
 from vpm.simplify.surrogates import surrogates
 from vpm.simplify.terms import CURVED, ROUNDING, deformation_share, effort_share, motions, ranked
@@ -57,10 +57,11 @@ def simplify(
     """Make a model simpler, place by place, as far as the tolerance allows, and find the cheapest way to step it.
 
     Effects are left out, flexible links made coarser or rigid in single deformations, spools of hydraulic drives made
-    static, their pressures one, NARX elements put in their place, velocity terms, coupling across joints and terms of
-    second order of links left out where their shares allow it, and every integrator of fixed steps is tried with one,
-    two and four steps in a period. The adjustable parameters of every reduced model are fitted again before it is
-    judged by simulation, so that what remains may take over what it can. Ctrl-C ends the search with what is known.
+    static, their pressures one, NARX elements put in their place, Coriolis and centrifugal terms, coupling across
+    joints and terms of second order of links left out where their shares allow it, and every integrator of fixed steps
+    is tried with one, two and four steps in a period. The adjustable parameters of every reduced model are fitted again
+    before it is judged by simulation, so that what remains may take over what it can. Ctrl-C ends the search with what
+    is known.
 
     Parameters
     ----------

@@ -1,8 +1,8 @@
 """Elements in sampled time in the place of servo-cylinders and their controllers, learnt from the full model.
 
-An element stands for a drive with its loop: a Maxwell element (D'Imperio 2016, section 5.2.5) or a polynomial NARX
-model, whose drive signal is the reference of the controller, or the command of a drive without one. It is fitted to
-what the full model does on the records to learn from.
+An element replaces a drive with its loop: a Maxwell element (D'Imperio 2016, section 5.2.5) or a polynomial NARX model.
+Its input is the reference of the controller, or the command of a drive without one. It is fitted to what the full model
+does on the records to learn from.
 """
 
 from __future__ import annotations

@@ -34,7 +34,7 @@ CURVED = ("modal", "bezier", "deflection", "hermite", "strain", "elements")
 Motion = tuple[Array, Array, Array]
 #: Samples of each record at which the shares are worked out.
 SAMPLES = 200
-#: Share that is rounding: a single joint about a fixed axis has no velocity terms.
+#: Share that is rounding: a single joint about a fixed axis has no Coriolis and centrifugal terms.
 ROUNDING = 1e-12
 #: Sets of parts that are offered beside the whole machine: the largest, which save most.
 SETS = 3
@@ -117,7 +117,7 @@ def coupling_joints(content: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def _moving(content: Mapping[str, Any]) -> dict[str, Any]:
-    """Bodies that a joint carries, and flexible links that bend: what has velocity terms of its own."""
+    """Bodies that a joint carries, and flexible links that bend: what has Coriolis and centrifugal terms of its own."""
     carried = [joint["child"] for joint in content.get("joints", {}).values() if joint["type"] != "fixed"]
     bodies = {name: content["bodies"][name] for name in carried}
     beams = content.get("beams", {}).items()
@@ -147,8 +147,8 @@ def effort_share(model: Model, reduced: Model, along: Sequence[Motion]) -> float
     """Share of the efforts at the joints that a reduced model leaves out, the largest of all motions.
 
     ``X / (I + V + R)`` with root mean squares along the motion of the Euclidean norms over the joints: X what is left
-    out, V the velocity terms, I inertia times acceleration, R weight, effects and what elastic links take. Along a
-    motion the share of single states says little: it is all wherever accelerations change sign.
+    out, V the Coriolis and centrifugal terms, I inertia times acceleration, R weight, effects and what elastic links
+    take. Along a motion the share of single states says little: it is all wherever accelerations change sign.
 
     Parameters
     ----------
@@ -233,7 +233,7 @@ def ranked(
 
 
 def parts(model: Model, q: Array, v: Array, a: Array) -> Array:
-    """Norms of velocity terms, inertia terms and the rest at single states, shape (N, 3), N m.
+    """Norms of Coriolis and centrifugal terms, inertia terms and the rest at single states, shape (N, 3), N m.
 
     Joints that move along a line are weighed as if a metre were a radian.
 

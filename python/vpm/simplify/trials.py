@@ -15,7 +15,7 @@ from vpm.errors import ExecutorError, SimulationError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.simplify.judge import Judge
-from vpm.simplify.ladder import Rung
+from vpm.simplify.pareto_front import Rung
 from vpm.simplify.reductions import Reduction, reduced
 from vpm.simplify.replacement import commanded
 from vpm.simulate import FIXED_STEP, Setup

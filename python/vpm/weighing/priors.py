@@ -1,4 +1,4 @@
-"""What is known of parameters before the records: as the model file says, or in the natural sizes of the records."""
+"""Priors of parameters: from the model file, or from the natural sizes of the records."""
 
 from __future__ import annotations
 

@@ -83,9 +83,9 @@ def weigh(
     Parameters
     ----------
     models : mapping of str to Model
-        Their adjustable parameters are fitted. The uncertainty in the model file is what is known of each before; sizes
-        of effects of which nothing is known may amount to a third of what the records show of their kind (effort,
-        speed, way), shapes of laws to a factor of ten on either side.
+        Their adjustable parameters are fitted. The prior of each is the uncertainty in the model file. Sizes of effects
+        without one may reach a third of what the records show of their kind (effort, speed, way), and shapes of laws a
+        factor of ten on either side.
     experiments : Experiment or sequence of Experiment
         With commands, and any of the outputs.
     channels : sequence of str, optional

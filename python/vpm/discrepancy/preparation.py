@@ -1,0 +1,129 @@
+"""What a diagnosis prepares: training and validation records, the nominal and the recalibrated model."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from vpm.discrepancy.candidates import slow_speeds
+from vpm.discrepancy.confirmation import Data, Judged, judge, judged_anyhow
+from vpm.discrepancy.filters import filters
+from vpm.discrepancy.moving import check_moving, check_stuck
+from vpm.discrepancy.prior_departure import moved_far
+from vpm.discrepancy.side_by_side import SideBySide
+from vpm.errors import DiagnosisError, DivergedError
+from vpm.experiment import Experiment, joints_from_shafts
+from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
+from vpm.identify.parallel import worker_count
+from vpm.model import Model
+from vpm.simulate import Setup
+
+#: Share of each record that is kept out of the fit when no validation record is given.
+HELD_OUT = 0.3
+#: Stated uncertainties, on a logarithmic scale, that a recalibration may move what the model is not linear in.
+REACH = 4.0
+
+#: Records to fit, records to judge on, and notes on both.
+Records = tuple[tuple[Experiment, ...], tuple[Experiment, ...], list[str]]
+
+
+def records_of(model: Model, experiments: Sequence[Experiment], validate: Sequence[Experiment]) -> Records:
+    """Records to fit, records to judge on, and notes on both."""
+    training = tuple(joints_from_shafts(record, model, free=model.adjustable) for record in experiments)
+    if not training:
+        raise DiagnosisError("no record was given; pass at least one experiment")
+    check_moving(model, training)
+    validation = tuple(joints_from_shafts(record, model) for record in validate)
+    if validation:
+        check_stuck(model, validation)
+        return training, validation, []
+    pairs = [e.split(1.0 - HELD_OUT) for e in training]
+    note = f"no validation record was given: the last {100 * HELD_OUT:.0f} % of each record was kept out of the fit"
+    return tuple(p[0] for p in pairs), tuple(p[1] for p in pairs), [note]
+
+
+def data_of(
+    model: Model,
+    training: Sequence[Experiment],
+    validation: Sequence[Experiment],
+    mode: str,
+    cutoff: float | None,
+    setup: Setup,
+    notes: list[str],
+) -> Data:
+    """Problems of the records, filtered and counted alike, with a note on each."""
+    balance = partial(InverseDynamicsProblem, model, hold=setup.course)
+    fitted = balance(training, cutoff=cutoff)
+    states, bands = filters(model, fitted, cutoff)
+    if states != tuple(m.cutoff for m in fitted.motions):
+        fitted = balance(training, cutoff=states, band=bands)
+    # One filter for all validation records: a gap that is measured in another band is another gap.
+    predicted = balance(validation, cutoff=min(states), band=min(bands))
+    for problem in (fitted, predicted):
+        problem.take_long_steps()
+        for number, (record, m) in enumerate(zip(problem.experiments, problem.motions, strict=True)):
+            still = problem.standstill(number)
+            rest = f"; {100 * still:.0f} % at standstill left out of the residual" if still > 0.0 else ""
+            notes.append(f"{record.name}: motion filtered at {m.cutoff:.4g} Hz, compared up to {m.band:.3g} Hz{rest}")
+    notes.append(f"validation records simulated in mode {mode}")
+    return Data(fitted, predicted, OutputErrorProblem(model, validation, mode, setup=setup))
+
+
+def nominal_of(model: Model, data: Data, notes: list[str]) -> Judged:
+    """The model as it stands; a nominal model that cannot simulate the records is still compared by effort."""
+    try:
+        return judge(model, (), data, {})
+    except DivergedError as error:
+        notes.append(f"the nominal model could not simulate the validation records: {error}")
+        return judge(model, (), replace(data, simulation=None), {})
+
+
+def recalibrated_of(model: Model, data: Data, notes: list[str], each: SideBySide) -> Judged:
+    """The model with its uncertain parameters fitted, compared by effort alone where it cannot simulate the records."""
+    free = model.adjustable
+    if not free:
+        notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
+    transitions = _transitions(model, data.training)
+    bounds = {**_within_reach(model, free), **transitions}
+    # This fit has all cores for its records; candidates share them from here on.
+    alone = replace(data, training=data.training.side_by_side(worker_count(each.workers)))
+    recalibrated, stopped = judged_anyhow(model, (*free, *transitions), alone, bounds)
+    if stopped:
+        notes.append(f"the recalibrated model could not simulate the validation records: {stopped}")
+    notes.extend(moved_far(model, recalibrated))
+    return recalibrated
+
+
+def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[float, float]]:
+    """Transition velocities of the dry friction that the model has, with bounds from the data.
+
+    Nobody knows them beforehand, and a wrong one leaves an error at every reversal, where small effects show.
+    """
+    found = {}
+    for effect in model.effects:
+        name = effect.parameter_names.get("transition_velocity")
+        dry = effect.type.sticks and not effect.type.close_to_rest
+        if dry and name is not None and effect.at in data.joints:
+            joint = data.joints.index(effect.at)
+            speeds = np.concatenate([np.abs(data.state(record)[1][:, joint]) for record in range(len(data.motions))])
+            found[name] = slow_speeds(float(np.quantile(speeds, 0.999)))
+    return found
+
+
+def _within_reach(model: Model, free: Sequence[str]) -> dict[str, tuple[float, float]]:
+    """Bounds of positive parameters that the model is not linear in, from their stated uncertainties.
+
+    With something large missing, a fit may flee to where nothing shows any more, such as oil as soft as air, from where
+    no effect leads back. What is linear comes back by itself.
+    """
+    found = {}
+    for name in free:
+        parameter = model.parameters[name]
+        value, spread = parameter.value, parameter.uncertainty or np.inf
+        if parameter.kind != "linear" and value > 0.0 and np.isfinite(spread):
+            factor = float(np.exp(REACH * spread / value))
+            found[name] = max(parameter.minimum, value / factor), min(parameter.maximum, value * factor)
+    return found

@@ -1,0 +1,69 @@
+"""Parameters that a fit moves far from the stated uncertainties of the model file.
+
+A stated uncertainty is a measurement. A correct effect brings the known parameters back to it. An effect that imitates
+another force together with a shifted centre of mass moves them away: a linear spring with an inverted pendulum imitates
+a hardening spring.
+"""
+
+from __future__ import annotations
+
+from vpm.discrepancy.confirmation import Judged
+from vpm.model import Model, Parameter
+from vpm.numbers import NORMAL_95, short
+
+#: Parameters that move by more of their stated uncertainties than this are reported, and no effect is accepted that
+#: drives one so far.
+FAR = 3.0
+
+
+def moved_far(model: Model, recalibrated: Judged) -> list[str]:
+    """Notes on parameters that a recalibration has moved far from a model file."""
+    notes = []
+    for name in recalibrated.free:
+        before, after = model.parameters[name], recalibrated.model.parameters[name]
+        spread = _stated(before)
+        if abs(after.value - before.value) > FAR * spread:
+            notes.append(
+                f"recalibration moved {name} from {short(before.value)} to {short(after.value)} {before.unit}, "
+                f"{abs(after.value - before.value) / spread:.1f} times its stated uncertainty"
+            )
+    return notes
+
+
+def driven_away(nominal: Model, recalibrated: Judged, final: Judged, ranked: Model | None = None) -> dict[str, float]:
+    """Parameters that effects surely drive far from what the model file says of them.
+
+    Parameters
+    ----------
+    nominal : Model
+        As the file has it.
+    recalibrated, final : Judged
+        Without the effects, and with them.
+    ranked : Model, optional
+        With the effects, as an observer of all joints knows it: the residual may see some of them alone.
+
+    Returns
+    -------
+    dict of str to float
+        Stated uncertainties by which the parameter stands away, the farthest first. Those are left out that were as far
+        before, for then the file is wrong whatever is missing, and those that the data hardly show beside the effects.
+    """
+    found = {}
+    for name, std in zip(final.free, final.fit.std, strict=True):
+        if name not in nominal.parameters or name not in recalibrated.model.parameters:
+            continue
+        parameter = nominal.parameters[name]
+        spread = _stated(parameter)
+        after = final.model.parameters[name].value
+        away = abs(after - parameter.value) - NORMAL_95 * float(std)
+        moved = abs(after - recalibrated.model.parameters[name].value)
+        if ranked is not None and abs(ranked.parameters[name].value - parameter.value) <= FAR * spread:
+            continue
+        if min(away, moved) > FAR * spread:
+            found[name] = abs(after - parameter.value) / spread
+    return dict(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def _stated(parameter: Parameter) -> float:
+    """Stated uncertainty; infinite where nothing is stated, or nothing is known."""
+    return parameter.uncertainty or float("inf")

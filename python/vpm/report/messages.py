@@ -1,0 +1,84 @@
+"""What the page and the terminal say alike: how sure a value is, what an effect took, where the steps stand."""
+
+from __future__ import annotations
+
+from math import isfinite, isnan
+
+from vpm.discrepancy import AcceptedEffect, Diagnosis, Step
+from vpm.numbers import percent, short
+
+VERDICT_WORDS = {
+    "effect_found": "An effect is missing in the model, and the data name it.",
+    "parameters_only": "Nothing is missing: the known parameters only had other values.",
+    "no_disagreement": "Model and data agree.",
+    "unexplained": "Something is missing, and no effect of the catalogue explains it.",
+}
+
+
+def estimate(value: float, std: float, unit: str, stated: float | None = None) -> str:
+    """``0.55 ± 0.01 N m``, and whether it differs from zero and from the model file.
+
+    Parameters
+    ----------
+    value, std : float
+        A deviation of zero stands for a value that was held.
+    unit : str
+    stated : float, optional
+        Value of the model file; None for what the file does not have.
+    """
+    shown = f" {unit}" if unit != "1" else ""
+    if not std > 0.0:
+        return f"{short(value)}{shown} (held)" if std == 0.0 else f"{short(value)}{shown} (deviation unknown)"
+    spread = f"± {std:.2g}" if isfinite(std) else "± ∞"
+    return f"{short(value)} {spread}{shown}{undetermined(value, std, stated)}"
+
+
+def undetermined(value: float, std: float, stated: float | None = None) -> str:
+    """``, undetermined: ...`` where a value is within its own deviation of zero or of the model file's, or ""."""
+    if not std > 0.0:
+        return ""
+    if abs(value) <= std:
+        return ", undetermined: within its deviation of zero"
+    if stated is not None and abs(value - stated) <= std:
+        return f", change undetermined: within its deviation of the model file's {short(stated)}"
+    return ""
+
+
+def took(effect: AcceptedEffect) -> str:
+    """What an effect did to the validation error when it came in."""
+    did = "took" if effect.gain >= 0.0 else "added"
+    ending = "of the validation mean square" if effect.gain >= 0.0 else "to the validation mean square"
+    return f"{did} {percent(abs(effect.gain))} {ending} ({effect.score:.1f} standard deviations)"
+
+
+def probability(effect: AcceptedEffect) -> str:
+    """Evidence and probability by a ranking, or ""."""
+    if isnan(effect.evidence_nats):
+        return ""
+    own, whole = effect.probability, effect.class_probability
+    beside = f", {whole:.2f} with what is not discriminated from it" if whole > own else ""
+    return f"evidence {short(effect.evidence_nats)} nats, probability {own:.2f}{beside}"
+
+
+def last_stage(d: Diagnosis) -> str:
+    """What the last model has that the recalibrated one has not, or "" where they are the same."""
+    formula = d.empirical is not None and bool(d.empirical.formula)
+    if d.effects:
+        return "with the effects and a formula" if formula else "with the effects"
+    return "with a formula, which is no physics" if formula else ""
+
+
+def step_name(step: Step) -> str:
+    """``+ coulomb_friction at axis``."""
+    signs = {"recalibrated": "recalibrated parameters", "added": "+ ", "removed": "− "}
+    return signs[step.change] + (f"{step.effect} at {step.site}" if step.effect else "")
+
+
+def refitted(d: Diagnosis) -> list[tuple[str, str, str]]:
+    """Name, stated value and estimate of each parameter of the model file that the last fit moved."""
+    rows = []
+    for name, value, std, unit in zip(d.fit.names, d.fit.values, d.fit.std, d.fit.units, strict=True):
+        if name in d.stated:
+            said = estimate(float(value), float(std), unit, d.stated[name])
+            rows.append((name, f"{short(d.stated[name])} {unit if unit != '1' else ''}".strip(), said))
+    return rows

@@ -1,0 +1,94 @@
+"""The low-frequency part of a residual, and what a bound lets a candidate do in screening."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from vpm import Experiment, Model
+from vpm.catalogue import EFFECTS
+from vpm.discrepancy.candidates import Candidate, candidates
+from vpm.discrepancy.low_frequency import AVERAGED, has_impacts, low_frequency
+from vpm.discrepancy.screening import Baseline, probe
+from vpm.identify import InverseDynamicsProblem
+
+TEXT = """name = "slide"
+gravity = [0.0, 0.0, -9.81]
+
+[bodies.body]
+mass = { value = 2.0, uncertainty = 0.2, unit = "kg" }
+
+[joints.axis]
+type = "prismatic"
+parent = "world"
+child = "body"
+axis = [1.0, 0.0, 0.0]
+
+[actuators.drive]
+joint = "axis"
+gain = { value = 1.0, unit = "N/N" }
+command_unit = "N"
+"""
+
+
+@pytest.fixture(scope="module")
+def problem() -> InverseDynamicsProblem:
+    """A slide that is pushed about at 0.8 and 1.7 Hz for 6 s, with forces that no mass explains: they pull it on."""
+    time = 1e-3 * np.arange(6000)
+    rates = 2.0 * np.pi * np.array([[0.8], [1.7]])
+    path = (np.array([[0.1], [0.04]]) * np.sin(rates * time)).sum(0)
+    acceleration = -(np.array([[0.1], [0.04]]) * rates**2 * np.sin(rates * time)).sum(0)
+    data = {"axis.position": path, "drive.command": -0.5 * acceleration}
+    record = Experiment.from_arrays(time, data, units={"axis.position": "m", "drive.command": "N"}, name="log")
+    return InverseDynamicsProblem(Model.from_toml(TEXT), [record])
+
+
+def test_asymmetric_friction_is_screened_with_a_change_of_direction_as_sharp_as_it_is(
+    problem: InverseDynamicsProblem,
+) -> None:
+    """A dry friction that is fitted wide without it makes up for some of it."""
+    (log,) = problem.experiments
+    motion = problem.motions[0]
+    command = 2.0 * motion.acceleration[:, 0] + np.where(motion.velocity[:, 0] > 0.0, 1.4, -0.6)
+    uneven = Experiment.from_arrays(
+        log.time,
+        {"axis.position": log["axis.position"], "drive.command": command},
+        units={"axis.position": "m", "drive.command": "N"},
+        name="uneven",
+    )
+    model = Model.from_toml(TEXT).with_effect("coulomb_friction", at="axis", coulomb=1.0, transition_velocity=0.2)
+    data = InverseDynamicsProblem(model, [uneven])
+    free = ("body.mass", "axis.friction.coulomb")
+    residual, jacobian = data.evaluate(model, model.theta, [model.index(name) for name in free])
+    (candidate,) = candidates(model, data, residual, ["asymmetric_friction"])
+    assert candidate.starts[0]["transition_velocity"] == 0.2
+    found = probe(Baseline(model, free, residual, jacobian), data, candidate)
+    assert found.model.parameters["axis.friction.asymmetric_transition_velocity"].value < 0.01
+    assert found.values["axis.friction.coulomb_difference"] == pytest.approx(0.8, rel=0.1)
+
+
+def test_low_frequencies_keep_what_lasts_and_loses_what_is_over_soon(problem: InverseDynamicsProblem) -> None:
+    block = problem.blocks[0]
+    lasting = np.sin(2.0 * np.pi * 0.2 / AVERAGED * block.time)
+    short = np.sin(2.0 * np.pi * 2.5 / AVERAGED * block.time)
+    middle = slice(block.time.size // 4, 3 * block.time.size // 4)
+    kept = low_frequency(problem, lasting + short)[middle]
+    assert np.std(kept) == pytest.approx(np.std(lasting[middle]) * np.sinc(0.2) ** 2, rel=0.05)
+
+
+def test_only_play_has_impacts() -> None:
+    model = Model.from_toml(TEXT)
+    assert not has_impacts(model)
+    assert has_impacts(model.with_effect("backlash", at="axis", gap=1e-3, stiffness=1e5))
+
+
+def test_no_candidate_is_credited_with_what_a_bound_forbids(problem: InverseDynamicsProblem) -> None:
+    model = Model.from_toml(TEXT).with_parameters({"body.mass": 1e-9})
+    residual, jacobian = problem.evaluate(model, model.theta, [model.index("body.mass")])
+    base = Baseline(model, ("body.mass",), residual, jacobian)
+    constant = Candidate(EFFECTS["bias_force"], "axis", ({},))
+    assert probe(base, problem, constant).drop > 0.9  # a mass below zero explains all of it
+    assert probe(replace(base, pushed={"body.mass": -1}), problem, constant).drop < 0.01
+    assert probe(replace(base, pushed={"body.mass": 1}), problem, constant).drop > 0.9

@@ -1,0 +1,64 @@
+"""What a model file believes of its parameters, and effects that would take them far from it."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vpm
+from shared_cases import shared_case
+from vpm.discrepancy.prior_departure import driven_away
+
+AXIS = """
+name = "axis"
+gravity = [0.0, 0.0, 0.0]
+bodies.load = { mass = { value = 1.0, unit = "kg", uncertainty = 0.1 } }
+joints.axis = { type = "prismatic", parent = "world", child = "load", axis = [1, 0, 0] }
+actuators.drive = { joint = "axis", gain = 1.0, command_unit = "N" }
+"""
+MASS = "load.mass"
+
+
+@pytest.mark.parametrize(
+    ("recalibrated", "final", "std", "times"),
+    [
+        (1.0, 1.5, 0.01, 5.0),  # the effect drives it there
+        (1.45, 1.5, 0.01, None),  # the file was wrong before
+        (1.6, 1.1, 0.01, None),  # the effect brings it back
+        (1.0, 1.2, 0.01, None),  # within what the file says
+        (1.0, 1.5, 0.2, None),  # the data hardly show it
+    ],
+)
+def test_a_parameter_counts_that_effects_alone_and_surely_drive_away(
+    recalibrated: float, final: float, std: float, times: float | None
+) -> None:
+    model = vpm.Model.from_toml(AXIS)
+
+    def judged(mass: float) -> Any:
+        fit = SimpleNamespace(std=np.array([std]))
+        return SimpleNamespace(model=model.with_parameters({MASS: mass}), free=(MASS,), fit=fit)
+
+    found = driven_away(model, judged(recalibrated), judged(final))
+    assert found == ({} if times is None else {MASS: pytest.approx(times)})
+
+
+def test_what_a_balance_of_some_joints_drives_away_may_be_known_better() -> None:
+    model = vpm.Model.from_toml(AXIS)
+    off: Any = SimpleNamespace(
+        model=model.with_parameters({MASS: 1.5}), free=(MASS,), fit=SimpleNamespace(std=np.array([0.01]))
+    )
+    before: Any = SimpleNamespace(model=model)
+    assert driven_away(model, before, off, ranked=model.with_parameters({MASS: 1.1})) == {}
+    assert driven_away(model, before, off, ranked=off.model) == {MASS: pytest.approx(5.0)}
+
+
+@pytest.mark.nightly
+def test_a_spring_that_turns_a_pendulum_upside_down_is_no_explanation() -> None:
+    """A spring that hardens is, to fifth order, a linear one beside a centre of mass above the axis."""
+    case = shared_case("axis_rotary", "cubic_spring", 43)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=["spring", "bias_force"], workers=1)
+    assert why.verdict == "unexplained"
+    assert "body.center_of_mass.z" in why.summary

@@ -1,0 +1,49 @@
+"""A drive that winds up, looked for among the frequencies at which it may swing."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+import vpm
+from shared_cases import shared_case
+from vpm.discrepancy.candidates import candidates
+from vpm.discrepancy.joint_compliance import best_start, is_searched
+from vpm.discrepancy.structural import moved
+from vpm.identify import InverseDynamicsProblem, estimate
+
+PAIR = ("joint_compliance", "viscous_friction")
+
+
+@pytest.mark.nightly
+def test_a_spring_is_looked_for_where_it_swings() -> None:
+    # A linearised step promises most of a spring that is fifty times as stiff, from where a refit finds a rigid one.
+    case = shared_case("axis_linear", PAIR, 159)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=PAIR, workers=1)
+    assert {effect.name for effect in why.effects} == set(PAIR)
+    found = next(effect for effect in why.effects if effect.name == "joint_compliance")
+    stiffness, true = found.parameters[0], case.truth.hidden[0].parameters["stiffness"]
+    assert stiffness.name == "stiffness"
+    assert abs(stiffness.value / true - 1.0) < 0.1
+
+
+@pytest.mark.nightly
+def test_a_start_is_as_near_as_springs_that_are_tried_and_none_where_nothing_winds_up() -> None:
+    for hidden in (PAIR, ("viscous_friction",)):
+        case = shared_case("axis_linear", hidden, 159)
+        model = case.model().with_effect("viscous_friction", at="axis")
+        data = InverseDynamicsProblem(model, case.train)
+        fit = estimate(
+            model, data, (*(p.name for p in model.parameters.values() if p.adjustable), "axis.friction.viscous")
+        )
+        fitted = model.with_parameters(dict(zip(fit.names, map(float, fit.values), strict=True)))
+        (spring,) = candidates(fitted, data, fit.residual, ["joint_compliance"])
+        assert is_searched(fitted, data, spring)
+        start = best_start(fitted, fit.jacobian, data, spring)
+        if len(hidden) == 1:
+            assert start is None
+        else:
+            assert start is not None
+            true = math.sqrt(case.truth.hidden[0].parameters["stiffness"] / moved(fitted, "axis"))
+            assert abs(math.sqrt(start["stiffness"] / moved(fitted, "axis")) / true - 1.0) < 0.2
