@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from vpm.errors import ExecutorError, IdentificationError
-from vpm.identify.estimation import LEAST_SCALE, Estimate, blinded, limits, touching
+from vpm.identify.estimation import Estimate, blinded, limits, touching
 from vpm.identify.identifiability import Combination, column_lengths, unseen_combinations
 from vpm.identify.objective import Objective, noise_levels
 from vpm.identify.parallel import worker_count
@@ -34,6 +34,8 @@ AGREEING, ROUNDING = 0.01, 1e-12
 ROUNDS, SETTLED = 5, 0.02
 #: Bounds further apart than this factor say nothing about where to start.
 WIDE = 1e4
+#: Least size of a parameter that a change is compared with, in parts of what moves the residual by as much as it is.
+LEAST_SCALE = 1e-3
 #: Largest change of a logarithm in one step.
 FARTHEST = float(np.log(30.0))
 

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import lsq_linear
+from scipy.optimize import least_squares, lsq_linear
 
 from vpm.identify.identifiability import RANK_TOLERANCE, Combination, column_lengths, unseen_combinations
 from vpm.identify.moments import AXES, PAIRS, Coordinates, real_bodies
 from vpm.identify.problem import Problem, segments
-from vpm.identify.solver import Box, Point, descend
 from vpm.identify.statistics import robust_covariance
 from vpm.model import Model
 
@@ -26,8 +25,6 @@ MOST_EVALUATIONS = 40
 PROGRESS = 0.05
 #: The same for a fit that has shown its worth: towards a bound, steps shrink with the distance and never end.
 CREEPING = 0.002
-#: Least size of a parameter that a change is compared with, in parts of what moves the residual by as much as it is.
-LEAST_SCALE = 1e-3
 #: Share by which the sum of squares may grow along a direction that the data cannot see.
 UNCHANGED = 1e-9
 
@@ -80,8 +77,8 @@ def estimate(
 ) -> Estimate:
     """Move ``free`` parameters of ``model`` until the residual of ``data`` is least.
 
-    A first step solves the problem as if it were linear (which on the inverse-dynamics regressor it mostly is);
-    `vpm.identify.solver.descend` finishes where it is not.
+    A first step solves the problem as if it were linear (which on the inverse-dynamics regressor it mostly is); the
+    trust-region reflective method of SciPy finishes where it is not.
 
     Parameters
     ----------
@@ -126,11 +123,11 @@ def estimate(
         residual, jacobian = counter(start)
         # Derivatives may leave all bounds where the motion itself does not; the best with derivatives stands then.
         if counter.best is not None and not np.all(np.isfinite(residual)):
-            start, (residual, jacobian) = counter.best.x, counter.best.raw
+            start, (residual, jacobian) = counter.best
     except (KeyboardInterrupt, _HopelessError) as reason:
         if counter.best is None:
             raise
-        start, (residual, jacobian) = counter.best.x, counter.best.raw
+        start, (residual, jacobian) = counter.best
         interrupted = isinstance(reason, KeyboardInterrupt)
         early = not interrupted
     values, jacobian = frame.parameters(start), frame.by_parameters(jacobian)
@@ -183,6 +180,15 @@ class _HopelessError(Exception):
     """A fit has not reached what makes it worth its time."""
 
 
+@dataclass(frozen=True)
+class _Point:
+    """Values of the free parameters, and the residual there with its derivative, if that was asked for."""
+
+    x: Array
+    residual: Array
+    slopes: Array | None
+
+
 class _Counter:
     """Evaluates the problem at given values of the free parameters; remembers the last points and the best.
 
@@ -202,21 +208,22 @@ class _Counter:
         self.model, self.data, self.columns, self.progress, self.worth = model, data, columns, progress, worth
         self.theta = model.theta.copy()
         self.count = 0
-        self._tried: Point | None = None
-        self._whole: Point | None = None
-        self.best: Point | None = None
+        self._tried: _Point | None = None
+        self._whole: _Point | None = None
+        self.best: tuple[Array, tuple[Array, Array]] | None = None
+        self._least = np.inf
         self._reached: list[float] = []
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
         known = self._whole
-        if known is not None and np.array_equal(x, known.x):
-            return known.raw
+        if known is not None and known.slopes is not None and np.array_equal(x, known.x):
+            return known.residual, known.slopes
         residual, slopes = self._evaluate(x, self.columns)
         if self._tried is None or not np.array_equal(x, self._tried.x):
             self._count(residual)
-        self._whole = _point(x.copy(), residual, slopes)
-        if self._whole.cost < (self.best.cost if self.best else np.inf):
-            self.best = self._whole
+        self._whole = _Point(x.copy(), residual, slopes)
+        if (cost := float(residual @ residual)) < self._least:
+            self._least, self.best = cost, (self._whole.x, (residual, slopes))
         return residual, slopes
 
     def residual(self, x: Array) -> Array:
@@ -225,8 +232,11 @@ class _Counter:
                 return known.residual
         residual, _ = self._evaluate(x, [])
         self._count(residual)
-        self._tried = _point(x.copy(), residual, np.zeros((0, x.size)))
+        self._tried = _Point(x.copy(), residual, None)
         return residual
+
+    def jacobian(self, x: Array) -> Array:
+        return self(x)[1]
 
     def _count(self, residual: Array) -> None:
         self.count += 1
@@ -306,25 +316,31 @@ def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance:
     # Nothing left to gain along any free direction: the problem was linear and the first step ended it.
     if np.all(np.abs(gradient[interior]) <= 1e-9 * np.sqrt(residual @ residual)):
         return start
+    inside = _strictly_inside(start, low, high)
+    if not np.all(
+        np.isfinite(counter.residual(inside))
+    ):  # a bound that the simulation does not bear, such as no friction
+        return start
+    result = least_squares(
+        counter.residual,
+        inside,
+        jac=counter.jacobian,
+        bounds=(low, high),
+        method="trf",
+        x_scale=1.0 / lengths,
+        max_nfev=most,
+        xtol=tolerance,
+        ftol=tolerance,
+        gtol=1e-12,
+    )
+    solution: Array = result.x
+    return solution if np.sum(counter.residual(solution) ** 2) <= np.sum(residual**2) else start
 
-    def tried(x: Array) -> Point:
-        return _point(x, counter.residual(x), np.zeros((0, x.size)))
 
-    def differentiated(point: Point) -> Point:
-        residual, slopes = counter(point.x)
-        return _point(point.x, residual if np.all(np.isfinite(slopes)) else np.full_like(residual, np.inf), slopes)
-
-    first = _point(start, residual, jacobian)
-    scale = np.maximum(np.abs(start), LEAST_SCALE * np.sqrt(first.cost) / lengths)
-    box = Box(low, high, scale)
-    found = descend(tried, first, box, tolerance=tolerance, most_evaluations=most, differentiate=differentiated)
-    if found.interrupted:
-        raise KeyboardInterrupt
-    return found.point.x
-
-
-def _point(x: Array, residual: Array, slopes: Array) -> Point:
-    return Point(x, float(residual @ residual), residual, slopes, (residual, slopes))
+def _strictly_inside(x: Array, low: Array, high: Array) -> Array:
+    """SciPy asks for a start that does not touch the bounds."""
+    width = np.where(np.isfinite(high - low), high - low, np.maximum(1.0, np.abs(x)))
+    return np.clip(x, np.where(np.isfinite(low), low + 1e-9 * width, low), high - 1e-9 * np.minimum(width, 1e300))
 
 
 def touching(names: Sequence[str], values: Array, low: Array, high: Array, near: float = 1e-300) -> tuple[str, ...]:

@@ -84,7 +84,6 @@ def descend(
     *,
     tolerance: float,
     most_evaluations: int,
-    differentiate: Callable[[Point], Point] | None = None,
 ) -> Descent:
     """Least sum of losses inside a box.
 
@@ -98,9 +97,6 @@ def descend(
     tolerance : float
         Relative change of the coordinates or of the cost at which to stop.
     most_evaluations : int
-    differentiate : callable, optional
-        Gives a point with its derivative where ``evaluate`` gives it without, and with an infinite cost where that has
-        none.
     """
     at, count, damping, ended = start, 0, DAMPING, "evaluations"
     try:
@@ -112,8 +108,6 @@ def descend(
             step, predicted = found
             trial = evaluate(at.x + step)
             count += 1
-            if differentiate is not None and trial.cost < at.cost:
-                trial = differentiate(trial)
             actual = at.cost - trial.cost
             small = bool(np.all(np.abs(step) <= tolerance * box.scale)) or predicted <= tolerance**1.5 * at.cost
             if actual > 0.0:
