@@ -7,7 +7,7 @@ simulation is taken off the residual of the log (C. Gouriéroux, A. Monfort, E. 
 Applied Econometrics* 8, 1993; B. Efron and R. Tibshirani, *An Introduction to the Bootstrap*, 1993, chapter 10).
 
 A log shows the noise of its instruments. The noise of drives, what they deliver beside their commands, nobody measures.
-It is as large as the residual asks for beyond the noise of the instruments: components of variance by the method of
+It is what the residual holds beyond the noise of the instruments: components of variance by the method of
 moments (S. Searle, G. Casella, C. McCulloch, *Variance Components*, 1992, chapter 5). Differences between neighbours
 are compared, from which what a model lacks beside a slow motion all but vanishes.
 """

@@ -16,7 +16,7 @@ DAMPING = float(np.sqrt(0.5))
 STEPS = 4
 #: Stretches into which a record is cut, so that each of its phases is in what is fitted and in what is held back.
 STRETCHES = 3
-#: Parts of a stretch, of which one is held back, the last one if nobody asks for another: two thirds tell the
+#: Parts of a stretch, of which one is held back, the last one unless another is named: two thirds tell the
 #: parameters, and one third is enough for pieces to compare.
 PARTS = 3
 

@@ -125,7 +125,7 @@ class Trials:
         ----------
         changes : tuple of Reduction
         below : float
-            Coarse time of a period (s) from which on nobody asks for the model.
+            Coarse time of a period (s) from which on the model is not fitted.
         """
         key, changes = frozenset(changes), _in_order(changes)
         if key not in self._rungs:

@@ -49,7 +49,7 @@ pub fn shifted<'d, S: Scalar>(
 /// Accelerations per unit of the efforts `tau`, at the state and with the inertias of the last [`articulated`] or [`shifted`].
 ///
 /// Law: the recursion is linear in the efforts, so the inertias that it left serve again, without velocities and gravity (Featherstone 2008,
-/// section 7.3). Costs a part of a recursion. Checked: against the difference of two recursions.
+/// section 7.3). Costs a part of a recursion. Checked: against the mass matrix of composite bodies, for all levels.
 pub fn response<'d, S: Scalar>(model: &Model<S>, data: &'d mut Data<S>, tau: &[S]) -> &'d [S] {
     debug_assert!(model.is_segmented() && tau.len() == model.n_coordinates());
     push(model, data, tau);

@@ -1,4 +1,4 @@
-"""Joint compliance: a drive that winds up; it splits its joint, and the link hangs behind, as with backlash.
+"""Joint compliance: an elastic transmission; it splits its joint, and the link hangs behind, as with backlash.
 
 Source: Spong 1987, equation 2.
 """

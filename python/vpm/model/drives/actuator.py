@@ -1,4 +1,4 @@
-"""All drives: one table for each kind, told apart by ``type``, and the checks of all of them and of their supplies."""
+"""All drives: one table for each kind, chosen by ``type``, and the checks of all of them and of their supplies."""
 
 from __future__ import annotations
 
