@@ -357,13 +357,13 @@ class System:
         sensitivities: Sequence[int] = ...,
         hold: str = ...,
         alone: bool = ...,
-        approximate: bool = ...,
+        moves: ArrayLike | None = ...,
     ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
         """Follow ``readings`` (N, m) with given ``gains`` (N, nx * m); as `simulate`, before each correction.
 
         Derivatives (N, m, k) are those of the measured outputs alone; outputs are, too, where ``alone``. They are those
-        of the steps; ``approximate`` ones may be those of the equations, to the order of the steps, where these take
-        less time.
+        of the steps. Where ``moves`` (k,) tell by how much each parameter may be moved for a difference, approximate
+        ones do where they take less time: differences, or derivatives of the equations to the order of the steps.
         """
     def answers(
         self,

@@ -32,8 +32,8 @@ pub(crate) use stepper::{Drive, Plan, Stepper};
 use crate::description::Description;
 use crate::error::{Diverged, Error, Result};
 use crate::integrator::{Halt, Method};
-use crate::scalar::Scalar;
-use crate::sensitivity::{Interrupt, Job, LANES, MANY, Pair, differentiate_by};
+use crate::scalar::{Scalar, seed};
+use crate::sensitivity::{Interrupt, Job, LANES, MANY, Pair, check_variables, difference, differentiate_by};
 use crate::system::{Build, Trouble};
 use crate::table::Table;
 use sampled::Astray;
@@ -202,9 +202,21 @@ impl<'a> Simulation<'a> {
     }
 }
 
+impl Simulation<'_> {
+    /// The moves for differences, where derivatives may be these and there is no machine code of those of the steps.
+    fn moves(&self) -> Option<&[f64]> {
+        let Setting { theta, sensitivities: by, .. } = self.setting;
+        let moves = self.plan.gains.and_then(|gains| gains.moves).filter(|moves| !moves.is_empty())?;
+        let stepper = self.stepper(&seed::<f64, LANES>(theta, &by[..by.len().min(LANES)]));
+        (!stepper.is_ok_and(|mut stepper| stepper.compile_if_it_pays())).then_some(moves)
+    }
+}
+
 impl Job for Simulation<'_> {
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
-        self.stepper(theta)?.by_code().run(self.setting.interrupt)
+        let mut stepper = self.stepper(theta)?;
+        stepper.compile_if_it_pays();
+        stepper.run(self.setting.interrupt)
     }
 }
 
@@ -227,8 +239,12 @@ fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
         (0..plan.horizon).flat_map(places).collect::<Vec<_>>()
     });
     let (theta, by) = (setting.theta, setting.sensitivities);
-    let (pair, jacobian) = match plan.gains {
-        Some(Gains { alone: true, .. }) if by.len() > LANES => differentiate_by::<_, MANY>(&job, theta, by, None)?,
+    check_variables(theta, by)?;
+    let (pair, jacobian) = match (job.moves(), plan.gains) {
+        (Some(moves), _) => difference(&job, theta, by, moves, measured.as_deref())?,
+        (None, Some(Gains { alone: true, .. })) if by.len() > LANES => {
+            differentiate_by::<_, MANY>(&job, theta, by, None)?
+        }
         _ => differentiate_by::<_, LANES>(&job, theta, by, measured.as_deref())?,
     };
     Ok(Run { outputs: pair.first, states: pair.second, jacobian })

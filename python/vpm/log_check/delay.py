@@ -56,12 +56,19 @@ class Delayed(Observed):
         super().__init__(model, [self._corrected(correction.delay)], settings, setup)
 
     def follow(
-        self, model: Model, theta: Array, observer: Observer, columns: Sequence[int] = ()
+        self,
+        model: Model,
+        theta: Array,
+        observer: Observer,
+        columns: Sequence[int] = (),
+        moves: Array | None = None,
     ) -> tuple[Array, Array]:
         """Readings less outputs, see `Observed.follow`; ``theta`` are the parameters, then the delay."""
         own, delay = len(model.theta), float(theta[-1])
-        parameters = [column for column in columns if column < own]
-        residual, slopes = self._at(delay).follow(model, theta[:own], observer, parameters)
+        places = [place for place, column in enumerate(columns) if column < own]
+        small = None if moves is None else moves[places]
+        by = [columns[place] for place in places], small
+        residual, slopes = self._at(delay).follow(model, theta[:own], observer, *by)
         if own not in columns:
             return residual, slopes
         step = STEP * self.logged.dt

@@ -13,7 +13,7 @@ from scipy.optimize import lsq_linear
 
 from vpm.errors import VpmError
 from vpm.ranking.noise_model import NoiseModel, Parts, white_noise
-from vpm.ranking.observed import Observed, Observer
+from vpm.ranking.observed import NOTHING, By, Observed, Observer
 from vpm.ranking.posterior import log_volume
 from vpm.ranking.settings import FAINT, SHARES, Settings
 from vpm.ranking.structure import Structure
@@ -189,14 +189,14 @@ class Fitter:
         VpmError
             The structure runs away from the records.
         """
-        columns = [structure.place(name) for name in names]
+        by = [structure.place(name) for name in names], structure.moves(names)
         if observer.fine:
             if residual is None:
-                residual, _ = self._pass(structure, observer, ())
+                residual, _ = self._pass(structure, observer)
             with contextlib.suppress(*ASTRAY):  # contacts may be too stiff for few steps
-                _, jacobian = self._pass(structure, observer.coarse, columns)
+                _, jacobian = self._pass(structure, observer.coarse, by)
                 return Followed(structure, observer, tuple(names), residual, jacobian)
-        return Followed(structure, observer, tuple(names), *self._pass(structure, observer, columns))
+        return Followed(structure, observer, tuple(names), *self._pass(structure, observer, by))
 
     def noise_of(self, structure: Structure, observer: Observer) -> NoiseModel:
         """Channels in the root mean squares of what the observer leaves where a fit begins.
@@ -206,7 +206,7 @@ class Fitter:
         VpmError
             The structure runs away from the records.
         """
-        residual, _ = self._pass(structure.at(structure.standard), observer, ())
+        residual, _ = self._pass(structure.at(structure.standard), observer)
         return white_noise(residual, self.observed.parts)
 
     def log_density(self, fitted: Fitted, noise: NoiseModel) -> Array:
@@ -245,7 +245,7 @@ class Fitter:
         for share in SHARES:
             tried = now.structure.moved(share * move)
             try:
-                residual, _ = self._pass(tried, now.observer, ())
+                residual, _ = self._pass(tried, now.observer)
             except ASTRAY:
                 continue
             after = self.cost(tried, residual, noise)
@@ -253,8 +253,8 @@ class Fitter:
                 return tried, residual, after
         return None
 
-    def _pass(self, structure: Structure, observer: Observer, columns: Sequence[int]) -> tuple[Array, Array]:
-        residual, jacobian = self.observed.follow(structure.model, structure.theta, observer, columns)
+    def _pass(self, structure: Structure, observer: Observer, by: By = NOTHING) -> tuple[Array, Array]:
+        residual, jacobian = self.observed.follow(structure.model, structure.theta, observer, *by)
         if not all(np.max(np.abs(numbers), initial=0.0) < RUNAWAY for numbers in (residual, jacobian)):
             raise VpmError(f"{structure.model.name} runs away from the records")
         return residual, jacobian

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import TypeAlias
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -24,6 +25,9 @@ from vpm.simulate import Setup
 from vpm.simulate.setup import AUTOMATIC
 
 Array = NDArray[np.float64]
+#: Places of parameters by which there are derivatives, and by how much these may be moved; exact ones if not given.
+By: TypeAlias = tuple[Sequence[int], Array | None]
+NOTHING: By = ((), None)
 
 
 @dataclass(frozen=True)
@@ -76,9 +80,6 @@ class Observed:
     setup : Setup, optional
     """
 
-    #: Whether derivatives may be those of the equations, see `vpm._core.System.observe`.
-    approximate = True
-
     def __init__(
         self, model: Model, experiments: Sequence[Experiment], settings: Settings, setup: Setup | None = None
     ) -> None:
@@ -122,7 +123,7 @@ class Observed:
         observer, theta = Observer(self.settings.bands[0], fine=False), self.model.theta
         try:
             begun = zip(self.records, self._begun(self.model), strict=True)
-            motion = np.concatenate([self._run(self.model, theta, observer, (), *one)[1] for one in begun])
+            motion = np.concatenate([self._run(self.model, theta, observer, NOTHING, *one)[1] for one in begun])
         except (VpmError, ArithmeticError):
             return Firsts()
         sizes = np.std(motion[:, [self.model.state_names.index(state) for state in states]], axis=0)
@@ -174,29 +175,37 @@ class Observed:
         return found
 
     def follow(
-        self, model: Model, theta: Array, observer: Observer, columns: Sequence[int] = ()
+        self,
+        model: Model,
+        theta: Array,
+        observer: Observer,
+        columns: Sequence[int] = (),
+        moves: Array | None = None,
     ) -> tuple[Array, Array]:
         """Readings less outputs (N, m) of all records, one after the other, and derivatives (N, m, len(columns)).
 
         ``theta`` are the parameters, then, if they are not those of balance, by how much the first states are others:
-        all of the first record, all of the second, and so on.
+        all of the first record, all of the second, and so on. Derivatives are exact, or approximate where ``moves``
+        (len(columns),) tell by how much each of these numbers may be moved for a difference.
         """
         own = len(model.theta)
         firsts = self.firsts if len(theta) > own else Firsts()
-        moves = theta[own:].reshape(len(self.records), len(firsts.states))
-        parameters = [column for column in columns if column < own]
+        shifts = theta[own:].reshape(len(self.records), len(firsts.states))
+        places = [place for place, column in enumerate(columns) if column < own]
+        parameters = [columns[place] for place in places]
+        small = None if moves is None else moves[places]
         residuals: list[Array] = []
         slopes: list[Array] = []
-        for record, begun, move in zip(self.records, self._begun(model), moves, strict=True):
-            start = firsts.added(model, begun, move)
-            outputs, _, slope = self._run(model, theta[:own], observer, parameters, record, start)
+        for record, begun, shift in zip(self.records, self._begun(model), shifts, strict=True):
+            start = firsts.added(model, begun, shift)
+            outputs, _, slope = self._run(model, theta[:own], observer, (parameters, small), record, start)
             whole = np.zeros((*outputs.shape, len(columns)))
-            whole[:, :, [place for place, column in enumerate(columns) if column < own]] = -slope
+            whole[:, :, places] = -slope
             before = own + len(residuals) * len(firsts.states)
             for number, size in enumerate(firsts.sizes):
                 if before + number in columns:
                     moved = firsts.added(model, start, STEP * size * (np.arange(len(firsts.sizes)) == number))
-                    others, _, _ = self._run(model, theta[:own], observer, (), record, moved)
+                    others, _, _ = self._run(model, theta[:own], observer, NOTHING, record, moved)
                     whole[:, :, columns.index(before + number)] = (outputs - others) / (STEP * size)
             residuals.append(record.readings - outputs)
             slopes.append(whole)
@@ -239,11 +248,11 @@ class Observed:
         model: Model,
         theta: Array,
         observer: Observer,
-        columns: Sequence[int],
+        by: By,
         record: Record,
         start: Array,
     ) -> tuple[Array, Array, Array]:
-        """Outputs of the channels of a record (N, m), states (N, nx), derivatives of the outputs (N, m, columns)."""
+        """Outputs of the channels of a record (N, m), states (N, nx), derivatives ``by`` some numbers (N, m, k)."""
         places = [model.output_channels.index(name) for name in record.channels]
         gain = observer_gain(model, record.channels, observer.band, record.dt, theta)
         outputs, states, slopes = model.core.observe(
@@ -256,10 +265,10 @@ class Observed:
             record.dt,
             self.setup.substeps * self._steps(model, observer, record),
             self.method(model, observer),
-            list(columns),
+            list(by[0]),
             self.setup.course,
             alone=True,
-            approximate=self.approximate,
+            moves=by[1],
         )
         return outputs, states, slopes
 

@@ -20,6 +20,9 @@ STRETCHES = 3
 #: parameters, and one third is enough for pieces to compare.
 PARTS = 3
 
+#: By which share of its deviation a parameter is moved for a difference.
+MOVE = 1e-5
+
 # ---- what noise is like ------------------------------------------------------------------------------------------
 
 #: Degrees of freedom of Student's density among which that of the errors is chosen; without end it is the normal one.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from types import MappingProxyType
@@ -14,6 +14,7 @@ from vpm.catalogue.kinds import Side
 from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.location_parameter import ANYWHERE
 from vpm.model import Effect, Model
+from vpm.ranking.settings import MOVE
 from vpm.weighing.priors import Prior
 
 Array = NDArray[np.float64]
@@ -121,6 +122,11 @@ class Structure:
         """Change of each unknown parameter by a deviation (k,)."""
         pairs = zip(self.priors.values(), self.columns, strict=True)
         return np.array([prior.slope(float(self.theta[column])) for prior, column in pairs])
+
+    def moves(self, names: Sequence[str]) -> Array:
+        """By how much each of these parameters may be moved for a difference (len(names),)."""
+        slopes = dict(zip(self.priors, np.abs(self.slopes), strict=True))
+        return MOVE * np.array([slopes[name] or 1.0 for name in names])
 
     @property
     def values(self) -> dict[str, float]:

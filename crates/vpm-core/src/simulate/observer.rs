@@ -51,8 +51,9 @@ pub struct Gains<'a> {
     pub gains: Table<'a>,
     /// Whether no other output than those that were measured is asked for.
     pub alone: bool,
-    /// Whether derivatives may be those of the equations to the order of the steps, where that takes less time than those of the steps.
-    pub approximate: bool,
+    /// By how much each parameter by which there are derivatives may be moved. Then these may be approximate, where that takes less time than
+    /// those of the steps: differences, or derivatives of the equations to the order of the steps.
+    pub moves: Option<&'a [f64]>,
 }
 
 impl Gains<'_> {
@@ -163,9 +164,25 @@ pub fn observe<'a>(
     gains.readings.check(&setting, &inputs)?;
     let (rows, entries) = (inputs.table.rows(), setting.description.n_states() * gains.readings.channels.len());
     gains.gains.expect("gains", rows, entries)?;
+    if let Some(moves) = gains.moves {
+        check_moves(moves, setting.sensitivities.len())?;
+    }
     check_state("initial_state", setting.description, initial_state)?;
     let drive = Drive::Commands(inputs);
     execute(setting, Plan { drive, initial: initial_state, starts: &[0], horizon: rows, gains: Some(gains) })
+}
+
+/// Complains about moves of parameters that give no differences.
+fn check_moves(moves: &[f64], count: usize) -> Result<()> {
+    Table::vector("moves", moves, count, "derivative")?;
+    let Some(&value) = moves.iter().find(|&&value| value == 0.0) else { return Ok(()) };
+    let (setting, condition) = ("a move of a parameter", "not be zero".to_owned());
+    Err(Error::Setting {
+        setting,
+        condition,
+        value,
+        repair: "give about 1e-5 of what is uncertain about the parameter",
+    })
 }
 
 /// A filter on its way through a record.

@@ -108,7 +108,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         if plan.gains.is_some_and(|gains| gains.is_of_motion(description.layout())) {
             system = system.seen_in_motion();
         }
-        if plan.gains.is_some_and(|gains| gains.approximate) {
+        if plan.gains.is_some_and(|gains| gains.moves.is_some()) {
             system = system.with_approximate_derivatives();
         }
         system.make_for(setting.stepping.method)?;
@@ -157,19 +157,20 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         })
     }
 
-    /// The same, by machine code where a run of the whole plan is long enough and the machine has any.
-    pub(crate) fn by_code(mut self) -> Self {
+    /// Goes on by machine code where a run of the whole plan is long enough and the machine has any; tells whether all of it has some.
+    pub(crate) fn compile_if_it_pays(&mut self) -> bool {
         let Stepping { substeps, method, .. } = self.stepping;
         let evaluations = self.plan.starts.len() * self.plan.horizon * substeps * method.evaluations();
         let (derived, corrected) = (S::plain(&[]).is_none(), self.plan.gains.is_some());
-        if code_pays(evaluations) || ((derived || corrected) && code_pays_in_fits(evaluations)) {
-            // What has no code runs as it is.
-            let _ = match self.courses {
-                Some(_) => self.compile(),
-                None => self.system.compile_steps(method),
-            };
+        if !(code_pays(evaluations) || ((derived || corrected) && code_pays_in_fits(evaluations))) {
+            return false;
         }
-        self
+        // What has no code runs as it is.
+        let made = match self.courses {
+            Some(_) => self.compile(),
+            None => self.system.compile_steps(method),
+        };
+        made.is_ok()
     }
 
     /// Goes on by machine code, or says why there is none.

@@ -64,9 +64,9 @@ impl System {
     }
 
     /// Outputs (N, ny) that an observer with given gains (N, nx * m) predicts from the samples before, or the measured ones (N, m) alone, its
-    /// states before they are corrected (N, nx), and the derivatives of the measured outputs (N, m, k): of the steps, or `approximate` ones
-    /// of the equations, to the order of the steps, where these take less time.
-    #[pyo3(signature = (theta, initial_state, inputs, channels, readings, gains, time_step, substeps, integrator, sensitivities=vec![], hold="zero_order", alone=false, approximate=false))]
+    /// states before they are corrected (N, nx), and the derivatives of the measured outputs (N, m, k): of the steps, or approximate ones where
+    /// these take less time and `moves` (k,) tell by how much parameters may be moved for them.
+    #[pyo3(signature = (theta, initial_state, inputs, channels, readings, gains, time_step, substeps, integrator, sensitivities=vec![], hold="zero_order", alone=false, moves=None))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn observe<'py>(
         &self,
@@ -83,18 +83,24 @@ impl System {
         sensitivities: Vec<i64>,
         hold: &str,
         alone: bool,
-        approximate: bool,
+        moves: Option<Any<'py>>,
     ) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
         let request = Request::new(self, theta, (time_step, substeps, integrator), &sensitivities)?;
         let hold = self.checked(py, Hold::from_name(hold))?;
         let initial = Numbers::vector("initial_state", initial_state)?;
         let (inputs, readings) = (Numbers::table("inputs", inputs)?, Numbers::table("readings", readings)?);
         let (gains, channels) = (Numbers::table("gains", gains)?, arrays::places("channels", &channels)?);
+        let moves = moves.map(|moves| Numbers::vector("moves", &moves)).transpose()?;
         let run = self.compute(py, |interrupt| {
             let setting = request.setting(&self.description, interrupt);
             let inputs = Inputs { table: inputs.as_table()?, hold };
             let readings = Readings { channels: &channels, table: readings.as_table()? };
-            observe(setting, initial.values(), inputs, Gains { readings, gains: gains.as_table()?, alone, approximate })
+            observe(
+                setting,
+                initial.values(),
+                inputs,
+                Gains { readings, gains: gains.as_table()?, alone, moves: moves.as_ref().map(Numbers::values) },
+            )
         })?;
         self.run(py, run, [channels.len(), sensitivities.len()])
     }

@@ -57,7 +57,7 @@ fn observed_at(
 ) -> Run {
     let rows = inputs.len() / 2;
     let readings = Readings { channels, table: Table::new("readings", readings, rows, 2).unwrap() };
-    let gains = Gains { readings, gains: Table::new("gains", gains, rows, 10).unwrap(), alone, approximate: false };
+    let gains = Gains { readings, gains: Table::new("gains", gains, rows, 10).unwrap(), alone, moves: None };
     observe(bench.setting(), &FIRST, Table::new("inputs", inputs, rows, 2).unwrap(), gains).unwrap()
 }
 
@@ -128,6 +128,28 @@ fn derivatives_are_those_of_differences() {
         moved.theta = theta.to_vec();
         measured(&moved, &observed(&moved, (&inputs, &readings), &gains))
     });
+}
+
+/// A run that is too short for machine code gives differences where these are allowed; moves must be some.
+#[test]
+fn differences_are_near_the_derivatives() {
+    let mut bench = Bench::new(&arm(), STEP, 1, Method::LinearlyImplicit);
+    let (inputs, readings) = record(&bench, 12);
+    let gains = filtered(&bench, (&inputs, &readings)).gains;
+    bench.sensitivities = vec![0, 2, 5, 7];
+    let run = |moves: Option<&[f64]>| {
+        let readings = Readings { channels: &[0, 4], table: Table::new("readings", &readings, 12, 2).unwrap() };
+        let gains = Gains { readings, gains: Table::new("gains", &gains, 12, 10).unwrap(), alone: true, moves };
+        observe(bench.setting(), &FIRST, Table::new("inputs", &inputs, 12, 2).unwrap(), gains)
+    };
+    let (exact, differences) = (run(None).unwrap(), run(Some(&[1e-6; 4])).unwrap());
+    assert_eq!(exact.outputs, differences.outputs);
+    let largest = exact.jacobian.iter().fold(0.0_f64, |most, slope| most.max(slope.abs()));
+    assert!(exact.jacobian != differences.jacobian && largest > 1e-3);
+    exact.jacobian.iter().zip(&differences.jacobian).for_each(|(&one, &other)| close(one, other, 1e-5 * largest));
+    let refused = run(Some(&[1e-6, 0.0, 1e-6, 1e-6])).unwrap_err().to_string();
+    assert!(refused.contains("a move of a parameter must not be zero"), "{refused}");
+    assert!(run(Some(&[1e-6])).unwrap_err().to_string().contains("moves"));
 }
 
 /// Asked for the measured outputs alone, samples need no rates where the state decides them: positions and velocities, and not the
@@ -223,7 +245,7 @@ fn a_late_sensor_is_observed_as_a_late_command() {
             readings: Readings { channels: &[0], table },
             gains: Table::new("gains", &gains, rows, 2).unwrap(),
             alone: false,
-            approximate: false,
+            moves: None,
         };
         let inputs = Table::new("inputs", &command, rows, 1).unwrap();
         let run = observe(bench.setting(), &[0.0, 0.0], inputs, gains).unwrap();
