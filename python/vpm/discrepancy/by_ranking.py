@@ -25,9 +25,8 @@ from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED
 from vpm.discrepancy.screening import Probe, sort_columns
 from vpm.discrepancy.search import Search
 from vpm.errors import VpmError
-from vpm.experiment import Experiment
 from vpm.identify import gain, segments
-from vpm.identify.along import SAMPLED_TYPES, bends
+from vpm.identify.along import bends
 from vpm.model import Effect, Model
 
 if TYPE_CHECKING:
@@ -61,23 +60,20 @@ class Settings:
 SETTINGS = Settings()
 
 
-def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
+def why_not_ranked(model: Model) -> str:
     """Why names do not come from a ranking, or "": it covers up to three joints, rigid links, and drives without oil.
 
-    It covers oil where a joint has no drive, for no search sees that. Drives may not go by samples of their own, and a
-    ranking does not read a deflection that a log holds.
+    It covers oil where a joint has no drive, for no search sees that.
     """
     if bends(model):
         return "links bend"
-    without = set(SAMPLED_TYPES) if free_joints(model) else {"hydraulic", *SAMPLED_TYPES}
-    for name in model.actuators:
-        if (kind := model.actuator_type(name)) in without:
-            return f"the actuator {name} has type {kind}"
+    oil = [name for name in model.actuators if model.actuator_type(name) == "hydraulic"]
+    if oil and not free_joints(model):
+        return f"the actuator {oil[0]} has type hydraulic"
     own = set(model.joints) - set(model.added_joints)
     if len(own) > SETTINGS.joints:
         return f"there are {len(own)} joints, more than {SETTINGS.joints}"
-    held = [channel for channel in model.deflections if any(channel in record for record in experiments)]
-    return f"records hold {held[0]}" if held else ""
+    return ""
 
 
 def free_joints(model: Model) -> tuple[str, ...]:
