@@ -62,7 +62,7 @@ def ranking_of(
     if names != "ranking":
         notes.extend(_not_searched(effects, f'names="{names}" was asked for'))
         return None
-    reason = why_not_ranked(model)
+    reason = why_not_ranked(model, training)
     if not reason:
         tell("ranking what could be missing")
         try:

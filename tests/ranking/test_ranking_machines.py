@@ -95,6 +95,11 @@ def test_dry_friction_of_a_guide_in_a_loop_is_named_and_not_that_of_the_crank(ch
     assert ranking.effects[0].values["guide.friction.coulomb"] == pytest.approx(2.0, rel=0.05)
 
 
+@pytest.mark.nightly
+def test_nothing_is_named_of_a_loop_without_friction_on_its_guide() -> None:
+    assert vpm.rank(Model.from_toml(SLIDER_CRANK), [turned(seed=seed) for seed in (1, 2)]).effects == ()
+
+
 def test_the_stand_in_of_a_loop_moves_as_the_loop_does_and_weighs_what_its_inertia_weighs() -> None:
     model, record = Model.from_toml(SLIDER_CRANK), turned(seed=1, channels=("guide.position",))
     alone = record.select(["motor.command", "crank.position"])

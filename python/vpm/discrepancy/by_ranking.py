@@ -25,6 +25,7 @@ from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED
 from vpm.discrepancy.screening import Probe, sort_columns
 from vpm.discrepancy.search import Search
 from vpm.errors import VpmError
+from vpm.experiment import Experiment
 from vpm.identify import gain, segments
 from vpm.identify.along import bends
 from vpm.model import Effect, Model
@@ -60,10 +61,11 @@ class Settings:
 SETTINGS = Settings()
 
 
-def why_not_ranked(model: Model) -> str:
+def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
     """Why names do not come from a ranking, or "": it covers up to three joints, rigid links, and drives without oil.
 
-    It covers oil where a joint has no drive, for no search sees that.
+    It covers oil where a joint has no drive, for no search sees that. A deflection that a log holds is compared by a
+    ranking, but on a log of a real arm a search names its friction more plausibly.
     """
     if bends(model):
         return "links bend"
@@ -73,7 +75,8 @@ def why_not_ranked(model: Model) -> str:
     own = set(model.joints) - set(model.added_joints)
     if len(own) > SETTINGS.joints:
         return f"there are {len(own)} joints, more than {SETTINGS.joints}"
-    return ""
+    held = [channel for channel in model.deflections if any(channel in record for record in experiments)]
+    return f"records hold {held[0]}" if held else ""
 
 
 def free_joints(model: Model) -> tuple[str, ...]:

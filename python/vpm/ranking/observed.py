@@ -67,7 +67,8 @@ class Observed:
     with a damper between the machine and its log. All structures are compared under the same one. Where a joint is
     split, what hangs behind its spring or backlash is drawn along with the motor: else both would answer to noise, and
     to what is missing elsewhere, otherwise than a rigid joint does. A deflection that the logs hold is compared and not
-    drawn: a structure without the joint behind predicts zero.
+    drawn: a structure without the joint behind predicts zero. Of joints that closed loops tie, as many are drawn as
+    there are degrees of freedom: more of them would have to be weighed against each other.
 
     Parameters
     ----------
@@ -86,6 +87,8 @@ class Observed:
         self.model, self.settings, self.setup = model, settings, setup or Setup()
         self.experiments = tuple(experiments)
         self.records = tuple(_records(model, self.experiments))
+        #: Channels to which the model is drawn.
+        self.drawn_to = _drawn(model, self.records[0].channels) if self.records else ()
         self._starts: WeakKeyDictionary[Model, list[Array]] = WeakKeyDictionary()
         ends = np.cumsum([len(record.time) for record in self.records])
         cuts = [
@@ -144,7 +147,7 @@ class Observed:
         for end, record in zip(np.cumsum([len(one.time) for one in self.records]), self.records, strict=True):
             zeros, poles = _free_mass(band, record.dt)
             for column, channel in enumerate(record.channels):
-                if is_position(self.model, channel):
+                if channel in self.drawn_to:
                     reading = record.readings[:, column] - record.readings[0, column]
                     left[end - len(reading) : end, column] = lfilter(zeros, poles, reading)
         return left
@@ -161,7 +164,7 @@ class Observed:
 
         It draws the model to what is slow, noise among that: less than all of it is left there.
         """
-        if not is_position(self.model, channel):
+        if channel not in self.drawn_to:
             return [np.ones(part.stop - part.start) for part in parts]
         ends = np.cumsum([len(record.time) for record in self.records])
         found = []
@@ -251,6 +254,7 @@ class Observed:
         known = [column for column, name in enumerate(record.channels) if name in model.output_channels]
         channels = [record.channels[column] for column in known]
         gain = observer_gain(model, channels, observer.band, record.dt, theta)
+        gain[:, [name not in self.drawn_to for name in channels]] = 0.0
         outputs, states, slopes = model.core.observe(
             theta,
             start,
@@ -278,6 +282,17 @@ def _records(model: Model, experiments: Sequence[Experiment]) -> Iterator[Record
         record = Record.of(model, experiment)
         readings = np.column_stack([record.readings, *(experiment[channel] for channel in held)])
         yield replace(record, channels=(*record.channels, *held), readings=readings)
+
+
+def _drawn(model: Model, channels: Sequence[str]) -> tuple[str, ...]:
+    """Positions of joints among these channels that do not follow from one another; those of driven ones first."""
+    positions = [name for name in channels if is_position(model, name)]
+    if not model.loops:
+        return tuple(positions)
+    joints = {name.rpartition(".")[0]: name for name in positions}
+    start, driven = model.loops.assembled(), [joint for joint in joints if joint in model.driven_joints]
+    ways = [set(joints) & set(model.loops.independent(start, preferred)) for preferred in (driven, list(joints))]
+    return tuple(joints[joint] for joint in joints if joint in max(ways, key=len))
 
 
 def _among(columns: Sequence[int], count: int, values: Array) -> Array:
