@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import product
+
 import numpy as np
 import pytest
 
@@ -55,8 +57,8 @@ def test_records_of_which_one_lacks_the_deflection_are_compared_without() -> Non
 
 def test_an_observer_keeps_a_slider_crank_on_the_equation_of_another_hand() -> None:
     true = Model.from_toml(SLIDER_CRANK).with_parameters({"slider.mass": SLIDER, "crank.friction.viscous": OIL})
-    observed = Observed(true, [turned(seed=1, channels=("guide.position",))], Settings())
-    for band in (1.0, 10.0):
+    for seed, band in product((1, 2), (1.0, 10.0)):
+        observed = Observed(true, [turned(seed=seed, channels=("guide.position",))], Settings())
         residual, _ = observed.follow(true, true.theta, Observer(band))
         # Of noise an observer leaves no more than all, and less of the guide, which the crank moves along.
         assert np.all(np.std(residual[500:], axis=0) < np.array([1e-4, 1e-5]))

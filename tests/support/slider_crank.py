@@ -46,7 +46,7 @@ axis = [1, 0, 0]
 type = "spherical"
 a = {{ parent = "rod", point = [{LENGTH}, 0, 0] }}
 b = {{ parent = "slider" }}
-start = {{ guide = {ARM + LENGTH} }}
+start = {{ crank = 1.5, pin = -1.84, guide = 0.29 }}
 [actuators.motor]
 joint = "crank"
 gain = {GAIN}
