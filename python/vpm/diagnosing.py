@@ -39,6 +39,7 @@ from vpm.model import Model
 from vpm.naming import BROKEN, FAILED, RANKING, Names, Tell, named, ranking_of, until_stopped
 from vpm.one_thread import in_one_thread
 from vpm.ranking import Ranking
+from vpm.ranking.stand_in import why_unbalanced
 from vpm.simulate import Setup, judging_mode
 from vpm.tasks import done_by
 
@@ -48,6 +49,11 @@ LEAST_LIMIT = 6
 FOUND_HOLD = "commands run from sample to sample, as readings of a drive do; simulate with hold {hold} too"
 #: Said where Ctrl-C came after the search.
 STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, was examined"
+#: Said of machines whose efforts do not follow from their motion.
+UNBALANCED = (
+    "{model}: a diagnosis measures what it names by efforts along the motion, and {reason}; "
+    "name what is missing by vpm.rank, which compares positions"
+)
 #: What is odd in a channel and may pass for an effect.
 NOTED = ("delay", "frozen", "clipped", "spikes")
 
@@ -130,7 +136,8 @@ def diagnose(
     Raises
     ------
     DiagnosisError
-        No record was given, or an effect name or the source of names is unknown.
+        No record was given, an effect name or the source of names is unknown, or no efforts follow from a motion of the
+        machine: `vpm.rank` names what such a one is missing.
     ExperimentError
         A channel is missing, or a log cannot be trusted.
     ExecutorError
@@ -206,6 +213,8 @@ def diagnosed(
     """
     effects, cutoff, limit = asked.get("effects"), asked.get("cutoff"), asked.get("limit")
     setup = asked.get("setup") or Setup()
+    if reason := why_unbalanced(model):
+        raise DiagnosisError(UNBALANCED.format(model=model.name, reason=reason))
     records = records_of(model, experiments, validate)
     if cutoff is not None:
         for record in chain(*records[:2]):

@@ -293,7 +293,15 @@ def test_modes_that_cannot_work_say_so() -> None:
         vpm.simulate(model, log, mode="inverse_dynamics")
     with pytest.raises(VpmError, match="cannot start again from a state in the middle of a record"):
         vpm.simulate(model, log, mode="restarts")
+
+
+def test_a_mass_behind_such_an_actuator_is_found_from_free_runs() -> None:
+    model = build(sample_time=1e-3)
+    log = log_of(model)
+    still = log.with_channel("axis.position", np.zeros(len(log.time)), "m")
+    still = still.with_channel("valve.command", log["valve.command"] * (log.time > 0.05))
+    seen = still.with_channel("axis.position", vpm.simulate(model, still, mode="free_run")["axis.position"], "m")
     uncertain = model.to_dict()
-    uncertain["bodies"]["carriage"]["mass"] = {"value": 8.0, "unit": "kg", "uncertainty": 1.0}
-    with pytest.raises(VpmError, match="no derivatives by parameters"):
-        vpm.identify(vpm.Model.from_dict(uncertain), log, mode="free_run")
+    uncertain["bodies"]["carriage"]["mass"] = {"value": 8.8, "unit": "kg", "uncertainty": 1.0}
+    fit = vpm.identify(vpm.Model.from_dict(uncertain), seen, mode="free_run")
+    assert fit.model.parameters["carriage.mass"].value == pytest.approx(8.0, rel=1e-6)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 
 import numpy as np
+from scipy.signal import lfilter
 
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -59,6 +60,7 @@ def pushed(
     winding: float = 0.0,
     lag: float = 0.0,
     late: float = 0.0,
+    pole: float = 0.0,
     ends: float = np.inf,
     seed: int = 0,
     duration: float = 8.0,
@@ -66,7 +68,7 @@ def pushed(
     """The sledge by small explicit steps: dry friction as an impulse that at most stops it, a delay as a queue.
 
     Dry friction may differ between the two directions by ``uneven``, and from place to place by ``wavy`` either way;
-    the force of the motor differs by a share ``winding`` of it.
+    the force of the motor differs by a share ``winding`` of it, and goes by a difference equation with a ``pole``.
     """
     random, samples, h = np.random.default_rng(seed), round(duration / STEP), STEP / FINE
     time = STEP * np.arange(samples)
@@ -75,13 +77,14 @@ def pushed(
         np.sin(2.1 * time + phases[0]) + 0.6 * np.sin(5.3 * time + phases[1]) + 0.3 * np.sin(17.0 * time + phases[2])
     )
     command = 5.0 * swing * np.minimum(time, 1.0)
+    sent = lfilter([1.0 - pole], [1.0, -pole], command)
     place, speed, force = 0.0, 0.0, 0.0
     queue = deque([0.0] * round(late / h))
     places = np.empty(samples)
     for sample in range(samples):
         places[sample] = place
         for _ in range(FINE):
-            queue.append(command[sample])
+            queue.append(sent[sample])
             asked, before = GAIN * queue.popleft() * (1.0 - winding * np.sin(2.0 * np.pi * place / TURN)), speed
             mean = asked + (force - asked) * (_mean_decay(h / lag) if lag else 0.0)
             force = asked + (force - asked) * (np.exp(-h / lag) if lag else 0.0)
@@ -94,6 +97,44 @@ def pushed(
     return Experiment.from_arrays(
         time, {"motor.command": command, "way.position": readings}, model=Model.from_toml(SLEDGE), name=f"push {seed}"
     )
+
+
+#: Pole of a drive that goes by a difference equation, and the sledge with it.
+POLE = 0.9
+SAMPLED = SLEDGE.replace(
+    "gain = 4.0",
+    f"""type = "narx"
+sample_time = {STEP}
+inputs = {{ u = "motor.command" }}
+terms = {{ "effort[k-1]" = {POLE}, "u[k]" = {(1.0 - POLE) * GAIN} }}""",
+)
+#: What hangs behind a spring on the sledge, and how its deflection is read.
+LINK, STIFFNESS, DAMPING, GAUGE = 2.2, 2e5, 40.0, 5e-6
+
+
+def wound(seed: int, *, logged: bool) -> Experiment:
+    """The sledge as a motor and a link behind a spring; the log holds the deflection of that, or not."""
+    random, samples, fine = np.random.default_rng(seed), 2000, 20
+    time, h, motor = STEP * np.arange(samples), STEP / fine, MASS - LINK
+    phases = random.uniform(0.0, 2.0 * np.pi, 3)
+    waves = zip((5.0, 3.0, 1.5), (2.1, 5.3, 17.0), phases, strict=True)
+    command = np.minimum(time, 1.0) * np.sum(
+        [size * np.sin(turn * time + phase) for size, turn, phase in waves], axis=0
+    )
+    place, speed, bent, rate = 0.0, 0.0, 0.0, 0.0
+    shown = np.empty((samples, 2))
+    for sample in range(samples):
+        shown[sample] = place, bent
+        for _ in range(fine):
+            spring = STIFFNESS * bent + DAMPING * rate
+            acceleration = (GAIN * command[sample] - OIL * speed + spring) / motor
+            speed, rate = speed + h * acceleration, rate - h * (spring / LINK + acceleration)
+            place, bent = place + h * speed, bent + h * rate
+    shown += np.array([READING, GAUGE]) * random.standard_normal(shown.shape)
+    channels = {"motor.command": command, "way.position": shown[:, 0]}
+    if logged:
+        channels["way_deflection.position"] = shown[:, 1]
+    return Experiment.from_arrays(time, channels, model=Model.from_toml(SLEDGE), name=f"wound {seed}")
 
 
 def _mean_decay(turn: float) -> float:

@@ -164,6 +164,14 @@ impl<S: Scalar> Data<S> {
         self.kinematics.get(k + 1).map(|slot| slot.twist)
     }
 
+    /// Makes coordinates `times` as heavy in the mass matrix of the last [`crate::dynamics::flexible::terms()`].
+    pub(crate) fn weigh(&mut self, coordinates: &[u32], times: f64) {
+        let n = self.acceleration.len();
+        for &place in coordinates {
+            self.mass_matrix[place as usize * (n + 1)] *= S::from_f64(times);
+        }
+    }
+
     /// Factorises the mass matrix of the last [`crate::dynamics::flexible::terms()`].
     pub(crate) fn factorise(&mut self) {
         self.composite.factors.factorise(&self.mass_matrix);

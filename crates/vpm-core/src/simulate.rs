@@ -222,12 +222,6 @@ impl Job for Simulation<'_> {
 
 fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
     let dim = setting.description.n_states();
-    if !setting.sensitivities.is_empty() {
-        setting.description.refuse_sampled(
-            "a simulation has no derivatives by parameters",
-            "ask for none, or identify the machine with an ideal drive that is given the measured effort",
-        )?;
-    }
     if let Some(first) = plan.initial.get(..dim) {
         check_step(setting.description, setting.theta, setting.stepping, first)?;
         check_starts(setting, plan.initial)?;

@@ -215,11 +215,11 @@ impl<S: Scalar> Dynamics<S> {
     }
 
     /// Brings coordinates and rates, which lead `x`, to where all loops are closed, see [`Loops::close`].
-    pub(crate) fn close(&mut self, x: &mut [S]) -> [S; 2] {
+    pub(crate) fn close(&mut self, x: &mut [S], held: &[u32]) -> [S; 2] {
         let n = self.coordinates();
         let (q, v) = x[..2 * n].split_at_mut(n);
         let Self { model, data, loops, .. } = self;
-        loops.as_mut().map_or([S::zero(); 2], |loops| loops.close(model, data, q, v))
+        loops.as_mut().map_or([S::zero(); 2], |loops| loops.close(model, data, (q, v), held))
     }
 
     /// Where the closed loops are at (q, v).

@@ -27,7 +27,7 @@ from vpm.discrepancy.search import Search
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import gain, segments
-from vpm.identify.along import SAMPLED_TYPES, bends
+from vpm.identify.along import bends
 from vpm.model import Effect, Model
 
 if TYPE_CHECKING:
@@ -64,15 +64,14 @@ SETTINGS = Settings()
 def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
     """Why names do not come from a ranking, or "": it covers up to three joints, rigid links, and drives without oil.
 
-    It covers oil where a joint has no drive, for no search sees that. Drives may not go by samples of their own, and a
-    ranking does not read a deflection that a log holds.
+    It covers oil where a joint has no drive, for no search sees that. A deflection that a log holds is compared by a
+    ranking, but on a log of a real arm a search names its friction more plausibly.
     """
     if bends(model):
         return "links bend"
-    without = set(SAMPLED_TYPES) if free_joints(model) else {"hydraulic", *SAMPLED_TYPES}
-    for name in model.actuators:
-        if (kind := model.actuator_type(name)) in without:
-            return f"the actuator {name} has type {kind}"
+    oil = [name for name in model.actuators if model.actuator_type(name) == "hydraulic"]
+    if oil and not free_joints(model):
+        return f"the actuator {oil[0]} has type hydraulic"
     own = set(model.joints) - set(model.added_joints)
     if len(own) > SETTINGS.joints:
         return f"there are {len(own)} joints, more than {SETTINGS.joints}"

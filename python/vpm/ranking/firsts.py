@@ -18,7 +18,12 @@ STEP = 1e-3
 
 
 def hidden_states(model: Model, channels: Sequence[str]) -> tuple[str, ...]:
-    """Positions and velocities of joints of which these channels tell no position; not of those that effects add."""
+    """Positions and velocities of joints of which these channels tell no position; not of those that effects add.
+
+    Of machines with closed loops none: first states next to one another would leave their loops open.
+    """
+    if model.loops:
+        return ()
     hidden = [name for name in model.joints if name not in model.added_joints and f"{name}.position" not in channels]
     names = [f"{name}.{what}" for what in ("position", "velocity") for name in hidden]
     return tuple(name for name in names if name in model.state_names)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -70,7 +70,9 @@ class Observed:
     The observer knows no noise: each measured joint is drawn to its encoder with the bandwidth, as by a soft spring
     with a damper between the machine and its log. All structures are compared under the same one. Where a joint is
     split, what hangs behind its spring or backlash is drawn along with the motor: else both would answer to noise, and
-    to what is missing elsewhere, otherwise than a rigid joint does.
+    to what is missing elsewhere, otherwise than a rigid joint does. A deflection that the logs hold is compared and not
+    drawn: a structure without the joint behind predicts zero. Of joints that closed loops tie, as many are drawn as
+    there are degrees of freedom: more of them would have to be weighed against each other.
 
     Parameters
     ----------
@@ -85,7 +87,9 @@ class Observed:
     ) -> None:
         self.model, self.settings, self.setup = model, settings, setup or Setup()
         self.experiments = tuple(experiments)
-        self.records = tuple(Record.of(model, record) for record in self.experiments)
+        self.records = tuple(_records(model, self.experiments))
+        #: Channels to which the model is drawn.
+        self.drawn_to = _drawn(model, self.records[0].channels) if self.records else ()
         self._starts: WeakKeyDictionary[Model, list[Array]] = WeakKeyDictionary()
         ends = np.cumsum([len(record.time) for record in self.records])
         cuts = [
@@ -120,10 +124,8 @@ class Observed:
         states = hidden_states(self.model, self.records[0].channels)
         if not states:
             return Firsts()
-        observer, theta = Observer(self.settings.bands[0], fine=False), self.model.theta
         try:
-            begun = zip(self.records, self._begun(self.model), strict=True)
-            motion = np.concatenate([self._run(self.model, theta, observer, NOTHING, *one)[1] for one in begun])
+            motion = np.concatenate(self.states(self.model, Observer(self.settings.bands[0], fine=False)))
         except (VpmError, ArithmeticError):
             return Firsts()
         sizes = np.std(motion[:, [self.model.state_names.index(state) for state in states]], axis=0)
@@ -146,7 +148,7 @@ class Observed:
         for end, record in zip(np.cumsum([len(one.time) for one in self.records]), self.records, strict=True):
             zeros, poles = _free_mass(band, record.dt)
             for column, channel in enumerate(record.channels):
-                if is_position(self.model, channel):
+                if channel in self.drawn_to:
                     reading = record.readings[:, column] - record.readings[0, column]
                     left[end - len(reading) : end, column] = lfilter(zeros, poles, reading)
         return left
@@ -163,7 +165,7 @@ class Observed:
 
         It draws the model to what is slow, noise among that: less than all of it is left there.
         """
-        if not is_position(self.model, channel):
+        if channel not in self.drawn_to:
             return [np.ones(part.stop - part.start) for part in parts]
         ends = np.cumsum([len(record.time) for record in self.records])
         found = []
@@ -173,6 +175,11 @@ class Observed:
             zeros, poles = (np.polyval(one, turns) for one in _free_mass(band, record.dt))
             found.append(np.abs(zeros / poles) ** 2)
         return found
+
+    def states(self, model: Model, observer: Observer) -> list[Array]:
+        """States (N, nx) along each record."""
+        begun = zip(self.records, self._begun(model), strict=True)
+        return [self._run(model, model.theta, observer, NOTHING, *one)[1] for one in begun]
 
     def follow(
         self,
@@ -253,14 +260,16 @@ class Observed:
         start: Array,
     ) -> tuple[Array, Array, Array]:
         """Outputs of the channels of a record (N, m), states (N, nx), derivatives ``by`` some numbers (N, m, k)."""
-        places = [model.output_channels.index(name) for name in record.channels]
-        gain = observer_gain(model, record.channels, observer.band, record.dt, theta)
+        known = [column for column, name in enumerate(record.channels) if name in model.output_channels]
+        channels = [record.channels[column] for column in known]
+        gain = observer_gain(model, channels, observer.band, record.dt, theta)
+        gain[:, [name not in self.drawn_to for name in channels]] = 0.0
         outputs, states, slopes = model.core.observe(
             theta,
             start,
             record.inputs,
-            places,
-            record.readings,
+            [model.output_channels.index(name) for name in channels],
+            record.readings[:, known],
             np.tile(gain.ravel(), (len(record.time), 1)),
             record.dt,
             self.setup.substeps * self._steps(model, observer, record),
@@ -270,7 +279,36 @@ class Observed:
             alone=True,
             moves=by[1],
         )
+        if len(known) < len(record.channels):
+            outputs, slopes = (_among(known, len(record.channels), one) for one in (outputs, slopes))
         return outputs, states, slopes
+
+
+def _records(model: Model, experiments: Sequence[Experiment]) -> Iterator[Record]:
+    """Records with the outputs of a model that each holds, and what all hold of deflections that it takes for zero."""
+    held = [channel for channel in model.deflections if all(channel in experiment for experiment in experiments)]
+    for experiment in experiments:
+        record = Record.of(model, experiment)
+        readings = np.column_stack([record.readings, *(experiment[channel] for channel in held)])
+        yield replace(record, channels=(*record.channels, *held), readings=readings)
+
+
+def _drawn(model: Model, channels: Sequence[str]) -> tuple[str, ...]:
+    """Positions of joints among these channels that do not follow from one another; those of driven ones first."""
+    positions = [name for name in channels if is_position(model, name)]
+    if not model.loops:
+        return tuple(positions)
+    joints = {name.rpartition(".")[0]: name for name in positions}
+    start, driven = model.loops.assembled(), [joint for joint in joints if joint in model.driven_joints]
+    ways = [set(joints) & set(model.loops.independent(start, preferred)) for preferred in (driven, list(joints))]
+    return tuple(joints[joint] for joint in joints if joint in max(ways, key=len))
+
+
+def _among(columns: Sequence[int], count: int, values: Array) -> Array:
+    """Channels (N, ...) in their columns among so many, the others zero."""
+    whole = np.zeros((len(values), count, *values.shape[2:]))
+    whole[:, columns] = values
+    return whole
 
 
 def _divided(stretches: Sequence[NDArray[np.int_]], held: int) -> tuple[Parts, Parts]:
@@ -300,9 +338,12 @@ def observer_gain(model: Model, channels: Sequence[str], band: float, dt: float,
 
 
 def is_position(model: Model, channel: str) -> bool:
-    """Whether a channel is the position of a joint, to which an observer draws the model."""
+    """Whether a channel is the position of a joint, to which an observer draws the model.
+
+    None that an effect has split off: another structure does not have it, and all have to be under the same observer.
+    """
     joint, _, quantity = channel.rpartition(".")
-    return quantity == "position" and joint in model.coordinates
+    return quantity == "position" and joint in model.coordinates and joint not in model.added_joints
 
 
 def _gains(band: float, dt: float) -> tuple[float, float]:

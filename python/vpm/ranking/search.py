@@ -12,7 +12,6 @@ from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.side_by_side import SideBySide
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
-from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.ranking.choice import as_good, likely, weighed
 from vpm.ranking.extensions import Extensions
@@ -27,6 +26,7 @@ from vpm.ranking.race import raced
 from vpm.ranking.result import Ranked, Ranking
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes, known
+from vpm.ranking.stand_in import shown
 from vpm.ranking.structure import Structure
 from vpm.ranking.trial import Trial
 from vpm.ranking.validation import gaps
@@ -51,8 +51,8 @@ class Search:
         say: Callable[[str], None],
     ) -> None:
         self.names, self.settings, self.each, self.say = names, settings, each, say
-        self.data = InverseDynamicsProblem(model, records)
         self.fitter = Fitter(Observed(model, records, settings, setup), settings)
+        self.data = shown(model, self.fitter.observed)
         self.extensions = Extensions(Sizes(model, self.data))
         firsts = self.fitter.observed.firsts.priors
         values = np.append(model.theta, np.zeros(len(firsts)))

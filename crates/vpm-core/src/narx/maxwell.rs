@@ -1,6 +1,7 @@
 //! A Maxwell element beside a spring as a difference equation, its spring a polynomial map of drive signal and length.
 
 use crate::error::{Error, NarxError, Result};
+use crate::scalar::Scalar;
 
 /// A polynomial of total degree <= 3 in the drive signal u and the length s, in the order `1, u, s, u^2, u s, s^2, u^3, u^2 s, u s^2, s^3`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,11 +17,11 @@ impl Surface {
 
     /// Its value at (u, s).
     #[inline]
-    pub fn at(&self, u: f64, s: f64) -> f64 {
+    pub fn at<S: Scalar>(&self, u: S, s: S) -> S {
         let [c, u1, s1, u2, us, s2, u3, u2s, us2, s3] = self.0;
-        let in_s = s * (s1 + s * (s2 + s * s3));
-        let in_u = u * (u1 + u * (u2 + u * u3));
-        c + in_s + in_u + u * s * (us + u * u2s + s * us2)
+        let in_s = s * (s * (s * s3 + s2) + s1);
+        let in_u = u * (u * (u * u3 + u2) + u1);
+        in_s + c + in_u + u * s * (u * u2s + us + s * us2)
     }
 }
 
@@ -58,11 +59,11 @@ pub struct MaxwellNarx {
 
 /// What the element remembers: the last two samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct MaxwellState {
-    force: [f64; 2],
-    length: [f64; 2],
-    elastic: f64,
-    stiffness: f64,
+pub struct MaxwellState<S = f64> {
+    force: [S; 2],
+    length: [S; 2],
+    elastic: S,
+    stiffness: S,
 }
 
 impl MaxwellNarx {
@@ -86,41 +87,41 @@ impl MaxwellNarx {
     }
 
     /// Memory that starts with the forces (N) and lengths (m) of the last two samples, oldest first, at the drive signal `u` of the last.
-    pub fn start(&self, force: [f64; 2], u: f64, length: [f64; 2]) -> MaxwellState {
+    pub fn start<S: Scalar>(&self, force: [S; 2], u: S, length: [S; 2]) -> MaxwellState<S> {
         let (elastic, stiffness) = self.elastic(u, length[1]);
         MaxwellState { force, length, elastic, stiffness }
     }
 
     /// Force in N of an element that has stood at drive signal `u` and length `s` (m): that of its spring.
     #[inline]
-    pub fn settled(&self, u: f64, s: f64) -> f64 {
+    pub fn settled<S: Scalar>(&self, u: S, s: S) -> S {
         self.elastic(u, s).0
     }
 
     /// `k_0 (s - s_0)` and `k_0` at (u, s).
     #[inline]
-    fn elastic(&self, u: f64, s: f64) -> (f64, f64) {
+    fn elastic<S: Scalar>(&self, u: S, s: S) -> (S, S) {
         let stiffness = self.k0.at(u, s);
         (stiffness * (s - self.s0.at(u, s)), stiffness)
     }
 
     /// Force in N at the next sample, where the drive signal is `u` and the length `s` (m).
     #[inline]
-    pub fn step(&self, state: &mut MaxwellState, u: f64, s: f64) -> f64 {
+    pub fn step<S: Scalar>(&self, state: &mut MaxwellState<S>, u: S, s: S) -> S {
         let (r, [older, old], [s_older, s_old]) = (self.tau_over_h, state.force, state.length);
         let (elastic, stiffness) = self.elastic(u, s);
         let force = match self.scheme {
             MaxwellScheme::Trapezoidal => {
-                let rate = (0.5 * (stiffness + state.stiffness) + self.k1) * (s - s_old);
-                (0.5 * (elastic + state.elastic) + r * rate + (r - 0.5) * old) / (r + 0.5)
+                let rate = ((stiffness + state.stiffness) * 0.5 + self.k1) * (s - s_old);
+                ((elastic + state.elastic) * 0.5 + rate * r + old * (r - 0.5)) / (r + 0.5)
             }
             MaxwellScheme::Printed => {
                 let rate = (state.stiffness + self.k1) * (s_old - s_older);
-                (state.elastic + r * rate + 0.5 * r * older) / (1.0 + 0.5 * r)
+                (state.elastic + rate * r + older * (0.5 * r)) / (1.0 + 0.5 * r)
             }
             MaxwellScheme::CentralMean => {
                 let rate = (state.stiffness + self.k1) * 0.5 * (s - s_older);
-                (state.elastic + r * rate + 0.5 * (r - 1.0) * older) / (0.5 * (r + 1.0))
+                (state.elastic + rate * r + older * (0.5 * (r - 1.0))) / (0.5 * (r + 1.0))
             }
         };
         *state = MaxwellState { force: [old, force], length: [s_old, s], elastic, stiffness };

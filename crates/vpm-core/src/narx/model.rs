@@ -5,6 +5,7 @@ use super::record::Record;
 use super::stepper::Stepper;
 use super::structure::Structure;
 use crate::error::{NarxError, Result};
+use crate::scalar::Scalar;
 
 /// `y[k] = sum_i theta_i prod_j x_ij` with numbers for theta.
 #[derive(Clone, Debug, PartialEq)]
@@ -52,6 +53,11 @@ impl Narx {
 
     /// A simulation that is fed sample by sample; all its memory is made here.
     pub fn stepper(&self) -> Stepper {
+        Stepper::new(self)
+    }
+
+    /// The same in numbers that may carry derivatives.
+    pub(crate) fn stepper_in<S: Scalar>(&self) -> Stepper<S> {
         Stepper::new(self)
     }
 

@@ -1,6 +1,7 @@
 //! A polynomial as a straight list of products, ready to be summed.
 
 use super::structure::Structure;
+use crate::scalar::Scalar;
 
 /// Numbers in the window of a narrow program: an index of eight bits cannot leave it.
 pub(super) const NARROW: usize = 256;
@@ -66,14 +67,14 @@ impl Program {
 
     /// The sum over the window that begins at `from`.
     #[inline]
-    pub(super) fn evaluate(&self, buffer: &[f64], from: usize) -> f64 {
+    pub(super) fn evaluate<S: Scalar>(&self, buffer: &[S], from: usize) -> S {
         let window = &buffer[from..];
         match &self.sums {
             Kind::Narrow(sums) => match window.first_chunk::<NARROW>() {
-                Some(window) => self.constant + sums.sum(|place| window[usize::from(place)]),
-                None => self.constant + sums.sum(|place| window[usize::from(place)]),
+                Some(window) => sums.sum(|place| window[usize::from(place)]) + self.constant,
+                None => sums.sum(|place| window[usize::from(place)]) + self.constant,
             },
-            Kind::Wide(sums) => self.constant + sums.sum(|place| window[place]),
+            Kind::Wide(sums) => sums.sum(|place| window[place]) + self.constant,
         }
     }
 }
@@ -93,26 +94,27 @@ impl<I: Copy> Sums<I> {
     }
 
     #[inline]
-    fn sum(&self, at: impl Fn(I) -> f64) -> f64 {
-        let linear = spread(&self.linear, |&(value, a)| value * at(a));
-        let square = spread(&self.square, |&(value, [a, b])| value * (at(a) * at(b)));
-        let cubic = spread(&self.cubic, |&(value, [a, b, c])| value * at(a) * (at(b) * at(c)));
-        let higher: f64 =
-            self.higher.iter().map(|(value, places)| places.iter().fold(*value, |product, &a| product * at(a))).sum();
+    fn sum<S: Scalar>(&self, at: impl Fn(I) -> S) -> S {
+        let linear = spread(&self.linear, |&(value, a)| at(a) * value);
+        let square = spread(&self.square, |&(value, [a, b])| at(a) * at(b) * value);
+        let cubic = spread(&self.cubic, |&(value, [a, b, c])| at(a) * value * (at(b) * at(c)));
+        let product =
+            |(value, places): &(f64, Vec<I>)| places.iter().fold(S::from_f64(*value), |product, &a| product * at(a));
+        let higher: S = self.higher.iter().map(product).sum();
         (linear + square) + (cubic + higher)
     }
 }
 
 /// A sum in four lanes, because each addition otherwise waits for the last one.
 #[inline]
-fn spread<T>(items: &[T], value: impl Fn(&T) -> f64) -> f64 {
+fn spread<T, S: Scalar>(items: &[T], value: impl Fn(&T) -> S) -> S {
     let (fours, rest) = items.as_chunks::<4>();
-    let mut lanes = [0.0; 4];
+    let mut lanes = [S::zero(); 4];
     for four in fours {
         for (lane, item) in lanes.iter_mut().zip(four) {
             *lane += value(item);
         }
     }
-    let rest: f64 = rest.iter().map(value).sum();
+    let rest: S = rest.iter().map(value).sum();
     (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]) + rest
 }

@@ -3,15 +3,16 @@
 use super::model::Narx;
 use super::program::Program;
 use crate::error::{NarxError, Result};
+use crate::scalar::Scalar;
 
 /// Rows that a window moves along before it is moved back: the copy is spread over so many steps.
 const ROWS: usize = 256;
 
 /// The memory of a running model: a window that slides along a buffer. A step allocates nothing.
 #[derive(Clone, Debug)]
-pub struct Stepper {
+pub struct Stepper<S = f64> {
     program: Program,
-    buffer: Vec<f64>,
+    buffer: Vec<S>,
     /// Where the window begins.
     from: usize,
     /// Where it begins at last.
@@ -19,11 +20,11 @@ pub struct Stepper {
     longest: usize,
 }
 
-impl Stepper {
+impl<S: Scalar> Stepper<S> {
     pub(super) fn new(model: &Narx) -> Self {
         let program = model.program.clone();
         let end = program.stride * ROWS;
-        let buffer = vec![0.0; end + program.reach()];
+        let buffer = vec![S::zero(); end + program.reach()];
         Self { longest: model.structure().longest_lag(), program, buffer, from: 0, end }
     }
 
@@ -32,7 +33,7 @@ impl Stepper {
     /// # Errors
     ///
     /// Other lengths.
-    pub fn start(&mut self, output: &[f64], inputs: &[f64]) -> Result<()> {
+    pub fn start(&mut self, output: &[S], inputs: &[S]) -> Result<()> {
         let (stride, lag) = (self.program.stride, self.longest);
         if output.len() != lag || inputs.len() != lag * (stride - 1) {
             let needed = format!("looks back {lag} samples with {} inputs", stride - 1);
@@ -52,12 +53,12 @@ impl Stepper {
     }
 
     /// Sets a past in which output and inputs stood; numbers missing in `inputs` count as zero.
-    pub fn stand(&mut self, output: f64, inputs: &[f64]) {
+    pub fn stand(&mut self, output: S, inputs: &[S]) {
         self.from = 0;
         for row in self.buffer.chunks_exact_mut(self.program.stride).take(self.longest) {
             row[0] = output;
             for (at, place) in row[1..].iter_mut().enumerate() {
-                *place = inputs.get(at).copied().unwrap_or(0.0);
+                *place = inputs.get(at).copied().unwrap_or_default();
             }
         }
     }
@@ -69,7 +70,7 @@ impl Stepper {
 
     /// The output of this sample from its inputs and the **simulated** past; numbers missing in `inputs` count as zero.
     #[inline]
-    pub fn step(&mut self, inputs: &[f64]) -> f64 {
+    pub fn step(&mut self, inputs: &[S]) -> S {
         let (row, value) = self.present(inputs);
         self.buffer[row] = value;
         self.advance();
@@ -78,7 +79,7 @@ impl Stepper {
 
     /// As [`step`](Self::step), but the past of the next samples is what was **measured** here.
     #[inline]
-    pub fn step_measured(&mut self, inputs: &[f64], measured: f64) -> f64 {
+    pub fn step_measured(&mut self, inputs: &[S], measured: S) -> S {
         let (row, value) = self.present(inputs);
         self.buffer[row] = measured;
         self.advance();
@@ -87,10 +88,10 @@ impl Stepper {
 
     /// Takes the inputs of this sample: where its row begins, and the output that the model gives for it.
     #[inline]
-    fn present(&mut self, inputs: &[f64]) -> (usize, f64) {
+    fn present(&mut self, inputs: &[S]) -> (usize, S) {
         let row = self.from + self.longest * self.program.stride;
         for (at, place) in self.buffer[row + 1..row + self.program.stride].iter_mut().enumerate() {
-            *place = inputs.get(at).copied().unwrap_or(0.0);
+            *place = inputs.get(at).copied().unwrap_or_default();
         }
         (row, self.program.evaluate(&self.buffer, self.from))
     }

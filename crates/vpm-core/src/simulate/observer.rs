@@ -4,7 +4,8 @@
 //! extended Kalman filter (Jazwinski 1970, chapter 8; Kristensen, Madsen & Jorgensen 2004): forces that nobody knows of move the machine,
 //! and sensors err. They follow the machine's own linearisation at every sample, so that they know by themselves what a joint that sticks, a
 //! play that is open or a contact lets through. What is left of the log is white where model and noise are right. Positions on their way
-//! to a late sensor are moved as those of the machine: the readings that come next will show them.
+//! to a late sensor are moved as those of the machine: the readings that come next will show them. Closed loops are closed again after each
+//! correction, and sampled drives go on with what they remember.
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
@@ -61,6 +62,17 @@ impl Gains<'_> {
     pub(super) fn is_of_motion(&self, layout: Layout) -> bool {
         self.alone && self.readings.channels.iter().all(|&channel| layout.is_of_motion(channel))
     }
+
+    /// Coordinates, of so many, that readings move.
+    pub(super) fn drawn(&self, coordinates: usize) -> Vec<u32> {
+        let (rows, width) = (0..self.gains.rows(), self.readings.channels.len());
+        let moves = |state: usize, row: usize| {
+            self.gains.row(row)[state * width..(state + 1) * width].iter().any(|&gain| gain != 0.0)
+        };
+        let states = |place: u32| [place as usize, place as usize + coordinates];
+        let drawn = |&place: &u32| states(place).into_iter().any(|state| rows.clone().any(|row| moves(state, row)));
+        (0..coordinates as u32).filter(drawn).collect()
+    }
 }
 
 /// What a filter gives, each table row by row.
@@ -80,9 +92,7 @@ pub struct Filtered {
 
 impl Readings<'_> {
     fn check(&self, setting: &Setting<'_>, inputs: &Inputs<'_>) -> Result<()> {
-        let (description, count) = (setting.description, setting.description.n_outputs());
-        description
-            .refuse_sampled("no observer can correct it", "use an ideal drive that is given the measured effort")?;
+        let count = setting.description.n_outputs();
         if let Some(&index) = self.channels.iter().find(|&&channel| channel >= count) {
             let what = "the list of measured channels".to_owned();
             return Err(Error::Reference { what, target: "output", index, count });
@@ -133,7 +143,11 @@ pub fn filter<'a>(
     noise: Noise<'a>,
 ) -> Result<Filtered> {
     let inputs = inputs.into();
-    setting.description.refuse_loops(OBSERVED, "compare free runs instead")?;
+    setting.description.refuse_loops(OBSERVED, "compare free runs instead, or give the gains")?;
+    setting.description.refuse_sampled(
+        "no filter knows how it answers to a correction",
+        "use an ideal drive that is given the measured effort, or give the gains",
+    )?;
     readings.check(&setting, &inputs)?;
     noise.check(setting.description, readings.channels.len())?;
     check_state("initial_state", setting.description, initial_state)?;
@@ -160,7 +174,6 @@ pub fn observe<'a>(
     gains: Gains<'a>,
 ) -> Result<Run> {
     let inputs = inputs.into();
-    setting.description.refuse_loops(OBSERVED, "compare free runs instead")?;
     gains.readings.check(&setting, &inputs)?;
     let (rows, entries) = (inputs.table.rows(), setting.description.n_states() * gains.readings.channels.len());
     gains.gains.expect("gains", rows, entries)?;

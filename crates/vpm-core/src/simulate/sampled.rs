@@ -5,6 +5,7 @@ use crate::controller::samples_between;
 use crate::description::{Description, maxwell_of, narx_of};
 use crate::error::{Diverged, Error, Result};
 use crate::narx::{MaxwellNarx, MaxwellState, Stepper};
+use crate::scalar::Scalar;
 use crate::sensor::{Channel, Layout};
 
 /// The drives of a machine that act at samples of their own, with all that they remember. None of it is a state of the integrator.
@@ -12,9 +13,9 @@ use crate::sensor::{Channel, Layout};
 /// Law: at each of its samples a drive takes its inputs as they are then, true and without sensors, makes one step, and holds the effort
 /// until its next sample, whatever steps the integrator takes in between. Before its first sample everything stood as it stands there.
 #[derive(Clone, Debug)]
-pub(crate) struct SampledDrives {
+pub(crate) struct SampledDrives<S = f64> {
     /// One place for each actuator.
-    drives: Vec<Option<SampledDrive>>,
+    drives: Vec<Option<SampledDrive<S>>>,
 }
 
 /// An effort that a drive cannot have.
@@ -26,38 +27,38 @@ pub(crate) struct Astray {
 }
 
 #[derive(Clone, Debug)]
-struct SampledDrive {
-    law: Law,
+struct SampledDrive<S> {
+    law: Law<S>,
     /// Samples of the record from one of the drive to its next.
     every: usize,
     limit: f64,
     started: bool,
-    effort: f64,
+    effort: S,
 }
 
 #[derive(Clone, Debug)]
-enum Law {
-    Narx(Narx),
-    Maxwell(Maxwell),
+enum Law<S> {
+    Narx(Narx<S>),
+    Maxwell(Maxwell<S>),
 }
 
 #[derive(Clone, Debug)]
-struct Narx {
-    stepper: Stepper,
+struct Narx<S> {
+    stepper: Stepper<S>,
     /// Column among the outputs that each input reads; none for the command.
     reads: Vec<Option<usize>>,
-    row: Vec<f64>,
-    initial: f64,
+    row: Vec<S>,
+    initial: S,
 }
 
 #[derive(Clone, Debug)]
-struct Maxwell {
+struct Maxwell<S> {
     law: MaxwellNarx,
-    state: MaxwellState,
+    state: MaxwellState<S>,
     length: usize,
 }
 
-impl SampledDrives {
+impl<S: Scalar> SampledDrives<S> {
     /// Those of a machine whose record has steps of `time_step` (s).
     pub(crate) fn new(description: &Description, time_step: f64) -> Result<Self> {
         let layout = description.layout();
@@ -76,7 +77,7 @@ impl SampledDrives {
             };
             let every = samples_between("actuator", &actuator.name, Some(sample_time), time_step)?;
             let limit = limit.unwrap_or(f64::INFINITY);
-            Ok(Some(SampledDrive { law, every, limit, started: false, effort: 0.0 }))
+            Ok(Some(SampledDrive { law, every, limit, started: false, effort: S::zero() }))
         });
         Ok(Self { drives: drives.collect::<Result<_>>()? })
     }
@@ -89,7 +90,7 @@ impl SampledDrives {
     /// Forgets everything.
     pub(crate) fn restart(&mut self) {
         for drive in self.drives.iter_mut().flatten() {
-            (drive.started, drive.effort) = (false, 0.0);
+            (drive.started, drive.effort) = (false, S::zero());
         }
     }
 
@@ -100,23 +101,24 @@ impl SampledDrives {
         &mut self,
         number: usize,
         row: usize,
-        command: f64,
-        see: impl Fn(usize) -> f64,
-    ) -> std::result::Result<Option<f64>, Astray> {
+        command: S,
+        see: impl Fn(usize) -> S,
+    ) -> std::result::Result<Option<S>, Astray> {
         let Some(Some(drive)) = self.drives.get_mut(number) else { return Ok(None) };
         if row.is_multiple_of(drive.every) {
-            let (value, limit) = (drive.step(command, see), drive.limit);
+            let (effort, limit) = (drive.step(command, see), drive.limit);
+            let value = effort.re();
             // Written so that a value that is no number is beyond any limit.
             if !(value.is_finite() && value.abs() <= limit) {
                 return Err(Astray { actuator: number, value, limit });
             }
-            drive.effort = value;
+            drive.effort = effort;
         }
         Ok(Some(drive.effort))
     }
 
     /// As [`SampledDrives::sample`] of a machine that stands and has not begun yet: no drive makes a step.
-    pub(crate) fn rest(&self, number: usize, command: f64, see: impl Fn(usize) -> f64) -> Option<f64> {
+    pub(crate) fn rest(&self, number: usize, command: S, see: impl Fn(usize) -> S) -> Option<S> {
         match &self.drives.get(number)?.as_ref()?.law {
             Law::Narx(narx) => Some(narx.initial),
             Law::Maxwell(maxwell) => Some(-maxwell.law.settled(command, see(maxwell.length))),
@@ -147,9 +149,9 @@ impl Astray {
     }
 }
 
-impl SampledDrive {
+impl<S: Scalar> SampledDrive<S> {
     #[inline]
-    fn step(&mut self, command: f64, see: impl Fn(usize) -> f64) -> f64 {
+    fn step(&mut self, command: S, see: impl Fn(usize) -> S) -> S {
         let first = !std::mem::replace(&mut self.started, true);
         match &mut self.law {
             Law::Narx(Narx { stepper, reads, row, initial }) => {
@@ -173,7 +175,7 @@ impl SampledDrive {
     }
 }
 
-impl Narx {
+impl<S: Scalar> Narx<S> {
     fn new(drive: &NarxDrive, layout: Layout) -> Result<Self> {
         let column = |reading: Reading| match reading {
             Reading::Command => None,
@@ -183,15 +185,15 @@ impl Narx {
             Reading::Rate(line) => Some(Channel::Rate { line }.column(layout)),
         };
         Ok(Self {
-            stepper: narx_of(drive)?.stepper(),
+            stepper: narx_of(drive)?.stepper_in(),
             reads: drive.inputs.iter().map(|&(_, reading)| column(reading)).collect(),
-            row: vec![0.0; drive.inputs.len()],
-            initial: drive.initial,
+            row: vec![S::zero(); drive.inputs.len()],
+            initial: S::from_f64(drive.initial),
         })
     }
 }
 
-impl Maxwell {
+impl<S: Scalar> Maxwell<S> {
     fn new(drive: &MaxwellNarxDrive, length: usize) -> Result<Self> {
         Ok(Self { law: maxwell_of(drive)?, state: MaxwellState::default(), length })
     }

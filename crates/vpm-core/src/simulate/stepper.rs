@@ -67,7 +67,7 @@ pub(crate) struct Stepper<'a, S> {
     sensors: Vec<(usize, Sensor<S>)>,
     /// The controllers, if there is a loop to close.
     control: Option<Control<S>>,
-    sampled: SampledDrives,
+    sampled: SampledDrives<S>,
     /// Inputs that move between samples, if they do.
     courses: Option<Courses<S>>,
     bounds: Bounds,
@@ -105,11 +105,14 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     /// As [`Stepper::new`], with the machine in a form of its own.
     pub(crate) fn of(setting: &Setting<'a>, plan: &Plan<'a>, theta: &[S], mut system: System<S>) -> Result<Self> {
         let description = setting.description;
-        if plan.gains.is_some_and(|gains| gains.is_of_motion(description.layout())) {
-            system = system.seen_in_motion();
-        }
-        if plan.gains.is_some_and(|gains| gains.moves.is_some()) {
-            system = system.with_approximate_derivatives();
+        if let Some(gains) = plan.gains {
+            system = system.drawn_at(gains.drawn(description.n_coordinates()));
+            if gains.is_of_motion(description.layout()) {
+                system = system.seen_in_motion();
+            }
+            if gains.moves.is_some() {
+                system = system.with_approximate_derivatives();
+            }
         }
         system.make_for(setting.stepping.method)?;
         let (dim, rows, zero) = (system.dim(), plan.horizon, S::zero());
@@ -282,7 +285,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         self.state.iter_mut().enumerate().for_each(|(place, state)| *state += moved(place));
         self.correct_arriving(row, moved);
         self.missed = missed;
-        self.system.forget();
+        self.system.corrected(&mut self.state);
     }
 
     /// Moves positions that have not arrived at a late sensor by sample `row` as an observer has `moved` those of the machine: else it
@@ -362,7 +365,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             let command = |sample: usize| commands[sample * inputs + number];
             let input = |row: usize| system.input(number, row + start, stepping.time_step, command);
             let now = input(row);
-            let effort = sampled.sample(number, row, now.re(), |column| truth[column].re())?.map(S::from_f64);
+            let effort = sampled.sample(number, row, now, |column| truth[column])?;
             if let Some(courses) = courses {
                 let course = || plan.hold().course(row, plan.horizon - 1, input);
                 courses.begin(number, effort.map_or_else(course, Course::constant));

@@ -16,6 +16,9 @@ use crate::spatial::{Matrix3, Pose, Vector3, Wrench};
 const DEPENDENT: f64 = 1e-8;
 /// Newton steps of a projection. Each multiplies the gap by about itself, and what a step of time leaves open is small.
 const TURNS: usize = 4;
+/// Mass of a held coordinate as a multiple of its own: what it gives way by is as much smaller than what the others do, and the forces of the
+/// loops keep ten digits.
+const HELD: f64 = 1e6;
 /// A gap (m, or as a sine) that is as good as closed: some roundings of lengths in metres.
 const CLOSED: f64 = 1e-14;
 
@@ -272,10 +275,18 @@ impl<S: Scalar> Loops<S> {
         self.forces = forces;
     }
 
-    /// Brings coordinates `q` onto the closures and rates `v` to where they stay, each the way that moves least in the metric of M.
+    /// Brings coordinates `q` onto the closures and rates `v` to where they stay, each the way that moves least in the metric of M. The
+    /// coordinates `held` count as [`HELD`] times as heavy: they stay where they are as far as the loops let them.
     /// Returns the largest gap that is left, and how many equations count.
-    pub(crate) fn close(&mut self, model: &Model<S>, data: &mut Data<S>, q: &mut [S], v: &mut [S]) -> [S; 2] {
+    pub(crate) fn close(
+        &mut self,
+        model: &Model<S>,
+        data: &mut Data<S>,
+        (q, v): (&mut [S], &mut [S]),
+        held: &[u32],
+    ) -> [S; 2] {
         flexible::terms(model, data, q, v);
+        data.weigh(held, HELD);
         data.factorise();
         poses(model, data);
         self.place(model, data);

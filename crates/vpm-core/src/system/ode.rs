@@ -18,6 +18,8 @@ use crate::scalar::Scalar;
 const MOST_OF_STEP: usize = 3_000;
 /// A gap (m, or the cosine of an angle that has to be a right one) at which a loop counts as torn.
 const OPEN: f64 = 1e-9;
+/// How often loops are closed again after a correction, which may lead farther away than steps do, to where their ways bend.
+const RETURNS: usize = 8;
 /// By how much a whole step is larger than the matrix that it asks for, at least: in plain numbers, and with derivatives.
 const LARGER: [usize; 2] = [2, 6];
 
@@ -51,6 +53,8 @@ pub struct System<S> {
     turning: Turning<S>,
     /// Coordinates and rates with closed loops, the gap that is left, and how many equations count.
     closed: Vec<S>,
+    /// What closes them after steps, and after an observer has drawn some coordinates, which are held.
+    closings: [Kind; 2],
     /// How many equations counted at first.
     independent: usize,
     /// What became of the loops.
@@ -79,6 +83,7 @@ impl<S: Scalar> System<S> {
             seen: Kind::Sample,
             turning: Turning::new(std::iter::empty()),
             closed: vec![S::zero(); if dynamics.loops.is_some() { 2 * dynamics.coordinates() + 2 } else { 0 }],
+            closings: [Kind::Closed(Vec::new()), Kind::Closed(Vec::new())],
             independent: 0,
             torn: None,
             dynamics,
@@ -111,33 +116,62 @@ impl<S: Scalar> System<S> {
     pub(crate) fn enter(&mut self, x: &mut [S]) {
         self.turn(|turning, n, hold| turning.enter(x, n, hold));
         if self.dynamics.loops.is_some() {
-            (self.torn, self.independent) = (None, usize::MAX);
-            self.independent = self.close(x);
+            self.torn = None;
+            let (gap, count) = self.close(x, 0);
+            self.independent = count;
+            self.watch(gap, count);
         }
     }
 
-    /// Brings the state to where all loops are closed; returns how many of their equations count.
-    fn close(&mut self, x: &mut [S]) -> usize {
+    /// The same, with coordinates that an observer draws.
+    #[must_use]
+    pub(crate) fn drawn_at(mut self, coordinates: Vec<u32>) -> Self {
+        self.closings[1] = Kind::Closed(coordinates);
+        self
+    }
+
+    /// Takes over a state that an observer has moved: loops are closed again, and what it draws stays where it has drawn it.
+    pub(crate) fn corrected(&mut self, x: &mut [S]) {
+        self.ready = false;
+        if self.dynamics.loops.is_some() && self.closings[0] != self.closings[1] {
+            let (mut gap, mut count) = self.close(x, 1);
+            for _ in 0..RETURNS {
+                if gap <= OPEN {
+                    break;
+                }
+                (gap, count) = self.close(x, 1);
+            }
+            self.watch(gap, count);
+        }
+    }
+
+    /// Brings the state to where all loops are closed, the way of that number; returns what is left and how many of their equations count.
+    fn close(&mut self, x: &mut [S], way: usize) -> (f64, usize) {
         self.ready = false;
         let moving = self.closed.len() - 2;
-        if let Some(routine) = self.routines.get(&Kind::Closed) {
-            self.closed.copy_from_slice(routine.at(x));
-        } else if let (Some(x), Some(closed)) = (S::plain(x), S::plain_mut(&mut self.closed)) {
+        let Self { closings, closed, routines, dynamics, .. } = self;
+        let kind = &closings[way];
+        if let Some(routine) = routines.get(kind) {
+            closed.copy_from_slice(routine.at(x));
+        } else if let (Kind::Closed(held), Some(x), Some(closed)) = (kind, S::plain(x), S::plain_mut(closed)) {
             closed[..moving].copy_from_slice(&x[..moving]);
-            let found = self.dynamics.close(closed);
+            let found = dynamics.close(closed, held);
             closed[moving..].copy_from_slice(&found);
         } else {
-            self.routines.copy(&Kind::Closed, x, &[], &mut self.closed);
+            routines.copy(kind, x, &[], closed);
         }
         x[..moving].copy_from_slice(&self.closed[..moving]);
         let [gap, count] = [0, 1].map(|place| self.closed[moving + place].re());
-        let count = count.round() as usize;
-        if self.independent != usize::MAX && count < self.independent {
+        (gap, count.round() as usize)
+    }
+
+    /// Keeps in mind what became of the loops where this `gap` is left, and so many of their equations count.
+    fn watch(&mut self, gap: f64, count: usize) {
+        if count < self.independent {
             self.torn.get_or_insert(Trouble::Dependent(self.independent, count));
         } else if gap > OPEN {
             self.torn.get_or_insert(Trouble::Open(gap));
         }
-        count
     }
 
     /// Writes the state `x` as users know it into `shown`.
@@ -181,16 +215,18 @@ impl<S: Scalar> System<S> {
     /// # Errors
     /// [`crate::error::Error::Unrecorded`] where a law decides by the value of a state.
     pub fn make_for(&mut self, method: Method) -> Result<()> {
-        let kinds = [Some(self.seen.clone()), kind_of(method), self.closing()].into_iter().flatten();
+        let kinds = [Some(self.seen.clone()), kind_of(method)].into_iter().flatten().chain(self.closing());
         for kind in kinds.filter(|kind| !self.is_direct(kind)).collect::<Vec<_>>() {
             self.routines.make(&kind)?;
         }
         Ok(())
     }
 
-    /// The function by which steps end that have loops to close.
-    fn closing(&self) -> Option<Kind> {
-        self.dynamics.loops.is_some().then_some(Kind::Closed)
+    /// The functions by which steps and corrections end that have loops to close.
+    fn closing(&self) -> Vec<Kind> {
+        let [plain, drawn] = &self.closings;
+        let own = self.dynamics.loops.iter().map(|_| plain);
+        own.clone().chain(own.filter(|_| plain != drawn).map(|_| drawn)).cloned().collect()
     }
 
     /// Whether a function is worked out by the laws themselves.
@@ -212,8 +248,8 @@ impl<S: Scalar> System<S> {
                 && self.routines.compile(&Kind::Rates).is_ok()
                 && self.routines.leave_matrices_constant().is_ok();
             // What has no code goes on operation by operation.
-            let kinds = [Some(Kind::Rates), Some(self.seen.clone()), kind_of(method), self.closing()];
-            let kinds = kinds.into_iter().flatten().filter(|kind| !constant || *kind != Kind::Prepared);
+            let kinds = [Some(Kind::Rates), Some(self.seen.clone()), kind_of(method)].into_iter().flatten();
+            let kinds = kinds.chain(self.closing()).filter(|kind| !constant || *kind != Kind::Prepared);
             return kinds.map(|kind| self.routines.compile(&kind)).fold(Ok(()), std::result::Result::and);
         }
         // An additive step begins with the rates of the sample before it, if that has any.
@@ -232,7 +268,7 @@ impl<S: Scalar> System<S> {
     pub(crate) fn compile_steps(&mut self, method: Method) -> std::result::Result<(), String> {
         if method == Method::LinearlyImplicit && self.dynamics.is_well_scaled() && self.has_small_steps() {
             let made = self.routines.compile_within(&Kind::Step, MOST_OF_STEP);
-            let mut needed = [Some(self.seen.clone()), self.closing()].into_iter().flatten();
+            let mut needed = [self.seen.clone()].into_iter().chain(self.closing());
             if made.and_then(|()| needed.try_for_each(|kind| self.routines.compile(&kind))).is_ok() {
                 (self.ready, self.whole) = (false, true);
                 return Ok(());
@@ -468,7 +504,8 @@ impl<S: Scalar> Ode<S> for System<S> {
 
     fn arrive(&mut self, x: &mut [S], step: Option<f64>) {
         if self.dynamics.loops.is_some() && !self.turning.is_resting() {
-            self.close(x);
+            let (gap, count) = self.close(x, 0);
+            self.watch(gap, count);
         }
         self.turn(|turning, n, hold| turning.arrive(x, n, step, hold));
     }

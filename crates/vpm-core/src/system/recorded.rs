@@ -88,8 +88,9 @@ pub enum Kind {
     Additive,
     /// The state after a linearly implicit step, then whether it is exact: one, or zero where the elimination would have to exchange rows.
     Step,
-    /// Coordinates and rates brought to where all loops are closed, then the largest gap that is left and how many equations count.
-    Closed,
+    /// Coordinates and rates brought to where all loops are closed, these coordinates held, then the largest gap that is left and how many
+    /// equations count, see [`super::Loops::close`].
+    Closed(Vec<u32>),
     /// Lever arms of all lines, line by line.
     Levers,
     /// Efforts that the accelerations need, those of the effects taken off.
@@ -305,9 +306,9 @@ fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recor
             stiff::elasticity(&dynamics, &mut block, 2 * n, &mut column);
             (rates, Some(Matrix::Entries(block, 2 * n)))
         }
-        Kind::Closed => {
+        Kind::Closed(held) => {
             let mut state = x[..2 * n].to_vec();
-            let found = dynamics.close(&mut state);
+            let found = dynamics.close(&mut state, held);
             state.extend(found);
             (state, None)
         }

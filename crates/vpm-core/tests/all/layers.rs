@@ -29,7 +29,7 @@ const ALONE: [(&str, &[&str]); 17] = [
     ("error", &[]),
     ("scalar", &[]),
     ("table", &["error"]),
-    ("narx", &["error"]),
+    ("narx", &["error", "scalar"]),
     ("realtime", &["error"]),
     ("graph", &["error", "scalar"]),
     ("delay", &["error", "scalar"]),

@@ -11,10 +11,11 @@ use vpm_core::linearize::linearize;
 use vpm_core::live::Live;
 use vpm_core::narx::{Factor, Narx, Structure, Term};
 use vpm_core::samples::{double_pendulum, pendulum, slider};
-use vpm_core::simulate::{Setting, Stepping};
+use vpm_core::simulate::{Gains, Noise, Readings, Run, Setting, Stepping, observe};
 use vpm_core::table::Table;
 
-use crate::common::{ALWAYS, Bench, Machine};
+use crate::common::{ALWAYS, Bench, Machine, solid};
+use crate::simulate::check;
 
 /// Time between samples of the record, s.
 const STEP: f64 = 1e-3;
@@ -45,7 +46,7 @@ fn beside() -> Narx {
 }
 
 fn driven(drive: Value) -> Machine {
-    let mut machine = Machine::new(&double_pendulum([1.0, 0.7], [0.5, 0.4]));
+    let mut machine = Machine::new(&solid(double_pendulum([1.0, 0.7], [0.5, 0.4])));
     machine.effect("viscous_friction", 1, &[("viscous", 0.1)]);
     machine.add("actuators", json!({"name": "valve", "on": {"joint": 0}, "drive": drive}), json!({}));
     machine.actuator(1, &[("gain", 1.5), ("lag", 0.06)]);
@@ -137,7 +138,7 @@ fn steps_allocate_nothing() {
 
 /// A mass on a rail and a Maxwell element from the world to it, as a differential or as a difference equation.
 fn sprung(drive: &Value, numbers: Value) -> Machine {
-    let mut machine = Machine::new(&slider(3.0));
+    let mut machine = Machine::new(&solid(slider(3.0)));
     let line = json!({"name": "strut", "from": {"on": "world", "point": [-0.3, 0.0, 0.0]},
         "to": {"on": {"body": 0}, "point": [0.0, 0.0, 0.0]}, "barrel": null, "rod": null});
     machine.add("lines", line, json!({}));
@@ -220,21 +221,17 @@ fn what_sampled_drives_make_impossible_is_refused() {
     assert!(sampled(error_of(linearize(&description, theta, &START, &[0.0; 2]))).contains("no linear model"));
     let inputs = commands(20);
     let stepping = Stepping::new(STEP, 1, Method::Rk4).unwrap();
-    let setting = |sensitivities: &'static [usize]| Setting {
-        description: &description,
-        theta,
-        stepping,
-        sensitivities,
-        interrupt: ALWAYS,
-    };
+    let setting = || Setting { description: &description, theta, stepping, sensitivities: &[], interrupt: ALWAYS };
     let table = Table::new("inputs", &inputs, 20, 2).unwrap();
-    let refused = vpm_core::simulate::free_run(setting(&[0]), &START, table);
-    assert!(sampled(error_of(refused)).contains("no derivatives"));
+    let readings = Readings { channels: &[0], table: Table::new("readings", &[0.0; 20], 20, 1).unwrap() };
+    let noise = Noise { readings: &[1e-3], forces: &[0.1; 2], states: &[0.0; 5], first: &[0.1; 5] };
+    let refused = vpm_core::simulate::filter(setting(), &START, table, readings, noise);
+    assert!(sampled(error_of(refused)).contains("no filter knows"));
     let states = Table::new("states", &START, 1, 5).unwrap();
-    let refused = vpm_core::simulate::restarts(setting(&[]), states, &[3], 4, table);
+    let refused = vpm_core::simulate::restarts(setting(), states, &[3], 4, table);
     assert!(sampled(error_of(refused)).contains("start again"));
     let text = error_of(vpm_core::simulate::free_run(
-        Setting { stepping: Stepping::new(3e-4, 1, Method::Rk4).unwrap(), ..setting(&[]) },
+        Setting { stepping: Stepping::new(3e-4, 1, Method::Rk4).unwrap(), ..setting() },
         &START,
         table,
     ));
@@ -302,4 +299,73 @@ proptest! {
             prop_assert!((row[FORCE] - effort).abs() < 1e-12);
         }
     }
+}
+
+/// Gains by which the first joint is drawn to its reading, by so many times.
+fn drawn(rows: usize, times: f64) -> Vec<f64> {
+    [0.05 * times, 0.0, 0.9 * times, 0.0, 0.0].repeat(rows)
+}
+
+fn observed(bench: &Bench, inputs: &[f64], readings: &[f64], gains: &[f64]) -> Run {
+    let rows = readings.len();
+    let readings = Readings { channels: &[0], table: Table::new("readings", readings, rows, 1).unwrap() };
+    let gains = Gains { readings, gains: Table::new("gains", gains, rows, 5).unwrap(), alone: false, moves: None };
+    observe(bench.setting(), &START, Table::new("inputs", inputs, rows, 2).unwrap(), gains).unwrap()
+}
+
+#[test]
+fn an_observer_without_gains_is_a_free_run() {
+    // Short enough to go by the laws, and long enough to go by machine code, both.
+    for rows in [10, 2500] {
+        let inputs = commands(rows);
+        let bench = Bench::new(&driven(narx(2.0 * STEP)), STEP, 2, Method::Rk4);
+        let free = bench.free(&START, &inputs);
+        let run = observed(&bench, &inputs, &vec![0.3; rows as usize], &drawn(rows as usize, 0.0));
+        assert_eq!(run.states, free.states);
+        assert_eq!(run.outputs, free.outputs);
+    }
+}
+
+#[test]
+fn an_observer_keeps_a_wrong_machine_on_its_log() {
+    let (rows, inputs) = (1500, commands(1500));
+    let truth = Bench::new(&driven(narx(STEP)), STEP, 1, Method::Rk4);
+    let readings = truth.channel(&truth.free(&START, &inputs), 0);
+    let mut machine = driven(narx(STEP));
+    machine.payload(0, 0.4, [0.0, 0.0, -0.5]);
+    let heavy = Bench::new(&machine, STEP, 1, Method::Rk4);
+    let left = |times: f64| {
+        let seen = heavy.channel(&observed(&heavy, &inputs, &readings, &drawn(rows, times)), 0);
+        seen.iter().zip(&readings).fold(0.0_f64, |most, (own, reading)| most.max((own - reading).abs()))
+    };
+    let (free, kept) = (left(0.0), left(1.0));
+    assert!(free > 0.02 && kept < 0.1 * free, "{free} {kept}");
+}
+
+/// Efforts that answer to the motion carry its derivatives, in a free run and beside a log.
+#[test]
+fn derivatives_through_sampled_drives_are_those_of_differences() {
+    let (rows, inputs) = (80, commands(80));
+    let readings: Vec<f64> = (0..rows).map(|k| 0.4 + 0.01 * (0.3 * k as f64).sin()).collect();
+    let machine = driven(narx(2.0 * STEP));
+    for times in [0.0, 1.0] {
+        let run = |theta: &[f64], sensitivities: Vec<usize>| {
+            let mut bench = Bench::new(&machine, STEP, 1, Method::Rosenbrock);
+            (bench.theta, bench.sensitivities) = (theta.to_vec(), sensitivities);
+            let run = observed(&bench, &inputs, &readings, &drawn(rows, times));
+            (bench.channel(&run, 0), run.jacobian)
+        };
+        let exact = run(&machine.values, (0..machine.values.len()).collect()).1;
+        check(&machine, &exact, "a sampled drive", |theta| run(theta, Vec::new()).0);
+    }
+    let element = sprung(&sampled_maxwell(STEP), Value::Null);
+    let run = |theta: &[f64], sensitivities: Vec<usize>| {
+        let mut bench = Bench::new(&element, STEP, 1, Method::Rk4);
+        (bench.theta, bench.sensitivities) = (theta.to_vec(), sensitivities);
+        bench.free(&[0.05, 0.0], &[0.0; 60])
+    };
+    let exact = run(&element.values, (0..element.values.len()).collect());
+    let width = exact.outputs.len();
+    assert_eq!(exact.jacobian.len(), width * element.values.len());
+    check(&element, &exact.jacobian, "a sampled element", |theta| run(theta, Vec::new()).outputs);
 }

@@ -206,6 +206,13 @@ impl Machine {
     }
 }
 
+/// The same with moments of inertia, so that differences can move these either way.
+pub fn solid(mut sample: Sample) -> Sample {
+    let inertias = sample.bodies.iter_mut().filter_map(|body| body.inertia.as_mut());
+    inertias.for_each(|inertia| inertia.moments[..3].fill(0.02));
+    sample
+}
+
 /// How the tests simulate.
 pub struct Bench {
     pub description: Description,

@@ -9,3 +9,5 @@ mod observer;
 mod records;
 mod sensitivities;
 mod timing;
+
+pub use sensitivities::check;

@@ -1,12 +1,12 @@
 //! Observers: gains in closed form, the innovations that they leave, derivatives.
 
 use vpm_core::integrator::Method;
-use vpm_core::samples::{Random, random_tree, slider};
+use vpm_core::samples::{Random, Sample, double_pendulum, random_tree, slider};
 use vpm_core::simulate::{Filtered, Gains, Noise, Readings, Run, filter, observe};
 use vpm_core::table::Table;
 
 use super::sensitivities::check;
-use crate::common::{Bench, Machine, close};
+use crate::common::{Bench, Machine, close, solid};
 
 const STEP: f64 = 0.01;
 
@@ -260,4 +260,110 @@ fn a_late_sensor_is_observed_as_a_late_command() {
     // A position that is drawn alone is drawn at once.
     assert!(gap(&left([0.2, 0.0], &delay, &[]), &left([0.2, 0.0], &[], &delay)) < 1e-3);
     assert!(gap(&left([0.05, 1.4], &delay, &[]), &left([0.05, 1.4], &[], &delay)) < 0.06);
+}
+
+/// A closed loop: a point of one body on a point of another.
+fn tied(machine: &mut Machine, [a, b]: [usize; 2], points: [[f64; 3]; 2]) {
+    let upright = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
+    let [a, b] = [(a, points[0]), (b, points[1])]
+        .map(|(body, point)| serde_json::json!({"on": {"body": body}, "translation": point, "rotation": upright}));
+    let part = serde_json::json!({"name": "pin", "joint": "spherical", "a": a, "b": b});
+    machine.add("loops", part, serde_json::json!({}));
+}
+
+/// One position drawn with these gains of its place and its rate.
+fn drawn(bench: &Bench, initial: &[f64], (inputs, readings): (&[f64], &[f64]), gain: [f64; 2]) -> Run {
+    let (rows, n) = (readings.len(), initial.len() / 2);
+    let mut gains = vec![0.0; 2 * n];
+    (gains[0], gains[n]) = (gain[0], gain[1]);
+    let readings = Readings { channels: &[0], table: Table::new("readings", readings, rows, 1).unwrap() };
+    let gains = gains.repeat(rows);
+    let gains = Table::new("gains", &gains, rows, 2 * n).unwrap();
+    let gains = Gains { readings, gains, alone: false, moves: None };
+    observe(bench.setting(), initial, Table::new("inputs", inputs, rows, 1).unwrap(), gains).unwrap()
+}
+
+/// Two masses on one rail that a loop ties are one mass, whichever of them is drawn, and however light that is.
+#[test]
+fn tied_masses_are_observed_as_one() {
+    let rows = 400;
+    let command: Vec<f64> = (0..rows).map(|k| (0.05 * k as f64).sin()).collect();
+    let readings: Vec<f64> = (0..rows).map(|k| 1e-2 * (0.02 * k as f64).sin()).collect();
+    let gain = [0.2, 3.0];
+    let mut whole = Machine::new(&slider(2.5));
+    whole.actuator(0, &[("gain", 1.0)]);
+    let bench = Bench::new(&whole, STEP, 1, Method::Rk4);
+    let alone = bench.channel(&drawn(&bench, &[0.0; 2], (&command, &readings), gain), 0);
+    for masses in [[1.5, 1.0], [0.1, 2.4]] {
+        let [first, second] = masses.map(|mass| slider(mass).bodies.remove(0));
+        let second = vpm_core::body::Body { name: "other".to_owned(), ..second };
+        let mut pair = Machine::new(&Sample { gravity: [0.0; 3], bodies: vec![first, second] });
+        pair.actuator(0, &[("gain", 1.0)]);
+        tied(&mut pair, [0, 1], [[0.0; 3]; 2]);
+        let bench = Bench::new(&pair, STEP, 1, Method::Rk4);
+        let run = drawn(&bench, &[0.0; 4], (&command, &readings), gain);
+        let [own, other] = [0, 4].map(|column| bench.channel(&run, column));
+        assert!(alone.iter().any(|place| place.abs() > 5e-3), "nothing moves");
+        for ((&own, &other), &alone) in own.iter().zip(&other).zip(&alone) {
+            // A held mass gives way by a millionth of the other's share.
+            close(own, alone, 1e-6);
+            close(other, own, 1e-13);
+        }
+    }
+}
+
+/// A slider-crank whose crank alone is measured: the loop stays closed, and derivatives are those of differences.
+#[test]
+fn loops_are_closed_again_after_corrections() {
+    let (lengths, height) = ([0.5, 0.4], 0.6);
+    let mut bodies = double_pendulum([1.0, 0.7], lengths).bodies;
+    bodies.extend(slider(2.0).bodies);
+    let mut machine = Machine::new(&solid(Sample { gravity: [0.0, 0.0, -9.81], bodies }));
+    machine.effect("viscous_friction", 1, &[("viscous", 0.2)]).actuator(0, &[("gain", 1.0)]);
+    tied(&mut machine, [1, 2], [[0.0, 0.0, -lengths[1]], [0.0, 0.0, -height]]);
+    let crank = 0.3_f64;
+    let rod = ((height - lengths[0] * crank.cos()) / lengths[1]).acos();
+    let first = [crank, rod - crank, -lengths[0] * crank.sin() - lengths[1] * rod.sin(), 0.0, 0.0, 0.0];
+    let rows = 40;
+    let inputs: Vec<f64> = (0..rows).map(|k| 3.0 * (0.2 * k as f64).sin()).collect();
+    let readings: Vec<f64> = (0..rows).map(|k| crank + 0.02 * (0.1 * k as f64).sin()).collect();
+    for method in [Method::Rk4, Method::LinearlyImplicit, Method::Rosenbrock] {
+        let observed = |theta: &[f64], sensitivities: Vec<usize>| {
+            let mut bench = Bench::new(&machine, STEP, 2, method);
+            (bench.theta, bench.sensitivities) = (theta.to_vec(), sensitivities);
+            let run = drawn(&bench, &first, (&inputs, &readings), [0.1, 2.0]);
+            (bench.channel(&run, 0), run)
+        };
+        let (own, exact) = observed(&machine.values, (0..machine.values.len()).collect());
+        // Kept on what it would have left.
+        assert!(own.iter().zip(&readings).all(|(own, reading)| (own - reading).abs() < 0.02));
+        let free = observed(&machine.values, Vec::new());
+        assert!(free.1.states.chunks_exact(6).any(|state| (state[0] - crank).abs() > 5e-3), "nothing moves");
+        for state in exact.states.chunks_exact(6) {
+            let angle = state[0] + state[1];
+            close(lengths[0] * state[0].cos() + lengths[1] * angle.cos(), height, 1e-12);
+            close(-lengths[0] * state[0].sin() - lengths[1] * angle.sin(), state[2], 1e-12);
+        }
+        check(&machine, &exact.jacobian, "a closed loop", |theta| observed(theta, Vec::new()).0);
+        // A reading that is far away is reached at once.
+        let bench = Bench::new(&machine, STEP, 2, method);
+        let far = drawn(&bench, &first, (&inputs, &vec![crank + 0.3; rows]), [1.0, 0.0]);
+        close(far.states[6], crank + 0.3, 1e-2);
+        close(lengths[0] * far.states[6].cos() + lengths[1] * (far.states[6] + far.states[7]).cos(), height, 1e-12);
+    }
+}
+
+#[test]
+fn a_filter_on_closed_loops_is_refused() {
+    let bodies =
+        ["one", "other"].map(|name| vpm_core::body::Body { name: name.to_owned(), ..slider(1.0).bodies.remove(0) });
+    let mut machine = Machine::new(&Sample { gravity: [0.0; 3], bodies: bodies.into() });
+    machine.actuator(0, &[("gain", 1.0)]);
+    tied(&mut machine, [0, 1], [[0.0; 3]; 2]);
+    let bench = Bench::new(&machine, STEP, 1, Method::Rk4);
+    let noise = Noise { readings: &[1e-3], forces: &[0.1; 2], states: &[0.0; 4], first: &[0.1; 4] };
+    let readings = Readings { channels: &[0], table: Table::new("readings", &[0.0; 9], 9, 1).unwrap() };
+    let table = Table::new("inputs", &[0.0; 9], 9, 1).unwrap();
+    let said = filter(bench.setting(), &[0.0; 4], table, readings, noise).unwrap_err().to_string();
+    assert!(said.contains("`pin`") && said.contains("give the gains"), "{said}");
 }

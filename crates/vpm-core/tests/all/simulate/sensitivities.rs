@@ -49,7 +49,7 @@ fn commands() -> Vec<f64> {
 }
 
 /// Central differences of `outputs(theta)` by every parameter of the machine, against the columns of `jacobian`.
-pub(super) fn check(machine: &Machine, jacobian: &[f64], what: &str, outputs: impl Fn(&[f64]) -> Vec<f64>) {
+pub fn check(machine: &Machine, jacobian: &[f64], what: &str, outputs: impl Fn(&[f64]) -> Vec<f64>) {
     let variables = machine.values.len();
     assert!(jacobian.iter().all(|slope| slope.is_finite()));
     for (k, name) in machine.names.iter().enumerate() {
