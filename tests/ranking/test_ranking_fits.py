@@ -29,7 +29,7 @@ from vpm.ranking.look import Look
 from vpm.ranking.observed import Observed, Observer, observer_gain
 from vpm.ranking.proposals import Proposal, _seated, proposals
 from vpm.ranking.search import _is_worse
-from vpm.ranking.settings import Settings
+from vpm.ranking.settings import PLACES, Settings
 from vpm.ranking.sizes import Sizes
 from vpm.ranking.starts import started
 from vpm.ranking.structure import Structure
@@ -375,6 +375,29 @@ def test_effects_that_do_nothing_share_a_pass_and_promise_the_same(monkeypatch: 
     assert passes[0] > passes[1] > passes[2]
     for others in promised[1:]:
         assert others == pytest.approx(promised[0], rel=1e-6, abs=1e-6)
+
+
+def test_effects_that_do_nothing_share_one_model_at_all_start_values(monkeypatch: pytest.MonkeyPatch) -> None:
+    """What they do not feel where they begin, such as where a spring without stiffness rests, is not asked for."""
+    model = Model.from_toml(SLEDGE)
+    data, fitter = InverseDynamicsProblem(model, records()), fitter_of(model)
+    structure = structure_of(model)
+    look = Look(fitter.fitted(structure, Observer(1.0), View(fitter.noise_of(structure, Observer(1.0)))), fitter)
+    passes: list[tuple[Model, int]] = []
+    follow = Observed.follow
+
+    def noted(observed: Observed, told: Model, theta: Any, observer: Observer, columns: Any = ()) -> Any:
+        if observer.cheap:
+            passes.append((told, len(columns)))
+        return follow(observed, told, theta, observer, columns)
+
+    monkeypatch.setattr(Observed, "follow", noted)
+    proposals(look, fitter, data, Extensions(Sizes(model, data)), SideBySide(1), ("spring", "cubic_spring"))
+    models, columns = {told for told, _ in passes}, [count for _, count in passes]
+    assert (len(passes), len(models), columns) == (len(PLACES), 1, [2] * len(PLACES))
+    pulled = model.with_effect("spring", "way", stiffness=0.0, rest=0.1)
+    _, slopes = follow(fitter.observed, pulled, pulled.theta, Observer(1.0), [pulled.index("way.spring.rest")])
+    assert not np.any(slopes)
 
 
 def test_more_or_less_of_an_effect_promises_what_it_would_gain() -> None:

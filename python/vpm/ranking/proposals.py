@@ -76,12 +76,13 @@ def proposals(
     ]
     extended = _extended(look.fitted.structure, listed, extensions)
     groups = _side_by_side([one for one in extended if one.candidate.neutral], look)
-    groups += [[one] for one in _hopeful([one for one in extended if not one.candidate.neutral], look, fitter, each)]
+    hopeful = _hopeful([one for one in extended if not one.candidate.neutral], look, fitter, each)
+    groups += [_Pass([one], [one]) for one in hopeful]
     screened = each(
         "screening",
-        lambda several: _screened(look, several, fitter, extensions),
+        lambda one: _screened(look, one, fitter, extensions),
         groups,
-        lambda several: f"{several[0].candidate.label}, {look.fitted.observer.label}",
+        lambda one: f"{one.present[0].candidate.label}, {look.fitted.observer.label}",
     )
     told = [one for several in screened if not isinstance(several, Failure) for one in several]
     return _seated(sorted(told, key=lambda one: -one.gain), look.promising, fitter.settings)
@@ -99,6 +100,21 @@ class _Extended:
     def fresh(self, look: Look) -> list[str]:
         """What is unknown in it beside what was."""
         return [name for name in self.structure.priors if name not in look.coarse.names]
+
+    def felt(self, look: Look) -> list[str]:
+        """What of that changes anything where it begins: an effect without size does not feel its shapes."""
+        effect, model = self.candidate.effect, self.structure.model
+        own = model.effect(*self.candidate.key, self.structure.side(self.candidate.key)).parameter_names
+        shapes = {name for short, name in own.items() if effect.parameter(short).shape}
+        return [name for name in self.fresh(look) if not (self.candidate.neutral and name in shapes)]
+
+
+@dataclass(frozen=True, eq=False)
+class _Pass:
+    """Effects that are present in a pass, and those of them that are asked for."""
+
+    present: Sequence[_Extended]
+    asked: Sequence[_Extended]
 
 
 def _extended(structure: Structure, listed: Sequence[Candidate], extensions: Extensions) -> list[_Extended]:
@@ -131,46 +147,61 @@ def _hopeful(several: Sequence[_Extended], look: Look, fitter: Fitter, each: Sid
     return [one for found in ordered for _, one in found[: fitter.settings.starts]]
 
 
-def _side_by_side(neutral: Sequence[_Extended], look: Look) -> list[list[_Extended]]:
-    """Effects that do nothing where they begin, by so many as a pass has derivatives for; no effect is there twice."""
-    groups: list[list[_Extended]] = []
-    taken: list[int] = []
+def _side_by_side(neutral: Sequence[_Extended], look: Look) -> list[_Pass]:
+    """Effects that do nothing where they begin, by so many as a pass has derivatives for; no effect is there twice.
+
+    The same effects stay together at all their start values, for which one model does: its code is made once.
+    """
+    starts: dict[tuple[Key, Side], list[_Extended]] = defaultdict(list)
     for one in neutral:
-        count = len(one.fresh(look))
-        for place, several in enumerate(groups):
-            if taken[place] + count <= AT_ONCE and all(one.candidate.key != other.candidate.key for other in several):
-                several.append(one)
-                taken[place] += count
-                break
+        starts[one.candidate.key, one.side].append(one)
+    groups: list[list[list[_Extended]]] = []
+    taken: list[int] = []
+    for own in sorted(starts.values(), key=len):
+        count, key = len(own[0].felt(look)), own[0].candidate.key
+        fits = [
+            place
+            for place, (group, so_many) in enumerate(zip(groups, taken, strict=True))
+            if so_many + count <= AT_ONCE and all(key != other[0].candidate.key for other in group)
+        ]
+        if fits:
+            groups[fits[0]].append(own)
+            taken[fits[0]] += count
         else:
-            groups.append([one])
+            groups.append([own])
             taken.append(count)
-    return groups
+    return [
+        _Pass([own[min(number, len(own) - 1)] for own in group], [own[number] for own in group if number < len(own)])
+        for group in groups
+        for number in range(max(map(len, group)))
+    ]
 
 
-def _screened(look: Look, several: Sequence[_Extended], fitter: Fitter, extensions: Extensions) -> list[Proposal]:
+def _screened(look: Look, one_pass: _Pass, fitter: Fitter, extensions: Extensions) -> list[Proposal]:
     """Effects at start values under one observer; several in one pass where none of them does anything there.
 
     Derivatives by what was unknown without them are taken as they were: a prediction of a gain can do with these.
     """
-    together = several[0].structure
+    first, *others = one_pass.present
+    together, asked = first.structure, one_pass.asked
     with contextlib.suppress(*ASTRAY):
-        for one in several[1:]:
+        for one in others:
             together = extensions.extended(together, one.candidate, one.start, one.side)
-        names = [name for one in several for name in one.fresh(look)]
+        names = [name for one in asked for name in one.felt(look)]
         followed = fitter.followed(together, look.fitted.observer.cheapest, names)
-        return [Proposal(one.structure, _gain(look, followed, one), one.candidate.neutral) for one in several]
-    if len(several) == 1:
+        return [Proposal(one.structure, _gain(look, followed, one), one.candidate.neutral) for one in asked]
+    if not others:
         return []  # it runs away from the records
-    return [proposal for one in several for proposal in _screened(look, [one], fitter, extensions)]
+    return [found for one in asked for found in _screened(look, _Pass([one], [one]), fitter, extensions)]
 
 
 def _gain(look: Look, followed: Followed, one: _Extended) -> float:
     """What a step of a fit of an effect is predicted to gain, of a pass that has its derivatives among others, nats."""
-    names = one.fresh(look)
-    columns = [followed.names.index(name) for name in names]
-    own = replace(followed, structure=one.structure, names=tuple(names), jacobian=followed.jacobian[:, :, columns])
-    return look.predicted_gain(own)
+    names, felt = one.fresh(look), one.felt(look)
+    jacobian = np.zeros((*followed.residual.shape, len(names)))
+    for name in felt:
+        jacobian[:, :, names.index(name)] = followed.jacobian[:, :, followed.names.index(name)]
+    return look.predicted_gain(replace(followed, structure=one.structure, names=tuple(names), jacobian=jacobian))
 
 
 def _seated(ordered: Sequence[Proposal], promising: float, settings: Settings) -> list[Proposal]:
