@@ -11,11 +11,13 @@ from scipy.integrate import solve_ivp
 import vpm
 from hydraulic_reference import AREA, RATIO, SUPPLY, TANK, VALUES
 from nightly import at_night
+from vpm.discrepancy.candidates import Candidate
 from vpm.errors import IdentificationError, ModelError
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.identify.sample_mask import SETTLING, at_stops
 from vpm.initial import joint_motion, measured_states
 from vpm.model.drives.states import commanded_states
+from vpm.ranking.sizes import Sizes
 
 Array = NDArray[np.float64]
 
@@ -394,6 +396,35 @@ def test_a_diagnosis_names_it(rig: vpm.Model, name: str) -> None:
     first = next(iter(values))
     dotted = truth.effects[-1].parameter_names[first]
     assert why.model.parameters[dotted].value == pytest.approx(values[first], rel=0.05)
+
+
+def test_what_effects_may_amount_to_is_of_the_size_of_their_kind(rig: vpm.Model) -> None:
+    """A gauge may be off by a share of what it reads, not of the way; oil by what matters, for records do not show it."""
+    nominal = sensed(rig)
+    log = record(nominal, 1.0)
+    sizes = Sizes(nominal, InverseDynamicsProblem(nominal, [log]))
+
+    def spread(effect: str, site: str) -> float:
+        parameter = vpm.catalogue.EFFECTS[effect].parameters[0]
+        return sizes.prior(Candidate(vpm.catalogue.EFFECTS[effect], site, ({},)), parameter, 0.0).spread
+
+    assert spread("sensor_offset", "gauge") == pytest.approx(0.05 * np.ptp(log["servo.pressure_a"]))
+    assert spread("supply_drop", "pump") == 1e10
+    assert spread("internal_leakage", "servo") == 1e-12
+
+
+def test_friction_that_follows_the_load_is_that_of_any_drive(rig: vpm.Model) -> None:
+    """What the motion needs does not depend on what brings it: a cylinder, or a drive that is given the effort."""
+    log = record(rig, 1.0)
+    content = {key: entry for key, entry in rig.to_dict().items() if key not in {"actuators", "supplies", "sensors"}}
+    ideal = vpm.Model.from_dict({**content, "actuators": {"servo": {"type": "ideal", "gain": 1.0, "joint": "axis"}}})
+    needed = []
+    for model in (rig, ideal):
+        lossy = model.with_effect("load_dependent_friction", at="axis", driving=0.1, driven=0.05)
+        needed += [InverseDynamicsProblem(other, [log]).effort(other, other.theta, 0)[2] for other in (model, lossy)]
+    np.testing.assert_allclose(needed[0], needed[2])
+    np.testing.assert_allclose(needed[1], needed[3])
+    assert np.max(np.abs(needed[1] - needed[0])) > 0.05 * np.max(np.abs(needed[0]))
 
 
 def test_friction_of_seals_is_sought_at_the_joint(rig: vpm.Model) -> None:

@@ -84,7 +84,10 @@ def whole(model: Model) -> Part:
 
 
 def carried(model: Model) -> Part:
-    """All that the effort of a motion may depend on: nothing of cylinders, supplies and controllers."""
+    """All that the effort of a motion may depend on: nothing of cylinders, supplies and controllers.
+
+    Friction that follows a load needs a drive to be read; where that was a cylinder, an idle one stands there.
+    """
     gone = {name for name in model.actuators if model.actuator_type(name) == "hydraulic"}
     gone |= {*model.supplies, *model.controllers}
     content = model.to_dict()
@@ -94,8 +97,12 @@ def carried(model: Model) -> Part:
         gone |= {name for name, entry in entries.items() if _owner(entry.get("measures", name)) in gone}
         content[kind] = {name: entry for name, entry in entries.items() if name not in gone}
     content["effects"] = [entry for entry in content.get("effects", ()) if entry["at"] not in gone]
+    loaded = {entry["at"] for entry in content["effects"] if EFFECTS[entry["type"]].takes_effort}
+    for name in gone & set(model.actuators):
+        for joint in loaded & set(model.joints_of_actuator(name)):
+            content["actuators"][name] = {"type": "ideal", "gain": 0.0, "joint": joint}
     kept = Model.from_dict(content)
-    return _part(model, kept, set(kept.parameter_names))
+    return _part(model, kept, set(kept.parameter_names) & set(model.parameter_names))
 
 
 def drives_of(model: Model, joints: tuple[str, ...]) -> Drives | None:
@@ -218,5 +225,6 @@ def _part(model: Model, alone: Model, felt: Collection[str], within: Model | Non
 
 
 def _places(names: Sequence[str], among: Sequence[str]) -> Indices:
+    """Where names stand among others; that of an idle drive, which stands nowhere and does nothing, is the first."""
     places = {name: place for place, name in enumerate(among)}
-    return np.array([places[name] for name in names], dtype=np.int64)
+    return np.array([places.get(name, 0) for name in names], dtype=np.int64)

@@ -16,6 +16,9 @@ from vpm.weighing.priors import FACTOR, NATURAL, NEAR, SHARE, Prior, natural_siz
 
 Array = NDArray[np.float64]
 
+#: What an effect may amount to, as a share of the size of its kind, where that is not `SHARE`: what is near a value by
+#: nature, and what has a size that matters rather than one that records show.
+SHARES = {"one": NEAR, "channel": NEAR, "time": 1.0, "resistance": 1.0, "leakage": 1.0}
 #: Effort, speed and way of what stands, in SI units.
 LEAST = 1e-9
 
@@ -46,6 +49,11 @@ class Sizes:
             name: _strength(np.concatenate([motion.inputs[:, place] for motion in data.motions]))
             for place, name in enumerate(model.actuators)
         }
+        self.readings: dict[str, float] = {}
+        for channel in dict.fromkeys(channel for log in data.experiments for channel in log.channels):
+            if sensor := model.sensor_of(channel):
+                shown = [log[channel] for log in data.experiments if channel in log]
+                self.readings[sensor] = 0.5 * float(np.ptp(np.concatenate(shown)))
 
     def moves(self, site: str) -> bool:
         """Whether a joint or a transmission is seen to move."""
@@ -54,24 +62,23 @@ class Sizes:
     def prior(self, candidate: Candidate, parameter: EffectParameter, value: float) -> Prior:
         """Prior of a parameter of an effect that begins at ``value``."""
         low, high = candidate.bounds.get(parameter.name, parameter.physical)
-        size = self._size(candidate.site, parameter.scale)
+        size = self._size(candidate.site, parameter)
         neutral = np.nan if parameter.shape or parameter.neutral is None else parameter.neutral
         if neutral in NATURAL and (candidate.neutral or value == neutral):
-            share = NEAR if parameter.scale in {"one", "channel"} else 1.0 if parameter.scale == "time" else SHARE
-            return Prior(neutral, share * size, low, high)
+            return Prior(neutral, SHARES.get(parameter.scale, SHARE) * size, low, high)
         if low < 0.0 or value <= 0.0:
             return Prior(value, SHARE * size, low, high)
         return Prior(value, FACTOR, max(low, 1e-12), high, logarithmic=True)
 
-    def _size(self, site: str, scale: str) -> float:
+    def _size(self, site: str, parameter: EffectParameter) -> float:
         effort, speed, way = (max(number, LEAST) for number in self._shown(site))
         sizes = {
             **natural_sizes(effort, speed, way),
-            "channel": way,
+            "channel": max(self.readings.get(site, way), LEAST),
             "time": DELAY,
             "command": self.commands.get(site, 1.0),
         }
-        return sizes.get(scale, 1.0)
+        return sizes.get(parameter.scale, parameter.typical)
 
     def _shown(self, site: str) -> tuple[float, float, float]:
         """Effort, speed and way at a site; the largest of all joints where it is at none of them."""
