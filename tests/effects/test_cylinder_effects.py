@@ -399,7 +399,7 @@ def test_a_diagnosis_names_it(rig: vpm.Model, name: str) -> None:
 
 
 def test_what_effects_may_amount_to_is_of_the_size_of_their_kind(rig: vpm.Model) -> None:
-    """A gauge may be off by a share of what it reads, not of the way; oil by what matters, as records do not show it."""
+    """A gauge may be off by a share of what it reads, not of the way; oil by what matters, which no record shows."""
     nominal = sensed(rig)
     log = record(nominal, 1.0)
     sizes = Sizes(nominal, InverseDynamicsProblem(nominal, [log]))
