@@ -386,10 +386,10 @@ def test_effects_that_do_nothing_share_one_model_at_all_start_values(monkeypatch
     passes: list[tuple[Model, int]] = []
     follow = Observed.follow
 
-    def noted(observed: Observed, told: Model, theta: Any, observer: Observer, columns: Any = ()) -> Any:
+    def noted(observed: Observed, told: Model, theta: Any, observer: Observer, columns: Any = (), *by: Any) -> Any:
         if observer.cheap:
             passes.append((told, len(columns)))
-        return follow(observed, told, theta, observer, columns)
+        return follow(observed, told, theta, observer, columns, *by)
 
     monkeypatch.setattr(Observed, "follow", noted)
     proposals(look, fitter, data, Extensions(Sizes(model, data)), SideBySide(1), ("spring", "cubic_spring"))

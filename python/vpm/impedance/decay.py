@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,9 @@ from vpm.errors import IdentificationError
 from vpm.experiment import noise_std
 from vpm.impedance.channels import RecordLike, check_moves, columns
 from vpm.results import Result
+
+if TYPE_CHECKING:
+    from scipy.optimize import OptimizeResult
 
 Array = NDArray[np.float64]
 
@@ -101,15 +105,19 @@ def identify_decay(record: RecordLike, displacement: str, mass: float) -> Decay:
 
     every = max(time.size // COARSE, 1)
     highest = np.log(np.pi / (4.0 * float(np.median(np.diff(time)))))
+    rates = np.linspace(np.log(1.0 / time[-1]), highest, 40)
     starts = [
-        np.array([rate, ratio])
-        for rate in np.linspace(np.log(1.0 / time[-1]), highest, 40)
+        min(([rate, ratio] for rate in rates), key=lambda place: float(np.sum(left(np.array(place), every) ** 2)))
         for ratio in np.log([0.005, 0.03, 0.1, 0.3, 0.7, 1.3, 3.0, 10.0])
     ]
-    best = min(starts, key=lambda place: float(np.sum(left(place, every) ** 2)))
-    # Bounds keep the logarithms where exp() means something: a ratio of 1e-6 is no damping.
-    low, high = [best[0] - 3.0, np.log(1e-6)], [best[0] + 3.0, np.log(1e3)]
-    fit = least_squares(left, best, bounds=(low, high), xtol=1e-14, ftol=1e-14, gtol=1e-14, x_scale=1.0)
+
+    def ended(start: list[float]) -> OptimizeResult:
+        # Bounds keep the logarithms where exp() means something: a ratio of 1e-6 is no damping.
+        low, high = [start[0] - 3.0, np.log(1e-6)], [start[0] + 3.0, np.log(1e3)]
+        return least_squares(left, start, bounds=(low, high), xtol=1e-14, ftol=1e-14, gtol=1e-14, x_scale=1.0)
+
+    # An overdamped motion shows little but the ratio of both, along which a single fit may end anywhere.
+    fit = min((ended(start) for start in starts), key=lambda fit: float(fit.cost))
     rate, ratio = map(float, np.exp(fit.x))
     matrix = _motions(time, rate, ratio)
     rest = float(np.linalg.lstsq(matrix, x, rcond=None)[0][0])
