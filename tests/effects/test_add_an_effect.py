@@ -53,7 +53,7 @@ def copy(tmp_path: Path) -> Path:
 
 def test_each_step_finds_its_place(copy: Path) -> None:
     touched = follow(copy)
-    assert len(touched) == 9
+    assert len(touched) == 10
     for path in touched:
         if path.suffix == ".py":
             compile(path.read_text(encoding="utf-8"), str(path), "exec")
@@ -76,5 +76,7 @@ def test_the_steps_give_an_effect(copy: Path) -> None:
         "tests/effects/test_eddy_brake.py",
         "tests/effects/test_one_file_an_effect.py",
         "tests/effects/test_one_effect_more.py",
+        "tests/effects/test_catalogue.py",
+        "tests/proving/test_blind_generators.py::test_names_of_known_effects_are_those_of_the_catalogue",
     ]
     run(sys.executable, "-m", "pytest", "-q", *tests, PYTHONPATH=str(copy / "python"))

@@ -263,7 +263,7 @@ fn effects_on_shafts_agree() -> Result<()> {
 }
 
 /// Effects of joints with their parameters: each a size that is drawn up to it, from a tenth of it.
-const EFFECTS: [(&str, &[(&str, f64)]); 16] = [
+const EFFECTS: &[(&str, &[(&str, f64)])] = &[
     ("viscous_friction", &[("viscous", 0.5)]),
     ("coulomb_friction", &[("coulomb", 2.0), ("transition_velocity", 0.2)]),
     ("stribeck_friction", &[("stribeck", 1.0), ("stribeck_velocity", 0.4), ("transition_velocity", 0.2)]),
