@@ -50,7 +50,7 @@ def check(
     Ends with exit code 1 where there is a mistake that was not corrected.
     """
     from vpm.log_check import check_log
-    from vpm.model.messages import importer_of
+    from vpm.model.reading import importer_of
     from vpm.simulate import Setup
 
     if fix:

@@ -255,7 +255,7 @@ def simulate(
     ] = None,
 ) -> None:
     """Run a scenario: a test without a log. Or simulate a model on the inputs of a log and compare with it."""
-    from vpm.model.messages import read_toml
+    from vpm.model.reading import read_toml
     from vpm.simulate import simulate as simulate_log
 
     if "scenario" in read_toml(model):

@@ -162,7 +162,7 @@ def fourier(
 
 def _limits(path: Path) -> dict[str, JointLimits]:
     from vpm.excitation import JointLimits
-    from vpm.model.messages import read_toml
+    from vpm.model.reading import read_toml
 
     limits = {}
     for joint, values in read_toml(path).items():

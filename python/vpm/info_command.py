@@ -48,7 +48,7 @@ def _plugins() -> list[dict[str, str]]:
         return []
     from vpm.catalogue.entries import OWN as EFFECTS
     from vpm.experiment.readers import OWN as READERS
-    from vpm.model.messages import OWN as IMPORTERS
+    from vpm.model.reading import OWN as IMPORTERS
 
     taken = {"effects": EFFECTS, "readers": READERS, "importers": IMPORTERS}
     found = (one for kind, names in taken.items() for one in plugins(kind, names).values())

@@ -10,7 +10,7 @@ from vpm.errors import ModelError, UnitError, near_match
 from vpm.linkages.karl import Karl, KarlGeometry
 from vpm.linkages.leg import Leg
 from vpm.linkages.leg_parameters import Attachment, Cylinder, LegParameters, LegPart, Segment
-from vpm.model.messages import read_toml
+from vpm.model.reading import read_toml
 from vpm.units import convert
 
 TYPES = ("karl", "leg")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from vpm.model.channel_table import load_channel_table, parse_channel_table
 from vpm.model.channels import ChannelEntry
-from vpm.model.cores import Shape
+from vpm.model.compile import Shape
 from vpm.model.dynamics import Dynamics
 from vpm.model.effects import Effect
 from vpm.model.model import Model

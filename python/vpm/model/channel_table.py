@@ -10,7 +10,8 @@ from pydantic import TypeAdapter, ValidationError
 
 from vpm.model.channels import ChannelEntry
 from vpm.model.form import schema_problems
-from vpm.model.messages import raise_first, read_toml
+from vpm.model.messages import raise_first
+from vpm.model.reading import read_toml
 
 _TABLE = TypeAdapter(dict[str, ChannelEntry])
 

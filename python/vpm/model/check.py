@@ -21,9 +21,10 @@ from vpm.model.controller import controller_problems
 from vpm.model.drives import actuator as drives
 from vpm.model.effects import EffectEntry, complete_effects, effect_problems
 from vpm.model.form import schema_problems
-from vpm.model.messages import Problem, check_plain, raise_first
+from vpm.model.messages import Problem, raise_first
 from vpm.model.omissions import omission_problems
 from vpm.model.parameters import Parameter, Slot
+from vpm.model.reading import check_plain
 from vpm.model.schema import Document
 from vpm.model.sensor import noise_problems, sensor_problems
 from vpm.model.splitting import reshapes, stop_problems

@@ -1,20 +1,38 @@
-"""From a checked document to the description that the core reads: names become indices, parameters one flat vector."""
+"""From a checked document to the core: names become indices, parameters one flat vector.
+
+One core serves all models that differ in parameter values only. It is given the values at every call; what it records
+and compiles of the equations then serves every model of the same structure.
+"""
 
 from __future__ import annotations
 
 import json
+from collections import OrderedDict
 from collections.abc import Mapping
-from typing import Any
+from dataclasses import dataclass, field
+from threading import Lock
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.errors import VpmError
 from vpm.model.body import inertia_described
 from vpm.model.checked import Checked
 from vpm.model.component import Described, Index
 from vpm.model.effects import SITES, effect_described, effects_of
 from vpm.model.omissions import omissions
 from vpm.model.structure import Axis
+
+if TYPE_CHECKING:
+    from vpm._core import System
+    from vpm.model.model import Model
+
+#: Systems that are kept; each holds what it recorded and compiled.
+KEPT = 64
+
+_systems: OrderedDict[str, System] = OrderedDict()
+_lock = Lock()
 
 
 def described(structure: str, theta: NDArray[np.float64]) -> str:
@@ -102,3 +120,50 @@ def _body(axis: Axis, index: Index) -> Described:
         "inertia": None if axis.body is None else inertia_described(axis.body, index),
         "rotor_inertia": index.get(f"{axis.name}.rotor_inertia"),
     }
+
+
+def core_of(structure: str, theta: NDArray[np.float64]) -> System:
+    """Compiled system of a structure, as `structure_text` gives it, for the parameters ``theta``.
+
+    Raises
+    ------
+    CoreError
+        The core refuses the description.
+    VpmError
+        There is no core.
+    """
+    try:
+        from vpm._core import System
+    except ImportError as error:
+        raise VpmError(f"the compiled core of vpm cannot be imported ({error}); reinstall vpm-dynamics") from error
+    with _lock:
+        known = _systems.get(structure)
+        if known is not None:
+            _systems.move_to_end(structure)
+    if known is not None:
+        known.check(theta)
+        return known
+    system = System(described(structure, theta))
+    with _lock:
+        _systems[structure] = system
+        while len(_systems) > KEPT:
+            _systems.popitem(last=False)
+    return system
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A model of which the structure counts alone: the key of answers that hold whatever the values are.
+
+    Attributes
+    ----------
+    model : Model
+        One of those that differ in values only.
+    structure : str
+    """
+
+    model: Model = field(compare=False)
+    structure: str = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "structure", self.model.structure)

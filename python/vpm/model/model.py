@@ -17,13 +17,12 @@ from vpm.errors import CoreError, ModelError, near_match
 from vpm.files import write_text
 from vpm.model.check import check_document, check_effect
 from vpm.model.checked import Checked
-from vpm.model.compile import described, structure_text
-from vpm.model.cores import core_of
+from vpm.model.compile import core_of, described, structure_text
 from vpm.model.effect_start import starting_values
 from vpm.model.effects import Effect, effects_of
 from vpm.model.evaluation import Evaluations
-from vpm.model.messages import parse_toml, read_toml
 from vpm.model.parameters import Parameter
+from vpm.model.reading import parse_toml, read_toml
 from vpm.model.writer import content_of, toml_of
 from vpm.numbers import number_of
 from vpm.results import Storable, html_table

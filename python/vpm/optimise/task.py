@@ -14,7 +14,8 @@ from pydantic import ValidationError
 
 from vpm.errors import ModelError, OptimisationError, UnitError, near_match
 from vpm.model import Model
-from vpm.model.messages import check_plain, parse_toml, place, read_toml
+from vpm.model.messages import place
+from vpm.model.reading import check_plain, parse_toml, read_toml
 from vpm.optimise.schema import GOALS, Boundary, Document, PhaseEntry, Range, schema_problems
 from vpm.units import convert
 

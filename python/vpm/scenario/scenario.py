@@ -18,7 +18,7 @@ from vpm.batch import side_by_side
 from vpm.errors import DivergedError, ScenarioError, SimulationError, VpmError, near_match
 from vpm.experiment import Experiment
 from vpm.model import Model
-from vpm.model.messages import parse_toml, read_toml
+from vpm.model.reading import parse_toml, read_toml
 from vpm.results import html_table
 from vpm.scenario.clock import check_numbers, clock_of
 from vpm.scenario.form import schema_problems
