@@ -94,12 +94,12 @@ def keys_of(*entries: type[BaseModel]) -> tuple[str, ...]:
     return tuple(field.alias or name for entry in entries for name, field in entry.model_fields.items())
 
 
-def located(location: Place) -> tuple[Place, Tables]:
-    """Place in a file that the schema tells, and the tables that its last key may stand in.
+def located(location: Place, document: type[BaseModel] = Document) -> tuple[Place, Tables]:
+    """Place in a file that the schema of a document tells, and the tables that its last key may stand in.
 
     A location of the schema also has the member of a union that was read, such as the type of an actuator.
     """
-    members, keys = list(_members(Document)), list[str | int]()
+    members, keys = list(_members(document)), list[str | int]()
     around = members
     for key in location:
         chosen = [member for member in members if key in member[1]] if len(members) > 1 else []
