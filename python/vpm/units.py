@@ -207,17 +207,6 @@ def si_unit(unit: str) -> str:
     return parse_unit(unit).si
 
 
-def same_dimension(left: str, right: str) -> bool:
-    """Whether one unit can be converted into the other.
-
-    Raises
-    ------
-    UnitError
-        One of them cannot be read.
-    """
-    return parse_unit(left).dimension == parse_unit(right).dimension
-
-
 def require_dimension(unit: str, expected: str) -> None:
     """Refuse a unit of the wrong kind.
 

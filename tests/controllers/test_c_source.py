@@ -178,7 +178,7 @@ DAILY = {
     "servo_cylinder/rig.toml",
     "wrist/wrist.toml",
 }
-#: Machines of one slide that winds up, with effects in groups that act at once.
+#: Machines of one compliant slide, with effects in groups that act at once.
 OWN = {"both_sides": rubbing_on_both_sides, "geared": geared}
 
 

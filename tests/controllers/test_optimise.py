@@ -361,6 +361,8 @@ def test_what_takes_longer_is_told_with_the_limit() -> None:
         ({"duration": [0.1, math.inf]}, "duration"),
         ({"time_step": 1e-9}, "samples"),
         ({"speed": 1.0}, "speed is not a known key"),
+        ({"end": {"rail.position": {"value": 1.0, "unti": "m"}}}, r'end."rail.position".unti .* did you mean "unit"'),
+        ({"phases": [{"name": "a", "duration": 1.0, "limit": {}}]}, r'phases\[0\].limit .* did you mean "limits"'),
         ({"obstacles": [{"marker": "hand", "center": [0.0, 0.0, 0.0], "radius": 1.0}]}, 'is "hand", no marker'),
         ({"guess": {"rail.position": 1.0}}, "is no command"),
         ({"level": "bezier(3)"}, "level is wrong"),

@@ -1,4 +1,4 @@
-"""A drive that winds up, looked for among the frequencies at which it may swing."""
+"""A joint compliance, looked for among the frequencies at which it may swing."""
 
 from __future__ import annotations
 

@@ -13,10 +13,10 @@ from scipy.stats import t as student_t
 import vpm
 from blind import Case
 from shared_cases import shared_case
-from vpm.discrepancy.closed_loop_prediction import fit_prediction, predict, spectra, weighted
 from vpm.discrepancy.confirmation import Data, judge
 from vpm.discrepancy.reference_response import Runs, Verdict, compare_driven, inexact, part
 from vpm.discrepancy.refusal import NEGLIGIBLE
+from vpm.discrepancy.whittle_likelihood import fit_prediction, predict, spectra, weighted
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
 from vpm.model import Model
 from vpm.simulate import Setup

@@ -39,7 +39,7 @@ def with_one(name: str) -> Model:
 
 
 def geared() -> Model:
-    """All of them at one joint that winds up, those that have sides on both."""
+    """All of them at one compliant joint, those that have sides on both."""
     model = elastic()
     for name, values in VALUES.items():
         model = model.with_effect(name, at="axis", **values)

@@ -1,4 +1,4 @@
-"""Effects on the motor side and on the link side of a joint that winds up: against equations of two masses by SciPy."""
+"""Effects on the motor side and on the link side of a compliant joint: against equations of two masses by SciPy."""
 
 from functools import cache
 from typing import Literal
@@ -140,7 +140,7 @@ def test_breakaway_goes_through_the_spring(integrator: str) -> None:
     before = elastic(60.0).with_effect("coulomb_friction", at="axis", **values)
     held = 0.9 * dry * np.minimum(time, 1.0)[:, None]
     _, states, _ = before.core.simulate(before.theta, np.zeros(4), held, 1e-3, 2, integrator, [])
-    # Before the spring the motor itself is held, and nothing winds up.
+    # Before the spring the motor itself is held, and nothing deflects.
     assert np.abs(states[-1][0]) < 2.0 * np.arctanh(0.9) * creep
     assert np.abs(states[-1][1]) < 1e-5
 

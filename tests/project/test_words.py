@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 
 from public_api import LIST
+from vpm.catalogue import EFFECTS, EffectType
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -133,6 +134,14 @@ def test_pages_use_the_terms_of_the_field(page: Path) -> None:
     assert not wrong, "\n".join(wrong)
     quoted = {phrase for place, phrase in QUOTED if place == name}
     assert quoted <= {phrase for _, phrase, _ in found}
+
+
+@pytest.mark.parametrize("effect", EFFECTS.values(), ids=lambda effect: effect.name)
+def test_effects_are_described_in_the_terms_of_the_field(effect: EffectType) -> None:
+    meanings = (parameter.meaning for parameter in effect.parameters)
+    texts = (effect.sentence, effect.impossible, *effect.confused_with.values(), *meanings)
+    wrong = [f'"{phrase}" is {term}' for text in texts for _, phrase, term in found_in(text)]
+    assert not wrong, "\n".join(wrong)
 
 
 def test_modules_are_named_by_what_they_hold() -> None:

@@ -430,6 +430,10 @@ SERVED = [{"name": "servo", "model": "servo.toml"}]
             {"runs": [{"name": "a", "model": "sled.toml", "with_effects": [{"type": "payload", "at": "axis"}]}]},
             'runs[0].with_effects[0].at is "axis", which is no body of the model',
         ),
+        (
+            {"runs": [{"name": "a", "model": "m", "with_effects": [{"type": "t", "at": "a", "size": {"mni": 1.0}}]}]},
+            'runs[0].with_effects[0].size.mni is not a known key; did you mean "min"?',
+        ),
         ({"references": {"drive": POINTS}}, "write [commands.drive], or add a controller to sled"),
         ({"commands": {"drive": POINTS}, "runs": SERVED}, "write [references.drive]"),
         ({"commands": {"drives": POINTS}}, 'commands.drives is no actuator of run "bare"; did you mean "drive"?'),

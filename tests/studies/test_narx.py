@@ -182,7 +182,7 @@ def test_bad_inputs_are_refused_in_one_sentence(record: Any, options: dict[str, 
     assert "\n" not in str(caught.value)
 
 
-def test_terms_that_cannot_be_told_apart_are_named() -> None:
+def test_terms_that_depend_linearly_are_named() -> None:
     record = noisy(1)
     both = {**record, "v": 2.0 * np.asarray(record["u"])}
     with pytest.raises(IdentificationError, match=r"`v\[k-1\]` is a linear combination of `u\[k-1\]` within rounding"):

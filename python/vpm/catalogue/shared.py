@@ -18,7 +18,7 @@ SLOW = (2e-4, 0.1)
 STRIBECK = (1e-2, 1e-1)
 #: Way over which a contact closes where none is given: prismatic (m), revolute (rad).
 CONTACT = (1e-5, 1e-4)
-#: A stiffness that nothing winds up or bends; a place that no joint reaches, and a command that is never given.
+#: A stiffness that nothing deflects; a place that no joint reaches, and a command that is never given.
 RIGID, NEVER = 1e9, 1e9
 #: Largest share of a load that inverse dynamics has one solution for.
 _SHARE = (0.0, 0.95)

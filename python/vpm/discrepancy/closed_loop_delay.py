@@ -2,15 +2,15 @@
 
 Where a joint sticks, the inverse-dynamics residual along the measured motion shows a late break-away, with or without a
 delay. The estimated delay comes out too long, and the transition of friction too wide. In closed loop a machine sticks
-when its model sticks, so a closed-loop prediction (`vpm.discrepancy.closed_loop_prediction`) separates both.
+when its model sticks, so a closed-loop prediction (`vpm.discrepancy.whittle_likelihood`) separates both.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction, fit_prediction
 from vpm.discrepancy.motion_only import WITHIN, Timed, timed_in_motion
+from vpm.discrepancy.whittle_likelihood import ClosedLoopPrediction, fit_prediction
 from vpm.errors import VpmError
 from vpm.identify import Gain, InverseDynamicsProblem, OutputErrorProblem, gain, segments
 from vpm.model import Model

@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 
 from vpm.discrepancy.candidates import joint_at
 from vpm.discrepancy.closed_loop_delay import gain_in_closed_loop, timed_in_closed_loop
-from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction
 from vpm.discrepancy.low_frequency import has_impacts, low_frequency
 from vpm.discrepancy.motion_only import CREEPING, Timed, is_dry, is_late
 from vpm.discrepancy.screening import Alias, Baseline, Probe, size_is_clear
 from vpm.discrepancy.starting import nearer_start
 from vpm.discrepancy.structural import ends_apart
+from vpm.discrepancy.whittle_likelihood import ClosedLoopPrediction
 from vpm.errors import DivergedError
 from vpm.identify import (
     Estimate,

@@ -19,12 +19,12 @@ from scipy.linalg import block_diag
 from vpm.discrepancy.backlash import is_read_off
 from vpm.discrepancy.candidates import Key
 from vpm.discrepancy.choice import Accepted
-from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction, fit_prediction
 from vpm.discrepancy.confirmation import Data, Judged, judge
 from vpm.discrepancy.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, WORTH_A_NAME
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.discrepancy.structural import moved
+from vpm.discrepancy.whittle_likelihood import ClosedLoopPrediction, fit_prediction
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import OutputErrorProblem, gain, segments

@@ -28,7 +28,6 @@ Array = NDArray[np.float64]
 
 #: Mode of a gap that an observer leaves.
 OBSERVED = "observed"
-VERDICTS = ("effect_found", "parameters_only", "no_disagreement", "unexplained")
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -14,7 +14,6 @@ import numpy as np
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.choice import Accepted, choose
-from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction, misfit
 from vpm.discrepancy.confirmation import Data, Trial, confirm, judge
 from vpm.discrepancy.elimination import Stage
 from vpm.discrepancy.motion_only import WITHIN
@@ -31,6 +30,7 @@ from vpm.discrepancy.screening import Probe, impossible_values
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.short_list import same_models
 from vpm.discrepancy.side_by_side import SideBySide
+from vpm.discrepancy.whittle_likelihood import ClosedLoopPrediction, misfit
 from vpm.errors import VpmError
 
 #: Effects that are asked for, of those that take most of the training residual.

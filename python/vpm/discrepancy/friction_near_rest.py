@@ -3,7 +3,7 @@
 Such friction acts for milliseconds while a joint breaks away. The filter of a measured motion smears that instant, so
 the inverse-dynamics residual hardly shows it and takes part of it for friction at small speeds. In closed loop a
 machine sticks when its model sticks. So the model predicts the training records without and with the effect
-(`vpm.discrepancy.closed_loop_prediction`). The validation records then give the share of the change between both
+(`vpm.discrepancy.whittle_likelihood`). The validation records then give the share of the change between both
 predictions that they support: zero for an effect that is absent, one for an effect that is there.
 """
 
@@ -15,7 +15,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.discrepancy.candidates import Candidate
-from vpm.discrepancy.closed_loop_prediction import (
+from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
+from vpm.discrepancy.motion_only import WITHIN
+from vpm.discrepancy.reference_response import against, part
+from vpm.discrepancy.refusal import MODEST_FACTOR, Thresholds
+from vpm.discrepancy.screening import Probe, impossible_values
+from vpm.discrepancy.whittle_likelihood import (
     SMOOTHED,
     ClosedLoopPrediction,
     fit_prediction,
@@ -25,11 +30,6 @@ from vpm.discrepancy.closed_loop_prediction import (
     spectra,
     weighted,
 )
-from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, judge
-from vpm.discrepancy.motion_only import WITHIN
-from vpm.discrepancy.reference_response import against, part
-from vpm.discrepancy.refusal import MODEST_FACTOR, Thresholds
-from vpm.discrepancy.screening import Probe, impossible_values
 from vpm.errors import VpmError
 from vpm.identify import Gain
 from vpm.identify.along import bends, has_own_drives

@@ -2,7 +2,7 @@
 
 The residual covers a few hertz along a filtered, noisy motion. Where a joint sticks, one reversal may outweigh all
 else. A closed-loop prediction is compared at every frequency with the noise that is left there
-(`vpm.discrepancy.closed_loop_prediction`). Two models with nearly the same residual may differ by tens of standard
+(`vpm.discrepancy.whittle_likelihood`). Two models with nearly the same residual may differ by tens of standard
 deviations in their predictions. Training and validation records give the share of that difference that they support:
 zero if the first model is right, one if its rival is.
 """
@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction, fit_prediction, misfit, predict
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.friction_near_rest import LEAST_SUPPORT, gain_of_predictions
 from vpm.discrepancy.low_frequency import has_impacts
 from vpm.discrepancy.refusal import MODEST_FACTOR, Thresholds
+from vpm.discrepancy.whittle_likelihood import ClosedLoopPrediction, fit_prediction, misfit, predict
 from vpm.errors import VpmError
 from vpm.identify import Gain
 from vpm.identify.along import bends, has_own_drives

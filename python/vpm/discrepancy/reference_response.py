@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vpm.discrepancy.closed_loop_prediction import RANK, ClosedLoopPrediction, Spectra, fit_prediction, least, spectra
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.refusal import NEGLIGIBLE
+from vpm.discrepancy.whittle_likelihood import RANK, ClosedLoopPrediction, Spectra, fit_prediction, least, spectra
 from vpm.errors import VpmError
 from vpm.identify.along import has_own_drives
 from vpm.identify.identifiability import column_lengths

@@ -9,13 +9,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from vpm.discrepancy.ambiguity import Rivals
-from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction
 from vpm.discrepancy.confirmation import Data, Trial
 from vpm.discrepancy.prediction_comparison import WORTH_A_FIT, compared, criterion, fitted_prediction, predicted
 from vpm.discrepancy.refusal import Thresholds, impossible_trial
 from vpm.discrepancy.rival_exchange import exchanged
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.side_by_side import SideBySide
+from vpm.discrepancy.whittle_likelihood import ClosedLoopPrediction
 
 
 def discriminated(

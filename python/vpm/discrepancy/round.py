@@ -12,7 +12,6 @@ from vpm.catalogue import EFFECTS
 from vpm.discrepancy.backlash import is_read_off, only_compliant
 from vpm.discrepancy.candidates import Candidate, Key, candidates, joint_at, left_out
 from vpm.discrepancy.choice import Accepted, choose
-from vpm.discrepancy.closed_loop_prediction import ClosedLoopPrediction
 from vpm.discrepancy.confirmation import Data, Judged, Trial, confirm, finished
 from vpm.discrepancy.diagnosis import RankedCandidate
 from vpm.discrepancy.friction_near_rest import is_supported, judged_by_prediction, needs_prediction, prediction_without
@@ -34,6 +33,7 @@ from vpm.discrepancy.short_list import SHORT_LIST, most_promising, same_models
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.discrepancy.structure import structure
 from vpm.discrepancy.timing import InTime, in_time
+from vpm.discrepancy.whittle_likelihood import ClosedLoopPrediction
 from vpm.identify import gain, segments
 from vpm.identify.along import bends, has_own_drives
 from vpm.identify.tangent import drives_on_tangent

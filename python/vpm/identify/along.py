@@ -244,7 +244,7 @@ def _bent(ask: Asked, channels: Sequence[str]) -> Pair:
     if not has_own_drives(ask.model):
         split = bending_of(ask.model, ask.m.joints, known)
         if split is None:
-            # A joint that winds up has no tangent, but laws on its measured side do not feel that either.
+            # A compliant joint has no tangent, but laws on its measured side do not feel that either.
             split, origin = bending_of(ask.model, ask.m.joints, known, wound=True), None
     part = split.bare if split else whole(ask.model)
     read = read_where_bent(ask.m.joints, channels)

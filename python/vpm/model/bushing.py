@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 #: The six directions of a bushing, in the order of all spatial vectors.
 DIRECTIONS = ("rx", "ry", "rz", "x", "y", "z")
-#: Names that the schema puts into a place to say what stands there.
-TAGS = ("entry", "row")
 #: Entries on both sides of a diagonal may differ by this share: numbers in files are rounded.
 _SYMMETRY = 1e-9
 #: How far below zero an eigenvalue of a scaled matrix may be: numbers in files are rounded.
@@ -109,7 +107,6 @@ class Bushing(Component):
         "b": 'b = { parent = "upper", point = [0.0, 0.0, -0.35] }',
         "stiffness": "stiffness = [1e4, 0.0, 1e4, 1e7, 1e7, 1e7]",
     }
-    NESTED: ClassVar[Mapping[str, type[Entry]]] = {"a": BushingEnd, "b": BushingEnd}
     CHANNELS: ClassVar[Mapping[str, str]] = WRENCH
 
     a: BushingEnd

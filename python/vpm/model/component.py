@@ -27,8 +27,6 @@ class Component(Entry):
 
     #: How a key is written, for messages about missing ones.
     EXAMPLES: ClassVar[Mapping[str, str]] = {}
-    #: Tables inside of it, by their key.
-    NESTED: ClassVar[Mapping[str, type[Entry]]] = {}
     #: Channels, with their SI units, where these do not depend on the model.
     CHANNELS: ClassVar[Mapping[str, str]] = {}
 

@@ -45,7 +45,6 @@ class Contact(Component):
         "dynamic": "dynamic = 0.55",
         "dynamic_velocity": 'dynamic_velocity = { value = 1, unit = "m/s" }',
     }
-    NESTED: ClassVar[Mapping[str, type[Entry]]] = {"plane": Plane, "friction": ContactFriction}
     CHANNELS: ClassVar[Mapping[str, str]] = {"depth": "m", "normal_force": "N", "fx": "N", "fy": "N", "fz": "N"}
 
     parent: Text

@@ -6,19 +6,14 @@ import re
 from collections.abc import Mapping
 from typing import Any
 
-from pydantic import BaseModel, ValidationError
+from pydantic import ValidationError
 
 from vpm.errors import near_match
-from vpm.model.beams.beam import Damping, Rest
-from vpm.model.beams.section import SECTION_KINDS, Layer, Material
-from vpm.model.bushing import TAGS
 from vpm.model.component import Component
 from vpm.model.drives.actuator import ACTUATOR_TYPES
 from vpm.model.entry import Quantity
-from vpm.model.joint import DenavitHartenberg
-from vpm.model.line import End, Part
 from vpm.model.messages import Problem, place, shown
-from vpm.model.schema import SECTIONS, Document, keys_of
+from vpm.model.schema import SECTIONS, Tables, keys_of, located
 
 #: How a key is written, for messages about missing ones.
 _EXAMPLES: Mapping[str, str] = {
@@ -49,22 +44,6 @@ _EXAMPLES: Mapping[str, str] = {
     "gauges.at": "at = 0.05",
 }
 
-#: Tables inside of components, by their key.
-_NESTED: Mapping[str, tuple[type[BaseModel], ...]] = {
-    "dh": (DenavitHartenberg,),
-    "material": (Material,),
-    "damping": (Damping,),
-    "section": SECTION_KINDS,
-    "sections": SECTION_KINDS,
-    "layers": (Layer,),
-    "rest": (Rest,),
-    "rests": (Rest,),
-    "from": (End,),
-    "to": (End,),
-    "barrel": (Part,),
-    "rod": (Part,),
-}
-
 #: What has to stand at a place, by the kind of error that says it does not.
 _KINDS: Mapping[str, str] = {
     "float_type": "a number",
@@ -93,54 +72,38 @@ def schema_problems(error: ValidationError, *, within: tuple[str, ...] = ()) -> 
     # Unknown keys come first: the key that is missing is often the one that is misspelt.
     for detail in sorted(error.errors(include_url=False), key=lambda found: found["type"] != "extra_forbidden"):
         written = (*within, *detail["loc"])
-        keys, tag = _without_tags(written), _actuator_type(written)
-        if keys[-1] == "value" and detail["type"] not in {"missing", "extra_forbidden"}:
+        keys, tables = located(written)
+        if keys[-1] == "value" and tables == (Quantity,) and detail["type"] not in {"missing", "extra_forbidden"}:
             keys = keys[:-1]  # bare numbers have no such key
         problems.append(
             Problem(
                 place(*keys),
-                _sentence(detail["type"], keys, detail["input"], detail.get("ctx", {}), detail["msg"], tag),
+                _sentence(detail["type"], keys, tables, detail["input"], detail.get("ctx", {}), detail["msg"]),
             )
         )
     return problems
 
 
-def _without_tags(keys: tuple[str | int, ...]) -> tuple[str | int, ...]:
-    """Place without the type of a controller or the shape of a section, which the schema puts into it."""
-    if _actuator_type(keys) is not None:
-        return (*keys[:2], *keys[3:])
-    if keys[0] == "bushings":
-        return tuple(key for key in keys if key not in TAGS)
-    tags = {("controllers", None): 2, ("beams", "section"): 3, ("beams", "sections"): 4}
-    tag = tags.get((str(keys[0]), str(keys[2]) if keys[0] == "beams" and len(keys) > 2 else None))
-    return keys if tag is None or len(keys) <= tag + 1 else (*keys[:tag], *keys[tag + 1 :])
-
-
-def _actuator_type(keys: tuple[str | int, ...]) -> str | None:
-    """Type of the actuator that a place is in, as the schema puts it there; None elsewhere."""
-    inside = len(keys) > 2 and keys[0] == "actuators" and keys[2] in ACTUATOR_TYPES
-    return str(keys[2]) if inside else None
-
-
-def _other_types(key: str, tag: str | None) -> tuple[str, ...]:
-    """Types of actuators that have a key which the type at hand has not."""
-    return () if tag is None else tuple(name for name, entry in ACTUATOR_TYPES.items() if key in keys_of(entry))
+def _other_types(key: str, tables: Tables) -> tuple[tuple[str, ...], str]:
+    """Types of actuators that have a key which the type at hand has not, and that type."""
+    own = next((name for name, entry in ACTUATOR_TYPES.items() if entry in tables), "")
+    return tuple(name for name, entry in ACTUATOR_TYPES.items() if own and key in keys_of(entry)), own
 
 
 def _sentence(
     kind: str,
     keys: tuple[str | int, ...],
+    tables: Tables,
     found: object,
     context: Mapping[str, Any],
     fallback: str,
-    tag: str | None = None,
 ) -> str:
-    """Rest of the sentence for one error of the schema; ``tag`` is the type of the actuator that it is in."""
+    """Rest of the sentence for one error of the schema in one of some tables."""
     if kind == "extra_forbidden":
-        other = _other_types(str(keys[-1]), tag) if len(keys) == 3 else ()
+        other, own = _other_types(str(keys[-1]), tables)
         if other:
-            return f'belongs to type = "{" or ".join(other)}", but this is {tag}; change the type or remove the key'
-        return f"is not a known key; {near_match(str(keys[-1]), _known_keys(keys, tag))}"
+            return f'belongs to type = "{" or ".join(other)}", but this is {own}; change the type or remove the key'
+        return f"is not a known key; {near_match(str(keys[-1]), keys_of(*tables))}"
     if kind == "missing":
         example = _example(str(keys[0]), str(keys[-1]))
         return "is missing; add it" + (f", for example {example}" if example else "")
@@ -183,19 +146,3 @@ def _choice_sentence(
         reason = str(context.get("error", fallback))
         return reason if reason.startswith(("has ", "is ")) else f"is wrong: {reason}"
     return f"is {shown(found)}: {fallback[:1].lower()}{fallback[1:]}"
-
-
-def _known_keys(keys: tuple[str | int, ...], tag: str | None = None) -> tuple[str, ...]:
-    """Keys that would have been right where an unknown one stands."""
-    if len(keys) == 1:
-        return keys_of(Document)
-    if len(keys) == 3 and tag is not None:
-        return keys_of(ACTUATOR_TYPES[tag])
-    if keys[0] in {"actuators", "supplies", "contacts", "bushings", "loops"} and len(keys) > 3:
-        kinds = SECTIONS[str(keys[0])] if tag is None else (ACTUATOR_TYPES[tag],)
-        inside_of = {key: table for kind in kinds if issubclass(kind, Component) for key, table in kind.NESTED.items()}
-        return keys_of(inside_of.get(str(keys[-2]), Quantity))
-    if len(keys) == 3 and keys[0] in SECTIONS:
-        return keys_of(*SECTIONS[str(keys[0])])
-    inside = [key for key in keys[2:-1] if not isinstance(key, int)]
-    return keys_of(*_NESTED[inside[0]]) if len(inside) == 1 and inside[0] in _NESTED else keys_of(Quantity)

@@ -83,7 +83,7 @@ def identify(
     ------
     IdentificationError
         The records do not tell the model: too few samples, lags longer than a record, a channel that never moves, terms
-        that cannot be told apart, a sample that is no number; by name.
+        that depend linearly on each other, a sample that is no number; by name.
     """
     signals = [output, *inputs]
     given = [series(record, output, inputs, f"record {at}") for at, record in enumerate(as_list(records))]

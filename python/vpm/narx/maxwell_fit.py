@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.narx.maxwell import MaxwellNarx
-from vpm.narx.maxwell_identifiability import basis_around, standard_errors, start_vector, told_apart, widened
+from vpm.narx.maxwell_identifiability import basis_around, identifiable_bases, standard_errors, start_vector, widened
 from vpm.narx.maxwell_maps import Basis, MaxwellMap, fit_maxwell_map
 from vpm.narx.maxwell_motion import LEAST, descend_motion, element_values, motion_covariance
 from vpm.narx.maxwell_problem import OutputErrors, Parameters
@@ -178,7 +178,7 @@ def _refined(
     degree: int | None,
 ) -> MaxwellFit:
     wide, dropped = widened(samples, bases, signals, degree)
-    wide, more_dropped = told_apart(begun.staged, samples, wide)
+    wide, more_dropped = identifiable_bases(begun.staged, samples, wide)
     dropped += more_dropped
     problem = OutputErrors(samples, begun.element.scheme, *wide)
     if problem.freedom < 2 * problem.count:

@@ -1,4 +1,4 @@
-"""What records tell of an element's coefficients: terms that they tell apart, and how well."""
+"""Identifiability of an element's coefficients: terms that records determine, and how well."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 #: A combination of parameters that moves the force by less than this share of what each of them does is not seen.
 UNSEEN = 1e-7
-#: A constant of k0 that is known to no better share leaves k0 and s0 hardly apart.
+#: A constant of k0 that is known to no better share leaves k0 and s0 strongly correlated.
 HARDLY = 0.2
 
 
@@ -64,13 +64,13 @@ def coefficient_names(bases: tuple[Basis, Basis]) -> list[str]:
     return [f"{of}[{POWER_NAMES[term]}]" for of, basis in maps for term in basis.terms] + ["k1", "tau"]
 
 
-def told_apart(
+def identifiable_bases(
     e: MaxwellNarx, samples: list[Samples], bases: tuple[Basis, Basis]
 ) -> tuple[tuple[Basis, Basis], list[str]]:
     """Bases without the terms of s0 in s that k0 and k1 can stand for.
 
     ``k0 (s - s0)`` stays what it is if k0 grows by c and s0 becomes ``s - k0 (s - s0) / (k0 + c)``, and so does
-    ``k0 + k1`` if k1 falls by c: where that is a polynomial of the map, the records cannot tell these apart.
+    ``k0 + k1`` if k1 falls by c: where that is a polynomial of the map, the records cannot discriminate these.
     """
     notes: list[str] = []
     while True:
@@ -102,9 +102,9 @@ def standard_errors(
     seen = values > UNSEEN * values[0]
     names = coefficient_names(bases)
     notes = [
-        "the records do not tell "
+        "the records determine only a combination of "
         + ", ".join(names[i] for i in np.flatnonzero(np.abs(row) > 0.1))
-        + " apart; the force is right, these values are one choice of many: take lower degrees"
+        + "; the force is right, these values are one choice of many: take lower degrees"
         for row in rows[~seen]
     ]
     sigma2 = float(rest @ rest) / max(problem.freedom - problem.count, 1)
@@ -120,8 +120,8 @@ def standard_errors(
         at += one.force.size
     if std[0] > HARDLY * abs(float(bases[0].to_plain()[0] @ x[: problem.terms])):
         notes.append(
-            "k0 and s0 are hardly told apart by these records: the force k0 (s - s0) is known, single coefficients are "
-            "not; take lower degrees where these are wanted"
+            "k0 and s0 are strongly correlated in these records: they determine the force k0 (s - s0), but not its "
+            "single coefficients; take lower degrees where these are wanted"
         )
     exact = np.sqrt(sigma2) < 1e-9 * max(float(np.abs(one.force).max()) for one in problem.records)
     if not exact and not inside(autocorrelation(rest, pieces, problem.records[0].step, "F")):

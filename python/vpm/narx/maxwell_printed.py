@@ -51,7 +51,7 @@ def static_rank(force: ArrayLike, length: ArrayLike, step: float) -> int:
 def minimum_norm_static(force: ArrayLike, length: ArrayLike, step: float) -> tuple[float, float, float]:
     """What the "right pseudo-inverse" of D'Imperio (2016), eq 5.57 and 5.58, gives: an artefact, for reproduction only.
 
-    With constant length, the minimum-norm solution shares the force among columns that cannot be told apart, in
+    With constant length, the minimum-norm solution shares the force among linearly dependent columns, in
     proportion to their size: ``s0 = -1/s`` and, at rest, ``k0 = F s / (s^2 + 1)``, whatever the element is. Use
     `static_windows` for stiffness and free length.
 
@@ -118,8 +118,8 @@ def printed_dynamic_regression(
     sizes = np.linalg.norm(columns, axis=0)
     if sizes.min() == 0.0 or np.linalg.matrix_rank(columns / sizes, tol=1e-12 * len(f)) < 3:
         raise IdentificationError(
-            "force, stretch and its rate cannot be told apart in this record, so that k1 and c1 have no estimate; give "
-            "a record in which the length moves"
+            "force, stretch and its rate are linearly dependent in this record, so that k1 and c1 have no estimate; "
+            "give a record in which the length moves"
         )
     solution, *_ = np.linalg.lstsq(columns / sizes, f[2:], rcond=None)
     b1, b2, b3 = solution / sizes

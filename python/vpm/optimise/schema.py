@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, Field, ValidationError
+from pydantic import BeforeValidator, Field, ValidationError
 
 from vpm.errors import near_match
 from vpm.model.entry import Entry, Number, Switch, Text, Vector
 from vpm.model.messages import Problem, place, shown
-from vpm.model.schema import keys_of
+from vpm.model.schema import keys_of, located
 
 #: Words of `minimise` that are no channels.
 GOALS = ("time", "energy")
@@ -106,9 +106,6 @@ class Document(Entry):
     phases: tuple[PhaseEntry, ...] = ()
 
 
-_TABLES: Mapping[str, type[BaseModel]] = {"phases": PhaseEntry, "obstacles": ObstacleEntry}
-
-
 def schema_problems(error: ValidationError) -> list[Problem]:
     """What the schema found, as sentences; unknown keys come first, for what is missing is often what is misspelt."""
     found = sorted(error.errors(include_url=False), key=lambda one: one["type"] != "extra_forbidden")
@@ -119,9 +116,8 @@ def _problem(found: dict[str, Any]) -> Problem:
     keys = tuple(key for key in found["loc"] if key != "channels" and not str(key).startswith("dict["))
     kind, context = found["type"], found.get("ctx", {})
     if kind == "extra_forbidden":
-        table = _TABLES.get(str(keys[0]), Document) if len(keys) <= 3 else Range
-        known = keys_of(table) if keys[0] in _TABLES or len(keys) == 1 else keys_of(Range)
-        return Problem(place(*keys), f"is not a known key; {near_match(str(keys[-1]), known)}")
+        _, tables = located(found["loc"], Document)
+        return Problem(place(*keys), f"is not a known key; {near_match(str(keys[-1]), keys_of(*tables))}")
     if kind == "missing":
         return Problem(place(*keys), "is missing; add it")
     if kind == "value_error":

@@ -9,10 +9,8 @@ from pydantic import ValidationError
 
 from vpm.errors import near_match
 from vpm.model.messages import Problem, place, shown
-from vpm.model.schema import keys_of
-from vpm.scenario.schema import INPUTS, SIGNALS, Document, Given, Listed, PlotEntry, RunEntry
-
-Keys = tuple[str | int, ...]
+from vpm.model.schema import Place, Tables, keys_of, located
+from vpm.scenario.schema import INPUTS, SIGNALS, Document
 
 #: How a key is written, for messages about missing ones.
 _EXAMPLES: Mapping[str, str] = {
@@ -51,33 +49,34 @@ def schema_problems(error: ValidationError) -> list[Problem]:
     """Rewrite what the schema found; unknown keys come first, for what is missing is often what is misspelt."""
     problems = []
     for detail in sorted(error.errors(include_url=False), key=lambda found: found["type"] != "extra_forbidden"):
-        keys, signal = _without_type(detail["loc"])
+        keys = _without_type(detail["loc"])
         if keys[-1] == "value" and detail["type"] not in {"missing", "extra_forbidden"} and _nested(keys):
             keys = keys[:-1]  # bare numbers have no such key
-        rest = _sentence(detail["type"], keys, signal, detail["input"], detail.get("ctx", {}))
+        _, tables = located(detail["loc"], Document)
+        rest = _sentence(detail["type"], keys, tables, detail["input"], detail.get("ctx", {}))
         problems.append(Problem(place(*keys), rest))
     return problems
 
 
-def _without_type(keys: Keys) -> tuple[Keys, str | None]:
+def _without_type(keys: Place) -> Place:
     """Place without what the schema puts into it: the type of a signal, the branch of a level."""
     if keys[0] in INPUTS and len(keys) > 2:
         place_of_number = keys[5:] if len(keys) == 6 and keys[4] == "value" else keys[4:]  # bare lists have no such key
-        return (*keys[:2], *keys[3:4], *place_of_number), str(keys[2])
+        return (*keys[:2], *keys[3:4], *place_of_number)
     if keys[0] == "runs" and len(keys) > 3 and keys[2] == "level":
-        return keys[:3], None
-    return keys, None
+        return keys[:3]
+    return keys
 
 
-def _nested(keys: Keys) -> bool:
+def _nested(keys: Place) -> bool:
     """Whether ``value`` at the end is that of a quantity, not a signal's own."""
     return not (keys[0] in INPUTS and len(keys) == 3)
 
 
-def _sentence(kind: str, keys: Keys, signal: str | None, found: object, context: Mapping[str, Any]) -> str:
+def _sentence(kind: str, keys: Place, tables: Tables, found: object, context: Mapping[str, Any]) -> str:
     """Rest of the sentence for one error of the schema."""
     if kind == "extra_forbidden":
-        return f"is not a known key; {near_match(str(keys[-1]), _known_keys(keys, signal))}"
+        return f"is not a known key; {near_match(str(keys[-1]), keys_of(*tables))}"
     if kind == "missing":
         example = _EXAMPLES.get(str(keys[-1]))
         return "is missing; add it" + (f", for example {example}" if example else "")
@@ -95,16 +94,3 @@ def _sentence(kind: str, keys: Keys, signal: str | None, found: object, context:
         return f"has the type {shown(context.get('tag'))}; {near_match(str(context.get('tag')), SIGNALS)}"
     reason = str(context.get("error", f"is {shown(found)}, which cannot be; correct it"))
     return reason if reason.startswith(("has ", "is ")) else f"is wrong: {reason}"
-
-
-def _known_keys(keys: Keys, signal: str | None) -> tuple[str, ...]:
-    """Keys that would have been right where an unknown one stands."""
-    if len(keys) == 1:
-        return keys_of(Document)
-    if signal is not None and len(keys) == 3:
-        return keys_of(SIGNALS[signal])
-    if keys[0] == "runs" and len(keys) == 3:
-        return keys_of(RunEntry)
-    if keys[0] == "plot":
-        return keys_of(PlotEntry)
-    return keys_of(Listed if keys[-2] == "time" else Given)

@@ -58,8 +58,8 @@ EFFECT = EffectType(
         " - 1/2 (q + 1/2 gap) / sqrt((q + 1/2 gap)^2 + width^2)) v"
     ),
     sentence=(
-        "{at} has a play of {gap} between contacts of {stiffness}, damped with {contact_damping}, and with {damping}"
-        " within it as well."
+        "{at} has a backlash of {gap} between contacts of {stiffness}, damped with {contact_damping}, and with"
+        " {damping} within it as well."
     ),
     impossible="a negative stiffness would pull the contacts into each other, a negative damping would feed energy in",
     confused_with={

@@ -35,8 +35,8 @@ EFFECT = EffectType(
     ),
     law="tau = -stiffness d - damping dd/dt on the deflection d, with inertia on the motor side",
     sentence=(
-        "{at} is elastic between motor and link: it winds up with {stiffness}, damped with {damping}, with {inertia} on"
-        " the side of the motor."
+        "{at} is compliant between motor and link, with a stiffness of {stiffness}, a damping of {damping} and an"
+        " inertia of {inertia} on the motor side."
     ),
     impossible="a negative stiffness would drive motor and link apart, a negative damping would feed energy in",
     confused_with={

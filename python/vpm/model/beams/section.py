@@ -201,10 +201,6 @@ Section = Annotated[
 ]
 
 
-#: All kinds of sections.
-SECTION_KINDS = (Rectangle, Circle, Tube, IBeam, Given, Layers, Stiffness)
-
-
 def section_parameter(beam: str, section: Way, inside: Way) -> str:
     """Dotted name of a number of a section; that of a material of its own goes without the word."""
     return ".".join(map(str, (beam, *section, *(key for key in inside if key != "material"))))

@@ -204,7 +204,6 @@ class Hydraulic(Drive):
         "line_a": 'line_a = { value = 2.9, unit = "cm^3" }',
         "line_b": 'line_b = { value = 1.7, unit = "cm^3" }',
     }
-    NESTED: ClassVar[Mapping[str, type[Entry]]] = {"valve": Valve, "cylinder": Cylinder, "friction": SealFriction}
     #: "" is the unit of the command.
     CHANNELS: ClassVar[Mapping[str, str]] = {
         "spool": "",

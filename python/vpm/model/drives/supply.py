@@ -61,7 +61,6 @@ class Supply(Component):
         "bulk_modulus": 'bulk_modulus = { value = 1.2, unit = "GPa" }',
         "fraction": "fraction = 0.005",
     }
-    NESTED: ClassVar[Mapping[str, type[Entry]]] = {"oil": Oil, "air": Air}
     CHANNELS: ClassVar[Mapping[str, str]] = {"pressure": "Pa", "flow": "m^3/s"}
 
     pressure: Annotated[ParameterValue, Rule("Pa", TINY, _ABSOLUTE)]

@@ -11,7 +11,7 @@ from vpm.errors import near_match
 from vpm.model.bushing import WRENCH, BushingEnd
 from vpm.model.component import Component, Described, Index
 from vpm.model.controller import ComputedTorque
-from vpm.model.entry import Entry, Number, Vector
+from vpm.model.entry import Number, Vector
 from vpm.model.joint import plane, unit
 from vpm.model.messages import Problem, place
 
@@ -30,7 +30,6 @@ class Loop(Component):
         "a": 'a = { parent = "crank", point = [0.1, 0.0, 0.0] }',
         "b": 'b = { parent = "rod", point = [0.3, 0.0, 0.0] }',
     }
-    NESTED: ClassVar[Mapping[str, type[Entry]]] = {"a": BushingEnd, "b": BushingEnd}
     CHANNELS: ClassVar[Mapping[str, str]] = WRENCH
 
     type: Literal["revolute", "spherical", "rigid"]

@@ -1,4 +1,4 @@
-"""Closed-loop predictions of a model, fitted to records at every frequency.
+"""Closed-loop predictions of a model, fitted to records by the Whittle likelihood.
 
 The inverse-dynamics residual covers a few hertz and takes the measured motion as given. It confuses stiction with
 delay, and delay with lag. A closed-loop prediction along the reference confuses neither, provided its own parameters
