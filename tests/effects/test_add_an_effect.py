@@ -18,7 +18,7 @@ INSERT = re.compile(
     r"^In `(?P<path>[^`]+)`, after `(?P<line>[^`]+)`:\n\n```\w+\n(?P<code>.*?)^```$", re.MULTILINE | re.DOTALL
 )
 #: What the steps touch, and what a build and a run of the tests of the effect need.
-PARTS = ("Cargo.toml", "Cargo.lock", "benches", "crates", "python", "docs", "tests", "pyproject.toml")
+PARTS = ("Cargo.toml", "Cargo.lock", "benches", "crates", "python", "docs", "examples", "tests", "pyproject.toml")
 
 
 def follow(folder: Path) -> list[Path]:
@@ -72,6 +72,7 @@ def test_the_steps_give_an_effect(copy: Path) -> None:
     run("cargo", "test", "--package", "vpm-core", "--test", "all", "recording")
     run("cargo", "build", "--release", "--package", "vpm-py", "--features", "extension-module")
     shutil.copy(ROOT / "target" / "release" / "lib_core.so", copy / "python" / "vpm" / "_core.abi3.so")
+    run(sys.executable, "docs/figures/effects.py", PYTHONPATH=str(copy / "python"))
     tests = [
         "tests/effects/test_eddy_brake.py",
         "tests/effects/test_one_file_an_effect.py",
