@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -61,7 +60,6 @@ class StandIn(InverseDynamicsProblem):
         return super()._answer(other, other.theta, record, places, tangent, known)
 
 
-@lru_cache(maxsize=8)
 def opened(model: Model) -> Model:
     """A machine with its loops open and drives without effort at the joints that these moved."""
     if not why_unbalanced(model):
