@@ -89,7 +89,7 @@ pub enum Kind {
     /// The state after a linearly implicit step, then whether it is exact: one, or zero where the elimination would have to exchange rows.
     Step,
     /// Coordinates and rates brought to where all loops are closed, these coordinates held, then the largest gap that is left and how many
-    /// equations count, see [`super::Loops::close`].
+    /// equations count, see `Loops::close`.
     Closed(Vec<u32>),
     /// Lever arms of all lines, line by line.
     Levers,
