@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from vpm.experiment import Experiment
 from vpm.log_check.correction import Correction
 from vpm.model import Model
-from vpm.ranking.observed import Observed, Observer
+from vpm.ranking.observed import Observed, Observer, among_parameters
 from vpm.ranking.settings import Settings
 from vpm.ranking.structure import Structure
 from vpm.simulate import Setup
@@ -65,9 +65,7 @@ class Delayed(Observed):
     ) -> tuple[Array, Array]:
         """Readings less outputs, see `Observed.follow`; ``theta`` are the parameters, then the delay."""
         own, delay = len(model.theta), float(theta[-1])
-        places = [place for place, column in enumerate(columns) if column < own]
-        small = None if moves is None else moves[places]
-        by = [columns[place] for place in places], small
+        _, by = among_parameters(own, columns, moves)
         residual, slopes = self._at(delay).follow(model, theta[:own], observer, *by)
         if own not in columns:
             return residual, slopes

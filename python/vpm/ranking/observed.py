@@ -198,14 +198,12 @@ class Observed:
         own = len(model.theta)
         firsts = self.firsts if len(theta) > own else Firsts()
         shifts = theta[own:].reshape(len(self.records), len(firsts.states))
-        places = [place for place, column in enumerate(columns) if column < own]
-        parameters = [columns[place] for place in places]
-        small = None if moves is None else moves[places]
+        places, by = among_parameters(own, columns, moves)
         residuals: list[Array] = []
         slopes: list[Array] = []
         for record, begun, shift in zip(self.records, self._begun(model), shifts, strict=True):
             start = firsts.added(model, begun, shift)
-            outputs, _, slope = self._run(model, theta[:own], observer, (parameters, small), record, start)
+            outputs, _, slope = self._run(model, theta[:own], observer, by, record, start)
             whole = np.zeros((*outputs.shape, len(columns)))
             whole[:, :, places] = -slope
             before = own + len(residuals) * len(firsts.states)
@@ -282,6 +280,12 @@ class Observed:
         if len(known) < len(record.channels):
             outputs, slopes = (_among(known, len(record.channels), one) for one in (outputs, slopes))
         return outputs, states, slopes
+
+
+def among_parameters(own: int, columns: Sequence[int], moves: Array | None) -> tuple[list[int], By]:
+    """Places of the columns that are among the ``own`` parameters of a model, and these columns with their moves."""
+    places = [place for place, column in enumerate(columns) if column < own]
+    return places, ([columns[place] for place in places], None if moves is None else moves[places])
 
 
 def _records(model: Model, experiments: Sequence[Experiment]) -> Iterator[Record]:
