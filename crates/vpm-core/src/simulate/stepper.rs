@@ -106,7 +106,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     pub(crate) fn of(setting: &Setting<'a>, plan: &Plan<'a>, theta: &[S], mut system: System<S>) -> Result<Self> {
         let description = setting.description;
         if let Some(gains) = plan.gains {
-            system = system.drawn_at(gains.drawn(description.n_coordinates()));
+            if !description.loops.is_empty() {
+                system = system.drawn_at(gains.drawn(description.n_coordinates()));
+            }
             if gains.is_of_motion(description.layout()) {
                 system = system.seen_in_motion();
             }
