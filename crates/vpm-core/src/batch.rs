@@ -44,7 +44,7 @@ pub struct Motions<'a> {
     pub third: Option<Table<'a>>,
 }
 
-/// By what a function is differentiated.
+/// The variables by which a function of a machine is differentiated.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct By<'a> {
     /// By coordinates, rates and accelerations (or efforts), n columns each.
@@ -53,7 +53,7 @@ pub struct By<'a> {
     pub parameters: &'a [usize],
 }
 
-/// What a function gives, row by row.
+/// Numbers of a function for all motions of a batch, with the derivatives that were asked for.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Answers {
     /// The numbers, `width` for each motion.

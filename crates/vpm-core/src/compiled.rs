@@ -74,7 +74,7 @@ impl Compiled {
         Self::parse(&std::fs::read_to_string(path).map_err(told)?)
     }
 
-    /// The same from memory.
+    /// Reads a compiled machine from the text of its file.
     pub fn parse(text: &str) -> Result<Self> {
         let faulty = |error: serde_json::Error| unreadable(format!("{error}; write it anew with `vpm compile`"));
         let Version { format } = serde_json::from_str(text).map_err(faulty)?;
@@ -113,7 +113,7 @@ impl Compiled {
         })
     }
 
-    /// The machine.
+    /// The description of the compiled machine.
     pub fn description(&self) -> &Arc<Description> {
         &self.description
     }

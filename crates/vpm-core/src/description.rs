@@ -9,6 +9,7 @@ mod controllers;
 mod drives;
 mod entry;
 mod sampled;
+mod stepping;
 mod tree_effects;
 
 use std::sync::Arc;
@@ -239,7 +240,7 @@ impl Description {
         Ok(System::new(self.machine(theta, &values)?)?.with_balls(self.balls.iter().map(|ball| (ball, false))))
     }
 
-    /// What somebody needs who runs the machine with the checked parameters `theta`, of these `values`.
+    /// All that a [`System`] is made from, with the checked parameters `theta`, whose plain numbers are `values`.
     pub(crate) fn machine<'a, S: Scalar>(&self, theta: &'a [S], values: &[f64]) -> Result<Machine<'a, S>> {
         let supplies = self.supplies.iter().filter(|supply| supply.is_logged());
         let commands = self.actuators.iter().map(|_| S::zero());
@@ -258,7 +259,7 @@ impl Description {
         self.recorded.functions(|| Box::new(self.clone()))
     }
 
-    /// What works a function of a motion out for so many motions, with the parameters `theta`.
+    /// The engine that evaluates the function `kind` for so many motions, with the parameters `theta`.
     ///
     /// # Errors
     /// The parts cannot be built, or a law decides by the value of a state.

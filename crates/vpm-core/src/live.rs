@@ -60,7 +60,7 @@ impl Live {
     pub fn new(description: Arc<Description>, theta: &[f64], state: &[f64], stepping: Stepping) -> Result<Self> {
         check_state("state", &description, state)?;
         check_step(&description, theta, stepping, state)?;
-        let mut system: System<f64> = description.stepped(theta)?;
+        let mut system: System<f64> = description.system_to_step(theta)?;
         system.make_for(stepping.method)?;
         let (dim, sensors) = (system.dim(), description.sensors(theta));
         let depth = depth(&description, theta, stepping.time_step)?;

@@ -23,7 +23,7 @@ const SHORTEST_PERIOD: f64 = 1e-5;
 /// The longest period, s.
 const LONGEST_PERIOD: f64 = 60.0;
 
-/// What a wake-up found.
+/// One wake-up of the loop: which deadline it serves and how late it is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Tick {
     /// Number of the deadline, from 0; grows by more than one where deadlines were missed.

@@ -341,7 +341,7 @@ impl Layout {
 }
 
 impl Channel {
-    /// Its place among the outputs of a model.
+    /// The column of this channel among the outputs of a model.
     pub fn column(self, layout: Layout) -> usize {
         match self {
             Self::Position { joint } => 4 * joint,

@@ -53,7 +53,7 @@ pub struct Stepping {
 }
 
 impl Stepping {
-    /// Checked settings.
+    /// Checks the settings of the time steps and keeps them.
     pub fn new(time_step: f64, substeps: usize, method: Method) -> Result<Self> {
         check_time_step(time_step)?;
         method.check()?;
@@ -95,7 +95,7 @@ pub struct Run {
     pub jacobian: Vec<f64>,
 }
 
-/// What all simulations are given.
+/// The machine, its parameters and its time steps: what every simulation is given.
 #[derive(Clone, Copy)]
 pub struct Setting<'a> {
     /// The machine.
@@ -270,7 +270,7 @@ pub(crate) fn strayed<S: Scalar>(stepper: &Stepper<'_, S>, astray: Astray, (row,
     }
 }
 
-/// What left its bounds and how, in the words of the model.
+/// The error of a run in which a state left its bounds, in the words of the model.
 pub(crate) fn diverged<S: Scalar>(
     stepper: &Stepper<'_, S>,
     (what, event): (String, String),

@@ -50,7 +50,7 @@ enum Newton {
 }
 
 impl Statics {
-    /// With the joints `passive` free, beside the beams.
+    /// Prepares the search for rest, with the beams and the joints `passive` free and all other joints held.
     pub(crate) fn new(description: &Description, theta: &[f64], passive: &[usize]) -> Result<Self> {
         let plain: Dynamics<f64> = description.dynamics(theta)?;
         let free: Vec<usize> = passive.iter().copied().chain(plain.joints()..plain.coordinates()).collect();

@@ -140,25 +140,25 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// With contacts, bushings and load cells.
+    /// These dynamics with contacts, bushings and load cells.
     #[must_use]
     pub fn connected(self, connections: Connections<S>) -> Self {
         Self { connections, ..self }
     }
 
-    /// With closed loops.
+    /// These dynamics with closed loops.
     #[must_use]
     pub(crate) fn closed_by(self, loops: Option<Loops<S>>) -> Self {
         Self { loops: loops.map(Box::new), ..self }
     }
 
-    /// With joints of three angles.
+    /// These dynamics with joints of three angles.
     #[must_use]
     pub(crate) fn with_balls(self, balls: Vec<Ball>) -> Self {
         Self { balls, ..self }
     }
 
-    /// With effects that remember.
+    /// These dynamics with effects that remember.
     #[must_use]
     pub(crate) fn remembering(self, memories: Memories<S>) -> Self {
         Self { memories, ..self }

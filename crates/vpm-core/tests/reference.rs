@@ -4,7 +4,7 @@ use vpm_core::Result;
 use vpm_core::Scalar;
 use vpm_core::beam::Component;
 use vpm_core::beam::Section;
-use vpm_core::beam::strain::{Drive, FlexibleLink, FlexibleTree, StrainBeam, TreeMotion};
+use vpm_core::beam::witness::strain_tree::{Drive, FlexibleLink, FlexibleTree, StrainBeam, TreeMotion};
 use vpm_core::error::Error;
 use vpm_core::integrator::reference::{Tolerance, solve};
 use vpm_core::integrator::{Integrator, Method};

@@ -16,7 +16,7 @@ pub(crate) struct Numbers {
 }
 
 impl Numbers {
-    /// One dimension.
+    /// Copies an array of one dimension.
     pub(crate) fn vector(name: &'static str, array: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (values, shape) = read(name, array)?;
         match shape[..] {
@@ -25,7 +25,7 @@ impl Numbers {
         }
     }
 
-    /// Two dimensions, (time, channel).
+    /// Copies an array of two dimensions, (time, channel).
     pub(crate) fn table(name: &'static str, array: &Bound<'_, PyAny>) -> PyResult<Self> {
         let (values, shape) = read(name, array)?;
         match shape[..] {
@@ -48,7 +48,7 @@ impl Numbers {
         Ok(self.values.as_chunks::<N>().0.to_vec())
     }
 
-    /// As the core reads it.
+    /// The copy as a table that the core can read.
     pub(crate) fn as_table(&self) -> Result<Table<'_>, vpm_core::Error> {
         Table::new(self.name, &self.values, self.rows, self.columns)
     }

@@ -56,7 +56,7 @@ impl Loop {
         self.rights = None;
     }
 
-    /// What was asked of the operating system: two times None (not asked), an empty text (given) or a sentence (refused).
+    /// Whether the system gave locked memory and priority, each None (not asked), an empty text (given) or a sentence (refused).
     #[getter]
     fn rights(&self) -> (Option<String>, Option<String>) {
         let told = |right: &Right| match right {

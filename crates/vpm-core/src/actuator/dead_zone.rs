@@ -24,7 +24,7 @@ impl<P> DeadZone<P> {
 }
 
 impl<S: Scalar> DeadZone<S> {
-    /// What is left of a command.
+    /// The command as it leaves the dead zone: nearer to zero by the width, zero inside.
     #[inline]
     pub fn apply(&self, command: S) -> S {
         let below = || command.if_less(-self.width, || command + self.width, S::zero);

@@ -142,7 +142,7 @@ impl<S: Scalar> Actuator<S> {
         input
     }
 
-    /// What its friction takes off a `force` of its drive where it moves with `rate`.
+    /// The part of the drive's `force` that the actuator's own friction takes away at `rate`.
     ///
     /// Law: [`LoadDependentFriction`] of this drive alone, whatever else moves the joint.
     #[inline]
@@ -160,7 +160,7 @@ impl<S: Scalar> Actuator<S> {
         own + self.friction_chord(force, rate)
     }
 
-    /// Its resistance there, the chord from rest.
+    /// Resistance of the actuator's own friction under `force` at `rate`: the chord from rest.
     #[inline]
     pub fn friction_chord(&self, force: S, rate: S) -> S {
         self.friction.as_ref().map_or_else(S::zero, |law| law.resistance_per_load(rate, force) * force.abs())

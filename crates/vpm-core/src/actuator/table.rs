@@ -122,7 +122,7 @@ impl TableDrive {
         effort
     }
 
-    /// What is wrong with it, and what to do about that.
+    /// The first fault of the table and its repair; none for a table that can be used.
     pub(crate) fn complaint(&self) -> Option<(String, &'static str)> {
         for (name, axis) in [("commands", &self.commands), ("velocities", &self.velocities)] {
             if axis.len() < 2 {

@@ -43,7 +43,7 @@ impl Conic {
         Self { c: self.s, s: self.c, cc: self.ss, ss: self.cc, ..self }
     }
 
-    /// Its value.
+    /// The value of the polynomial at (c, s).
     pub fn at(&self, c: f64, s: f64) -> f64 {
         self.constant + c * (self.c + self.cc * c + self.cs * s) + s * (self.s + self.ss * s)
     }

@@ -18,7 +18,7 @@ pub struct SingularValues {
 }
 
 impl SingularValues {
-    /// Of the matrix with these columns.
+    /// Works out the singular values of the matrix with these columns.
     pub fn new(columns: &[Vec<f64>]) -> Self {
         let n = columns.len();
         let identity = |k| (0..n).map(|row| if row == k { 1.0 } else { 0.0 }).collect();

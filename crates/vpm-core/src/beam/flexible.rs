@@ -172,7 +172,7 @@ impl<S: Scalar> Beam<S> {
         Some(axis.slices(&self.inertia, |station| self.is_slice(station), (root, spatial)))
     }
 
-    /// The same of each of its segments, on their begins.
+    /// The slices of each segment, seen from where the segment begins; none if one of them does not bend in one plane.
     pub(crate) fn segment_slices(&self, spatial: bool) -> Option<Vec<Slices<S>>> {
         let of = |segment: &Segment| segment.slices(&self.inertia, |station| self.is_slice(station), spatial);
         self.segments.iter().map(of).collect()
@@ -182,12 +182,12 @@ impl<S: Scalar> Beam<S> {
         self.heavy[station] && !self.eccentric && !self.marks.contains(&station)
     }
 
-    /// Its parts, root to tip, in which some of its coordinates act alone.
+    /// The segments of the beam, root to tip: in each only some of its coordinates act.
     pub(crate) fn segments(&self) -> &[Segment] {
         &self.segments
     }
 
-    /// In row `row` of stiffness and damping, the columns between which there may be entries.
+    /// The range of columns that may hold entries in row `row` of stiffness and damping.
     #[inline]
     pub(crate) fn couplings(&self, row: usize) -> Range<usize> {
         self.couplings[row].clone()

@@ -7,9 +7,8 @@
 //! [`Beam`] is the beam of a machine, over the number type of its parameters: the same sums for every level, only the map from
 //! coordinates to sections differs: strain integrated along the axis, of Bezier control points or strain coordinates; interpolated
 //! deflection; rigid segments with springs.
-//! [`linear`] interpolates the deflection: constant matrices, small deflection, stiffening by the second-order shortening.
-//! [`strain`] interpolates the strain and integrates the pose along the axis: exact at any deflection, in space, in a tree.
-//! [`two_node`] is an independent finite element in absolute coordinates that checks them at large deflection.
+//! [`strain`] integrates the pose along the axis, exact at any deflection. [`witness`] holds the beams that only tests use, to check
+//! those of machines.
 //!
 //! Sources: Selig & Ding 2009, "A screw theory of Timoshenko beams", J. Appl. Mech. 76(3) 031003, for screws and their
 //! derivative; Simo & Vu-Quoc 1986, "On the dynamics of flexible beams under large overall motions", J. Appl. Mech. 53, for
@@ -26,7 +25,6 @@ mod entry;
 mod fields;
 mod flexible;
 mod gauge;
-pub mod linear;
 mod lumped;
 mod motion;
 mod profile;
@@ -37,7 +35,7 @@ pub mod section;
 mod segment;
 pub mod shape;
 pub mod strain;
-pub mod two_node;
+pub mod witness;
 
 pub use basis::Basis;
 pub use composite::{Laminate, Layer, Moduli};

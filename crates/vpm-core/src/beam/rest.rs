@@ -28,7 +28,7 @@ pub(super) struct Rest {
 }
 
 impl Rest {
-    /// By its entries, whose places ascend; none of them for a straight beam.
+    /// The rest shape of these entries, whose places ascend; a straight beam has none.
     pub fn new(entries: &[RestEntry]) -> Self {
         Self { entries: entries.to_vec() }
     }

@@ -42,7 +42,7 @@ struct Cut {
 }
 
 impl Segment {
-    /// A whole beam.
+    /// The whole beam as its one segment, for coordinates that act everywhere.
     pub(super) fn whole(axis: &Axis, coordinates: usize, stations: usize) -> Vec<Self> {
         let coordinates = (0..coordinates).collect();
         vec![Self { axis: axis.clone(), coordinates, shared: 0, stations: 0..stations, sections: stations }]
@@ -102,7 +102,9 @@ impl Segment {
         self.axis.sweep(q, v, out, accelerates);
     }
 
-    /// Its slices on its begin, if it bends in one plane: those stations of a beam with these `inertias` that `is_slice` names.
+    /// The slices of this segment, seen from where it begins; none unless it bends in one plane.
+    ///
+    /// They are the stations that `is_slice` names, of a beam with these `inertias`.
     pub(super) fn slices<S: Scalar>(
         &self,
         inertias: &[SpatialInertia<S>],

@@ -53,7 +53,7 @@ pub(super) struct Machine {
 }
 
 impl Pattern {
-    /// How many entries.
+    /// Number of entries of the pattern.
     pub(super) fn len(&self) -> usize {
         self.places.len()
     }

@@ -1,4 +1,6 @@
-//! Ball joints of a machine: which of them turn freely when it is stepped, and the machine in which they do.
+//! Ball joints of a machine: which of them turn freely when it is stepped, and the functions of the machine in which they do.
+
+use std::sync::Arc;
 
 use super::Description;
 use crate::actuator::Target;
@@ -9,38 +11,16 @@ use crate::model::Omissions;
 use crate::mount::Mount;
 use crate::scalar::Scalar;
 use crate::sensor::Sensor;
-use crate::system::{Build, Dynamics, Kind, Machine, Placed, Places, Recorder, Recording, System};
+use crate::system::{Build, Dynamics, Functions, Kind, Placed, Places, Recorder, Recording};
 
 /// The machine with its free ball joints turning from orientations that stand among its inputs.
 #[derive(Clone, Debug)]
 struct Turned(Description);
 
 impl Description {
-    /// The machine with the parameters `theta` for whoever steps it in time: ball joints turn freely where they can.
-    pub(crate) fn stepped<S: Scalar>(&self, theta: &[S]) -> Result<System<S>> {
-        let free: Vec<bool> = self.balls.iter().map(|ball| self.hindrance(ball).is_none()).collect();
-        if !free.contains(&true) {
-            return self.system(theta);
-        }
-        let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
-        self.check_values(&values)?;
-        let mut machine = Machine {
-            functions: self.turned.functions(|| Box::new(Turned(self.clone()))),
-            ..self.machine(theta, &values)?
-        };
-        self.turn_freely(&mut machine.dynamics);
-        for _ in self.free_balls() {
-            machine.inputs.extend([1.0, 0.0, 0.0, 0.0].map(S::from_f64));
-        }
-        Ok(System::new(machine)?.with_balls(self.balls.iter().zip(free)))
-    }
-
-    /// The same for looking at one step or less from `state`, which it brings into the coordinates of the step.
-    pub(crate) fn stepped_from<S: Scalar>(&self, theta: &[S], state: &mut [S]) -> Result<System<S>> {
-        let mut system = self.stepped(theta)?;
-        system.enter(state);
-        system.rest();
-        Ok(system)
+    /// The functions of the machine whose free ball joints turn, recorded as they are asked for.
+    pub(super) fn functions_of_turned(&self) -> Arc<Functions> {
+        self.turned.functions(|| Box::new(Turned(self.clone())))
     }
 
     /// A function of the machine whose free ball joints turn from orientations that follow its inputs, with the parameters at the places
@@ -93,11 +73,12 @@ impl Description {
     }
 
     /// Ball joints that turn freely, in their order.
-    fn free_balls(&self) -> impl Iterator<Item = &Ball> {
+    pub(super) fn free_balls(&self) -> impl Iterator<Item = &Ball> {
         self.balls.iter().filter(|ball| self.hindrance(ball).is_none())
     }
 
-    fn turn_freely<S: Scalar>(&self, dynamics: &mut Dynamics<S>) {
+    /// Lets the free ball joints turn freely in the dynamics of this machine.
+    pub(super) fn turn_freely<S: Scalar>(&self, dynamics: &mut Dynamics<S>) {
         self.free_balls().for_each(|ball| dynamics.model.turn_freely(ball.angles[0][0]));
     }
 

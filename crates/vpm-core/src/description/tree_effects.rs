@@ -77,7 +77,7 @@ impl<P> TreeEffect<P> {
         }
     }
 
-    /// What it sits at, with its number; gravity has none.
+    /// The joint or beam at which the effect acts, as its kind and number; none for gravity.
     pub(super) fn site(&self) -> Option<(&'static str, usize)> {
         match self {
             Self::RotorInertia { joint, .. } => Some(("joint", *joint)),

@@ -128,7 +128,7 @@ impl<S: Scalar> MemoryChords<S> {
         self.gain * v + self.source - self.fading * z
     }
 
-    /// What is left of it where nothing rubs: a spring.
+    /// This law where nothing rubs: without resistance and fading only a spring is left.
     pub(crate) fn frictionless(self) -> Self {
         Self { resistance: S::zero(), fading: S::zero(), ..self }
     }
@@ -191,7 +191,7 @@ macro_rules! family {
         }
 
         impl<S: Scalar> $name<S> {
-            /// Its law.
+            /// The law of this effect, whichever kind it is.
             #[inline]
             pub fn law(&self) -> &dyn $law<S> {
                 match self {

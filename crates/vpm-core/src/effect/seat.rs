@@ -44,7 +44,7 @@ impl<P> Seat<P> {
         }
     }
 
-    /// Where it is.
+    /// The place of the seat, without the ratios of its shaft.
     #[inline]
     pub(crate) fn place(&self) -> Place {
         match self {
@@ -81,13 +81,13 @@ impl<P> Seat<P> {
 }
 
 impl<S: Scalar> Seat<S> {
-    /// Its coordinate or rate of the joints' `numbers`.
+    /// The coordinate or rate of this seat, from the `numbers` of all joints.
     #[inline]
     pub fn of(&self, numbers: &[S]) -> S {
         self.sum(|joint| numbers[joint])
     }
 
-    /// The same of numbers that are given joint by joint.
+    /// The coordinate or rate of this seat, where `number` gives that of a joint.
     #[inline]
     pub fn sum(&self, number: impl Fn(usize) -> S) -> S {
         match self {
@@ -97,7 +97,7 @@ impl<S: Scalar> Seat<S> {
         }
     }
 
-    /// What the actuators push on its joint with, of their `efforts` on the joints; laws that follow it do not sit on shafts.
+    /// The effort of the actuators on the joint of this seat, from their `efforts` on all joints; zero on a shaft.
     #[inline]
     pub(crate) fn load(&self, efforts: &[S]) -> S {
         self.joint().map_or_else(S::zero, |joint| efforts[joint])

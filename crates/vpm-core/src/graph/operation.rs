@@ -30,7 +30,7 @@ pub enum Function {
     Frozen,
 }
 
-/// What makes a number.
+/// One operation of a graph: how a number is made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Operation {
     /// A constant, by the bits of its `f64`, so that equal constants are one.
@@ -63,7 +63,7 @@ pub struct Call {
 }
 
 impl Call {
-    /// What it finds, where `value` tells the values of its arguments.
+    /// The result of the search, where `value` gives the values of its arguments.
     #[inline]
     pub fn value(&self, value: impl Fn(Node) -> f64) -> f64 {
         self.search.value(self.arguments.iter().map(|&argument| value(argument)))
@@ -71,7 +71,7 @@ impl Call {
 }
 
 impl Function {
-    /// Its value.
+    /// The value of the function at `x`.
     #[inline]
     pub fn of<S: Scalar>(self, x: S) -> S {
         match self {
@@ -125,7 +125,9 @@ impl Operation {
         }
     }
 
-    /// Its value, where `value` tells those of its arguments and `input` those of inputs; `calls` are those beside it.
+    /// The value of the operation, where `value` gives those of its arguments and `input` those of inputs.
+    ///
+    /// `calls` are the searches that stand beside it.
     #[inline]
     pub fn value(&self, calls: &[Call], value: impl Fn(Node) -> f64, input: impl Fn(u32) -> f64) -> f64 {
         match *self {

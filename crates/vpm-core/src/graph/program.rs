@@ -100,7 +100,7 @@ impl Program {
         program
     }
 
-    /// What some of its outputs, by their places, need: a program of the same inputs.
+    /// The smaller program that gives only the outputs at these places, from the same inputs.
     #[must_use]
     pub fn part(&self, outputs: impl IntoIterator<Item = usize>) -> Self {
         let outputs: Vec<_> = outputs.into_iter().map(|place| self.outputs[place]).collect();

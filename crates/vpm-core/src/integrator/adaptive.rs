@@ -109,7 +109,7 @@ impl Stuck {
         "changes faster than any step can follow".to_owned()
     }
 
-    /// What to do.
+    /// What a user can do about it, for the end of the message.
     pub fn repair(&self) -> &'static str {
         if self.many {
             "use a larger tolerance or more substeps, and look for a vibration or a growth that should not be there"
@@ -120,7 +120,7 @@ impl Stuck {
 }
 
 impl Halt {
-    /// The same, counted from a time (s) before.
+    /// This halt, with its time counted from `time` (s) earlier.
     pub(super) fn later(self, time: f64) -> Self {
         match self {
             Self::Interrupted => Self::Interrupted,

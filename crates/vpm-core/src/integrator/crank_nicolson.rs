@@ -18,6 +18,7 @@ const SHARE: f64 = 0.125;
 /// `9/16 x+ + 3/8 x + 1/16 x-` (modified Crank-Nicolson). A vibration of `w` that is implicit loses the share `c (w h)^4 / 4` of its amplitude
 /// in a step and is slower by the share `(1/12 + c/2) (w h)^2`; that of a spring that is explicit grows by `(1 - c) (w h)^4 / 8`.
 /// Where `x` is not where the last step ended, or the step has another length, k' is `F(x, x + h (1 + c)/2 k')`, which keeps the order.
+/// Small corrections, as of an observer, are no such jump: each moves the state of both steps.
 /// Source: Ascher, Ruuth & Wetton 1995, "Implicit-explicit methods for time-dependent partial differential equations", SIAM J. Numer.
 /// Anal. 32(3), section 2.2 (MCNAB). Checked: order 2 against other integrators, the roots of its characteristic polynomial, the energy
 /// of a machine without friction, steps far above the explicit limit, jumps of commands.
@@ -83,6 +84,11 @@ impl<S: Scalar> CrankNicolson<S> {
     /// Takes note that a state counts anew from `value`.
     pub(super) fn recount(&mut self, state: usize, value: S) {
         self.end[state] = value;
+    }
+
+    /// Takes note that a small correction has moved the leading states to `x`.
+    pub(super) fn correct(&mut self, x: &[S]) {
+        self.end[..x.len()].copy_from_slice(x);
     }
 
     /// Forgets the last step.

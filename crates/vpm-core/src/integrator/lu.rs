@@ -93,7 +93,7 @@ impl<S: Scalar> Lu<S> {
             .fold(S::zero(), |largest, factor| largest.max(factor.abs()))
     }
 
-    /// In which order the factors take the rows of the matrix.
+    /// The order in which the factors take the rows of the matrix.
     pub(super) fn order(&self) -> &[usize] {
         &self.order
     }
@@ -103,7 +103,9 @@ impl<S: Scalar> Lu<S> {
         for_size!(self.dim, N => self.solve_of::<N>(b, |_| ()));
     }
 
-    /// The same after a change of `b`, the entries of which come in the order of the factors; of N rows, or of any number if N is 0.
+    /// Solves as [`Lu::solve`] after `change`, which sees the entries of `b` in the order of the factors.
+    ///
+    /// N is the number of rows, or 0 for any number.
     #[inline]
     pub(super) fn solve_of<const N: usize>(&mut self, b: &mut [S], change: impl FnOnce(&mut [S])) {
         let Self { columns, order, scratch, .. } = self;
@@ -128,7 +130,7 @@ impl<S: Scalar> Lu<S> {
 }
 
 impl Lu<f64> {
-    /// As [`Lu::solve_of`], of numbers of another kind, in room for as many of these as the matrix has rows.
+    /// Solves as [`Lu::solve_of`] for a `b` of another number type; `known` is a buffer of one entry for each row of the matrix.
     pub(super) fn solve_numbers<T: Scalar>(&self, b: &mut [T], known: &mut [T], change: impl FnOnce(&mut [T])) {
         let (n, columns) = (self.dim, &self.columns);
         for (entry, &row) in known.iter_mut().zip(&self.order) {

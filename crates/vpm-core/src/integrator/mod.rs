@@ -253,6 +253,13 @@ impl<S: Scalar> Integrator<S> {
         }
     }
 
+    /// Takes note that a small correction has moved the leading states to `x`.
+    pub(crate) fn correct(&mut self, x: &[S]) {
+        if let Scheme::CrankNicolson(method) = &mut self.scheme {
+            method.correct(x);
+        }
+    }
+
     /// Forgets what earlier steps have told about the next.
     pub fn reset(&mut self) {
         match &mut self.scheme {

@@ -66,7 +66,7 @@ pub struct Steps {
 }
 
 impl Resolution {
-    /// Of the linear system `x' = A x`, A (`jacobian`) row by row, in states of these natural `sizes`.
+    /// Judges what `steps` resolve of the linear system `x' = A x`, A (`jacobian`) row by row, in states of these natural `sizes`.
     ///
     /// Law: a mode `e^(s t)` is a damped oscillator. The method itself makes one step of it; the eigenvalue g of what that does to its
     /// state leaves `(|g| e^(-h Re s))^(t/h)` of its amplitude over a time t, beside its own damping, and makes its frequency

@@ -22,7 +22,7 @@ pub(super) struct Course {
 }
 
 impl Course {
-    /// What the first array of `job` is, which depends on no more than the parameters `own`.
+    /// Runs `job` and keeps its first array, with derivatives by the parameters asked for among `own`; it depends on no others.
     pub(super) fn new(job: &impl Job, theta: &[f64], sensitivities: &[usize], own: &[usize]) -> Result<Self> {
         let by: Vec<usize> = (0..sensitivities.len()).filter(|&place| own.contains(&sensitivities[place])).collect();
         let chosen: Vec<usize> = by.iter().map(|&place| sensitivities[place]).collect();

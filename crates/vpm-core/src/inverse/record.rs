@@ -49,7 +49,7 @@ pub(super) struct Numbers {
     pub(super) jacobian: Vec<f64>,
 }
 
-/// What goes into the functions of a machine along a record.
+/// A record as the inputs of a machine's functions, with derivatives of these inputs by parameters.
 pub(super) struct Along<'a> {
     record: Record<'a>,
     theta: &'a [f64],
@@ -98,7 +98,7 @@ impl<'a> Along<'a> {
         Ok(Self { record, theta, sensitivities, joints, memories })
     }
 
-    /// What the function `kind`, of `width` numbers, gives sample by sample.
+    /// Evaluates the function `kind`, of `width` numbers, sample by sample, with derivatives where parameters are asked for.
     pub(super) fn follow(&self, kind: Kind, width: usize) -> Result<Numbers> {
         let (description, theta) = (self.record.description, self.theta);
         let (places, functions) = (description.places(), description.functions());

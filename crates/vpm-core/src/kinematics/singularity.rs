@@ -25,7 +25,7 @@ pub struct Task {
     pub tolerance: f64,
 }
 
-/// What a configuration is, as far as the task is concerned.
+/// Whether a configuration loses a freedom of the task, and in which way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Singularity {
     /// All freedoms of the task are there.

@@ -101,7 +101,7 @@ impl Karl {
         Ok(Self { geometry, linkages })
     }
 
-    /// Its two linkages, each of a stroke and an angle.
+    /// The two linkages, hip first, each between a stroke and an angle.
     pub fn linkages(&self) -> &[StrokeLinkage; 2] {
         &self.linkages
     }

@@ -6,7 +6,7 @@ use super::{Elastic, Link, Node, Wire};
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, Twist};
 
-/// What is left out, by the numbers of the parts.
+/// Terms that the equations of motion leave out, by the numbers of the parts.
 ///
 /// With `V_k = J_k^T (m A_k + V_k x* m V_k)` what the products of rates of one body need, A_k the acceleration that they alone give it, the
 /// velocity terms are the sum of all V_k: each can go by itself. Source: the sum over bodies of virtual work, D'Imperio 2016, section 2.4.

@@ -8,14 +8,14 @@ use crate::scalar::Scalar;
 pub struct Surface(pub [f64; 10]);
 
 impl Surface {
-    /// The same number everywhere.
+    /// A surface of the same value everywhere.
     pub fn constant(value: f64) -> Self {
         let mut coefficients = [0.0; 10];
         coefficients[0] = value;
         Self(coefficients)
     }
 
-    /// Its value at (u, s).
+    /// The value of the surface at (u, s).
     #[inline]
     pub fn at<S: Scalar>(&self, u: S, s: S) -> S {
         let [c, u1, s1, u2, us, s2, u3, u2s, us2, s3] = self.0;

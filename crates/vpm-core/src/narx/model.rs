@@ -56,7 +56,7 @@ impl Narx {
         Stepper::new(self)
     }
 
-    /// The same in numbers that may carry derivatives.
+    /// A simulation that is fed sample by sample, in numbers that may carry derivatives.
     pub(crate) fn stepper_in<S: Scalar>(&self) -> Stepper<S> {
         Stepper::new(self)
     }

@@ -61,7 +61,7 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    /// Of a machine with the parameters `theta`, which these `dynamics` have too.
+    /// The bounds of a machine with the parameters `theta`; its `dynamics` were built with them.
     pub(crate) fn new<S: Scalar>(description: &Description, theta: &[S], dynamics: &Dynamics<f64>) -> Self {
         let mut most = vec![0.0; dynamics.dim()];
         dynamics.scales(&mut most);
@@ -159,7 +159,7 @@ pub(crate) fn repair(method: Method) -> &'static str {
     }
 }
 
-/// The same along a motion, with drives that answer to it or without.
+/// What helps against such a state along a prescribed motion, with drives that answer to it or without.
 pub(super) fn repair_along(method: Method, drives: bool) -> &'static str {
     match method {
         Method::Adaptive { .. } => "check units and jumps of the motion",

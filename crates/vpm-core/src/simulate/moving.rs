@@ -22,7 +22,7 @@ pub(super) struct Courses<S> {
 }
 
 impl<S: Scalar> Courses<S> {
-    /// Those of so many `inputs` to a machine of `dim` states, `interval` (s) from one sample to the next.
+    /// Courses of so many `inputs`, all zero yet, for a machine of `dim` states and `interval` (s) between samples.
     pub(super) fn new(inputs: usize, dim: usize, interval: f64) -> Self {
         Self {
             inputs: vec![Course::constant(S::zero()); inputs],

@@ -42,7 +42,7 @@ pub fn resolution(
 ) -> Result<Resolution> {
     check_state("state", description, state)?;
     let mut state = state.to_vec();
-    let mut system: System<f64> = description.stepped_from(theta, &mut state)?;
+    let mut system: System<f64> = description.system_to_step_from(theta, &mut state)?;
     let dim = description.n_states();
     let (mut jacobian, mut sizes) = (vec![0.0; dim * dim], vec![0.0; dim]);
     system.without_dry_friction(&state, &mut jacobian);

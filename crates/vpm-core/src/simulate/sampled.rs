@@ -59,7 +59,7 @@ struct Maxwell<S> {
 }
 
 impl<S: Scalar> SampledDrives<S> {
-    /// Those of a machine whose record has steps of `time_step` (s).
+    /// The sampled drives of a machine whose record has steps of `time_step` (s).
     pub(crate) fn new(description: &Description, time_step: f64) -> Result<Self> {
         let layout = description.layout();
         let drives = description.actuators.iter().map(|actuator| {
@@ -127,7 +127,7 @@ impl<S: Scalar> SampledDrives<S> {
 }
 
 impl Astray {
-    /// As an error of the `time` (s) and the sample where it happened, with the name of the actuator.
+    /// The error that names the actuator; `at` is the time (s) and the sample where it happened.
     #[cold]
     pub(crate) fn error(self, description: &Description, at: (f64, usize), method: String, step: f64) -> Error {
         let Self { actuator, value, limit } = self;

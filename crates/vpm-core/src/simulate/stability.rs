@@ -34,7 +34,7 @@ pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Ste
         return Ok(());
     }
     let mut state = state.to_vec();
-    let mut system: System<f64> = description.stepped_from(theta, &mut state)?;
+    let mut system: System<f64> = description.system_to_step_from(theta, &mut state)?;
     let (n, dim) = (description.n_coordinates(), description.n_states());
     let (mut jacobian, mut elastic, mut sizes) = (vec![0.0; dim * dim], vec![0.0; 2 * n * n], vec![0.0; dim]);
     system.without_friction(&state, &mut jacobian);
@@ -54,9 +54,9 @@ fn check_additive(description: &Description, theta: &[f64], stepping: Stepping, 
     }
     let lifted: Vec<Dual<f64, LANES>> = theta.iter().map(|&value| Dual::constant(value)).collect();
     let mut start: Vec<_> = state.iter().map(|&value| Dual::constant(value)).collect();
-    let mut duals: System<Dual<f64, LANES>> = description.stepped_from(&lifted, &mut start)?;
+    let mut duals: System<Dual<f64, LANES>> = description.system_to_step_from(&lifted, &mut start)?;
     let mut state = state.to_vec();
-    let mut system: System<f64> = description.stepped_from(theta, &mut state)?;
+    let mut system: System<f64> = description.system_to_step_from(theta, &mut state)?;
     let dim = description.n_states();
     let (mut jacobian, mut sizes) = (vec![0.0; dim * dim], vec![0.0; dim]);
     system.jacobian(&state, &mut jacobian);
@@ -112,7 +112,7 @@ pub(crate) fn check_structure(
         return Ok(());
     }
     let mut state = state.to_vec();
-    let mut system: System<f64> = description.stepped_from(theta, &mut state)?;
+    let mut system: System<f64> = description.system_to_step_from(theta, &mut state)?;
     let n = description.n_coordinates();
     let implicit = stepping.method == Method::SemiImplicit && system.elasticity(&state, &mut vec![0.0; 2 * n * n]);
     if implicit && !connected {

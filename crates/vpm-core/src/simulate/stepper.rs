@@ -99,7 +99,7 @@ pub(crate) struct Stepper<'a, S> {
 
 impl<'a, S: Scalar> Stepper<'a, S> {
     pub(crate) fn new(setting: &Setting<'a>, plan: &Plan<'a>, theta: &[S]) -> Result<Self> {
-        Self::of(setting, plan, theta, setting.description.stepped(theta)?)
+        Self::of(setting, plan, theta, setting.description.system_to_step(theta)?)
     }
 
     /// As [`Stepper::new`], with the machine in a form of its own.
@@ -288,6 +288,8 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         self.correct_arriving(row, moved);
         self.missed = missed;
         self.system.corrected(&mut self.state);
+        // A correction is no event of the machine: what earlier steps have told goes on.
+        self.integrator.correct(&self.state);
     }
 
     /// Moves positions that have not arrived at a late sensor by sample `row` as an observer has `moved` those of the machine: else it

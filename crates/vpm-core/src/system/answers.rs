@@ -109,7 +109,7 @@ impl<S: Scalar> Dynamics<S> {
         total
     }
 
-    /// What the coordinates miss at rest under a share of the weight: `weight bias(q, 0) + K q - effects(q, 0)`.
+    /// The load that the coordinates miss at rest under a share of the weight: `weight bias(q, 0) + K q - effects(q, 0)`.
     pub(crate) fn unbalance(&mut self, q: &[S], weight: S) -> Vec<S> {
         let zero = vec![S::zero(); q.len()];
         self.terms(q, &zero);

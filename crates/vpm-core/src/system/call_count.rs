@@ -30,7 +30,7 @@ impl Matrix {
     }
 }
 
-/// What was asked for.
+/// How often an integrator asked for rates, matrices and samples.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Calls {
     pub(crate) rates: u64,

@@ -91,7 +91,7 @@ impl<S: Scalar> Connections<S> {
         Ok(Self { contacts, bushings, cells, extra })
     }
 
-    /// Whether nothing acts.
+    /// Whether there are neither contacts nor bushings.
     #[inline]
     pub(crate) fn is_free(&self) -> bool {
         self.contacts.is_empty() && self.bushings.is_empty()

@@ -18,7 +18,7 @@ pub(super) struct Constant {
 }
 
 impl Constant {
-    /// By machine code of these routines; or says why there is none.
+    /// Compiles these routines to machine code for the matrices; or says why there is none.
     pub(super) fn new(mut routines: Routines<f64>) -> Result<Self, String> {
         routines.compile(&Kind::Prepared)?;
         let [state, matrix, rates] = [const { Vec::new() }; 3];

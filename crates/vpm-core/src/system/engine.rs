@@ -11,7 +11,7 @@ use crate::graph::{Evaluator, Lanes};
 use crate::scalar::Scalar;
 use crate::spatial::Pose;
 
-/// What works a function of a motion out.
+/// One of three ways to evaluate a function of a motion: the laws, blocks of motions, or machine code.
 #[derive(Clone)]
 pub(crate) enum Engine {
     /// The laws.

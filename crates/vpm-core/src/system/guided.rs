@@ -147,7 +147,7 @@ impl<S: Scalar> Guided<S> {
         self.collect();
     }
 
-    /// The same, then what is seen at `y`: the state of the whole machine, all its outputs, the efforts of the drives on the joints. The
+    /// Evaluates the rates at `y`, then fills `seen`: state of the whole machine, all its outputs, efforts of the drives on the joints. The
     /// outputs `effort` of the joints are what the motion needs; commands are left to the caller.
     pub(super) fn sample(&mut self, y: &[S], seen: &mut [S]) {
         self.place(y);

@@ -15,7 +15,7 @@ pub struct Memories<S> {
 }
 
 impl<S: Scalar> Memories<S> {
-    /// Relaxed ones.
+    /// Memories of these laws, all relaxed.
     pub(crate) fn new(laws: Vec<(Seat<S>, MemoryEffect<S>)>) -> Self {
         let (values, chords) = (vec![S::zero(); laws.len()], vec![None; laws.len()]);
         Self { laws, values, chords }
@@ -129,7 +129,7 @@ impl<S: Scalar> Memories<S> {
         }
     }
 
-    /// What stands for the laws where nothing rubs.
+    /// The chords of the laws at rest, without what rubs.
     pub(super) fn frictionless(&self) -> Vec<Option<MemoryChords<S>>> {
         let at_rest = |(_, effect): &(Seat<S>, MemoryEffect<S>)| effect.law().chords(S::zero(), S::zero());
         self.laws.iter().map(|law| Some(at_rest(law).frictionless())).collect()

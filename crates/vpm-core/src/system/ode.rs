@@ -94,19 +94,19 @@ impl<S: Scalar> System<S> {
         Ok(system)
     }
 
-    /// With ball joints, each with whether it turns freely.
+    /// This machine with ball joints, each with whether it turns freely.
     #[must_use]
     pub(crate) fn with_balls<'a>(self, balls: impl Iterator<Item = (&'a Ball, bool)>) -> Self {
         Self { turning: Turning::new(balls), ..self }
     }
 
-    /// The same, of which samples ask no more than outputs that the state alone decides.
+    /// This machine, whose samples give only the outputs that the state alone decides.
     #[must_use]
     pub(crate) fn seen_in_motion(self) -> Self {
         Self { seen: Kind::Motion, ..self }
     }
 
-    /// The same, whose derivatives may be those of the equations to the order of its steps where that takes less time.
+    /// This machine, whose derivatives may be right only to the order of its steps where that takes less time.
     #[must_use]
     pub(crate) fn with_approximate_derivatives(self) -> Self {
         Self { approximate: !Self::is_plain(), ..self }
@@ -123,7 +123,7 @@ impl<S: Scalar> System<S> {
         }
     }
 
-    /// The same, with coordinates that an observer draws.
+    /// This machine, with coordinates that an observer draws: closing loops leaves them where it has drawn them.
     #[must_use]
     pub(crate) fn drawn_at(mut self, coordinates: Vec<u32>) -> Self {
         self.closings[1] = Kind::Closed(coordinates);
@@ -407,12 +407,12 @@ impl<S: Scalar> System<S> {
         }
     }
 
-    /// As df/dx, without the friction of joints and seals, row by row.
+    /// The matrix df/dx without the friction of joints and seals, row by row.
     pub(crate) fn without_friction(&mut self, x: &[S], matrix: &mut [S]) {
         self.matrix_alone(&Kind::Frictionless, x, matrix);
     }
 
-    /// As df/dx, without friction of joints and seals that is not linear.
+    /// The matrix df/dx with the linear damping of effects in the place of all friction, row by row.
     pub(crate) fn without_dry_friction(&mut self, x: &[S], matrix: &mut [S]) {
         self.matrix_alone(&Kind::LinearFriction, x, matrix);
     }

@@ -337,7 +337,7 @@ impl<S: Scalar> Routines<S> {
         self.compile_within(kind, usize::MAX)
     }
 
-    /// The same, of so many operations at most.
+    /// Makes the function of that kind as machine code, if it has at most `most` operations; or says why there is none.
     pub(crate) fn compile_within(&mut self, kind: &Kind, most: usize) -> std::result::Result<(), String> {
         let words = |error: Error| error.to_string();
         let fits = |function: &Function| match function.often.size() {
@@ -453,7 +453,7 @@ pub(crate) fn code_pays(evaluations: usize) -> bool {
     evaluations >= PAYS
 }
 
-/// The same of a run that comes again and again, with other parameters.
+/// Whether machine code pays in a run of so many evaluations that a fit repeats with other parameters.
 pub(crate) fn code_pays_in_fits(evaluations: usize) -> bool {
     code_pays(REPEATS * evaluations)
 }

@@ -19,7 +19,7 @@ pub(super) fn linearly_implicit(dynamics: &mut Dynamics<Recorded>, places: Place
     step::<0>(dynamics, places, &[]).into_iter().map(|number| number.value).collect()
 }
 
-/// The same, and the derivatives of all that by the inputs at these places.
+/// The numbers of [`linearly_implicit`], and their derivatives by the inputs at the places `by`.
 ///
 /// Law: derivatives of a stage follow from those of its state, and of the solution of a linear system from that system again, see
 /// [`Ode::turned`]: far fewer operations than derivatives of each operation.

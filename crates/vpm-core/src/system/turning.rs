@@ -55,7 +55,7 @@ struct Watched {
 }
 
 impl<S: Scalar> Turning<S> {
-    /// Of ball joints, each with whether it turns freely.
+    /// Follows these ball joints, each with whether it turns freely.
     pub(super) fn new<'a>(balls: impl Iterator<Item = (&'a Ball, bool)>) -> Self {
         let (mut own, mut watched) = (Vec::new(), Vec::new());
         for (number, (ball, free)) in balls.enumerate() {

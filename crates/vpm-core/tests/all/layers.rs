@@ -4,7 +4,7 @@ use std::fs;
 use std::io::Result;
 use std::path::{Path, PathBuf};
 
-/// The tree, lowest first; `beam` steps some of its motions by itself: each may import any before it.
+/// The tree, lowest first, `beam` after `integrator` because `beam::witness` steps its motions by itself: each may import any before it.
 const TREE: [&str; 17] = [
     "error",
     "scalar",
@@ -134,6 +134,24 @@ fn modules_import_downward_only() -> Result<()> {
         }
     }
     assert!(checked > 60, "only {checked} imports found: the test has gone blind");
+    Ok(())
+}
+
+#[test]
+fn no_machine_needs_the_witnesses_of_beams() -> Result<()> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let (mut files, mut inside) = (Vec::new(), 0);
+    sources(&root, &mut files)?;
+    for file in files {
+        if file.starts_with(root.join("beam/witness")) {
+            inside += 1;
+            continue;
+        }
+        for line in code(&file)?.iter().filter(|line| line.contains("witness")) {
+            assert_eq!(line, "pub mod witness;", "{} uses what only tests may use", file.display());
+        }
+    }
+    assert!(inside > 5, "only {inside} files of witnesses found: the test has gone blind");
     Ok(())
 }
 

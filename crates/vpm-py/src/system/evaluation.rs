@@ -211,8 +211,9 @@ impl System {
         Ok(PyArray1::from_vec(py, result))
     }
 
-    /// Of the closed loops at a position and a velocity: what they miss (m,), its derivative (m, n), `J' v` (m,), and 1.0 for each equation that
-    /// is independent of the others (m,).
+    /// State of the closed loops at a position and a velocity: their gap (m,), its derivative J (m, n) and `J' v` (m,).
+    ///
+    /// The last array has 1.0 for each equation that is independent of the others (m,).
     fn loops<'py>(
         &self,
         py: Python<'py>,

@@ -176,7 +176,7 @@ impl<S: Scalar> ServoRig<S> {
         Ok(Self { servo, lifted, current: S::zero(), force: S::zero() })
     }
 
-    /// What the rig consists of.
+    /// The servo-cylinder of the rig.
     pub fn servo(&self) -> &ServoCylinder<S> {
         &self.servo
     }

@@ -41,7 +41,7 @@ pub struct Solid {
     pub interfaces: Vec<Field<6>>,
 }
 
-/// What becomes of a point or a frame: at rest, per mode, and half of it per pair of modes.
+/// How a point or a frame moves with the modes: place at rest, first and second derivatives.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, bound = "[f64; D]: Serialize + for<'a> Deserialize<'a>")]
 pub struct Field<const D: usize> {
@@ -59,7 +59,7 @@ impl Reduced {
         Self(Arc::new(solid))
     }
 
-    /// Its numbers.
+    /// The numbers of the reduced solid.
     pub fn solid(&self) -> &Solid {
         &self.0
     }
@@ -87,7 +87,7 @@ impl Reduced {
         self.solid().interfaces.iter().zip(1_u32..).find(|(_, number)| f64::from(*number) == at).map(|(field, _)| field)
     }
 
-    /// What it stores, J, when every point of it is moved by its distance from the root as fast as its fastest mode swings.
+    /// Kinetic energy (J) if each point moves with its distance from the root times the frequency of the fastest mode.
     pub(crate) fn largest_energy(&self) -> f64 {
         let Solid { squares, masses, points, .. } = self.solid();
         let reach = |field: &Field<3>| field.rest.iter().map(|x| x * x).sum::<f64>();

@@ -27,7 +27,9 @@ struct Pair {
 type Term = (usize, f64);
 
 impl Angles {
-    /// Of points with these numbers and places on an axis of that length, entry `number n + i` of `rows` by coordinate i.
+    /// Pairs the `points`, each a number and a place on an axis of that `length`.
+    ///
+    /// Entry `number n + i` of `rows` is the derivative of a point's angle by coordinate i.
     pub fn new(points: &[(usize, f64)], length: f64, rows: &[f64], n: usize) -> Self {
         let (mut left, mut alone, mut pairs) = (points.to_vec(), Vec::new(), Vec::<Pair>::new());
         while let Some((number, place)) = left.pop() {

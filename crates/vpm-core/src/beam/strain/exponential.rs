@@ -88,7 +88,7 @@ pub(super) struct Tangent<S> {
 }
 
 impl<S: Scalar> Tangent<S> {
-    /// At `twist`.
+    /// Prepares the derivative of the exponential at `twist`.
     pub fn new(twist: Twist<S>) -> Self {
         let (w, v) = (twist.angular, twist.linear);
         let x = w.dot(w);

@@ -31,7 +31,7 @@ struct Piece {
 /// How a frame moves on across a piece: pose, twist of its end relative to its begin, and the rate of that at constant coordinate
 /// rates.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Crossing<S> {
+pub(in crate::beam) struct Crossing<S> {
     pub pose: Pose<S>,
     pub twist: Twist<S>,
     pub acceleration: Twist<S>,
@@ -72,7 +72,7 @@ impl SpaceAxis {
     ///
     /// Law: fourth-order Magnus step with exact moments (Iserles et al. 2000, section 5.3): `Omega = A + A x B`, `A = int e dmu`,
     /// `B = 1/h int (mu - m) e dmu` with m the middle; the sign of the bracket is that of a strain that multiplies from the right.
-    pub(super) fn cross<S: Scalar>(&self, piece: usize, c: &[S], rates: &[S]) -> Crossing<S> {
+    pub(in crate::beam) fn cross<S: Scalar>(&self, piece: usize, c: &[S], rates: &[S]) -> Crossing<S> {
         self.cross_as_asked(piece, (c, rates), true)
     }
 
@@ -105,7 +105,12 @@ impl SpaceAxis {
     }
 
     /// The twist of the end of a piece relative to its begin, per unit rate of coordinate `k`; none where it does nothing.
-    pub(super) fn column<S: Scalar>(&self, piece: usize, crossing: &Crossing<S>, k: usize) -> Option<Twist<S>> {
+    pub(in crate::beam) fn column<S: Scalar>(
+        &self,
+        piece: usize,
+        crossing: &Crossing<S>,
+        k: usize,
+    ) -> Option<Twist<S>> {
         let [whole, moment] = self.rows(piece).map(|row| row[k]);
         if whole == 0.0 && moment == 0.0 {
             return None;

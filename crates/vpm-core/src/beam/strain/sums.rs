@@ -79,7 +79,7 @@ pub(super) struct Passing<'a, S> {
 }
 
 impl<S: Scalar> Slices<S> {
-    /// Of a beam with these inertias at its stations and these derivatives of its angle there; those stations count that `is_slice` names.
+    /// The slices of a beam: the stations that `is_slice` names, with the beam's inertias and the derivatives of its angle (`rows`) there.
     pub(super) fn new(
         (inertias, about_y): (&[SpatialInertia<S>], bool),
         is_slice: impl Fn(usize) -> bool,

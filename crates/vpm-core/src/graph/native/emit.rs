@@ -155,7 +155,7 @@ impl Emitter<'_> {
         self.code.ins().extractlane(value, 0)
     }
 
-    /// The same bits as another type.
+    /// Reads the bits of `value` as the type `to`, without changing them.
     pub fn seen_as(&mut self, to: Type, value: Value) -> Value {
         self.code.ins().bitcast(to, MemFlagsData::new(), value)
     }

@@ -39,7 +39,7 @@ impl DutyCycle {
     pub const HIGH: Self = Self { rate: 10.0, acceleration: 5.0 };
 }
 
-/// Over what the shares are taken.
+/// The motions and angles over which the shares are taken.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShareStudy {
     /// What a share is.
@@ -56,7 +56,7 @@ pub struct ShareStudy {
 }
 
 impl ShareStudy {
-    /// That of the thesis: six values of each rate and acceleration, angles every 10 deg in -40..60 and -140..-20 deg.
+    /// The study of the thesis: six values of each rate and acceleration, angles every 10 deg in -40..60 and -140..-20 deg.
     pub fn of(duty: DutyCycle) -> Self {
         let ranges = [[-40.0_f64, 60.0], [-140.0, -20.0]].map(|range| range.map(f64::to_radians));
         Self { definition: ShareDefinition::default(), duty, samples: 6, ranges, counts: [11, 13] }

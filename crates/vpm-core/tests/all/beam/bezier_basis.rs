@@ -2,8 +2,8 @@
 
 use nalgebra::{DMatrix, DVector};
 use proptest::prelude::*;
-use vpm_core::beam::linear::{LinearBeam, Plane, Theory, TipBody};
 use vpm_core::beam::quadrature::gauss;
+use vpm_core::beam::witness::linear::{LinearBeam, Plane, Theory, TipBody};
 use vpm_core::beam::{Basis, Beam, Component, Level, Section, Shape};
 use vpm_core::samples::Random;
 use vpm_core::{Error, Result};

@@ -2,7 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use vpm_core::beam::two_node::{NodeLoad, TwoNodeChain, rotation};
+use vpm_core::beam::witness::two_node::{NodeLoad, TwoNodeChain, rotation};
 use vpm_core::beam::{
     Beam, BeamEntry, Component, DampingEntry, Level, Material, Properties, Section, SectionEntry, Shape,
 };

@@ -6,7 +6,7 @@
 use nalgebra::DMatrix;
 use vpm_core::Result;
 use vpm_core::beam::eigen::modes;
-use vpm_core::beam::linear::{LinearBeam, Plane, Theory, TipBody};
+use vpm_core::beam::witness::linear::{LinearBeam, Plane, Theory, TipBody};
 use vpm_core::beam::{Basis, Material, Section, Shape};
 
 use super::ROOTS;

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use allocation_counter::measure;
 use nalgebra::{DMatrix, DVector};
-use vpm_core::beam::strain::{Drive, FlexibleLink, FlexibleTree, StrainBeam, TreeMotion};
+use vpm_core::beam::witness::strain_tree::{Drive, FlexibleLink, FlexibleTree, StrainBeam, TreeMotion};
 use vpm_core::beam::{Component, Section};
 use vpm_core::integrator::{Integrator, Method};
 use vpm_core::ode::Ode;

@@ -4,7 +4,8 @@ use std::f64::consts::TAU;
 
 use nalgebra::DMatrix;
 use vpm_core::beam::eigen::modes;
-use vpm_core::beam::strain::{FlexibleLink, FlexibleTree, StrainBeam, TipLoad, exponential, tangent};
+use vpm_core::beam::strain::{exponential, tangent};
+use vpm_core::beam::witness::strain_tree::{FlexibleLink, FlexibleTree, StrainBeam, TipLoad};
 use vpm_core::beam::{Component, Material, Section, Shape};
 use vpm_core::samples::Random;
 use vpm_core::spatial::{Matrix3, Pose, Twist, Vector3};

@@ -1,6 +1,6 @@
 //! Flexible trees against other derivations: rigid-body algorithms, Christoffel symbols.
 
-use vpm_core::beam::strain::{FlexibleLink, FlexibleTree};
+use vpm_core::beam::witness::strain_tree::{FlexibleLink, FlexibleTree};
 use vpm_core::data::Data;
 use vpm_core::dynamics::{crba, rnea};
 use vpm_core::mount::Mount;

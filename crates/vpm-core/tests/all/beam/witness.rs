@@ -1,7 +1,7 @@
 //! Levels against one another and against other derivations of the same sums.
 
 use vpm_core::Result;
-use vpm_core::beam::strain::{Field, FlexibleLink, FlexibleTree, StrainBeam};
+use vpm_core::beam::witness::strain_tree::{Field, FlexibleLink, FlexibleTree, StrainBeam};
 use vpm_core::beam::{Basis, Beam, Component, Level, Section, SectionEntry, Shape};
 use vpm_core::joint::{Joint, JointKind};
 use vpm_core::samples::Random;

@@ -1,7 +1,7 @@
 //! Parts of flexible trees that several tests use.
 
 use vpm_core::Result;
-use vpm_core::beam::strain::{Field, FlexibleLink, FlexibleTree, StrainBeam};
+use vpm_core::beam::witness::strain_tree::{Field, FlexibleLink, FlexibleTree, StrainBeam};
 use vpm_core::beam::{Basis, Component, Section};
 use vpm_core::joint::{Joint, JointKind};
 use vpm_core::spatial::{Matrix3, Pose, SpatialInertia, Symmetric3, Vector3};

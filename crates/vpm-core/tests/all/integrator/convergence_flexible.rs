@@ -2,7 +2,7 @@
 
 use vpm_core::beam::Component;
 use vpm_core::beam::Section;
-use vpm_core::beam::strain::{Drive, FlexibleLink, FlexibleTree, StrainBeam, TreeMotion};
+use vpm_core::beam::witness::strain_tree::{Drive, FlexibleLink, FlexibleTree, StrainBeam, TreeMotion};
 use vpm_core::integrator::{Integrator, Method};
 use vpm_core::ode::Ode;
 use vpm_core::{Result, Scalar};

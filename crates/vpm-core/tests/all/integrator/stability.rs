@@ -4,7 +4,7 @@ use nalgebra::DMatrix;
 use vpm_core::Result;
 use vpm_core::beam::Component;
 use vpm_core::beam::eigen::modes;
-use vpm_core::beam::strain::{FlexibleLink, FlexibleTree, StrainBeam};
+use vpm_core::beam::witness::strain_tree::{FlexibleLink, FlexibleTree, StrainBeam};
 use vpm_core::beam::{Material, Section, Shape};
 use vpm_core::error::Error;
 use vpm_core::integrator::stability::{LinearSystem, check};

@@ -104,6 +104,23 @@ fn an_observer_with_these_gains_leaves_the_same() {
     }
 }
 
+/// A method that remembers a step goes on across corrections, and keeps its order.
+#[test]
+fn corrections_keep_the_order_of_a_method_of_two_steps() {
+    let machine = arm();
+    let bench = |pieces: usize, method: Method| Bench::new(&machine, STEP, pieces, method);
+    let (inputs, readings) = record(&bench(1, Method::Rk4), 80);
+    let gains = filtered(&bench(1, Method::Rk4), (&inputs, &readings)).gains;
+    let states = |bench: Bench| observed(&bench, (&inputs, &readings), &gains).states;
+    let exact = states(bench(64, Method::Rk4));
+    let gaps = [2, 4, 8].map(|pieces| {
+        let found = states(bench(pieces, Method::CrankNicolson));
+        found.iter().zip(&exact).map(|(found, exact)| (found - exact).abs()).fold(0.0, f64::max)
+    });
+    assert!(gaps[0] > 1e-6, "nothing to see: {gaps:?}");
+    assert!(gaps[1] < 0.35 * gaps[0] && gaps[2] < 0.35 * gaps[1], "{gaps:?}");
+}
+
 #[test]
 fn without_gains_it_runs_freely() {
     let bench = Bench::new(&arm(), STEP, 1, Method::Rosenbrock);

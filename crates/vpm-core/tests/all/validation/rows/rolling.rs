@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use vpm_core::Result;
-use vpm_core::beam::two_node::{NodeLoad, TwoNodeChain};
+use vpm_core::beam::witness::two_node::{NodeLoad, TwoNodeChain};
 use vpm_core::beam::{BeamEntry, Component, Level, Material, Properties, Section, SectionEntry, Shape};
 
 use super::derivations::name;

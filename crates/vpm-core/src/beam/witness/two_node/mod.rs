@@ -13,7 +13,7 @@ mod chain;
 
 pub use chain::{NodeLoad, TwoNodeChain};
 
-use super::{Section, positive};
+use crate::beam::{Section, positive};
 use crate::error::Result;
 use crate::scalar::{Dual, Scalar};
 use crate::spatial::{Matrix3, Vector3};

@@ -3,12 +3,11 @@
 use crate::beam::fields::{self, Fields, Interpolated};
 use crate::beam::quadrature::gauss;
 use crate::beam::rest::Rest;
+use crate::beam::strain::{Crossing, SpaceAxis};
 use crate::beam::{Basis, Component, Section, not_negative};
 use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 use crate::spatial::{SpatialInertia, Symmetric3, Twist, Vector3};
-
-use super::space::{Crossing, SpaceAxis};
 
 /// A strain that the beam may have, with its shape functions. Strains that are not listed are rigid.
 #[derive(Clone, Debug, PartialEq)]

@@ -2,9 +2,9 @@
 
 use nalgebra::{DMatrix, DVector};
 
-use super::eigen::{self, Modes};
-use super::quadrature::composite;
-use super::{Basis, Section, dimension, not_negative};
+use crate::beam::eigen::{self, Modes};
+use crate::beam::quadrature::composite;
+use crate::beam::{Basis, Section, dimension, not_negative};
 use crate::error::{Error, Result};
 
 /// Direction of the deflection.
