@@ -172,7 +172,7 @@ def _outcomes_of(done: Done[int] | None, size: int) -> list[Run | VpmError | Non
 
 
 def _chunk(one: Callable[[Item], Run], items: Sequence[Item]) -> list[Run | VpmError]:
-    """What becomes of each item, an error as a value."""
+    """Runs of several trials, one after the other, with an error as a value in the place of a run."""
     found: list[Run | VpmError] = []
     for item in items:
         try:
@@ -204,7 +204,7 @@ def _one(model: Model, mode: str, setup: Setup, cutoff: float | None, trial: Tri
 
 @contextmanager
 def _shown(progress: Callable[[int, int], object] | bool, total: int) -> Iterator[Callable[[int, int], object] | None]:
-    """Who is told what is done: a function, a progress bar on the error stream, or nobody."""
+    """Function that shows how many simulations are done: the caller's, a progress bar on the error stream, or none."""
     if progress is not True:
         yield progress or None
         return

@@ -75,6 +75,7 @@ FoundHold = Annotated[
 Check = Annotated[
     bool, typer.Option("--check/--no-check", help="Refuse logs with a wrong unit, sign, name or clock, see vpm check.")
 ]
+Share = Annotated[float, typer.Option(help="Share of the period that a step may take at its 99.9 % quantile.")]
 Workers = Annotated[int, typer.Option(min=0, help="Candidates at a time; 0 for one per core. The result is the same.")]
 
 
@@ -86,14 +87,14 @@ def writable(path: Path | None) -> Path | None:
 
 
 def fillable(path: Path | None) -> Path | None:
-    """The same for a folder."""
+    """A folder to write into in the end, refused at once where it could not be written."""
     if path is not None:
         probe_folder(path)
     return path
 
 
 def drawable(path: Path | None) -> Path | None:
-    """The same for a picture, whose ending says its format."""
+    """A picture to write in the end, refused at once where its ending is no format or it could not be written."""
     if path is not None and path.suffix.lower() not in PICTURES:
         raise VpmError(f"{path} is no name of a picture; give it one of the endings {', '.join(PICTURES)}")
     if str(path) == BESIDE:  # it gets its name later
@@ -111,7 +112,7 @@ Each = Callable[[str, str, int, int], None]
 
 
 def load_model(path: Path) -> Model:
-    """Model of a file."""
+    """Model of a model file that a command names."""
     from vpm.model import Model
 
     model = Model.load(path)
@@ -120,7 +121,7 @@ def load_model(path: Path) -> Model:
 
 
 def load_record(path: Path, model: Model, channels: Path | None, interpolate: bool) -> Experiment:
-    """Record of a file, with its channels as the model names them."""
+    """Record of a log that a command names, with its channels as the model names them."""
     from vpm.experiment import Experiment
 
     record = Experiment.load(path, channels, model, irregular="interpolate" if interpolate else "error")
@@ -129,13 +130,13 @@ def load_record(path: Path, model: Model, channels: Path | None, interpolate: bo
 
 
 def load_pair(model: Path, log: Path, channels: Path | None, interpolate: bool) -> tuple[Model, Experiment]:
-    """Model and record."""
+    """Model and one record of the files that a command names."""
     machine = load_model(model)
     return machine, load_record(log, machine, channels, interpolate)
 
 
 def load_all(model: Path, logs: list[Path], channels: Path | None, interpolate: bool) -> tuple[Model, list[Experiment]]:
-    """Model and several records."""
+    """Model and several records of the files that a command names."""
     machine = load_model(model)
     return machine, [load_record(log, machine, channels, interpolate) for log in logs]
 

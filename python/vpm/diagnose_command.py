@@ -45,7 +45,9 @@ Limit = Annotated[
 ]
 Names = Annotated[
     Literal["ranking", "search"],
-    typer.Option(help="Where names come from; a ranking covers rigid machines of up to three joints, a search others."),
+    typer.Option(
+        help="Where names come from; a ranking covers rigid machines of up to three joints and loops, a search others."
+    ),
 ]
 Substeps = Annotated[
     int, typer.Option(min=1, help="Integration steps per sample, in simulations of validation records.")

@@ -12,7 +12,7 @@ from typing import TypedDict, get_args
 
 from vpm.discrepancy.ambiguity import Rivals, listed
 from vpm.discrepancy.assembled import accepted_effect, classes, examined, gaps_of, of_search, step
-from vpm.discrepancy.by_ranking import observed_gaps
+from vpm.discrepancy.by_ranking import tracker_gaps
 from vpm.discrepancy.candidates import asked_for
 from vpm.discrepancy.choice import Accepted
 from vpm.discrepancy.confirmation import Data, Judged
@@ -32,13 +32,14 @@ from vpm.discrepancy.verdict import is_negligible, verdict
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records
 from vpm.experiment.signal import check_cutoff
-from vpm.identify.fitted import fit_of
+from vpm.identify.fit_result import fit_of
 from vpm.identify.parallel import worker_count
 from vpm.log_check import refuse_mistakes
 from vpm.model import Model
-from vpm.naming import BROKEN, FAILED, RANKING, Names, Tell, named, ranking_of, until_stopped
+from vpm.naming import BROKEN, FAILED, RANKING, Names, Tell, named, ranked_notes, ranking_of, until_stopped
 from vpm.one_thread import in_one_thread
 from vpm.ranking import Ranking
+from vpm.ranking.by_tracker import diagnosed_by_tracker
 from vpm.ranking.stand_in import why_unbalanced
 from vpm.simulate import Setup, judging_mode
 from vpm.tasks import done_by
@@ -49,17 +50,14 @@ LEAST_LIMIT = 6
 FOUND_HOLD = "commands run from sample to sample, as readings of a drive do; simulate with hold {hold} too"
 #: Said where Ctrl-C came after the search.
 STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, was examined"
-#: Said of machines whose efforts do not follow from their motion.
-UNBALANCED = (
-    "{model}: a diagnosis measures what it names by efforts along the motion, and {reason}; "
-    "name what is missing by vpm.rank, which compares positions"
-)
+#: Said where a cut-off frequency was asked for and no motion is filtered.
+UNFILTERED = "the cut-off frequency is not used, for an observer filters nothing"
 #: What is odd in a channel and may pass for an effect.
 NOTED = ("delay", "frozen", "clipped", "spikes")
 
 
 class Asked(TypedDict, total=False):
-    """Of what `diagnose` takes, that which holds for many diagnoses."""
+    """Arguments of `diagnose` that hold for many diagnoses, without model and records."""
 
     effects: Sequence[str] | None
     cutoff: float | None
@@ -92,7 +90,9 @@ def diagnose(
     three joints move, a ranking of the training records names what is missing, see `vpm.rank`, and validation records
     decide no name. Elsewhere every effect is screened at every site by its regressor; those with the largest predicted
     gain are refitted together with the model. They have to predict validation records, by the inverse-dynamics residual
-    and in simulation. One is accepted at a time, the one with the largest validation gain per number.
+    and in simulation. One is accepted at a time, the one with the largest validation gain per number. Where no efforts
+    follow from a motion, with closed loops or drives that go by their own samples, a ranking names, and what its
+    observer leaves of validation records is told.
 
     Parameters
     ----------
@@ -136,8 +136,8 @@ def diagnose(
     Raises
     ------
     DiagnosisError
-        No record was given, an effect name or the source of names is unknown, or no efforts follow from a motion of the
-        machine: `vpm.rank` names what such a one is missing.
+        No record was given, an effect name or the source of names is unknown, or names are to come from a search where
+        no efforts follow from a motion of the machine.
     ExperimentError
         A channel is missing, or a log cannot be trusted.
     ExecutorError
@@ -213,8 +213,6 @@ def diagnosed(
     """
     effects, cutoff, limit = asked.get("effects"), asked.get("cutoff"), asked.get("limit")
     setup = asked.get("setup") or Setup()
-    if reason := why_unbalanced(model):
-        raise DiagnosisError(UNBALANCED.format(model=model.name, reason=reason))
     records = records_of(model, experiments, validate)
     if cutoff is not None:
         for record in chain(*records[:2]):
@@ -243,7 +241,7 @@ def _diagnosis(
     each: SideBySide,
     tell: Tell | None,
 ) -> Diagnosis:
-    """See `diagnose`."""
+    """The diagnosis of `diagnose` on checked records: names the effects, judges them, and tells what is left."""
     began = time.perf_counter()
     say = tell or (lambda _: None)
     training, validation, notes = records
@@ -254,6 +252,12 @@ def _diagnosis(
     if ranking is not None and ranking.hold != setup.course:
         notes.append(FOUND_HOLD.format(hold=ranking.hold))
         setup = replace(setup, hold=ranking.hold)
+    if ranking is not None and (reason := why_unbalanced(model)):
+        say("measuring what was named on validation records")
+        notes.extend([] if cutoff is None else [UNFILTERED])
+        told = diagnosed_by_tracker(ranking, model, records, (effects, limit), setup, reason)
+        more = ranked_notes(ranking, told.refused, told.interrupted)
+        return replace(told, notes=(*told.notes, *more), seconds=time.perf_counter() - began)
     data = data_of(model, training, validation, mode, cutoff, setup, notes)
     say("comparing the nominal model with the data")
     nominal = nominal_of(model, data, notes)
@@ -265,12 +269,12 @@ def _diagnosis(
         return _told(known, found, mode, setup, each, say)
     except BROKEN as error:
         notes.append(FAILED.format(what="what follows the search", error=error))
-        return of_search(model, records, recalibrated, found, data, time.perf_counter() - began)
+        return of_search(model, records, recalibrated, found, data.training, time.perf_counter() - began)
 
 
 @dataclass(frozen=True)
 class _Known:
-    """What a diagnosis knows when the names are found.
+    """What a diagnosis knows once effects are named: models, records, ranking and rivals.
 
     Attributes
     ----------
@@ -304,7 +308,7 @@ class _Concluded:
 
 
 def _told(known: _Known, found: Search, mode: str, setup: Setup, each: SideBySide, say: Tell) -> Diagnosis:
-    """What is left after the search, and all that is to be said."""
+    """The diagnosis after its search: noise floor, what is left of the residual, and the verdict."""
     data, (_, _, notes) = known.data, known.records
     say("measuring the noise floor")
     measure = partial(examined, known.nominal, known.recalibrated, data, mode, setup)
@@ -315,7 +319,7 @@ def _told(known: _Known, found: Search, mode: str, setup: Setup, each: SideBySid
     rest, stopped = until_stopped(
         lambda: _rest(known.recalibrated, found, data, each) if found.accepted or not is_negligible(gap) else None, None
     )
-    beyond = observed_gaps(known.ranking, data.training.joints) if known.ranking is not None else {}
+    beyond = tracker_gaps(known.ranking, data.training.joints) if known.ranking is not None else {}
     said = verdict(data, known.nominal, known.recalibrated, found, gap | beyond, left, rest)
     concluded = _concluded(known, found, said, gap, floor, rest)
     say("designing discriminating experiments")
@@ -350,7 +354,7 @@ def _concluded(
 def _whole(
     known: _Known, found: Search, concluded: _Concluded, floor: dict[str, float], *, interrupted: bool
 ) -> Diagnosis:
-    """The diagnosis with its evidence and pictures."""
+    """The diagnosis as a result, with its evidence and pictures."""
     data, nominal, (training, validation, notes) = known.data, known.nominal, known.records
     final, accepted, summary = concluded.final, concluded.accepted, concluded.summary
     ambiguous = known.ambiguous if accepted else ()
@@ -363,7 +367,7 @@ def _whole(
         found.ranking,
         listed(ambiguities(accepted), ambiguous),
         where(known.recalibrated.model, data.validation),
-        tuple(step(data, stage) for stage in found.stages),
+        tuple(step(data.training, data.validation, stage) for stage in found.stages),
         tuple(e.name for e in training),
         tuple(e.name for e in validation),
         tuple(notes),
@@ -382,6 +386,6 @@ def _whole(
 
 
 def _rest(recalibrated: Judged, found: Search, data: Data, each: SideBySide) -> Remainder:
-    """What is left; what an interrupted search accepted stands, for rounds that would have judged it were not to be."""
+    """Remainder of the residual under the effects found; those of an interrupted search stand."""
     start = found.final if found.interrupted or not found.accepted else recalibrated
     return remainder(start, found.final, data, min(m.dt for m in data.training.motions), worker_count(each.workers))

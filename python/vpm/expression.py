@@ -153,7 +153,7 @@ class Expression:
 
 
 def read_expression(text: str) -> Expression:
-    """Read an expression.
+    """Read an expression over columns of a log.
 
     Parameters
     ----------

@@ -175,7 +175,7 @@ def _fitted(
 
 
 def _told(fit: Fit, machine: Model, unseen: list[Experiment], cutoff: float | None) -> list[str]:
-    """Print what was found, and what it leaves of unseen records."""
+    """Print the values of a fit, and what it leaves of validation records."""
     from vpm.identify import judged_on
     from vpm.identify.export import told, told_unseen
 
@@ -211,7 +211,7 @@ def _print(lines: list[str]) -> None:
 
 
 def _without(model: Model, free: list[str] | None, fixed: list[str] | None) -> list[str] | None:
-    """Free parameters, less those that are to stay.
+    """Names of the free parameters, less those that are to stay.
 
     Raises
     ------

@@ -56,7 +56,7 @@ def _plugins() -> list[dict[str, str]]:
 
 
 def _way(model: Model) -> str:
-    """How steps of a model run."""
+    """Sentence on how long runs of a model step: as machine code, or why not."""
     from vpm.simulate import Setup
 
     begin = perf_counter()

@@ -155,7 +155,7 @@ def _along(model: Model, theta: Array, given: tuple[Array, Array, Array], joints
 
 
 def _forgetful(model: Model, joints: tuple[str, ...]) -> tuple[Model, NDArray[np.int64]]:
-    """A machine without what remembers at some joints, with its parameters among those that it had.
+    """Machine without effects that remember at some joints, and its parameters among those of the whole one.
 
     One behind a spring moves what nobody measures, and stays.
     """
@@ -200,7 +200,7 @@ def _settled(model: Model, theta: Array, positions: Array, dt: float) -> Array:
 
 
 def _internal(model: Model, experiment: Experiment, theta: Array, coordinates: Array, row: int) -> Array:
-    """What drives and supplies hold after a rest at the pressures that the log holds of supplies."""
+    """States of drives and supplies after a rest at the pressures that the log holds of supplies."""
     known = [name for name in model.supplies if f"{name}.pressure" in experiment]
     if known:
         theta = theta.copy()
@@ -210,7 +210,7 @@ def _internal(model: Model, experiment: Experiment, theta: Array, coordinates: A
 
 
 def _seen(model: Model, experiment: Experiment, theta: Array, state: Array, internal: Array, row: int) -> Array:
-    """Internal states with what the log holds of them; see `_chambers` for pressures."""
+    """Internal states of drives where the log holds them; see `_chambers` for pressures."""
     for place, name in enumerate(model.internal_names):
         owner, _, quantity = name.partition(".")
         if quantity in {"spool", "current"} and name in experiment:

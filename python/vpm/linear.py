@@ -124,7 +124,7 @@ class LinearModel(Result):
         return exponential[:nx, :nx].copy(), exponential[:nx, nx:].copy()
 
     def part(self, *, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> LinearModel:
-        """The same with some of the inputs and outputs, in the given order.
+        """The linear model with some of the inputs and outputs, in the given order.
 
         Raises
         ------

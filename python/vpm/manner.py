@@ -41,7 +41,7 @@ class Output(Console):
     trouble: OSError | None = None
 
     def print(self, *objects: Any, **options: Any) -> None:  # noqa: ANN401
-        """As of any console."""
+        """Print to the console as any console does, until its file takes no more."""
         try:
             super().print(*objects, **options)
         except BrokenPipeError:  # whoever read it has seen enough
@@ -132,7 +132,7 @@ def progressed(text: str) -> None:
 
 
 def in_lines() -> bool:
-    """Whether progress is told in lines, not by a bar that moves."""
+    """Whether a command tells its progress in lines, not by a bar that moves."""
     return _now.verbose or not notes.is_terminal
 
 

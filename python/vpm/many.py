@@ -18,7 +18,7 @@ from vpm.tasks import BatchInterruptedError, Done, outcomes
 
 @dataclass(frozen=True)
 class Case:
-    """One diagnosis of many.
+    """One of the diagnoses that `diagnose_many` runs.
 
     Attributes
     ----------
@@ -42,7 +42,7 @@ class Case:
 
     @property
     def called(self) -> str:
-        """What sentences call it."""
+        """Name of a case in sentences: its own, or model and first record."""
         return self.name or " on ".join([self.model.name, *(record.name for record in self.records[0][:1])])
 
 
@@ -111,7 +111,7 @@ def diagnose_many(
 
 
 def _answer(done: Done[int], case: Case, asked: Asked, workers: int | None) -> Diagnosis | VpmError:
-    """The diagnosis with where it comes from, or why there is none: one that fails takes no other with it."""
+    """Diagnosis of a case with its provenance, or the error of one that failed: it takes no other with it."""
     if done.error is None:
         return with_provenance(done.value, case.model, *case.records, asked, workers)
     if isinstance(done.error, VpmError):

@@ -12,6 +12,7 @@ from vpm.discrepancy.by_ranking import free_joints, searched, why_not_ranked
 from vpm.discrepancy.by_ranking import notes as notes_of
 from vpm.discrepancy.confirmation import Data, Judged
 from vpm.discrepancy.contacts import with_predicted_contacts
+from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.forward_step import forward_step
 from vpm.discrepancy.rival_discrimination import discriminated
 from vpm.discrepancy.rival_exchange import in_order, replaced, timed_again
@@ -21,6 +22,7 @@ from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.ranking import Ranking, Settings, rank
+from vpm.ranking.stand_in import why_unbalanced
 from vpm.simulate import Setup
 
 #: What an interrupted diagnosis says of itself.
@@ -29,6 +31,7 @@ STOPPED = "stopped by Ctrl-C before every candidate was tried: this is what was 
 RANKED = "names come from a ranking of the training records"
 SEARCHED = "names come from a search on inverse-dynamics residuals, for {reason}"
 NOT_SEARCHED = "a search on inverse-dynamics residuals does not try {effects}"
+NO_SEARCH = "{model} has no inverse-dynamics residual to search on, for {reason}; take names from a ranking"
 #: Said where names come from a search.
 UNSEEN = "the joint {joint} has no drive: no inverse-dynamics residual shows what acts there, and nothing is said of it"
 #: Said where an error follows a search, and what such an error is.
@@ -56,13 +59,21 @@ def ranking_of(
     Validation records only say, at the end, how much of their error what was found leaves.
 
     ``by`` says where names come from, of which effects, and how many at most. What keeps it from that is noted.
+
+    Raises
+    ------
+    VpmError
+        Neither a ranking nor a search covers the machine.
     """
     names, effects, limit = by
     training, validation = records
+    unbalanced = why_unbalanced(model)
     if names != "ranking":
+        if unbalanced:
+            raise DiagnosisError(NO_SEARCH.format(model=model.name, reason=unbalanced))
         notes.extend(_not_searched(effects, f'names="{names}" was asked for'))
         return None
-    reason = why_not_ranked(model, training)
+    reason = "" if unbalanced else why_not_ranked(model, training)
     if not reason:
         tell("ranking what could be missing")
         try:
@@ -80,6 +91,8 @@ def ranking_of(
         except KeyboardInterrupt:
             return Ranking((), (), model, model, interrupted=True, hold=setup.course)
         except (VpmError, ArithmeticError) as error:
+            if unbalanced:
+                raise
             reason = f"a ranking fails: {error}"
     notes.append(SEARCHED.format(reason=reason))
     notes.extend(_not_searched(effects, reason))
@@ -102,10 +115,7 @@ def named(
     if ranking is not None:
         tell("measuring what was named on validation records")
         found, ambiguous = searched(ranking, recalibrated, data, Settings(effects=limit), effects)
-        named = {one.key for one in ranking.effects}
-        lost = [one for one in found.refused if (one.name, one.site) in named]
-        notes.extend([RANKED, *notes_of(found.accepted), *([STOPPED] if found.interrupted else [])])
-        notes.extend(f"the ranking names {one.name} at {one.site}: {one.reason}" for one in lost)
+        notes.extend([*notes_of(found.accepted), *ranked_notes(ranking, found.refused, found.interrupted)])
         return found, ambiguous, False
     found = search(recalibrated, data, screened, limit, tell, each)
     if found.interrupted:
@@ -119,6 +129,14 @@ def named(
         notes.append(FAILED.format(what="what else would do in the place of each effect", error=error))
         ambiguous, late = nothing, False
     return found, ambiguous, late
+
+
+def ranked_notes(ranking: Ranking, refused: Sequence[RefusedEffect], interrupted: bool) -> list[str]:
+    """Where names come from, whether there may be more, and names of the ranking that had to be refused."""
+    named = {one.key for one in ranking.effects}
+    lost = [one for one in refused if (one.name, one.site) in named]
+    told = [f"the ranking names {one.name} at {one.site}: {one.reason}" for one in lost]
+    return [RANKED, *([STOPPED] if interrupted else []), *told]
 
 
 def _settled(

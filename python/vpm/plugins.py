@@ -33,7 +33,7 @@ class PluginError(VpmError):
 
 @dataclass(frozen=True)
 class Plugin:
-    """One entry point.
+    """An effect, reader or importer that another package offers by an entry point.
 
     Attributes
     ----------

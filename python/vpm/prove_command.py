@@ -130,7 +130,7 @@ def page(path: Path, text: str) -> str:
 
 
 def numbers(text: str) -> tuple[int, ...]:
-    """Numbers such as ``0-4,7``."""
+    """Seeds from text such as ``0-4,7``."""
     found: list[int] = []
     for part in text.split(","):
         first, dash, last = part.strip().partition("-")

@@ -112,7 +112,7 @@ class Parcel:
         return cls(_sendable(thing))
 
     def open(self) -> Any:  # noqa: ANN401  whatever was put into it
-        """What is in it."""
+        """The object that was packed into a parcel."""
         return pickle.loads(self.content)  # noqa: S301  see above
 
 

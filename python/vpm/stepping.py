@@ -90,12 +90,12 @@ class Simulation:
 
     @property
     def model(self) -> Model:
-        """The machine."""
+        """The machine that is simulated step by step."""
         return self._model
 
     @property
     def time_step(self) -> float:
-        """Time between samples, s."""
+        """Time between samples of a simulation step by step, s."""
         return self._time_step
 
     @property
@@ -110,7 +110,7 @@ class Simulation:
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
-        """Names of the outputs."""
+        """Names of the outputs of a simulation step by step."""
         return self._model.output_channels
 
     @cached_property

@@ -83,7 +83,7 @@ def _never() -> bool:
 
 
 class _Outer(local):
-    """Whether tasks that this thread waits for are to end: those of a task that was told to stop."""
+    """Function that says, for this thread, whether the task around its tasks was told to stop."""
 
     asked: Callable[[], bool] = staticmethod(_never)
 
@@ -147,7 +147,7 @@ class Tasks(Generic[K]):
         return AHEAD * workers if isinstance(workers, int) else UNTOLD
 
     def add(self, key: K, job: Callable[[], object], name: str = "") -> None:
-        """One task more.
+        """Add a task to those that wait for a worker.
 
         Parameters
         ----------
@@ -219,7 +219,7 @@ class Tasks(Generic[K]):
         self._refused.append(Done(task.key, error=reason))
 
     def _ended(self, future: Future[Any]) -> Done[K] | None:
-        """How a task ended; None of one that is tried again."""
+        """Outcome of a task whose future ended; None of one that is tried again."""
         task, executor = self._flying.pop(future)
         try:
             answer = future.result()
@@ -367,7 +367,7 @@ def processes(count: int) -> ProcessPoolExecutor:
 
 
 def _maker(where: Where) -> Callable[[], Executor]:
-    """What makes an executor, also in the place of one that was given and broke."""
+    """Function that makes an executor, also in the place of one that was given and broke."""
     if isinstance(where, int):
         return partial(ThreadPoolExecutor, where, "vpm")
     if isinstance(where, Executor):

@@ -153,7 +153,7 @@ _DIMENSIONLESS: tuple[Power, ...] = (0,) * len(BASE_UNITS)
 
 @lru_cache(maxsize=1024)
 def parse_unit(text: str) -> Unit:
-    """Read a unit.
+    """Read a unit from text such as ``N m/rad``.
 
     Parameters
     ----------

@@ -115,7 +115,7 @@ def budget(
 
 
 def _rank(rate: float, priority: int | None) -> str:
-    """Words on the priority that was asked for."""
+    """Priority of the timed thread in words, such as ", at priority 80"; empty where none was asked for."""
     if priority is None:
         return ""
     with Loop(rate, priority=priority) as loop:
@@ -131,7 +131,7 @@ def _stages(timed: Timed) -> tuple[Stage, ...]:
 
 
 def _latency(rate: float, seconds: float, tell: Callable[[str], None] | None) -> dict[str, float]:
-    """How late a loop without work wakes up."""
+    """How late a real-time loop without work wakes up."""
     if tell:
         tell(f"watching an idle loop for {seconds:g} s")
     with Loop(rate) as loop:

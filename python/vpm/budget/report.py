@@ -89,7 +89,7 @@ class BudgetReport(Result):
 
     @property
     def holds(self) -> bool:
-        """Whether that share is within the allowed one, and no step asks for memory."""
+        """Whether a step takes at most its allowed share of the period, and no step asks for memory."""
         return self.taken <= self.share and self.allocations == 0
 
     @property

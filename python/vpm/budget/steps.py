@@ -30,7 +30,7 @@ NOT_ASKED = "machine code was not asked for"
 
 @dataclass(frozen=True)
 class Timed:
-    """Steps that were timed.
+    """Timed steps of a simulation: duration of each, stages, and how often they asked for memory.
 
     Attributes
     ----------
@@ -142,7 +142,7 @@ def time_steps(
 
 
 def _ahead(rate: float, priority: int | None) -> AbstractContextManager[object]:
-    """Before all ordinary threads, as a controller runs; nothing without a priority."""
+    """Loop of raised priority, in which steps are timed as a controller runs; does nothing without a priority."""
     return nullcontext() if priority is None else Loop(rate, priority=priority)
 
 

@@ -46,7 +46,7 @@ EFFECTS: Mapping[str, EffectType] = _CATALOGUE
 
 
 def effect_type(name: str) -> EffectType:
-    """Entry of the catalogue.
+    """Entry of the catalogue for the name of an effect.
 
     Parameters
     ----------
@@ -195,7 +195,7 @@ def unregister(name: str) -> None:
 
 
 def registered() -> tuple[EffectType, ...]:
-    """Effects that `register` added."""
+    """Effects of users that `vpm.catalogue.register` added."""
     return tuple(effect for effect in _CATALOGUE.entries.values() if effect.formula)
 
 

@@ -81,7 +81,7 @@ def _combined(operation: str, first: float, second: float) -> float:
 
 
 def compile_formula(text: str, names: Sequence[str]) -> Formula:
-    """Compile a law.
+    """Compile the law of a user's effect into a postfix program.
 
     Parameters
     ----------

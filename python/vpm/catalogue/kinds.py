@@ -172,7 +172,7 @@ class EffectType(Traits):
 
     @property
     def has_law(self) -> bool:
-        """Whether it is a law of its own; a form for what no law explains has no number that must be there."""
+        """Whether an effect has a law of its own, and is not a form for what no law explains."""
         return any(not parameter.shape and not parameter.optional for parameter in self.parameters)
 
     @property
@@ -182,12 +182,12 @@ class EffectType(Traits):
 
     @property
     def rubs(self) -> bool:
-        """Whether it turns round with the motion, within a transition velocity."""
+        """Whether an effect is friction: it turns round with the motion, within a transition velocity."""
         return any(parameter.name == "transition_velocity" for parameter in self.parameters)
 
     @property
     def adds_inertia(self) -> bool:
-        """Whether a mass or an inertia is among its parameters."""
+        """Whether a mass or an inertia is among the parameters of an effect."""
         return any(parameter.scale in {"mass", "inertia"} for parameter in self.parameters)
 
     @property
@@ -197,7 +197,7 @@ class EffectType(Traits):
         return words.replace("coulomb", "Coulomb").replace("stribeck", "Stribeck").replace("lugre", "LuGre")
 
     def parameter(self, name: str) -> EffectParameter:
-        """Parameter by short name.
+        """Parameter of an effect by its short name.
 
         Raises
         ------

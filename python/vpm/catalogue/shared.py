@@ -72,7 +72,7 @@ def motor_inertia(suffix: str) -> EffectParameter:
 
 
 def delay(meaning: str) -> EffectParameter:
-    """Time by which something is late."""
+    """Parameter of a delay: time by which something is late."""
     return nonlinear(
         "time", "delay.time", "s", "time", meaning, neutral=0.0, physical=NOT_NEGATIVE, evaluable=NOT_NEGATIVE
     )

@@ -55,7 +55,7 @@ class _Remembered(OutputErrorProblem):
 
 @dataclass(frozen=True)
 class _Data:
-    """What a level is fitted to, and judged on."""
+    """Training and validation problem of a level: one is fitted, the other judges."""
 
     train: OutputErrorProblem
     validation: OutputErrorProblem
@@ -159,7 +159,7 @@ def climb(
 
 
 def _through(family: Family, data: _Data, reached: list[_Reached], say: Callable[[str], None]) -> bool:
-    """Levels of one kind, finer and finer as long as that lowers the error; whether one of them paid."""
+    """Fit levels of one kind, finer and finer as long as that lowers the error; whether one of them paid."""
     paid, error = False, np.inf
     for name, machine in family:
         say(name)
@@ -175,12 +175,12 @@ def _through(family: Family, data: _Data, reached: list[_Reached], say: Callable
 
 
 def _best(reached: Sequence[_Reached]) -> _Reached | None:
-    """The last level that paid."""
+    """The last level of a climb that paid."""
     return next((step for step in reversed(reached) if step.level.pays), None)
 
 
 def _climbed(name: str, machine: Model, data: _Data, below: _Reached | None, best: _Reached | None) -> _Reached | None:
-    """A level, fitted and judged; None where it cannot be simulated."""
+    """A level fitted and judged on validation records; None where it cannot be simulated."""
     known = {} if below is None else below.known
     try:
         start = _start(machine, known, data.train)
@@ -214,7 +214,7 @@ def _climbed(name: str, machine: Model, data: _Data, below: _Reached | None, bes
 
 
 def _start(machine: Model, known: dict[str, float], problem: OutputErrorProblem) -> Model:
-    """Where the level below left its parameters, or where the model has them if that is nearer to the data."""
+    """Model with the parameters of the level below, or with its own where these are nearer to the data."""
     learnt = machine.with_parameters({key: value for key, value in known.items() if key in machine.parameters})
     if np.array_equal(learnt.theta, machine.theta):
         return machine
@@ -265,7 +265,7 @@ def families(model: Model) -> list[Family]:
 
 
 def _made(model: Model, beams: Mapping[str, Any], level: str) -> Model | None:
-    """Model with its links at a level, each at most as fine as its own; None where nothing changes or it is invalid."""
+    """Model with links at one level, each at most as fine as its own; None where nothing changes or it is invalid."""
     finer = {name: level for name, beam in beams.items() if 0 < size_of(level, beam) < size_of(beam["level"], beam)}
     if not finer:
         return None

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Level(Storable):
-    """One level of a climb.
+    """One level of detail of a climb, with its error and its parameters.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Level(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Climb(Result):
-    """A climb in complexity.
+    """Errors and parameters of a model at growing levels of detail.
 
     Attributes
     ----------

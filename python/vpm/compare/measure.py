@@ -27,7 +27,7 @@ SAME = 1e-12
 
 
 class SimulatedRun(Protocol):
-    """What is asked of a run; `vpm.simulate.Run` has it."""
+    """Simulated channels with time and units as `compare` needs them; `vpm.simulate.Run` has all of it."""
 
     @property
     def model_name(self) -> str:
@@ -35,11 +35,11 @@ class SimulatedRun(Protocol):
 
     @property
     def mode(self) -> str:
-        """Mode of the simulation."""
+        """Mode of the simulation that a run comes from."""
 
     @property
     def time(self) -> Array:
-        """Shape (N,), s."""
+        """Time of the samples of the run, shape (N,), s."""
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -47,15 +47,15 @@ class SimulatedRun(Protocol):
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Their units."""
+        """Units of the simulated channels."""
 
     @property
     def values(self) -> Array:
-        """Shape (N, C)."""
+        """Values of the simulated channels, shape (N, C)."""
 
     @property
     def measured(self) -> Array | None:
-        """Shape (N, C), NaN where a channel was not measured; None to take it from the log."""
+        """Measured values, shape (N, C), NaN where a channel was not measured; None to take them from the log."""
 
     @property
     def starts(self) -> NDArray[np.int64]:

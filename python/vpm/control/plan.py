@@ -59,7 +59,7 @@ class FlexibleFeedforward(Result):
 
     @property
     def time_step(self) -> float:
-        """Time between samples, s."""
+        """Time between samples of a feed-forward, s."""
         return float(self.time[1] - self.time[0])
 
     @property

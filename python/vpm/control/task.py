@@ -103,7 +103,7 @@ class Task:
     # ---- the outputs -------------------------------------------------------------------------------------------------
 
     def values(self, q: Array) -> Array:
-        """Outputs (N, m)."""
+        """Outputs of a machine that follow a target (N, m)."""
         poses = {name: self.model.forward_kinematics(name, q) for name in self._markers}
         columns = [
             q[:, self.model.joints.index(owner)] if end == "position" else poses[owner][:, AXES[end] - 3, 3]

@@ -22,8 +22,8 @@ from vpm.discrepancy.preparation import Records
 from vpm.discrepancy.search import Search
 from vpm.discrepancy.structure import Structure, structure
 from vpm.discrepancy.timing import in_time
-from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gaps
-from vpm.identify.fitted import fit_of
+from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, Problem, gaps
+from vpm.identify.fit_result import fit_of
 from vpm.model import Model
 from vpm.simulate import Setup
 
@@ -32,9 +32,22 @@ ALIKE = "predicts the validation data as well"
 
 
 def of_search(
-    model: Model, records: Records, recalibrated: Judged, found: Search, data: Data, seconds: float
+    model: Model, records: Records, start: Judged, found: Search, fitted: Problem, seconds: float
 ) -> Diagnosis:
-    """What a search found, where nothing after it can be computed: nobody waits for it twice."""
+    """What a search found, where nothing after it can be computed: nobody waits for it twice.
+
+    Parameters
+    ----------
+    model : Model
+    records : tuple
+    start : Judged
+        What the last fit is compared with.
+    found : Search
+    fitted : problem
+        What was fitted.
+    seconds : float
+        Time it took.
+    """
     training, validation, notes = records
     names = ", ".join(entry.label for entry in found.accepted) or "no effect"
     return Diagnosis(
@@ -53,9 +66,9 @@ def of_search(
         found.final.model,
         fit_of(
             found.final.model,
-            data.training,
+            fitted,
             found.final.fit,
-            recalibrated.fit.residual,
+            start.fit.residual,
             [e.name for e in training],
         ),
         (),
@@ -147,7 +160,7 @@ def classes(accepted: Sequence[Accepted], ambiguous: Sequence[Rivals]) -> tuple[
     return tuple(found)
 
 
-def step(data: Data, stage: Stage) -> Step:
+def step(training: Problem, validation: Problem, stage: Stage) -> Step:
     """A stage of the search with its values, and the largest shares that it leaves."""
     fit, model = stage.judged.fit, stage.judged.model
     names = stage.judged.free
@@ -158,6 +171,6 @@ def step(data: Data, stage: Stage) -> Step:
         {name: model.parameters[name].value for name in names},
         dict(zip(names, map(float, fit.std), strict=True)),
         {name: model.parameters[name].unit for name in names},
-        max(share for _, share, _ in gaps(data.training, fit.residual).values()),
-        max(share for _, share, _ in gaps(data.validation, stage.judged.validation).values()),
+        max(share for _, share, _ in gaps(training, fit.residual).values()),
+        max(share for _, share, _ in gaps(validation, stage.judged.validation).values()),
     )

@@ -6,7 +6,7 @@ dynamics cannot be computed with an effect. Reported values are those of the res
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
 from typing import TYPE_CHECKING
@@ -84,15 +84,18 @@ def free_joints(model: Model) -> tuple[str, ...]:
     return tuple(name for name in model.joints if name not in {*model.driven_joints, *model.added_joints})
 
 
-def observed_gaps(ranking: Ranking, balanced: Sequence[str]) -> dict[str, ChannelGap]:
-    """Errors of an observer on validation records, of joints that the inverse-dynamics residual does not show."""
-    joints = set(ranking.recalibrated.joints) - set(balanced)
+def tracker_gaps(ranking: Ranking, balanced: Sequence[str] | None) -> dict[str, ChannelGap]:
+    """Errors of a tracker on validation records, of joints that the inverse-dynamics residual does not show.
+
+    Of all channels where there is no such residual, and so no joint of which the efforts are ``balanced``.
+    """
+    joints = set(ranking.recalibrated.joints) - set(balanced or ())
     return {
         f"{channel} ({OBSERVED})": ChannelGap(
             gap.before, gap.recalibrated, gap.after, gap.noise, gap.unit, gap.signal, OBSERVED
         )
         for channel, gap in ranking.gaps.items()
-        if channel.rpartition(".")[0] in joints
+        if balanced is None or channel.rpartition(".")[0] in joints
     }
 
 
@@ -117,28 +120,66 @@ def searched(
 
     Ctrl-C gives the effects that were refitted until then.
     """
+    known: tuple[Rivals, ...] = ()
+
+    def offered(final: Judged) -> tuple[Candidate, ...]:
+        return candidates(final.model, data.training, final.fit.residual, asked_for(effects), simulated=True)
+
+    def beside(current: Judged, model: Model, one: Ranked) -> Trial:
+        return _beside(current, model, one, data)
+
+    found = staged(ranking, recalibrated, beside, offered, settings)
+    try:
+        if found.interrupted == ranking.interrupted:
+            known = _rivals(ranking, found.final, found.accepted, data)
+    except KeyboardInterrupt:
+        found = replace(found, interrupted=True)
+    return found, known
+
+
+def staged(
+    ranking: Ranking,
+    recalibrated: Judged,
+    beside: Callable[[Judged, Model, Ranked], Trial],
+    offered: Callable[[Judged], tuple[Candidate, ...]],
+    settings: RankingSettings,
+) -> Search:
+    """What a ranking found as a search, effect by effect.
+
+    Parameters
+    ----------
+    ranking : Ranking
+    recalibrated : Judged
+        The model without effects.
+    beside : callable
+        Measures an effect: of a model without it, the model with it, and the effect.
+    offered : callable
+        All that could still be missing of a model.
+    settings : vpm.ranking.Settings
+        Of the ranking.
+
+    Ctrl-C gives the effects that were measured until then.
+    """
     stages, accepted = [Stage("recalibrated", "", "", recalibrated)], list[Accepted]()
     outside: dict[Key, str] = {}
-    known: tuple[Rivals, ...] = ()
     interrupted = ranking.interrupted or recalibrated.fit.interrupted
     try:
         for place, one in enumerate(ranking.effects):
             gone = [other for other in ranking.effects if other.key in outside] + list(ranking.effects[place + 1 :])
             try:
-                trial = _beside(stages[-1].judged, _without(ranking.model, gone), one, data)
+                trial = beside(stages[-1].judged, _without(ranking.model, gone), one)
             except VpmError as error:
-                outside[one.key] = f"it {_removes(one)}, but no inverse-dynamics residual can be computed: {error}"
+                outside[one.key] = f"it {_removes(one)}, but no residual can be computed: {error}"
                 continue
             accepted.append(Accepted(trial, one.rivals, one.evidence, one.probability, one.side, one.class_probability))
             stages.append(Stage("added", *one.key, trial.judged))
-        known = _rivals(ranking, stages[-1].judged, accepted, data)
     except KeyboardInterrupt:
         interrupted = True
     gains = {entry.key: entry.trial.validation.relative for entry in accepted}
     if ranking.rounds:
-        outside |= _unpromising(ranking, stages[-1].judged, data, effects)
+        outside |= _unpromising(ranking, offered(stages[-1].judged))
     refused, tried = _refused(ranking, outside, settings), _candidates(ranking, gains, settings)
-    found = Search(
+    return Search(
         tuple(stages),
         tuple(accepted),
         refused,
@@ -148,7 +189,6 @@ def searched(
         ranked=ranking.model,
         within_laws=ranking.is_within_laws(settings),
     )
-    return found, known
 
 
 def _without(model: Model, gone: Sequence[Ranked]) -> Model:
@@ -170,9 +210,7 @@ def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
         Efforts cannot be balanced in this model.
     """
     candidate = _candidate(current, one, data)
-    own = _own(model, one)
-    known = tuple(_renamed(current.model, model).get(name, name) for name in current.free)
-    known = tuple(name for name in known if name in model.parameters)
+    known, own = fitted_in(current, model, one)
     residual, columns = data.training.evaluate(model, model.theta, [model.index(name) for name in (*known, *own)])
     visible = _has_derivatives(columns)
     beside, fresh = columns[:, : len(known)][:, visible[: len(known)]], np.where(visible, columns, 0.0)[:, len(known) :]
@@ -219,11 +257,14 @@ def _candidate(current: Judged, one: Ranked, data: Data) -> Candidate:
     return next((each for each in listed if each.key == one.key), plain)
 
 
-def _own(model: Model, one: Ranked) -> tuple[str, ...]:
-    """Parameters of an effect that the ranking fitted, by their names in this model."""
+def fitted_in(current: Judged, model: Model, one: Ranked) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Parameters that are fitted without an effect, and those of it that a ranking fitted, by their names with it."""
+    renamed = _renamed(current.model, model)
+    known = (renamed.get(name, name) for name in current.free)
     fitted = {_anywhere(name) for name in one.values}
     names = model.effect(*one.key, one.side).parameter_names.values()
-    return tuple(name for name in names if _anywhere(name) in fitted)
+    own = tuple(name for name in names if _anywhere(name) in fitted)
+    return tuple(name for name in known if name in model.parameters), own
 
 
 def _anywhere(name: str) -> str:
@@ -329,9 +370,8 @@ def _refused(ranking: Ranking, outside: Mapping[Key, str], settings: RankingSett
     return tuple(RefusedEffect(*key, reason) for key, reason in reasons.items())
 
 
-def _unpromising(ranking: Ranking, final: Judged, data: Data, effects: Sequence[str] | None) -> dict[Key, str]:
+def _unpromising(ranking: Ranking, offered: Sequence[Candidate]) -> dict[Key, str]:
     """Effects that could be there and that no round of a ranking fitted, with the reason."""
-    offered = candidates(final.model, data.training, final.fit.residual, asked_for(effects), simulated=True)
     tried = {one.key for several in ranking.rounds for one in several}
     reason = "the first step of a fit predicted less evidence than others did, or too little for a fit"
     return {candidate.key: reason for candidate in offered if candidate.key not in tried}

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 
-#: Mode of a gap that an observer leaves.
+#: Mode of a gap that a tracker leaves, as results and reports write it.
 OBSERVED = "observed"
 
 
@@ -188,7 +188,7 @@ class ChannelGap(Storable):
     signal : float
         Root mean square of the measured signal; the gaps over it are the relative errors.
     mode : str
-        Mode of comparison; `OBSERVED` where an observer kept the model on the record.
+        Mode of comparison; `OBSERVED` where a tracker kept the model on the record.
     """
 
     before: float
@@ -258,7 +258,7 @@ class Step(Storable):
     values, std, units : dict
         All fitted parameters by dotted name.
     training_error, unseen_error : float
-        Largest gap of any channel relative to the measured effort.
+        Largest gap of any channel relative to what was measured.
     """
 
     change: str
@@ -460,10 +460,14 @@ class Diagnosis(Result):
         return {name: [getattr(c, name) for c in self.candidates] for name in fields}
 
     def plot(self) -> Figure:
-        """Residual before and after, over time, velocity and position. Needs the extra ``plot``."""
-        from vpm.plot import plot_pictures
+        """Residual before and after, over time, velocity and position. Needs the extra ``plot``.
 
-        return plot_pictures(self.pictures)
+        Where no efforts follow from a motion: what was measured, and what an observer makes of the model.
+        """
+        from vpm.plot import plot_pictures
+        from vpm.plot.findings import plot_traces
+
+        return plot_pictures(self.pictures) if self.pictures or not self.traces else plot_traces(self.traces)
 
 
 def _gap(gap: ChannelGap) -> dict[str, object]:

@@ -45,18 +45,18 @@ class Joints:
     worst: str
 
     @classmethod
-    def of(cls, gap: Mapping[str, ChannelGap], left: Structure, observed: Mapping[str, float]) -> Joints:
-        """From the residual and what is left of it, and the error of an observer of a joint, see `Search.left`."""
+    def of(cls, gap: Mapping[str, ChannelGap], left: Structure | None, tracked: Mapping[str, float]) -> Joints:
+        """From the residual, what is left of it, and what a tracker leaves of each joint, see `Search.left`."""
         efforts = {channel.rpartition(".")[0]: g for channel, g in gap.items() if _is_effort(channel, g)}
         efforts = {joint: g for joint, g in efforts.items() if _is_clear(g.recalibrated, g)}
         shares = {
-            joint: min((g.after / g.recalibrated) ** 2, observed.get(joint, np.inf)) for joint, g in efforts.items()
+            joint: min((g.after / g.recalibrated) ** 2, tracked.get(joint, np.inf)) for joint, g in efforts.items()
         }
         most = {joint: share for joint, share in shares.items() if share > MOSTLY_OPEN}
         still = {
             joint: share
             for joint, share in most.items()
-            if left.present and _is_clear(efforts[joint].after, efforts[joint])
+            if left is not None and left.present and _is_clear(efforts[joint].after, efforts[joint])
         }
         worst = max(
             efforts, key=lambda joint: efforts[joint].recalibrated / max(efforts[joint].signal, TINY), default=""

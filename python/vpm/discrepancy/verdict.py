@@ -46,33 +46,34 @@ def _above(main: list[ChannelGap]) -> float:
 
 
 def verdict(
-    data: Data,
+    data: Data | None,
     nominal: Judged,
     recalibrated: Judged,
     found: Search,
     gap: dict[str, ChannelGap],
-    left: Structure,
+    left: Structure | None,
     rest: Remainder | None,
 ) -> tuple[str, str, bool]:
     """Verdict, summary, and whether something is left that should be described.
 
     Parameters
     ----------
-    data : Data
+    data : Data or None
+        None where no efforts can be balanced: gaps are those of an observer alone.
     nominal, recalibrated : Judged
     found : Search
     gap : dict of str to ChannelGap
-    left : Structure
-        Of the residual with the accepted effects.
+    left : Structure or None
+        Of the residual with the accepted effects; None without efforts.
     rest : Remainder or None
         None where nothing was found and what is left is negligible.
     """
     main = main_gaps(gap)
     beside = [g for g in gap.values() if g.mode == OBSERVED]
     still = [g for g in beside if not _is_nothing(g) and _above([g]) > FLOOR_FACTOR]
-    above, small = _above(main + still), is_negligible(gap)
+    above, small = _above(main + still or beside), is_negligible(gap)
     # A channel far above its noise that is nothing beside its signal says nothing of one that is not.
-    structured = left.present and _above([g for g in main if not _is_nothing(g)]) > FLOOR_FACTOR
+    structured = left is not None and left.present and _above([g for g in main if not _is_nothing(g)]) > FLOOR_FACTOR
     remaining = structured or (rest is not None and rest.repeats and not small) or bool(still)
     remaining = remaining and not found.within_laws
     worst = max(beside if beside and _is_unmeasured(found, data) else main + beside, key=_clear_of_noise)
@@ -87,14 +88,14 @@ def verdict(
             f"{names}, {_farthest(away)}. Error on validation data: {numbers}, {_percent(worst.after, worst)} after.",
             True,
         )
-    observed = min(found.left.values(), default=np.nan)
+    tracked = min(found.left.values(), default=np.nan)
     mostly_open = (structured and share_left > MOSTLY_OPEN) or _is_described_better(rest)
     joints = Joints.of(gap, left, found.left)
     apart = joints.differ and not any(joints.has(entry, found.final.model) for entry in found.accepted)
     if found.accepted and (
-        _is_spoiled(found, gap, observed) or (not apart and not _is_explanation(found, observed, mostly_open))
+        _is_spoiled(found, gap, tracked) or (not apart and not _is_explanation(found, tracked, mostly_open))
     ):
-        leave = f"leave {100.0 * (observed if observed >= 1.0 else share_left):.0f} % of its mean square"
+        leave = f"leave {100.0 * (tracked if tracked >= 1.0 else share_left):.0f} % of its mean square"
         return (
             "unexplained",
             f"The residual is structured and {above:.2g} times the noise floor. The effects of the catalogue that come "
@@ -124,23 +125,23 @@ def _is_worse_than_none(gap: ChannelGap) -> bool:
     return gap.recalibrated < gap.signal < gap.after
 
 
-def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], observed: float) -> bool:
+def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], tracked: float) -> bool:
     """Whether named effects leave most of a measured effort where they act, or more than a model without any force.
 
     No noise excuses that: the floor of a drive that gives next to nothing is as large as its effort. A backlash is hard
-    to balance: where little is left of what an observer sees, that says more.
+    to balance: where little is left of what a tracker sees, that says more.
     """
-    if observed <= MOSTLY_OPEN and any(effect.type.has_play for effect in found.final.model.effects):
+    if tracked <= MOSTLY_OPEN and any(effect.type.has_play for effect in found.final.model.effects):
         return False
     efforts = [gap[channel] for joint in _joints(found) if (channel := f"{joint}.effort") in gap]
     most = any(g.after**2 > MOST_OF_IT * g.signal**2 for g in efforts)
     return most or any(map(_is_worse_than_none, main_gaps(gap)))
 
 
-def _is_unmeasured(found: Search, data: Data) -> bool:
+def _is_unmeasured(found: Search, data: Data | None) -> bool:
     """Whether all that was named acts at joints that the residual does not see."""
     at = _joints(found)
-    return bool(at) and not at & {*data.training.joints, ""}
+    return data is not None and bool(at) and not at & {*data.training.joints, ""}
 
 
 def _joints(found: Search) -> set[str]:
@@ -159,17 +160,17 @@ def _is_described_better(rest: Remainder | None) -> bool:
     return rest is not None and (rest.open > MOSTLY_OPEN or rest.instead)
 
 
-def _is_explanation(found: Search, observed: float, mostly_open: bool) -> bool:
+def _is_explanation(found: Search, tracked: float, mostly_open: bool) -> bool:
     """Whether what was found explains the gap, where the residual is said to leave it mostly open or not.
 
-    The error of an observer along validation records decides where it is clear. Effects that leave little in the
-    channel ``observed`` best are the explanation there; those that leave more than there was are none.
+    The share ``tracked`` of the error power that a tracker has left, of the joint that is explained best, decides where
+    it is clear. Effects that leave little there are the explanation; those that leave more than there was are none.
     """
     if found.within_laws:
         return True
-    if np.isnan(observed):
+    if np.isnan(tracked):
         return _shown_by_predictions(found) or not mostly_open
-    return observed <= MOSTLY_OPEN or (observed < 1.0 and not mostly_open)
+    return tracked <= MOSTLY_OPEN or (tracked < 1.0 and not mostly_open)
 
 
 def _farthest(away: Mapping[str, float]) -> str:
@@ -189,7 +190,7 @@ def _shown_by_predictions(found: Search) -> bool:
 
 
 def _nothing_missing(
-    data: Data,
+    data: Data | None,
     nominal: Judged,
     recalibrated: Judged,
     both: tuple[list[ChannelGap], list[ChannelGap]],
@@ -197,10 +198,9 @@ def _nothing_missing(
 ) -> tuple[str, str]:
     """Of gaps of the residual, and of an observer of joints that it does not see."""
     (main, beside), numbers = both, _stages(worst)
-    small = max(g.before / g.signal if g.signal > 0.0 else 0.0 for g in main) <= NEGLIGIBLE
+    small = max((g.before / g.signal if g.signal > 0.0 else 0.0 for g in main), default=0.0) <= NEGLIGIBLE
     agrees = small or max((g.before / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main) <= FLOOR_FACTOR
-    better = gain(nominal.validation, recalibrated.validation, segments(data.validation))
-    balanced = not agrees and better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL))
+    balanced = data is not None and not agrees and _is_better(nominal, recalibrated, data)
     if balanced or any(_was_closed(g) for g in beside):
         closed = max(main + beside, key=_closed)
         if _closed(worst) < 0.0 < _closed(closed):
@@ -211,6 +211,12 @@ def _nothing_missing(
             f"Error on validation data: {numbers}.",
         )
     return "no_disagreement", f"The nominal model agrees with the data. Error on validation data: {numbers}."
+
+
+def _is_better(nominal: Judged, recalibrated: Judged, data: Data) -> bool:
+    """Whether other values of the known parameters surely lower the residual of the validation records."""
+    better = gain(nominal.validation, recalibrated.validation, segments(data.validation))
+    return better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL))
 
 
 def _was_closed(gap: ChannelGap) -> bool:

@@ -60,7 +60,7 @@ class Excitation(Result):
 
     @property
     def time_step(self) -> float:
-        """Time between samples, s."""
+        """Time between samples of an excitation, s."""
         return float(self.time[-1] - self.time[0]) / (self.time.size - 1)
 
     def __len__(self) -> int:
@@ -76,7 +76,7 @@ class Excitation(Result):
         return self.data[:, self.channels.index(channel)]
 
     def unit(self, channel: str) -> str:
-        """Unit of a channel."""
+        """Unit of a channel of an excitation."""
         return self.units[self.channels.index(channel)] if channel in self.channels else str(self[channel])
 
     def crest_factor(self, channel: str) -> float:

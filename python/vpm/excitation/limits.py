@@ -12,7 +12,7 @@ from vpm.results import Storable
 
 @dataclass(frozen=True, repr=False, eq=False)
 class JointLimits(Storable):
-    """Limits of a joint.
+    """Limits of a joint that an excitation keeps.
 
     Attributes
     ----------

@@ -106,7 +106,7 @@ class Campaign(Result, Sequence[Experiment]):
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Names of the records."""
+        """Names of the records of a campaign."""
         return tuple(record.name for record in self.experiments)
 
     @property

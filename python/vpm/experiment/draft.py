@@ -31,7 +31,7 @@ TIME_COLUMNS = ("time", "time_s", "t")
 
 @dataclass
 class Draft:
-    """A record under construction."""
+    """A record while it is read: columns, units, delays, clocks and history."""
 
     source: Source
     time: Array

@@ -37,7 +37,7 @@ SMOOTH_QUANTITIES = ("position", "velocity", "acceleration")
 
 @dataclass(frozen=True)
 class Source:
-    """Where numbers came from, for the words of an error.
+    """File or record that numbers came from, so that an error can name file and line.
 
     Attributes
     ----------
@@ -54,7 +54,7 @@ class Source:
     path: str | None = None
 
     def at(self, sample: int) -> str:
-        """Place of a sample in words."""
+        """Place of a sample in its file, in words, such as ``log.csv, line 12``."""
         if self.lines is None:
             return f"{self.name}, sample {sample}"
         return f"{self.name}, line {self.lines[sample]}"

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 
 class Parts(NamedTuple):
-    """What an `Experiment` is made of."""
+    """Name, time, data, channels and history of an `Experiment` that is about to be made."""
 
     name: str
     time: Array

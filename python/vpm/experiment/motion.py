@@ -35,7 +35,7 @@ NO_INSTRUMENT = 1e-9
 
 
 class Machine(Protocol):
-    """What is asked of a model: its name, its joints in the order of its coordinates, and its inputs."""
+    """What `motion` asks of a model: its name, its joints in the order of its coordinates, and its inputs."""
 
     @property
     def name(self) -> str:
@@ -51,7 +51,7 @@ class Machine(Protocol):
 
     @property
     def optional_inputs(self) -> Collection[str]:
-        """Those of them that are zero where the log does not hold them."""
+        """Input channels that are zero where the log does not hold them."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -94,7 +94,7 @@ class Motion(Result):
     notes: tuple[str, ...]
 
     def held_as(self, hold: str) -> Motion:
-        """The same of inputs that do this between samples, see `vpm.Setup`: each is its mean until the next sample.
+        """The motion with inputs of another hold, see `vpm.Setup`: each is its mean until the next sample.
 
         Held inputs are that already. A cubic lies off the straight line by a twelfth of what its slopes differ by.
         """
@@ -109,7 +109,7 @@ class Motion(Result):
 
     @property
     def kept(self) -> slice:
-        """Samples between the two ends."""
+        """Samples of a motion between its two ends."""
         return slice(self.edge, self.time.size - self.edge)
 
     @property
@@ -180,7 +180,7 @@ def motion(
     measured: Collection[str] = (),
     band: float | None = None,
 ) -> Motion:
-    """What inverse dynamics needs from a log.
+    """Filtered positions, velocities, accelerations and inputs of a log, as inverse dynamics needs them.
 
     Positions pass a zero-phase Butterworth filter of order 4 and two central differences, the customary preparation
     for inverse dynamic identification (M. Gautier, "Dynamic identification of robots with power model", ICRA 1997).

@@ -264,7 +264,7 @@ class Experiment(Result):
 
     @property
     def rate(self) -> float:
-        """Samples per second, Hz."""
+        """Samples of a record per second, Hz."""
         return 1.0 / self.dt
 
     @property

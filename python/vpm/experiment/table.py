@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of a file.
+    """Columns of a text file of numbers.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ def read_header(path: str | PathLike[str]) -> Dialect:
 
 
 def read_table(path: str | PathLike[str], dialect: Dialect, wanted: Sequence[str]) -> Table:
-    """Read columns of numbers.
+    """Read columns of numbers of a text file.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ from vpm.identify.comparison import FIT_MODES, problem
 from vpm.identify.estimation import Estimate, Worth, estimate
 from vpm.identify.export import write_fit
 from vpm.identify.fit import identify
-from vpm.identify.fitted import Fit
+from vpm.identify.fit_result import Fit
 from vpm.identify.identifiability import Combination, unseen_combinations
 from vpm.identify.inertial import identify_inertial
 from vpm.identify.inertial_fit import InertialFit

@@ -37,7 +37,7 @@ IN_PLAY = 5e-4
 
 @dataclass(frozen=True)
 class Response:
-    """What shows along one record, between the two ends where its filter settles, or where it is compared.
+    """Efforts required and applied and other outputs along one record, with their derivatives.
 
     Attributes
     ----------
@@ -64,12 +64,12 @@ def has_own_drives(model: Model) -> bool:
 
 
 def bends(model: Model) -> bool:
-    """Whether any of its links is elastic."""
+    """Whether any link of a model is elastic."""
     return bool(model.core.n_elastic)
 
 
 def has_hidden(model: Model, joints: Sequence[str]) -> bool:
-    """Whether it moves in ways beside the measured ``joints``: elastic links, or joints that nobody measures."""
+    """Whether a model moves in ways beside the measured ``joints``: elastic links, or joints that nobody measures."""
     return bends(model) or tuple(model.joints) != tuple(joints)
 
 
@@ -184,7 +184,7 @@ def respond(
 
 @dataclass(frozen=True)
 class Asked:
-    """What is asked of a machine along one record, as `respond` has it."""
+    """Model, parameters and record of which `respond` works out efforts and derivatives."""
 
     model: Model
     theta: Array
@@ -275,7 +275,7 @@ def bending_of(model: Model, joints: tuple[str, ...], known: Following, *, wound
 
 
 def _of_laws(ask: Asked, laws: Model, shell: Part, theta: Array, columns: Sequence[int]) -> Pair:
-    """What a rigid machine needs more than the one that lacks the laws of its joints, and the derivative."""
+    """Efforts of the laws of joints of a rigid machine (n, joints), and their derivative."""
     efforts, slopes = _required(laws, ask.m, theta, columns)
     names = [laws.parameter_names[column] for column in columns]
     common = [place for place, name in enumerate(names) if name in shell.model.parameter_names]

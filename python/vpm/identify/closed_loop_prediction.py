@@ -106,7 +106,7 @@ def _own(model: Model, data: InverseDynamicsProblem, how: OwnSimulation, random:
 
 
 def _pushes(model: Model) -> bool | None:
-    """Whether commands push, or move as those of valves of cylinders do; None where there are drives of both kinds."""
+    """Whether commands push as efforts do, or move as openings of valves do; None where drives are of both kinds."""
     kinds = {model.actuator_type(name) != "hydraulic" for name in model.actuators}
     return kinds.pop() if len(kinds) == 1 else None
 
@@ -196,7 +196,7 @@ def _mass_matrix(model: Model, m: Motion) -> Array:
 
 
 def _middle(model: Model, m: Motion) -> tuple[list[int], Array]:
-    """Which of the joints were measured, and the middle of the motion of all; others stand at zero."""
+    """Numbers of the measured joints, and the middle of the motion of all joints; others stand at zero."""
     places, position = [model.joints.index(joint) for joint in m.joints], np.zeros(len(model.joints))
     position[places] = np.mean(m.position, axis=0)
     return places, position

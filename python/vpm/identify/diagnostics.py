@@ -15,7 +15,7 @@ from vpm.identify.settings import Checks
 from vpm.model import Model
 
 if TYPE_CHECKING:
-    from vpm.identify.fitted import Fit
+    from vpm.identify.fit_result import Fit
 
 Array = NDArray[np.float64]
 
@@ -65,7 +65,7 @@ def remarks(
     others: int = 0,
     reasons: Mapping[str, str] | None = None,
 ) -> list[str]:
-    """Sentences about parameters.
+    """Warnings about the parameters of a fit, as sentences.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ SLOPE_STEP = 2e-3
 
 
 def picked(model: Model, outputs: Array, jacobian: Array, rows: slice, channels: Sequence[str]) -> tuple[Array, Array]:
-    """Some outputs with their derivative; of what a machine lacks, nothing shows."""
+    """Some outputs and their derivative, by the names of channels; zero for those that a machine lacks."""
     known = [column for column, channel in enumerate(channels) if channel in model.output_channels]
     places = [model.output_channels.index(channels[column]) for column in known]
     kept, slopes = outputs[rows], jacobian[rows]
@@ -67,7 +67,7 @@ def _thinned(m: Motion, every: int) -> Motion:
 
 
 def _between(slopes: Array, every: int, samples: int) -> Array:
-    """Derivatives at all samples from those at every so many."""
+    """Derivatives at all samples by cubic splines through those at every so many."""
     from scipy.interpolate import CubicSpline
 
     grid = every * np.arange(len(slopes))
@@ -105,7 +105,7 @@ def driven(
 
 
 def _measured_states(model: Model, experiment: Experiment) -> tuple[list[int], Array]:
-    """Which states of drives the log holds, and their values: currents, and both pressures of a cylinder or none."""
+    """Numbers and values of states of drives that the log holds: currents, and both pressures of a cylinder or none."""
     places: list[int] = []
     columns: list[Array] = []
     for place, name in enumerate(model.internal_names):

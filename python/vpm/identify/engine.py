@@ -126,14 +126,14 @@ def _weighs_later(fitting: Fitting) -> bool:
 
 
 def _plain(fitting: Fitting) -> Fitting:
-    """The same search with squares of residuals over the spread of their channel."""
+    """Settings of a fit with the squares of residuals over the spread of their channel as its cost."""
     return replace(fitting, loss="squares", noise="spread", priors=False, noise_levels={})
 
 
 def _search(
     objective: Objective, begun: Sequence[Array], fitting: Fitting, tolerance: float
 ) -> tuple[list[Descent], bool]:
-    """Descents that have a point, and whether Ctrl-C ended them."""
+    """Descents from all starts, side by side on threads, and whether Ctrl-C ended them."""
     jobs = [partial(_descent, objective, x, fitting, tolerance) for x in begun]
     found, interrupted = until_interrupted(jobs, worker_count(fitting.workers or None))
     return [descent for descent in found if descent is not None], interrupted
@@ -147,7 +147,7 @@ def _search_elsewhere(
     executor: Executor | Callable[[], Executor],
     progress: Progress | None,
 ) -> tuple[list[Descent], bool]:
-    """The same by an executor; a start whose worker died again and again is told, and left out."""
+    """Descents from all starts by an executor; a start whose worker died again and again is told, and left out."""
     shared = Parcel.of(objective)
 
     def heard(ended: Sequence[Done[int]]) -> None:

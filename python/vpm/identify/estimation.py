@@ -140,7 +140,7 @@ def estimate(
 
 
 def standing(model: Model, data: Problem, free: Sequence[str]) -> Estimate:
-    """What is said of ``free`` parameters where they stand: residual, derivatives and uncertainty, nothing moved."""
+    """Estimate of ``free`` parameters at the values they have: residual, derivatives and uncertainty, nothing moved."""
     columns = [model.index(name) for name in free]
     residual, jacobian = data.evaluate(model, model.theta, columns)
     unseen = unseen_combinations(jacobian, free)
@@ -150,7 +150,7 @@ def standing(model: Model, data: Problem, free: Sequence[str]) -> Estimate:
 
 @dataclass(frozen=True)
 class Worth:
-    """What a fit has to reach to be worth its time.
+    """Sum of squares that a fit has to reach within so many evaluations to be worth its time.
 
     Attributes
     ----------
@@ -164,11 +164,11 @@ class Worth:
     evaluations: int
 
     def lost(self, reached: Sequence[float]) -> bool:
-        """Whether least sums of squares after each evaluation say that a fit is not, and will not be."""
+        """Whether the sums of squares of a fit have not come down to its goal, and hardly come nearer."""
         return reached[-1] > self.cost and self._hardly_nearer(reached, PROGRESS)
 
     def creeps(self, reached: Sequence[float]) -> bool:
-        """Whether they say that what is left to gain decides nothing; who takes the result fits it to the end."""
+        """Whether the sums of squares of a fit still fall, but by so little that it decides nothing."""
         return self._hardly_nearer(reached, CREEPING)
 
     def _hardly_nearer(self, reached: Sequence[float], progress: float) -> bool:
@@ -177,7 +177,7 @@ class Worth:
 
 
 class _HopelessError(Exception):
-    """A fit has not reached what makes it worth its time."""
+    """A fit ended early, because it has not reached what makes it worth its time."""
 
 
 @dataclass(frozen=True)
@@ -283,7 +283,7 @@ def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Ar
 
 
 def _nearest(counter: _Counter, found: Array, start: Array, low: Array, high: Array) -> Array:
-    """The same sum of squares as near to the start as possible: along unseen directions a descent may go anywhere.
+    """Fitted values moved back to the start along directions that the data do not see, with the same sum of squares.
 
     Parameters stay where they were if that makes a machine, else the coordinates do.
     """

@@ -10,7 +10,7 @@ from pathlib import Path
 from vpm.errors import MissingExtraError
 from vpm.experiment import Experiment
 from vpm.files import make_folder, replacing, write_text
-from vpm.identify.fitted import Fit
+from vpm.identify.fit_result import Fit
 from vpm.identify.intervals import Bootstrap, Profile, bootstrap, profile_intervals
 from vpm.identify.problem import Gaps
 
@@ -18,7 +18,7 @@ _COLUMNS = ("name", "start", "value", "std", "low", "high", "unit")
 
 
 def told(fit: Fit) -> list[str]:
-    """Values with their deviations, first states, offsets, agreement of starts, noise, warnings, gaps, a line each."""
+    """Lines that tell a fit: values with deviations, first states, offsets, agreement of starts, noise, warnings."""
     lines = [_line(*row) for row in zip(fit.names, fit.values, fit.std, fit.units, strict=True)]
     lines += [_line(label, value, fit.states_std[label], "first state") for label, value in fit.states.items()]
     lines += [_line(label, value, fit.offsets_std[label], "offset") for label, value in fit.offsets.items()]
@@ -66,7 +66,7 @@ def intervals(
 
 
 def told_intervals(found: Sequence[Profile | Bootstrap]) -> list[str]:
-    """Intervals, a line each."""
+    """Lines that tell profile and bootstrap intervals of a fit, one each."""
     lines = []
     for one in found:
         if isinstance(one, Profile):

@@ -64,7 +64,7 @@ class BegunAnywhere:
     _space: Array | None = None
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
-        """See `vpm.identify.problem.Problem`."""
+        """Residual and derivative beside unknown first states; see `vpm.identify.problem.Problem`."""
         raise NotImplementedError
 
     def open_states(self, model: Model) -> tuple[Array, int]:
@@ -72,26 +72,26 @@ class BegunAnywhere:
         raise NotImplementedError
 
     def begun(self, departures: Array | None) -> Self:
-        """The same from other first states, which are taken for known."""
+        """The problem with other first states, which are taken for known."""
         return self.changed(departures=departures, _space=None)
 
     def beside(self, slopes: Array) -> Self:
-        """The same beside unknown first states, by which the residual has these slopes (n, k)."""
+        """The problem beside unknown first states, by which the residual has these slopes (n, k)."""
         return self.changed(_space=basis(slopes) if slopes.shape[1] else None)
 
     def changed(self, **attributes: object) -> Self:
-        """A copy with other attributes."""
+        """A copy of the problem with other attributes."""
         same = copy(self)
         vars(same).update(attributes)
         return same
 
     @property
     def unknown(self) -> int:
-        """Unknown first states that show."""
+        """Number of unknown first states that the residual shows."""
         return 0 if self._space is None else self._space.shape[1]
 
     def _left(self, values: Array) -> Array:
-        """What no first states explain of a residual (n,) or its derivative (n, columns)."""
+        """Residual (n,) or its derivative (n, columns) without what first states explain of it."""
         if self._space is None or not np.all(np.isfinite(values)):
             return values
         return np.asarray(values - self._space @ (self._space.T @ values))
@@ -134,7 +134,7 @@ def begun_likeliest(model: Model, data: AnyBegun) -> AnyBegun:
 
 
 def begun_again(model: Model, data: AnyBegun) -> AnyBegun:
-    """The same for other records, if it is beside unknown first states: what filters do to the ends is in these."""
+    """The problem with the likeliest first states of its records, if it is beside unknown ones; else as it is."""
     return begun_likeliest(model, data) if data.unknown else data
 
 
@@ -169,7 +169,7 @@ def _early(data: BegunAnywhere, share: float) -> Rows:
 
 
 def _solved(slopes: Array, residual: Array) -> Array:
-    """Least squares along directions that show."""
+    """Least-squares solution along the directions that the data show."""
     lengths = np.linalg.norm(slopes, axis=0)
     lengths[lengths == 0.0] = 1.0
     return np.asarray(np.linalg.lstsq(slopes / lengths, residual, rcond=DEPENDENT)[0] / lengths)

@@ -17,7 +17,7 @@ from vpm.identify.comparison import comparison
 from vpm.identify.diagnostics import constant_channels, contradictions, lost_channels, remarks, resting
 from vpm.identify.engine import Found, fit_problem
 from vpm.identify.estimation import Estimate, Progress, blinded, estimate, limits
-from vpm.identify.fitted import Fit, fit_of
+from vpm.identify.fit_result import Fit, fit_of
 from vpm.identify.identifiability import column_lengths
 from vpm.identify.missing import missing_effects, whiteness
 from vpm.identify.moments import on_the_border
@@ -135,7 +135,7 @@ def identify(
 
 
 def _names(model: Model, free: Sequence[str] | None) -> tuple[str, ...]:
-    """What is to be fitted."""
+    """Names of the parameters to fit: those of ``free=``, or all that the model file leaves open."""
     names = tuple(free) if free is not None else model.adjustable
     if not names:
         raise IdentificationError(
@@ -181,7 +181,7 @@ def _by_engine(
 def _dressed(
     model: Model, data: Problem, found: Estimate, before: Array, records: Sequence[str], ties: Mapping[str, str]
 ) -> Fit:
-    """An estimate as a result, with the covariance of a final one."""
+    """Fit result of an estimate, with the covariance of a final one."""
     result = found if isinstance(found, Found) else _with_intervals(data, found)
     fit = fit_of(model, data, replace(result, residual=result.residual + expected(data)), before, records, ties)
     if isinstance(found, Found):
@@ -190,7 +190,7 @@ def _dressed(
 
 
 def _with_intervals(data: Problem, found: Estimate) -> Estimate:
-    """The same with the covariance of a final estimate, which takes longer than that of a search."""
+    """Estimate with the covariance of a final fit, which takes longer than that of a search."""
     covariance = sandwich(found.jacobian, found.residual, record_groups(data.blocks))
     return replace(found, covariance=blinded(covariance, found.unseen, found.names))
 
@@ -204,7 +204,7 @@ def _judged(
     settled: bool,
     own: Own | None,
 ) -> Fit:
-    """The same with how white its residual is, and how sure it is beside first states and the noise of the records."""
+    """Fit with the whiteness of its residual, and deviations that know of first states and noise of the records."""
     off = expected(data)
     fit = replace(fit, expected=off if isinstance(off, np.ndarray) else np.zeros(0))
     fit = replace(fit, whiteness=whiteness(fit.model, records, data, found.residual, found.jacobian, checks))

@@ -51,7 +51,7 @@ class Answer:
 
     @property
     def numbers(self) -> int:
-        """How many numbers it holds."""
+        """How many numbers a remembered answer holds."""
         return self.values.size * (1 + len(self.slopes))
 
 
@@ -85,7 +85,7 @@ class Memo:
             return self._answers.get(key)
 
     def once(self, key: Hashable, build: Callable[[], Built]) -> Built:
-        """What holds whatever the values are, such as a part, built when it is asked for first."""
+        """Object that does not depend on parameter values, such as a part, built when it is asked for first."""
         with self._lock:
             if key in self._built:
                 return self._built[key]  # type: ignore[return-value]
@@ -201,13 +201,13 @@ class Following:
             self.memo.keep(self._key(other, values[other.places], more), Answer(known.values, slopes))
 
     def _key(self, part: Part, values: Array, more: Hashable) -> Hashable:
-        """What an answer depends on, for the values of its part."""
+        """Key under which the answer of a part is remembered: record, structure and parameter values."""
         return self.record, part.model.structure, values[part.felt].tobytes(), more
 
 
 @dataclass(frozen=True)
 class Hold:
-    """What holds links along one record.
+    """Strain gauges that hold the flexible links of a machine along one record: rates and gains.
 
     Attributes
     ----------
@@ -275,7 +275,7 @@ def gauge_gains(model: Model, experiments: Sequence[Experiment], position: Array
 
 
 def hold_of(gains: dict[str, float], experiment: Experiment, m: Motion) -> Hold | None:
-    """What holds links along one record; None where no gauge does."""
+    """Measured rates and gains of the gauges that hold links along one record; None where no gauge does."""
     if not gains:
         return None
     strains = np.column_stack([experiment[f"{name}.strain"] for name in gains])

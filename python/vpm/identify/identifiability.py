@@ -135,7 +135,7 @@ def closest_column(column: Array, others: Array) -> int:
 
 
 def _combination(direction: Array, lengths: Array, names: Sequence[str], value: float) -> Combination:
-    """Who takes part is judged on the scaled columns, which know no units; the weights are in the parameters' units."""
+    """Combination of parameters along a direction (n,) of the scaled derivatives, weights in the parameters' units."""
     share = np.abs(direction) / np.max(np.abs(direction))
     order = [int(i) for i in np.argsort(-share) if share[i] > 1e-3]
     weights = direction / lengths
@@ -165,7 +165,7 @@ class Base:
 
     @property
     def rank(self) -> int:
-        """Number of independent columns."""
+        """Number of independent columns of a regressor."""
         return len(self.kept)
 
     @property

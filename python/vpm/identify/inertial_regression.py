@@ -108,7 +108,7 @@ class InertialRegression(Storable):
 
     @property
     def slices(self) -> tuple[slice, ...]:
-        """Samples of each record."""
+        """Rows of the regression that are the samples of each record."""
         ends = np.cumsum(self.records)
         return tuple(slice(int(end) - count, int(end)) for end, count in zip(ends, self.records, strict=True))
 

@@ -26,7 +26,7 @@ from vpm.numbers import NORMAL_95
 from vpm.results import Result
 
 if TYPE_CHECKING:
-    from vpm.identify.fitted import Fit
+    from vpm.identify.fit_result import Fit
 
 Array = NDArray[np.float64]
 
@@ -152,7 +152,7 @@ def profile_intervals(
 
 
 def _profile(fit: Fit, objective: Objective, at: Point, bread: Array, place: int) -> Profile:
-    """Both ends; the square root of the growth of the cost is nearly linear, so secants find them in a few steps."""
+    """Profile likelihood of one parameter: both ends of its interval, and the costs on the way."""
     slope = objective.slopes(at.x)[place]
     spread = float(fit.std[place] / slope)
     growth = NORMAL_95**2 * spread**2 / bread[place, place]
@@ -256,7 +256,7 @@ def _piece(residual: Array, blocks: Sequence[Block]) -> int:
 def _drawn(
     blocks: Sequence[Block], records: Sequence[str], length: int, rows: int, random: np.random.Generator
 ) -> Array:
-    """How often each row is drawn; rows beside the records, gaps and priors, once."""
+    """Weights of a block bootstrap: how often each row of the residual is drawn; gaps and priors count once."""
     weights = np.ones(rows)
     whole = random.multinomial(len(records), np.full(len(records), 1.0 / len(records)))
     for place, record in enumerate(records):
@@ -291,7 +291,7 @@ def _replicate(objective: Objective, at: Point, weights: Array, refit: bool) -> 
 
 
 def _again(fit: Fit, experiments: Experiment | Sequence[Experiment], cutoff: float | None) -> tuple[Objective, Point]:
-    """The objective of a fit and the point where it ended."""
+    """Objective of an earlier fit and the point where it ended, for its intervals."""
     from vpm.identify.comparison import comparison
 
     records = as_records(experiments)

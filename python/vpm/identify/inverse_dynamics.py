@@ -114,7 +114,7 @@ class InverseDynamicsProblem(BegunAnywhere):
         )
 
     def on(self, experiments: Sequence[Experiment]) -> InverseDynamicsProblem:
-        """The same of other records of the same lengths, filtered, counted and weighed as these are."""
+        """The problem on other records of the same lengths, filtered, counted and weighed as these are."""
         motions = self._motions(experiments, [m.cutoff for m in self.motions])
         pairs = list(zip(motions, experiments, strict=True))
         return self.changed(
@@ -127,11 +127,11 @@ class InverseDynamicsProblem(BegunAnywhere):
         )
 
     def less(self, expected: Array) -> InverseDynamicsProblem:
-        """The same, less what is left of it at the true values, shape (n,)."""
+        """The problem less the residual ``expected`` at the true values, shape (n,)."""
         return self.changed(expected=expected)
 
     def side_by_side(self, workers: int) -> InverseDynamicsProblem:
-        """The same, which works on so many records at a time."""
+        """The problem worked out by ``workers`` threads, a record each."""
         return self.changed(workers=workers)
 
     @property
@@ -158,7 +158,7 @@ class InverseDynamicsProblem(BegunAnywhere):
                 self._known = (*self._known[:record], quick, *self._known[record + 1 :])
 
     def later(self) -> InverseDynamicsProblem:
-        """The same, but for commands, each of which holds from the sample after its own on."""
+        """The problem with commands one sample later: each holds from the sample after its own on."""
         moved = tuple(replace(m, inputs=np.concatenate([m.inputs[:1], m.inputs[:-1]])) for m in self._whole)
         # What drives answered to commands at their own times is no answer to these; what the motion needs is.
         return self.changed(_whole=moved, _known=tuple(replace(known, commands=1) for known in self._known))
@@ -200,12 +200,12 @@ class InverseDynamicsProblem(BegunAnywhere):
         )
 
     def begun(self, departures: Array | None) -> Self:
-        """See :class:`BegunAnywhere`; by coordinates, then rates."""
+        """The problem with other first states, coordinates, then rates; see :class:`BegunAnywhere`."""
         known = self._held(self.experiments, self.motions, self.integrators, departures)
         return super().begun(departures).changed(_known=known)
 
     def open_states(self, model: Model) -> tuple[Array, int]:
-        """Of joints that nobody measures, and of links that no gauge holds; see :class:`BegunAnywhere`."""
+        """Sizes of unknown first states of unmeasured joints and links without gauges; see :class:`BegunAnywhere`."""
         coordinates, joints = len(model.coordinates), self.motions[0].joints
         free = np.array([joint not in joints for joint in model.joints] + [not self._gains] * model.core.n_elastic)
         sizes = np.zeros(2 * coordinates)
@@ -220,7 +220,7 @@ class InverseDynamicsProblem(BegunAnywhere):
         return guided(model, model.theta, self._whole[record], (), self._known[record])[1]
 
     def bending(self, model: Model) -> Bending | None:
-        """What of a machine bends, or flies, along these records; see `vpm.identify.parts.bending`."""
+        """Split of a machine into parts that bend or fly along these records; see `vpm.identify.parts.bending`."""
         return bending_of(model, self.motions[0].joints, self._known[0])
 
     def share(self, whole: Model, others: Sequence[tuple[Model, Sequence[str]]]) -> None:
@@ -236,7 +236,7 @@ class InverseDynamicsProblem(BegunAnywhere):
             known.share((source.bare, whole.theta), targets, read)
 
     def added(self, efforts: Sequence[Array]) -> Array:
-        """What efforts add to the residual, filtered and weighed as it is, shape (n, k).
+        """Part of the residual (n, k) that given efforts add, filtered and weighed as it is.
 
         Parameters
         ----------
@@ -266,7 +266,7 @@ class InverseDynamicsProblem(BegunAnywhere):
         origin: Array | None = None,
         known: Following | None = None,
     ) -> Response:
-        """What shows along one record, filtered."""
+        """Filtered efforts and outputs along one record, with derivatives; see `Response`."""
         whole, experiment, known = self._whole[record], self.experiments[record], known or self._known[record]
         return respond(model, theta, whole, experiment, columns, self.shown, known, origin)
 
@@ -322,7 +322,7 @@ class InverseDynamicsProblem(BegunAnywhere):
         return tuple(blocks)
 
     def _sizes(self, model: Model) -> tuple[list[Array], list[Array]]:
-        """For each record the size of each channel, and (n, channels) which samples count.
+        """Size of each channel by record, and the samples (n, channels) that count.
 
         Efforts are as large as what the drives deliver, and of a joint that coasts as what its inertia takes; of other
         channels, such as pressures, it is the spread.
@@ -361,7 +361,7 @@ class InverseDynamicsProblem(BegunAnywhere):
 
 
 def _alike(exact: Response, rough: Response, measured: Array) -> bool:
-    """Whether what drives answer differs by less than `ROUGH` of its size, or of what was measured in its place.
+    """Whether two answers of drives differ by less than `ROUGH` of their size, or of what was measured in their place.
 
     Where something is missing the one may be many times the other, and it is the measured one that is to be explained.
     """
@@ -374,5 +374,5 @@ def _alike(exact: Response, rough: Response, measured: Array) -> bool:
 
 
 def _each(value: float | Sequence[float] | None, records: Sequence[Experiment]) -> Sequence[float | None]:
-    """One value for each record."""
+    """One number for each record, such as a cut-off (Hz); a single one stands for all of them."""
     return [value] * len(records) if value is None or isinstance(value, int | float) else value

@@ -175,7 +175,7 @@ def _of_log(model: Model, record: Experiment, checks: Checks) -> Groups:
 
 
 def _laws(motion: Sequence[Array], efforts: Sequence[Array], checks: Checks) -> list[_Law]:
-    """What one effect each would add: springs, friction, masses, ripple; delays, compliance; backlash, dead zones."""
+    """Efforts (n, k) of single effects: springs, friction, masses, ripple; delays, compliance; backlash, dead zones."""
     sharp = [np.tanh(effort / (SHARPNESS * (float(np.sqrt(np.mean(effort**2))) or 1.0))) for effort in efforts]
     late = [tuple(shifted(effort) for effort in each) for each in (efforts, sharp) if each]
     steady = [*(powers(part) for part in motion), *waves(motion[0], checks.waves, checks.waves_each)]

@@ -86,7 +86,7 @@ class Objective:
         return np.concatenate([np.where(self.log, np.log(safe), theta), self.first if states is None else states])
 
     def parameters(self, x: Array) -> Array:
-        """Free parameters at coordinates."""
+        """Free parameters of a fit at coordinates."""
         mine = x[: len(self.columns)]
         return np.where(self.log, np.exp(np.where(self.log, mine, 0.0)), mine)
 

@@ -83,7 +83,7 @@ class CylinderGeometry(Storable):
 
     @classmethod
     def of(cls, model: _Machine, actuator: str) -> CylinderGeometry:
-        """That of a hydraulic actuator of a model.
+        """Areas, stroke and line volumes of the cylinder of a hydraulic actuator of a model.
 
         Parameters
         ----------
@@ -154,7 +154,7 @@ def pressures_from_force(
 
 @dataclass(frozen=True)
 class Equation:
-    """One balance of oil, and what else may stand in it.
+    """One balance of oil: stored volume, flow, leakage and air.
 
     ``stored/beta - Kv int(flow u) + Ci int(leakage) = c - place``.
 

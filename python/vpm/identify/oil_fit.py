@@ -31,7 +31,7 @@ BOILING = 5e4
 
 @dataclass(frozen=True, repr=False, eq=False)
 class OilFit(Result):
-    """What a record says about oil and valve.
+    """Compliance of the oil and valve gain that a record of one cylinder shows.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class OilFit(Result):
 
     @property
     def std(self) -> Array:
-        """Standard deviations, shape (p,)."""
+        """Standard deviations of the oil's parameters, shape (p,)."""
         return np.sqrt(np.diag(self.covariance))
 
     @property
@@ -79,7 +79,7 @@ class OilFit(Result):
 
     @property
     def bulk_modulus(self) -> float:
-        """Of the oil, Pa; negative where the record says so."""
+        """Bulk modulus of the oil, Pa; negative where the record says so."""
         return 1.0 / self["compliance"]
 
     @property

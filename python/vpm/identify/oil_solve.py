@@ -54,7 +54,7 @@ class Rows:
 
 
 def _columns(equation: Equation, opening: Array, columns: Sequence[str]) -> tuple[list[Array], list[Array]]:
-    """What each unknown stores and what it lets flow, with its sign; zeros where it does not."""
+    """Oil that each unknown stores, and the flow that it lets through; zeros where it does not."""
     zero = np.zeros_like(opening)
     stored = {"compliance": equation.stored, "air": equation.air}
     flows = {"flow_gain": -equation.flow * opening, "leakage": equation.leakage, "offset": -equation.flow}
@@ -105,7 +105,7 @@ def integral_rows(
 def rate_rows(
     equations: Sequence[Equation], opening: Array, columns: Sequence[str], dt: float, cutoff: float | None
 ) -> Rows:
-    """Rows of rates: by central differences, or, with a cut-off frequency, all columns through the same filter."""
+    """Rows of rates of oil balances: by central differences, or all columns through the same filter."""
     count = len(opening)
     edge = 1 if cutoff is None else min(settling_samples(1.0 / dt, cutoff) + 2, count // 4)
     kept = slice(edge, count - edge)
@@ -230,7 +230,7 @@ def unexplained(rows: Rows, values: Array, residual: Array) -> tuple[float, floa
 
 
 def _integral(values: Array, dt: float) -> Array:
-    """Of a sampled function from the first sample on, by the trapezoidal rule."""
+    """Integral of a sampled function from the first sample on, by the trapezoidal rule."""
     total = np.zeros_like(values)
     np.cumsum(0.5 * dt * (values[1:] + values[:-1]), out=total[1:])
     return total

@@ -26,7 +26,7 @@ from vpm.model import Model
 from vpm.simulate import Setup, SimulatedArrays, copied_channels, simulate_arrays, simulated_rows
 
 if TYPE_CHECKING:
-    from vpm.identify.fitted import Fit
+    from vpm.identify.fit_result import Fit
 
 Array = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ class OutputErrorProblem(BegunAnywhere):
 
     @property
     def setup(self) -> Setup:
-        """Integrator, substeps and horizon."""
+        """Integrator, substeps and horizon of the simulations that a fit compares."""
         return self._setup
 
     @property
@@ -88,11 +88,11 @@ class OutputErrorProblem(BegunAnywhere):
         return tuple(block for block in self.blocks if block.channel in self.offsets)
 
     def with_offsets_left(self) -> Self:
-        """The same with these constants in its residual."""
+        """The problem with the constant offsets of sensors left in its residual."""
         return self.changed(offsets=())
 
     def _left(self, values: Array) -> Array:
-        """What neither offsets nor first states explain of a residual (n,) or its derivative (n, columns)."""
+        """Residual (n,) or its derivative (n, columns) without what offsets and first states explain of it."""
         return super()._left(less_means(values, self.offset_blocks))
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
@@ -114,7 +114,7 @@ class OutputErrorProblem(BegunAnywhere):
         return self._left(np.concatenate(residuals)), self._left(np.concatenate(jacobians))
 
     def open_states(self, model: Model) -> tuple[Array, int]:
-        """All states where whole records are simulated, as large as they get; see :class:`BegunAnywhere`.
+        """Sizes of unknown first states: all where whole records are simulated; see :class:`BegunAnywhere`.
 
         Of machines with closed loops none: first states next to one another would leave their loops open.
         """
@@ -245,7 +245,7 @@ def offset_blocks(data: Problem) -> tuple[Block, ...]:
 
 
 def with_offsets(fit: Fit, data: Problem, weights: Array) -> Fit:
-    """The same with offsets and their deviations, from the covariance of parameters, first states and constants.
+    """Fit with offsets of sensors and their deviations, from the covariance of parameters, first states and constants.
 
     Parameters
     ----------

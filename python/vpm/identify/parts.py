@@ -79,12 +79,12 @@ class Drives:
 
 
 def whole(model: Model) -> Part:
-    """The machine as it is."""
+    """The whole machine as a part of itself."""
     return _part(model, model, set(model.parameter_names))
 
 
 def carried(model: Model) -> Part:
-    """All that the effort of a motion may depend on: nothing of cylinders, supplies and controllers.
+    """The machine without cylinders, supplies and controllers: all that the effort of a motion depends on.
 
     Friction that follows a load needs a drive to be read; where that was a cylinder, an idle one stands there.
     """
@@ -225,6 +225,6 @@ def _part(model: Model, alone: Model, felt: Collection[str], within: Model | Non
 
 
 def _places(names: Sequence[str], among: Sequence[str]) -> Indices:
-    """Where names stand among others; that of an idle drive, which stands nowhere and does nothing, is the first."""
+    """Numbers of names in a list; that of an idle drive, which stands nowhere and does nothing, is 0."""
     places = {name: place for place, name in enumerate(among)}
     return np.array([places.get(name, 0) for name in names], dtype=np.int64)

@@ -62,7 +62,7 @@ class PredictionErrorProblem:
         self.blocks = self._lay_out(model)
 
     def renewed(self, model: Model) -> PredictionErrorProblem:
-        """The same with noise and gains of another model."""
+        """The problem with the noise and the gains of another model."""
         given = {"channels": self._channels, "setup": self._setup, "noise": self._stated}
         return PredictionErrorProblem(model, self.experiments, workers=self.workers, **given)  # type: ignore[arg-type]
 

@@ -73,7 +73,7 @@ def segments(problem: Problem) -> list[slice]:
 
 
 def less_means(values: Array, blocks: Sequence[Block]) -> Array:
-    """What constants of some blocks leave of a residual (n,) or its derivative (n, columns).
+    """Residual (n,) or its derivative (n, columns) less the mean of each of some blocks.
 
     The least squares beside constants are those of what is left (R. Frisch and F. Waugh, *Econometrica* 1, 1933;
     variable projection: G. Golub and V. Pereyra, *SIAM J. Numerical Analysis* 10, 1973). Values are zero where a
@@ -93,7 +93,7 @@ def less_means(values: Array, blocks: Sequence[Block]) -> Array:
 
 
 def gaps(problem: Problem, residual: Array) -> Gaps:
-    """Root mean square, its share of the measured signal, and the unit, for each channel over all records."""
+    """Root mean square residual of each channel over all records, its share of the measured signal, and the unit."""
     result = {}
     for channel in dict.fromkeys(block.channel for block in problem.blocks):
         mine = [block for block in problem.blocks if block.channel == channel]

@@ -15,7 +15,7 @@ from vpm.identify.closed_loop_prediction import Noise, Own, noisy, own_residual
 from vpm.identify.comparison import comparison
 from vpm.identify.estimation import Estimate
 from vpm.identify.first_states import BegunAnywhere, begun_likeliest, matters
-from vpm.identify.fitted import Fit
+from vpm.identify.fit_result import Fit
 from vpm.identify.identifiability import RANK_TOLERANCE
 from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.identify.problem import Gaps, Problem, gaps, tied, untied
@@ -57,7 +57,7 @@ def unknown(data: Problem) -> int:
 
 
 def with_first_states(fit: Fit, data: Problem, settled: bool) -> Fit:
-    """The same with what it knows of unknown first states."""
+    """Fit with the unknown first states of its records, as its problem knows them."""
     plain = untied(data)
     if not isinstance(plain, BegunAnywhere) or plain.departures is None:
         return fit
@@ -124,7 +124,7 @@ def beside_own(
 
 
 def with_noise(fit: Fit, data: Problem, jacobian: Array, lengths: Array, noise: Noise, weights: Array) -> Fit:
-    """The same with deviations that know how far the noise of the records moves the estimates.
+    """Fit with deviations that know how far the noise of the records moves the estimates.
 
     Columns of the jacobian are divided by their ``lengths``; rows went into the fit with their ``weights``.
     """
@@ -143,7 +143,7 @@ def with_noise(fit: Fit, data: Problem, jacobian: Array, lengths: Array, noise: 
 
 
 def expected(data: Problem) -> Array | float:
-    """What was taken off the residual."""
+    """Residual (n,) at the true values that was taken off a problem; 0 without one."""
     plain = untied(data)
     return plain.expected if isinstance(plain, InverseDynamicsProblem) else 0.0
 

@@ -79,7 +79,7 @@ class SampleMask:
         ]
 
     def of_channel(self, model: Model, channel: str, record: int, ends: Array) -> Array:
-        """Which samples of a shown channel count: those of a drive not while its joint rests.
+        """Samples of a channel that count: those of a drive not while its joint rests.
 
         What a shut valve encloses drifts with the smallest leak, and whatever load dry friction takes up does not show.
         """
@@ -100,7 +100,7 @@ class SampleMask:
         return busy if busy.mean() >= 0.5 else np.ones_like(busy)
 
     def free(self, model: Model, record: int) -> NDArray[np.bool_]:
-        """Where (n, joints) no piston of one record touches an end, as far as the filters carry the touch."""
+        """Samples (n, joints) at which no piston of a record touches an end, as far as the filters carry the touch."""
         m, experiment = self.motions[record], self.experiments[record]
         away = np.ones((len(m.retained), len(self.joints)), dtype=np.bool_)
         for name, touching in at_stops(model, experiment, m).items():
@@ -129,7 +129,7 @@ def _period(m: Motion) -> int:
 
 
 def _standing(speed: Array, limit: Array, samples: int) -> NDArray[np.bool_]:
-    """Where all speeds within ``samples`` to both sides are below the limit."""
+    """Samples at which all speeds within ``samples`` to both sides are below the limit."""
     return np.asarray(maximum_filter1d(speed, 2 * samples + 1, axis=0) < limit)
 
 

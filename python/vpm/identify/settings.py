@@ -14,7 +14,7 @@ NOISES = ("spread", "estimated", "given")
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Fitting(Storable):
-    """How `vpm.identify` fits; the defaults are those of a fit without it, but for the method of descent.
+    """Settings of `vpm.identify`; the defaults are those of a fit without it, but for the method of descent.
 
     Attributes
     ----------
@@ -113,7 +113,7 @@ class Fitting(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Checks(Storable):
-    """When a fit warns that it may be wrong.
+    """Thresholds at which a fit warns that it may be wrong.
 
     Attributes
     ----------
@@ -149,7 +149,7 @@ class Checks(Storable):
 
 @dataclass(frozen=True)
 class OwnSimulation:
-    """How a fit is compared with simulations of its own model, see `vpm.identify.closed_loop_prediction`.
+    """Settings of the simulations of its own model that a fit is compared with.
 
     Attributes
     ----------

@@ -31,7 +31,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Pieces:
-    """Where the pieces of one record begin (rows), how many samples each has with both ends, and their first states."""
+    """First rows, lengths and first states of the pieces into which multiple shooting cuts one record."""
 
     starts: NDArray[np.int64]
     length: int
@@ -125,11 +125,11 @@ class ShootingProblem(OutputErrorProblem):
 
     @property
     def gap_rows(self) -> int:
-        """Number of gaps at the end of the residual."""
+        """Number of rows at the end of the residual that are gaps between pieces."""
         return sum(len(p.starts) - 1 for p in self.pieces) * len(self._gap_columns)
 
     def open_states(self, model: Model) -> tuple[Array, int]:
-        """None beside those that are fitted."""
+        """Sizes of unknown first states: none, because those of all pieces are fitted."""
         return np.zeros(len(model.state_names)), len(self.experiments)
 
     def evaluate(
@@ -272,7 +272,7 @@ class ShootingProblem(OutputErrorProblem):
         return np.array(sizes)
 
     def _rows(self, record: int) -> NDArray[np.int64]:
-        """See `OutputErrorProblem`."""
+        """Rows of one record at which its pieces begin; see `OutputErrorProblem`."""
         return self.pieces[record].rows
 
 

@@ -23,7 +23,7 @@ MANY = 24
 
 @dataclass(frozen=True)
 class Point:
-    """Where a fit is.
+    """Coordinates of a fit with cost, residual and derivatives there.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Descent:
-    """How a fit went: its last point, the first one's cost, and why it ended."""
+    """Outcome of a least-squares descent: its last point, the first one's cost, and why it ended."""
 
     point: Point
     first_cost: float
@@ -54,13 +54,13 @@ class Descent:
 
     @property
     def interrupted(self) -> bool:
-        """Whether Ctrl-C ended it."""
+        """Whether Ctrl-C ended a descent."""
         return self.ended == "interrupted"
 
 
 @dataclass(frozen=True)
 class Box:
-    """Where a descent may go.
+    """Bounds, scales and largest steps of the coordinates of a descent.
 
     Attributes
     ----------

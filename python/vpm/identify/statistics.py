@@ -213,7 +213,7 @@ def sandwich(jacobian: Array, residual: Array, groups: Sequence[Sequence[slice]]
 
 
 def white_sandwich(jacobian: Array, residual: Array) -> Array:
-    """The same for residuals (n,) that are unequal, but do not know of each other."""
+    """Sandwich covariance for residuals (n,) of unequal size that are independent of each other."""
     bread, scores = _bread_and_scores(jacobian, residual)
     return np.asarray(bread @ (scores.T @ scores) @ bread)
 

@@ -35,7 +35,7 @@ class Tangent:
         self.data, self.origin, self.blocks = data, origin, data.blocks
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
-        """See `vpm.identify.problem.Problem`."""
+        """Residual and derivative of the linearised problem; see `vpm.identify.problem.Problem`."""
         return self.data.evaluate(model, theta, columns, self.origin)
 
 

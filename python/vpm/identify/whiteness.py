@@ -40,7 +40,7 @@ REACH = 3
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Whiteness(Storable):
-    """What is left of one channel of one record after a fit.
+    """Whiteness of the residual of one channel of one record after a fit, and what motion explains of it.
 
     Attributes
     ----------

@@ -38,7 +38,7 @@ def whole_cycles(found: Columns, frequency: float | None) -> tuple[float, int, N
 
 
 def parts(time: Array, rate: float, cycles: int) -> list[NDArray[np.bool_]]:
-    """Samples of each cycle."""
+    """Rows of a record that are the samples of each cycle."""
     at = np.minimum(((time - time[0]) * rate + 1e-9).astype(int), cycles - 1)
     return [at == cycle for cycle in range(cycles)]
 

@@ -184,7 +184,7 @@ class LogarithmicDecrement(Result):
         return float(mass * natural**2)
 
     def damping(self, mass: float) -> float:
-        """``2 m f delta``, N s/m."""
+        """Damping of a fading oscillation, ``2 m f delta``, N s/m."""
         return 2.0 * mass * self.frequency * self.decrement
 
 

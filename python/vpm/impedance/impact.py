@@ -43,7 +43,7 @@ def stop_factor(quarters: int) -> float:
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Stop(Result):
-    """Damping from a stop.
+    """Damping from a stop of a mass by a damper: balance of energy.
 
     Attributes
     ----------

@@ -25,7 +25,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Landing(Result):
-    """What a transient says.
+    """Stiffness and damping that a motion from rest to rest shows, such as a landing.
 
     Attributes
     ----------

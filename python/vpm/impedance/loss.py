@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
-from vpm.impedance.loop import Loop
+from vpm.impedance.hysteresis_loop import Loop
 from vpm.results import Result
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ REFUSAL = 0.01
 
 @dataclass(frozen=True, repr=False, eq=False)
 class LossLaw(Result):
-    """The law of a loss.
+    """Law that the energy lost in cycles follows: viscous, structural, Coulomb or mixed.
 
     Attributes
     ----------
@@ -166,7 +166,7 @@ def _sentence(
     shares: Mapping[str, float],
     exponents: tuple[float, float],
 ) -> str:
-    """The outcome in words."""
+    """Sentence on the law that the energy losses follow."""
     grown = [
         f"{name}^{value + 0.0:.2f}"
         for name, value in zip(("X", "omega"), np.round(exponents, 2), strict=True)

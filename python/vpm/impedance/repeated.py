@@ -23,11 +23,11 @@ class Estimate(Protocol):
 
     @property
     def stiffness(self) -> float:
-        """N/m."""
+        """Stiffness that a test shows, N/m."""
 
     @property
     def damping(self) -> float:
-        """N s/m."""
+        """Damping that a test shows, N s/m."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -57,7 +57,7 @@ class Repeated(Result):
 
     @property
     def n(self) -> int:
-        """Number of tests."""
+        """Number of repeated tests."""
         return self.values.size
 
     @property
@@ -67,7 +67,7 @@ class Repeated(Result):
 
     @property
     def half_width(self) -> float:
-        """Half of the interval."""
+        """Half of the interval of the mean of repeated tests."""
         return 0.5 * (self.interval[1] - self.interval[0])
 
     def __str__(self) -> str:
@@ -224,6 +224,6 @@ def _cells(one: Repeated) -> str:
 
 
 def _line(row: RepeatedTests) -> str:
-    """One row of text."""
+    """One row of the impedance table as text."""
     head = f"{row.test:14s}{row.joint:8s}{row.impedance:11s}{row.stiffness.n:3d}"
     return head + _cells(row.stiffness) + _cells(row.damping)

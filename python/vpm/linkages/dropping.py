@@ -56,7 +56,7 @@ class DropLimit(Result):
 
     @property
     def unit(self) -> str:
-        """Of the limit."""
+        """Unit of the limit of a motion, rad/s or rad/s^2."""
         return "rad/s" if self.term == "velocity" else "rad/s^2"
 
     def share_of_workspace(self, motion: float) -> float:

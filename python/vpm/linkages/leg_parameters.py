@@ -14,7 +14,7 @@ HyqSet = Literal["table", "identified", "plausible"]
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Segment(Storable):
-    """Upper or lower leg.
+    """Upper or lower segment of a leg.
 
     Attributes
     ----------

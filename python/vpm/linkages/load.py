@@ -24,14 +24,14 @@ class _Table:
         self.asked: set[str] = set()
 
     def number(self, key: str, unit: str) -> float:
-        """One number in SI."""
+        """One number in SI from a table of a linkage file."""
         value = self._value(key, unit)
         if isinstance(value, list):
             self._refuse(key, f"is a list of {len(value)}, but has to be a number")
         return self._si(key, value, unit)
 
     def pair(self, key: str, unit: str) -> tuple[float, float]:
-        """Two numbers in SI."""
+        """Two numbers in SI from a table of a linkage file."""
         value = self._value(key, unit)
         if not isinstance(value, list) or len(value) != 2:
             self._refuse(key, "has to be a list of two numbers")

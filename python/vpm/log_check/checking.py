@@ -37,7 +37,7 @@ def check_log(
 ) -> LogCheck:
     """Find wrong units, signs, names and clocks of logs, and stretches of channels that cannot be right.
 
-    A slow observer keeps the model on the beginning of each record. What it leaves of a channel is compared with what
+    A slow tracker keeps the model on the beginning of each record. What it leaves of a channel is compared with what
     it leaves of masses on which nothing acts: that share does not depend on the scale of the channel. A mistake is
     named where its correction leaves at most a tenth of what is left without it. In both cases the uncertain parameters
     of the model and friction of its joints have been fitted, so that a missing effect does not pass for a mistake.
@@ -146,7 +146,7 @@ class _Check:
 
 
 def _beginning(record: Experiment, outputs: Sequence[str], settings: Settings) -> Experiment:
-    """The beginning of the motion of a record, from rest if it begins so: no observer knows unmeasured oscillations."""
+    """Beginning of the motion of a record, from rest if it begins so: no tracker knows unmeasured oscillations."""
     fewest, most = settings.samples
     speeds = np.zeros(len(record))
     for name in outputs:
@@ -167,7 +167,7 @@ def _finding(
     record: str,
     settings: Settings,
 ) -> Finding:
-    """What is said of a correction that explains a record."""
+    """Finding of a correction that explains a record."""
     correction, before, after = found.correction, found.before.by_channel, found.after.by_channel
     said = ", or ".join(one.sentence(units) for one in (correction, *found.rivals))
     if found.is_possible:
@@ -198,7 +198,7 @@ def _written(correction: Correction, changed: Mapping[str, ChannelEntry]) -> tup
 def _of_related(
     correction: Correction, related: Related, units: Mapping[str, str], changed: Mapping[str, ChannelEntry], record: str
 ) -> Finding:
-    """What is said of a channel that contradicts the one that tells it."""
+    """Finding of a channel that contradicts the one that tells it."""
     lines, repair = _written(correction, changed)
     before, after = related.error(), related.error(correction.factor)
     return Finding(
@@ -222,7 +222,7 @@ def _units(model: Model, record: Experiment, table: Mapping[str, ChannelEntry]) 
 
 
 def _evidence(found: Explanation, place: str) -> str:
-    """By what a correction explains a record, in numbers."""
+    """Sentence with the numbers by which a correction explains a record."""
     before, after = found.before, found.after
     corrected = "both corrected" if found.at_once else "that corrected"
     if found.is_of_values:
@@ -244,7 +244,7 @@ def _percent(share: float) -> str:
 
 
 def _together(findings: Sequence[Finding]) -> list[Finding]:
-    """The same mistake of several records as one finding."""
+    """Findings with the same mistake of several records as one finding."""
     found: list[Finding] = []
     for one in findings:
         place = next((n for n, other in enumerate(found) if one.is_alike(other)), None)

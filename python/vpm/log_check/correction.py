@@ -41,7 +41,7 @@ class Correction:
     unit: str = ""
 
     def applied(self, record: Experiment) -> Experiment:
-        """The record without the mistake.
+        """The record with this correction done.
 
         Raises
         ------
@@ -79,7 +79,7 @@ class Correction:
         return entry.model_copy(update={"scale": self.factor * entry.scale, "offset": self.factor * entry.offset})
 
     def sentence(self, units: Mapping[str, str]) -> str:
-        """What is wrong, for people; ``units`` are those that were read."""
+        """Sentence on the mistake of a channel table that this corrects; ``units`` are those that were read."""
         names = _listed(self.channels)
         are, have = ("is", "has") if len(self.channels) == 1 else ("are", "have")
         if self.swap:
@@ -98,7 +98,7 @@ class Correction:
 
     @property
     def kind(self) -> str:
-        """See `Finding.kind`."""
+        """Kind of mistake that a correction undoes; see `Finding.kind`."""
         if self.swap:
             return "swap"
         if self.is_clock:
@@ -111,12 +111,12 @@ class Correction:
 
     @property
     def is_clock(self) -> bool:
-        """Whether it changes the time of all channels."""
+        """Whether a correction changes the time of all channels."""
         return self.channels == (TIME,)
 
     @property
     def is_mirror(self) -> bool:
-        """Whether it turns or exchanges channels and leaves their sizes as they are."""
+        """Whether a correction turns or exchanges channels and leaves their sizes as they are."""
         return self.swap or self.factor == -1.0
 
     @property
@@ -134,7 +134,7 @@ class Correction:
 
     @property
     def is_possible(self) -> bool:
-        """Whether a machine may do that by itself: its answer comes late, or its sensors do."""
+        """Whether a machine may be late as this correction says: by its answer, or by its sensors."""
         return self.delay != 0.0 and all(
             (self.delay < 0.0) == name.endswith((".command", ".disturbance")) for name in self.channels
         )
@@ -147,7 +147,7 @@ class Pair(NamedTuple):
     second: Correction
 
     def applied(self, record: Experiment) -> Experiment:
-        """The record without both mistakes."""
+        """The record with both corrections done."""
         return self.second.applied(self.first.applied(record))
 
     def sentence(self, units: Mapping[str, str]) -> str:

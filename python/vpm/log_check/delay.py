@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from vpm.experiment import Experiment
 from vpm.log_check.correction import Correction
 from vpm.model import Model
-from vpm.ranking.observed import Observed, Observer, among_parameters
 from vpm.ranking.settings import Settings
 from vpm.ranking.structure import Structure
+from vpm.ranking.tracked_records import TrackedRecords, Tracker, among_parameters
 from vpm.simulate import Setup
 from vpm.weighing.priors import Prior
 
@@ -24,7 +24,7 @@ DELAY = "delay"
 STEP = 0.1
 
 
-class Delayed(Observed):
+class Delayed(TrackedRecords):
     """A record with delayed channels; the delay follows the parameters of the model in ``theta``.
 
     It has the same samples for every delay: those at its ends, which have no values of their own, are cut.
@@ -59,22 +59,22 @@ class Delayed(Observed):
         self,
         model: Model,
         theta: Array,
-        observer: Observer,
+        tracker: Tracker,
         columns: Sequence[int] = (),
         moves: Array | None = None,
     ) -> tuple[Array, Array]:
-        """Readings less outputs, see `Observed.follow`; ``theta`` are the parameters, then the delay."""
+        """Readings less outputs, see `TrackedRecords.follow`; ``theta`` are the parameters, then the delay."""
         own, delay = len(model.theta), float(theta[-1])
         _, by = among_parameters(own, columns, moves)
-        residual, slopes = self._at(delay).follow(model, theta[:own], observer, *by)
+        residual, slopes = self._at(delay).follow(model, theta[:own], tracker, *by)
         if own not in columns:
             return residual, slopes
         step = STEP * self.logged.dt
-        moved, _ = self._at(delay + step).follow(model, theta[:own], observer)
+        moved, _ = self._at(delay + step).follow(model, theta[:own], tracker)
         return residual, np.insert(slopes, list(columns).index(own), (moved - residual) / step, axis=2)
 
-    def _at(self, delay: float) -> Observed:
-        return Observed(self.model, [self._corrected(delay)], self.settings, self.setup)
+    def _at(self, delay: float) -> TrackedRecords:
+        return TrackedRecords(self.model, [self._corrected(delay)], self.settings, self.setup)
 
     def _corrected(self, delay: float) -> Experiment:
         later = replace(self.correction, delay=delay).applied(self.logged)
@@ -91,6 +91,6 @@ def with_delay(structure: Structure, delay: float, longest_delay: float) -> Stru
 
 
 def without_delay(structure: Structure) -> Structure:
-    """The same with the unknowns of the model alone."""
+    """The structure with the unknowns of the model alone, without the delay."""
     priors = {name: prior for name, prior in structure.priors.items() if name != DELAY}
     return replace(structure, theta=structure.theta[:-1], priors=priors, firsts=())

@@ -13,8 +13,8 @@ import numpy as np
 from vpm.discrepancy.side_by_side import Failure, SideBySide
 from vpm.experiment import Experiment
 from vpm.log_check.correction import Correction, Pair
-from vpm.log_check.corrections import delays, of_two, scales
 from vpm.log_check.shares import FORCES, Judge, Shares, Tangent
+from vpm.log_check.tried_corrections import delays, of_two, scales
 
 Change = TypeVar("Change", Correction, Pair)
 
@@ -48,7 +48,7 @@ class Explanation:
 
     @property
     def is_possible(self) -> bool:
-        """Whether a machine may do that by itself."""
+        """Whether a machine may do by itself what a correction would undo."""
         return any(one.is_possible for one in (self.correction, *self.rivals))
 
 
@@ -61,7 +61,7 @@ class _Trial(NamedTuple):
 
 
 class Explainer:
-    """Tries corrections of records.
+    """Finds the corrections of channel tables that explain what a model leaves of records.
 
     Parameters
     ----------
@@ -171,7 +171,7 @@ class Explainer:
         return self._mirrored(found, used)
 
     def _mirrored(self, found: Explanation, used: Sequence[str]) -> Explanation:
-        """With the other side of a delay: some channels late is the same in a log as all others early."""
+        """The explanation with the other side of a delay: some channels late is the same as all others early."""
         correction = found.correction
         others = tuple(name for name in used if name not in correction.channels)
         if others not in {one.channels for one in delays(self.model, used, self.settings)} or not correction.delay:
@@ -196,7 +196,7 @@ class Explainer:
         return set(left.by_channel) if left.far > self.settings.far else left.above(self.settings.doubtful)
 
     def _about(self, corrections: Iterable[Correction], channels: set[str], left: Shares) -> list[Correction]:
-        """Those that may have affected one of these channels."""
+        """Corrections that may have affected one of these channels."""
         return [correction for correction in corrections if channels & set(self._affected(correction, left))]
 
     def _affected(self, correction: Correction, left: Shares) -> tuple[str, ...]:

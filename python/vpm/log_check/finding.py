@@ -48,7 +48,7 @@ class Finding(Storable):
     lines: Mapping[str, str] = field(default_factory=dict)
 
     def is_alike(self, other: Finding) -> bool:
-        """Whether both are the same mistake, in whichever records."""
+        """Whether two findings are the same mistake, in whichever records."""
         same = (self.kind, self.channels, self.factor) == (other.kind, other.channels, other.factor)
         return same and self.mistake and other.mistake
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from vpm.experiment import Experiment, choose_cutoff
 from vpm.experiment.signal import differentiate, lowpass, settling_samples
 from vpm.log_check.correction import Correction
-from vpm.log_check.corrections import scales
 from vpm.log_check.settings import Settings
+from vpm.log_check.tried_corrections import scales
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Related:
-    """A channel beside what tells it.
+    """Values of a channel beside those that another channel says it should have, shape (N,).
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class Related:
 def wrong_scales(
     model: Model, record: Experiment, units: Mapping[str, str], settings: Settings
 ) -> Iterator[tuple[Correction, Related]]:
-    """Units and signs of channels that no observer compares, where one of them explains why another contradicts them.
+    """Units and signs of channels that no tracker compares, where one of them explains why another contradicts them.
 
     A machine follows the references of its controllers more or less; derivatives of a position are its acceleration.
 
@@ -84,7 +84,7 @@ def _references(model: Model, record: Experiment) -> Iterator[Related]:
 
 
 def _accelerations(model: Model, record: Experiment) -> Iterator[Related]:
-    """Through the filter of the position, without what it needs to settle."""
+    """Measured accelerations beside those of the filtered positions, without the ends."""
     for joint in model.joints:
         position, acceleration = f"{joint}.position", f"{joint}.acceleration"
         if position not in record or acceleration not in record:

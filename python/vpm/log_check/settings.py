@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Numbers that decide.
+    """Thresholds of the log check: bandwidth, stretch, shares and sizes.
 
     Attributes
     ----------
     band : float
-        Bandwidth of the observer that keeps the model on the log, Hz.
+        Bandwidth of the tracker that keeps the model on the log, Hz.
     turn : float
-        Largest product of bandwidth and sample time: in a log whose time is wrong the observer is slower.
+        Largest product of bandwidth and sample time: in a log whose time is wrong the tracker is slower.
     still : float
         Share of the motion of a record, as squares of its steps, that has gone by where it begins.
     before : float

@@ -21,10 +21,10 @@ from vpm.model import Model
 from vpm.observer import measured_outputs
 from vpm.ranking.fit import ASTRAY, Fitter, Followed, View
 from vpm.ranking.noise_model import white_noise
-from vpm.ranking.observed import Observed, Observer, is_position
 from vpm.ranking.settings import Settings as RankingSettings
 from vpm.ranking.sizes import stated
 from vpm.ranking.structure import Structure
+from vpm.ranking.tracked_records import TrackedRecords, Tracker, is_position
 from vpm.simulate import Setup
 from vpm.weighing.priors import Prior, natural_sizes
 
@@ -97,14 +97,14 @@ class Shares:
 
     @property
     def order(self) -> tuple[float, float]:
-        """Which of several leaves least; where all is as good as nothing, by what is left all the same."""
+        """Sort key of several shares: what leaves least comes first."""
         return self.cost, self.logarithm(self.by_channel)
 
 
 class Judge:
     """Measures records by a model, to which friction and other forces were added at each joint without them.
 
-    An observer of stated bandwidth keeps the model on the record, see `vpm.ranking.observed.Observed`.
+    A tracker of stated bandwidth keeps the model on the record, see `vpm.ranking.tracked_records.TrackedRecords`.
 
     Parameters
     ----------
@@ -124,13 +124,13 @@ class Judge:
 
     def measured(self, record: Experiment, values: Array | None = None) -> Shares:
         """Shares at given values of the parameters, by default those of the model, without friction that was added."""
-        observer, values = self._observer(record), self.model.theta if values is None else values
+        tracker, values = self._tracker(record), self.model.theta if values is None else values
         try:
-            observed = self._observed(record)
-            residual, _ = observed.follow(self.model, values, observer)
+            tracked = self._tracked(record)
+            residual, _ = tracked.follow(self.model, values, tracker)
         except ASTRAY:
             return self._lost(record, values)
-        return self._shares(observed, residual, observer, values)
+        return self._shares(tracked, residual, tracker, values)
 
     def guessed(self, record: Experiment) -> Shares:
         """Shares at the values of the model, with no dry friction or as much as is usual, whichever leaves less."""
@@ -146,24 +146,24 @@ class Judge:
 
     def fitted(self, record: Experiment) -> Shares:
         """Shares when the uncertain parameters of the model, and friction of its joints, have been fitted."""
-        observer, structure, observed = self._observer(record), self._structure(record), self._observed(record)
+        tracker, structure, tracked = self._tracker(record), self._structure(record), self._tracked(record)
         try:
-            fitter = Fitter(observed, observed.settings)
-            found = fitter.fitted(structure, observer, View(fitter.noise_of(structure, observer)))
+            fitter = Fitter(tracked, tracked.settings)
+            found = fitter.fitted(structure, tracker, View(fitter.noise_of(structure, tracker)))
         except ASTRAY:
             return self.measured(record)
-        shares = self._shares(observed, found.residual, observer, found.structure.theta)
+        shares = self._shares(tracked, found.residual, tracker, found.structure.theta)
         return self._with_departure(shares, found.structure)
 
     def tangent(self, record: Experiment, at: Shares, forces: Collection[str] = FRICTION) -> Tangent | None:
         """Change of the error with the parameters, about some values of them; None where that cannot be computed."""
         if at.residual is None:
             return None
-        observer, structure = self._observer(record), replace(self._structure(record, forces), theta=at.values)
-        observed = self._observed(record)
+        tracker, structure = self._tracker(record), replace(self._structure(record, forces), theta=at.values)
+        tracked = self._tracked(record)
         try:
-            fitter = Fitter(observed, observed.settings)
-            followed = fitter.followed(structure, observer, tuple(structure.priors))
+            fitter = Fitter(tracked, tracked.settings)
+            followed = fitter.followed(structure, tracker, tuple(structure.priors))
         except ASTRAY:
             return None
         if not np.all(np.isfinite(followed.jacobian)):
@@ -176,38 +176,38 @@ class Judge:
         Derivatives cost most: secants correct them on the way. They are worked out once more in between, for no tangent
         says where a spring rests that is not there yet; where hardly anything was gained, there is none.
         """
-        observed, observer, found = self._observed(record), self._observer(record), None
+        tracked, tracker, found = self._tracked(record), self._tracker(record), None
         for _ in range(TURNS):
             start = self.tangent(record, plain if found is None else found.shares, FORCES)
             if start is None:
                 break
-            found = self._descended(observed, observer, start)
+            found = self._descended(tracked, tracker, start)
             if found.shares.cost > start.shares.cost + math.log(self.settings.alike):
                 break
         return found
 
-    def _descended(self, observed: Observed, observer: Observer, start: Tangent) -> Tangent:
+    def _descended(self, tracked: TrackedRecords, tracker: Tracker, start: Tangent) -> Tangent:
         """The tangent where secants lead from another one."""
-        noise = white_noise(start.residual, observed.parts)
-        fitted, slopes = Fitter(observed, observed.settings).moved(start.followed(observer), View(noise))
+        noise = white_noise(start.residual, tracked.parts)
+        fitted, slopes = Fitter(tracked, tracked.settings).moved(start.followed(tracker), View(noise))
         sizes, kept = np.array(noise.deviations)[:, None, None], np.zeros_like(start.slopes)
-        seen = _seen(observed)
+        seen = _seen(tracked)
         kept[seen] = (slopes.reshape(len(sizes), -1, slopes.shape[1]) * sizes).transpose(1, 0, 2)
-        shares = self._shares(observed, fitted.residual, observer, fitted.structure.theta)
+        shares = self._shares(tracked, fitted.residual, tracker, fitted.structure.theta)
         return Tangent(fitted.structure, fitted.residual, kept, self._with_departure(shares, fitted.structure))
 
     def fit_delay(self, record: Experiment, correction: Correction, tangent: Tangent) -> tuple[Correction, Shares]:
         """A delay that is fitted with the parameters and all forces, from the values of a tangent without it."""
-        observer, longest_delay = self._observer(record), self.settings.longest_delay
+        tracker, longest_delay = self._tracker(record), self.settings.longest_delay
         structure = with_delay(tangent.structure, correction.delay, longest_delay)
         try:
             whole = Delayed(self.model, record, correction, longest_delay, self._ranking(record), self.setup)
-            observed = whole.whole()
-            residual, slope = observed.follow(self.model, structure.theta, observer, [len(self.model.theta)])
+            tracked = whole.whole()
+            residual, slope = tracked.follow(self.model, structure.theta, tracker, [len(self.model.theta)])
             known = tangent.slopes[whole.cut : whole.cut + len(residual)]
             start = Tangent(structure, residual, np.concatenate([known, slope * longest_delay], axis=2), tangent.shares)
-            view = View(white_noise(residual, observed.parts))
-            found, _ = Fitter(observed, observed.settings).moved(start.followed(observer), view, anew=True)
+            view = View(white_noise(residual, tracked.parts))
+            found, _ = Fitter(tracked, tracked.settings).moved(start.followed(tracker), view, anew=True)
         except ASTRAY:
             return correction, self._lost(record, tangent.shares.values)
         *values, delay = found.structure.theta.tolist()
@@ -216,7 +216,7 @@ class Judge:
         return refined, self._with_departure(shares, without_delay(found.structure))
 
     def _with_departure(self, shares: Shares, structure: Structure) -> Shares:
-        """With how far the parameters of the model are from what its file states."""
+        """Shares with how far the parameters of the model are from what its file states."""
         from scipy.stats import chi2  # slow to import, and seldom needed
 
         moved = zip(structure.priors, np.abs(structure.standard).tolist(), strict=True)
@@ -250,7 +250,7 @@ class Judge:
         return replace(before, by_channel=shares)
 
     def _begins_alike(self, corrected: Experiment, record: Experiment) -> bool:
-        """Whether the first state stays: the pressures of a closed chamber are never far from where they began."""
+        """Whether a corrected record begins in the same first state as the record, as closed chambers may not."""
         first, then = (initial_state(self.model, one, self.model.theta) for one in (record, corrected))
         return bool(np.array_equal(first, then))
 
@@ -291,25 +291,25 @@ class Judge:
     def _is_added(self, parameter: str) -> bool:
         return any(parameter in self.model.effect(*key).parameter_names.values() for key in self.added)
 
-    def _observer(self, record: Experiment) -> Observer:
-        return Observer(min(self.settings.band, self.settings.turn / record.dt), fine=False)
+    def _tracker(self, record: Experiment) -> Tracker:
+        return Tracker(min(self.settings.band, self.settings.turn / record.dt), fine=False)
 
     def _ranking(self, record: Experiment) -> RankingSettings:
-        return RankingSettings(bands=(self._observer(record).band,), iterations=self.settings.steps)
+        return RankingSettings(bands=(self._tracker(record).band,), iterations=self.settings.steps)
 
-    def _observed(self, record: Experiment) -> Observed:
-        return Observed(self.model, [record], self._ranking(record), self.setup).whole()
+    def _tracked(self, record: Experiment) -> TrackedRecords:
+        return TrackedRecords(self.model, [record], self._ranking(record), self.setup).whole()
 
-    def _shares(self, observed: Observed, residual: Array, observer: Observer, values: Array) -> Shares:
-        drawn, seen = observed.drawn(observer.band), _seen(observed)
-        free = np.sum(np.where(np.any(drawn != 0.0, axis=0), drawn, observed.motion)[seen] ** 2, axis=0)
+    def _shares(self, tracked: TrackedRecords, residual: Array, tracker: Tracker, values: Array) -> Shares:
+        drawn, seen = tracked.drawn(tracker.band), _seen(tracked)
+        free = np.sum(np.where(np.any(drawn != 0.0, axis=0), drawn, tracked.motion)[seen] ** 2, axis=0)
         with np.errstate(all="ignore"):
             errors = map(_share, np.sum(residual[seen] ** 2, axis=0).tolist(), free.tolist())
-        shares = dict(zip(observed.records[0].channels, errors, strict=True))
+        shares = dict(zip(tracked.records[0].channels, errors, strict=True))
         return Shares(shares, values, residual, free, seen, floor=self.settings.negligible)
 
     def _lost(self, record: Experiment, values: Array) -> Shares:
-        """Where the model runs away from a record."""
+        """Shares of a record from which the model runs away: all of every channel is left."""
         shares = dict.fromkeys(measured_outputs(self.model, record), 1.0)
         return Shares(shares, values, floor=self.settings.negligible)
 
@@ -333,10 +333,10 @@ class Tangent:
     slopes: Array
     shares: Shares
 
-    def followed(self, observer: Observer) -> Followed:
-        """Where a fit begins that need not work out its first derivatives."""
+    def followed(self, tracker: Tracker) -> Followed:
+        """Residual with derivatives from which a fit begins that need not work out its first ones."""
         names, jacobian = tuple(self.structure.priors), self.slopes / self.structure.slopes
-        return Followed(self.structure, observer, names, self.residual, jacobian)
+        return Followed(self.structure, tracker, names, self.residual, jacobian)
 
     @property
     def deviations(self) -> Array:
@@ -376,16 +376,16 @@ class Tangent:
 
 
 def rows_of(part: Experiment, record: Experiment) -> NDArray[np.intp]:
-    """Which samples of a record are those of a part of it."""
+    """Rows of a record that are the samples of a part of it."""
     return np.asarray(np.round((part.time - record.time[0]) / record.dt), dtype=np.intp)
 
 
-def _seen(observed: Observed) -> NDArray[np.intp]:
+def _seen(tracked: TrackedRecords) -> NDArray[np.intp]:
     """Samples that count: all but the beginning, which the first state decides."""
-    return np.concatenate([np.arange(part.start, part.stop) for part in observed.parts])
+    return np.concatenate([np.arange(part.start, part.stop) for part in tracked.parts])
 
 
 def _share(left: float, free: float) -> float:
-    """Error power beside that of free masses; one at most."""
+    """Error power as a share of that of free masses; one at most."""
     share = left / max(free, 1e-300)
     return min(share, 1.0) if np.isfinite(share) else 1.0

@@ -113,7 +113,7 @@ def _powers(values: Array) -> tuple[Array, float]:
 
 
 def _window(count: int) -> Array:
-    """One whose leakage falls fast enough that no motion is taken for noise at other frequencies."""
+    """Window (count,) whose leakage falls fast enough that no motion is taken for noise at other frequencies."""
     return np.asarray(np.hanning(count) ** 3)
 
 
@@ -155,7 +155,7 @@ def _is_noisy(values: Array, settings: Settings) -> bool:
 
 
 def _longest(same: NDArray[np.bool_]) -> slice:
-    """The longest run of true values."""
+    """Slice of the longest run of true values."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
     if not edges.size:
         return slice(0, 0)

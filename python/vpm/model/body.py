@@ -34,7 +34,7 @@ class Body(Component):
     velocity_terms: Switch = True
 
     def slots(self, keys: Keys, structure: Structure) -> Iterator[Slot]:  # noqa: ARG002
-        """Its parameters."""
+        """Parameters of a body."""
         name = keys[1]
         yield Slot((*keys, "mass"), self.mass, "kg", ABOVE_ZERO, kind="linear")
         for i, (axis, quantity) in enumerate(zip("xyz", self.center_of_mass, strict=True)):
@@ -46,7 +46,7 @@ class Body(Component):
 
 
 def inertia_described(body: str, index: Index) -> Described:
-    """Where the core finds the inertia of a body."""
+    """Numbers of the parameters from which the core takes the inertia of a body."""
     return {
         "mass": index[f"{body}.mass"],
         "center_of_mass": [index[f"{body}.center_of_mass.{axis}"] for axis in "xyz"],

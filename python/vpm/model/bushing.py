@@ -38,12 +38,12 @@ class BushingEnd(Entry):
     rotation: Vector = ORIGIN
 
     def frame(self, structure: Structure) -> Frame:
-        """What it is fixed to, and where."""
+        """Frame to which an end of a bushing is fixed: its mount and the place on it."""
         return structure.mounted(self.parent, self.at, pose(self.point, self.rotation))
 
     @property
     def told(self) -> str:
-        """What it is on, in words."""
+        """Name of the component that an end of a bushing is on, in words."""
         return f'"{self.parent}"' + ("" if self.at is None else f" at {self.at:g} m")
 
 
@@ -58,7 +58,7 @@ _Six = Field(min_length=6, max_length=6)
 
 
 def _square(matrix: tuple[Quantity | Row, ...]) -> tuple[Quantity | Row, ...]:
-    """The diagonal, or all rows."""
+    """Check that a matrix of a bushing is six numbers of its diagonal, or six rows of six."""
     lengths = [len(row) for row in matrix if isinstance(row, tuple)]
     if lengths not in ([], [6] * 6):
         raise ValueError("has to be six numbers (the diagonal), or six rows of six; correct the list")
@@ -122,7 +122,7 @@ class Bushing(Component):
             yield Problem(place("bushings", name), rest)
 
     def slots(self, keys: Keys, structure: Structure) -> Iterator[Slot]:  # noqa: ARG002
-        """Its parameters: every entry that is written down."""
+        """Parameters of a bushing: every entry that is written down."""
         name, fleeing = keys[1], "a bushing with negative stiffness would push away from its rest"
         for key, time, impossible in (("stiffness", "", fleeing), ("damping", " s", FEEDING)):
             for row, column, way, quantity in entries(getattr(self, key)):
@@ -158,7 +158,7 @@ class Bushing(Component):
                 yield Problem(place("bushings", name, key), rest)
 
     def described(self, name: str, structure: Structure, index: Index) -> Described:
-        """What the core reads of it; entries that nobody wrote down are zero."""
+        """What the core reads of a bushing; entries that nobody wrote down are zero."""
 
         def matrix(key: str, *, symmetric: bool) -> list[list[int | None]]:
             def place(i: int, j: int) -> int | None:

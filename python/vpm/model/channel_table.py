@@ -17,7 +17,7 @@ _TABLE = TypeAdapter(dict[str, ChannelEntry])
 
 
 def parse_channel_table(content: Mapping[str, object], *, path: str | None = None) -> Mapping[str, ChannelEntry]:
-    """Check a channel table.
+    """Check a channel table that was parsed from TOML.
 
     Parameters
     ----------

@@ -15,7 +15,7 @@ from vpm.errors import ModelError
 from vpm.model.beams.beam import with_solids
 from vpm.model.body import inertia_problems
 from vpm.model.channels import channel_problems
-from vpm.model.checked import Checked, Rule
+from vpm.model.checked_document import Checked, Rule
 from vpm.model.component import Component
 from vpm.model.controller import controller_problems
 from vpm.model.drives import actuator as drives
@@ -134,7 +134,7 @@ def _table(slots: Iterable[Slot]) -> Mapping[str, Parameter]:
 
 
 def _rules(structure: Structure) -> Iterator[Rule]:
-    """What has to hold between parameters, in the order in which it is told."""
+    """Conditions between parameters of a model file, in the order in which their problems are told."""
     yield from (Rule(partial(inertia_problems, body)) for body in structure.bodies)
     yield Rule(_size_problems)
     for sections in (("supplies", "actuators"), ("contacts", "bushings")):

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import VpmError
 from vpm.model.body import inertia_described
-from vpm.model.checked import Checked
+from vpm.model.checked_document import Checked
 from vpm.model.component import Described, Index
 from vpm.model.effects import SITES, effect_described, effects_of
 from vpm.model.omissions import omissions

@@ -31,11 +31,11 @@ class Component(Entry):
     CHANNELS: ClassVar[Mapping[str, str]] = {}
 
     def problems(self, name: str, structure: Structure) -> Iterator[Problem]:  # noqa: ARG002
-        """What is wrong with what it names, and what may not be together."""
+        """Problems of a component: what it names wrongly, and what may not be together."""
         yield from ()
 
     def complete(self) -> Self:
-        """The same with what need not be given, once its form and its units are right."""
+        """The component with what need not be given, once its form and its units are right."""
         return self
 
     def units(self, name: str, structure: Structure) -> Mapping[str, str]:  # noqa: ARG002
@@ -43,7 +43,7 @@ class Component(Entry):
         return {}
 
     def slots(self, keys: Keys, structure: Structure) -> Iterator[Slot]:
-        """Its parameters, in index order; what it names is right, and ``keys`` are its section and its name."""
+        """Parameters of a component in index order; what it names is right, and ``keys`` are section and name."""
         yield from slots_of(keys, self, self.units(str(keys[1]), structure))
 
     def value_problems(self, name: str, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:  # noqa: ARG002

@@ -67,7 +67,7 @@ class Contact(Component):
         return f"N/m^{self.exponent.value:.6g}"
 
     def problems(self, name: str, structure: Structure) -> Iterator[Problem]:
-        """What cannot touch its plane, a plane without a direction, a stiffness of another exponent."""
+        """Problems of a contact: what cannot touch its plane, no direction, a stiffness of another exponent."""
         if structure.mounted(self.parent, self.at, Pose()).mount.kind == "world":
             rest = f'is "{self.parent}", which does not move against the plane; name a body or a beam that moves'
             yield Problem(place("contacts", name, "parent"), rest)
@@ -113,7 +113,7 @@ class Contact(Component):
             yield Problem(place("contacts", name, "friction", "dynamic_velocity"), rest)
 
     def described(self, name: str, structure: Structure, index: Index) -> Described:
-        """What the core reads of it."""
+        """What the core reads of a contact."""
         frame = structure.mounted(self.parent, self.at, Pose(self.point))
         words = {"static": "static_coefficient", "dynamic": "dynamic_coefficient"}
         friction = {

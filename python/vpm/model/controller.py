@@ -55,7 +55,7 @@ class Sampled(Component):
     @property
     @abstractmethod
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Each actuator that it commands, with the channel that it measures there."""
+        """Each actuator that a controller commands, with the channel that it measures there."""
 
     def commands(self, structure: Structure) -> list[str]:
         """Units of what it commands."""
@@ -73,7 +73,7 @@ class OneAxis(Sampled):
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Each actuator that it commands, with the channel that it measures there."""
+        """The actuator that a controller commands, with the channel that it measures there."""
         return ((self.actuator, self.measures),)
 
     def units(self, name: str, structure: Structure) -> Mapping[str, str]:  # noqa: ARG002
@@ -93,7 +93,7 @@ class OneAxis(Sampled):
         }
 
     def described(self, name: str, structure: Structure, index: Index) -> Described:
-        """What the core reads of it."""
+        """What the core reads of a controller of one actuator by one channel."""
         return {
             **self._common(name),
             "actuator": list(structure.document.actuators).index(self.actuator),
@@ -172,7 +172,7 @@ class ComputedTorque(Sampled):
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
-        """Each actuator that it commands, with the channel that it measures there."""
+        """Each actuator that a computed-torque controller commands, with the channel that it measures there."""
         return tuple(zip(self.actuators, self.measures, strict=False))
 
     @property
@@ -181,7 +181,7 @@ class ComputedTorque(Sampled):
         return tuple(channel.partition(".")[0] for channel in self.measures)
 
     def slots(self, keys: Keys, structure: Structure) -> Iterator[Slot]:
-        """Its gains, and its limits."""
+        """Gains of a computed-torque controller, and its limits."""
         commands = self.commands(structure)
         units = {"proportional": ["1/s^2"] * len(commands), "derivative": ["1/s"] * len(commands), "limit": commands}
         for key, of_key in units.items():
@@ -190,7 +190,7 @@ class ComputedTorque(Sampled):
                 yield Slot((*keys, key, i), quantity, si_unit(unit), bounds, named=named)
 
     def described(self, name: str, structure: Structure, index: Index) -> Described:
-        """What the core reads of it."""
+        """What the core reads of a computed-torque controller."""
         actuators = list(structure.document.actuators)
 
         def of_joints(key: str) -> list[int]:

@@ -48,12 +48,12 @@ class EffectEntry(BaseModel):
 
     @property
     def owner(self) -> str:
-        """What the dotted names of its parameters begin with."""
+        """Component with its side, with which the dotted names of an effect's parameters begin."""
         return self.at if self.side == "motor" else f"{self.at}.{self.side}"
 
     @property
     def traits(self) -> Traits:
-        """What it does; nothing if the catalogue does not have it."""
+        """Traits of an effect in a model file; none if the catalogue does not have it."""
         return EFFECTS.get(self.type, Traits())
 
     @property
@@ -67,7 +67,7 @@ class EffectEntry(BaseModel):
         return tuple(p for p in EFFECTS[self.type].parameters if not p.optional or p.name in self.values)
 
     def slots(self, position: int, structure: Structure) -> Iterator[Slot]:
-        """Its parameters, when it is complete and stands at a position of the file."""
+        """Parameters of an effect, when it is complete and stands at a position of the file."""
         effect, given = EFFECTS[self.type], self.values
         for parameter in self.parameters:
             yield Slot(
@@ -104,7 +104,7 @@ class Effect:
 
     @property
     def key(self) -> tuple[str, str] | tuple[str, str, Side]:
-        """What no other effect of the model shares: name and component, and the side if it is that of the link."""
+        """Key of an effect that no other one of the model has: name and component, and its side on the link."""
         return (self.name, self.at) if self.side == "motor" else (self.name, self.at, self.side)
 
     @property
@@ -114,7 +114,7 @@ class Effect:
 
     @property
     def type(self) -> EffectType:
-        """Entry of the catalogue."""
+        """Entry of the catalogue for an effect of a model."""
         return EFFECTS[self.name]
 
 
@@ -282,7 +282,7 @@ def _on_joint(effect: Effect, structure: Structure, numbers: dict[str, int], ind
 
 
 def _carrier(site: str, structure: Structure) -> dict[str, int]:
-    """Where a payload sits: at a body of the core, at one that is fixed to something, or at the tip of a beam."""
+    """Number of the body, weld or beam on which the core puts a payload."""
     if site in structure.beams:
         return {"beam": structure.beams.index(site)}
     if site in structure.welds:

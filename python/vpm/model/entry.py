@@ -33,7 +33,7 @@ class Quantity(Entry):
     maximum: WideNumber | None = Field(default=None, alias="max")
 
     def mapped(self, change: Callable[[float], float], unit: str | None) -> Quantity:
-        """The same in another unit, by what that makes of each number."""
+        """The quantity in another unit, with value, uncertainty and limits changed by a function."""
         value, *others = (self.value, self.uncertainty, self.minimum, self.maximum)
         spread, low, high = (None if number is None else change(number) for number in others)
         return Quantity(value=change(value), unit=unit, uncertainty=spread, minimum=low, maximum=high)

@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from vpm.errors import CoreError, ModelError, near_match
 from vpm.linear import LinearModel
 from vpm.model.drives.states import follow, rest
-from vpm.model.loops.loops import Loops
+from vpm.model.loops.closure import Loops
 from vpm.model.loops.states import close, reduced, resting
 from vpm.model.motions import Motions
 from vpm.numbers import array_of, number_of

@@ -119,7 +119,7 @@ def _sentence(
 
 
 def _example(section: str, key: str) -> str | None:
-    """How a key is written."""
+    """Example of a key of a model file as a person writes it, for messages; None where there is none."""
     kinds = SECTIONS.get(section, ())
     own = next((kind.EXAMPLES[key] for kind in kinds if issubclass(kind, Component) and key in kind.EXAMPLES), None)
     return own or _EXAMPLES.get(f"{section}.{key}", _EXAMPLES.get(key))

@@ -135,7 +135,7 @@ class Joint(Component):
     inertia_coupling: Switch = True
 
     def coordinate_names(self, name: str) -> tuple[str, ...]:
-        """Names of its coordinates."""
+        """Names of the coordinates of a joint."""
         return tuple(f"{name}{suffix}" for suffix in SUFFIXES[self.type])
 
     def coordinates(self, name: str) -> tuple[Coordinate, ...]:

@@ -25,7 +25,7 @@ class End(Entry):
     point: Vector = ORIGIN
 
     def described(self, structure: Structure) -> Described:
-        """What the core reads of it."""
+        """What the core reads of an end of a line."""
         frame = structure.mounted(self.parent, self.at, Pose(self.point))
         return {"on": frame.mount.described(), "point": list(frame.pose.translation)}
 
@@ -60,7 +60,7 @@ class Line(Component):
             yield Problem(place("lines", name), rest)
 
     def described(self, name: str, structure: Structure, index: Index) -> Described:
-        """What the core reads of it."""
+        """What the core reads of a line between two points."""
         parts = {
             key: None if part is None else {short: index[f"{name}.{key}.{short}"] for short in Part.model_fields}
             for key, part in (("barrel", self.barrel), ("rod", self.rod))

@@ -35,7 +35,7 @@ class LoadCell(Component):
             yield Problem(where, f'is "{self.joint}", which is no joint of the model; {repair}')
 
     def described(self, name: str, structure: Structure, index: Index) -> Described:  # noqa: ARG002
-        """What the core reads of it; at a joint of several coordinates the last one carries the child."""
+        """What the core reads of a load cell; at a joint of several coordinates the last one carries the child."""
         if self.joint in structure.joints:
             return {"name": name, "joint": structure.joints.index(self.joint)}
         return {"name": name, "joint": max(k for k, axis in enumerate(structure.axes) if axis.joint == self.joint)}

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 class Marker(Component):
-    """Frame to watch."""
+    """Frame of a model whose motion is watched."""
 
     CHANNELS: ClassVar[Mapping[str, str]] = {
         **dict.fromkeys(("x", "y", "z"), "m"),
@@ -27,6 +27,6 @@ class Marker(Component):
     rotation: Vector = ORIGIN
 
     def described(self, name: str, structure: Structure, index: Index) -> Described:  # noqa: ARG002
-        """What the core reads of it."""
+        """What the core reads of a marker."""
         frame = structure.mounted(self.parent, self.at, pose(self.translation, self.rotation))
         return {"name": name, **frame.described()}

@@ -16,7 +16,7 @@ from vpm.catalogue import SITE_KINDS, Side, effect_type
 from vpm.errors import CoreError, ModelError, near_match
 from vpm.files import write_text
 from vpm.model.check import check_document, check_effect
-from vpm.model.checked import Checked
+from vpm.model.checked_document import Checked
 from vpm.model.compile import core_of, described, structure_text
 from vpm.model.effect_start import starting_values
 from vpm.model.effects import Effect, effects_of

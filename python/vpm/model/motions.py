@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import CoreError, ModelError
-from vpm.model.components import Components
+from vpm.model.component_names import Components
 from vpm.model.standard import OF_FILE, PLAIN, STANDARD, standard_parameters
 from vpm.numbers import array_of
 
@@ -66,12 +66,12 @@ class Motions(Components):
     @property
     @abstractmethod
     def parameters(self) -> Mapping[str, Parameter]:
-        """Parameters by dotted name."""
+        """Parameters of a model by dotted name."""
 
     @property
     @abstractmethod
     def theta(self) -> Array:
-        """Values of all parameters."""
+        """Values of all parameters of a model, in index order."""
 
     @abstractmethod
     def index(self, name: str) -> int:
@@ -80,7 +80,7 @@ class Motions(Components):
     @property
     @abstractmethod
     def core(self) -> System:
-        """Compiled system."""
+        """Compiled system of a model."""
 
     @cached_property
     def dynamics(self) -> Dynamics:
@@ -342,7 +342,7 @@ class Motions(Components):
         return self.markers.index(self._known(name, self.markers, "marker"))
 
     def _answers(self, question: str, motion: Sequence[ArrayLike], shape: Shape, marker: int = 0) -> Array:
-        """What the core answers about all motions, (..., *shape)."""
+        """Answer of the core to one question about all motions, (..., *shape)."""
         leading, tables = self._tables(motion)
         values, _ = self.core.answers(self.theta, question, marker, tables)
         return values.reshape(leading + shape)
@@ -362,7 +362,7 @@ class Motions(Components):
         return values.reshape(*leading, n), derivatives.reshape(*leading, n, len(columns))
 
     def _tables(self, motion: Sequence[ArrayLike]) -> tuple[Shape, list[Array]]:
-        """Shape of the motions, and each quantity as a table with one row for each."""
+        """Common shape of the motions given, and each of their quantities as a table, a row each."""
         n, arrays = len(self.coordinates), []
         for name, given in zip(MOTION, motion, strict=False):
             array = array_of(given, f"{self.name}: {name}", CoreError)

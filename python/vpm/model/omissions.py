@@ -10,7 +10,7 @@ from vpm.model.structure import Structure
 
 
 def omissions(structure: Structure) -> Mapping[str, list[int]]:
-    """What is left out, by the numbers of bodies, joints and beams of the core; nothing where nothing is.
+    """Terms that a model leaves out, by the numbers of bodies, joints and beams of the core.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ class Owners(NamedTuple):
 
 
 def owners(structure: Structure) -> Iterator[Owners]:
-    """Who has channels, in the order of the core."""
+    """Components that have output channels, in the order of the core."""
     document = structure.document
 
     def those(what: str, section: str, key: str = "") -> Iterator[Owners]:

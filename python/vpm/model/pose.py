@@ -38,7 +38,7 @@ class Pose:
         return Pose(tuple(moved.tolist()), tuple(turned.ravel().tolist()))
 
     def described(self) -> dict[str, Any]:
-        """What the core reads of it."""
+        """What the core reads of a pose."""
         return {"translation": list(self.translation), "rotation": list(self.rotation)}
 
 
@@ -60,7 +60,7 @@ class Mount:
     at: float = 0.0
 
     def described(self) -> str | dict[str, Any]:
-        """What the core reads of it."""
+        """What the core reads of a mount."""
         if self.kind == "world":
             return "world"
         return {"body": self.index} if self.kind == "body" else {"section": {"beam": self.index, "at": self.at}}
@@ -74,7 +74,7 @@ class Frame:
     pose: Pose
 
     def described(self) -> dict[str, Any]:
-        """What the core reads of it."""
+        """What the core reads of a frame that is fixed to a mount."""
         return {"on": self.mount.described(), **self.pose.described()}
 
 

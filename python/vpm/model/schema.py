@@ -127,7 +127,7 @@ def _members(kind: object, tags: tuple[object, ...] = ()) -> Iterator[tuple[obje
 
 
 def _inside(kind: object, key: str | int) -> Iterator[tuple[object, tuple[object, ...]]]:
-    """What a key leads to from a table, a list, or a table of names."""
+    """Types that a key of a model file leads to from a table, a list, or a table of names."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         fields = [field for name, field in kind.model_fields.items() if key == (field.alias or name)]
         for field in fields:

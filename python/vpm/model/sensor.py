@@ -24,7 +24,7 @@ _ROUNDED = 1.0 / 12.0
 
 
 class Sensor(Component):
-    """Reading of one channel.
+    """Sensor that reads one channel, with noise and resolution.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Sensor(Component):
                 yield Slot(("sensors", name, key), quantity, structure.unit(self.measures), _RANGE)
 
     def described(self, name: str, structure: Structure, index: Index) -> Described:
-        """What the core reads of it."""
+        """What the core reads of a sensor."""
         effects = {key: index.get(f"{name}.{key}.{last}") for key, last in _EFFECTS.items()}
         return {"name": name, "channel": described_channel(self.measures, structure), **effects}
 

@@ -30,7 +30,7 @@ def name_behind(joint: str) -> str:
 
 
 def splits_joint(entry: EffectEntry, document: Document) -> bool:
-    """Whether an effect parts motor and link: wind-up always, play at a joint that an actuator drives directly.
+    """Whether an effect splits a joint into motor and link: wind-up always, play where an actuator drives directly.
 
     A joint without an actuator may be the play itself.
     """

@@ -124,7 +124,7 @@ class Structure:
         return (*self.joints, *elastic)
 
     def with_document(self, document: Document) -> Structure:
-        """The same of a document that has other effects, none of which reshapes the machine."""
+        """The structure of a document that has other effects, none of which reshapes the machine."""
         other = replace(self, document=flexed(document))
         other.__dict__.update((name, answer) for name, answer in self.__dict__.items() if name not in other.__dict__)
         return other
@@ -246,7 +246,7 @@ class Structure:
 
     @cached_property
     def known_channels(self) -> frozenset[str]:
-        """The same, to look one up."""
+        """Every channel that a log may hold, as a set to look one up."""
         return frozenset(self.channels)
 
     def effort_unit(self, actuator: str) -> str:

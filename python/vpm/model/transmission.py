@@ -37,7 +37,7 @@ class Transmission(Component):
                 yield Problem(where, rest)
 
     def slots(self, keys: Keys, structure: Structure) -> Iterator[Slot]:
-        """Its parameters."""
+        """Parameters of a transmission."""
         for joint, ratio in self.ratios.items():
             unit = COORDINATE_UNIT[structure.joint_kind(joint)]
             yield Slot((*keys, "ratios", joint), ratio, "1" if unit == "rad" else f"rad/{unit}", ANY)
@@ -45,10 +45,10 @@ class Transmission(Component):
             yield Slot((*keys, "inertia"), self.inertia, "kg m^2", NOT_NEGATIVE, INERTIA, "linear")
 
     def levers(self, name: str, structure: Structure, index: Index) -> list[dict[str, int]]:
-        """Its ratios, with the numbers of their joints."""
+        """Ratios of a transmission, with the numbers of their joints."""
         places = structure.joints
         return [{"joint": places.index(joint), "ratio": index[f"{name}.ratios.{joint}"]} for joint in self.ratios]
 
     def described(self, name: str, structure: Structure, index: Index) -> Described:
-        """What the core reads of it."""
+        """What the core reads of a transmission."""
         return {"name": name, "ratios": self.levers(name, structure, index), "inertia": index.get(f"{name}.inertia")}

@@ -52,7 +52,7 @@ class Basis:
         return cls(centre, (0.5 * (u1 - u0) or 1.0, 0.5 * (s1 - s0) or 1.0), tuple(range(10)))
 
     def columns(self, drive: Array, length: Array) -> Array:
-        """Its monomials, shape (N, terms)."""
+        """Monomials of a coefficient map in drive and length, shape (N, terms)."""
         u, s = (drive - self.centre[0]) / self.scale[0], (length - self.centre[1]) / self.scale[1]
         return surface_columns(u, s)[:, list(self.terms)]
 

@@ -34,7 +34,7 @@ class Parameters:
         return cls(x[:terms], x[terms:-2], float(x[-2]), float(np.exp(x[-1])))
 
     def to_vector(self) -> Array:
-        """The same array."""
+        """Array of k0, s0, k1 and the logarithm of tau."""
         return np.concatenate([self.k0, self.s0, [self.k1, np.log(self.tau)]])
 
 
@@ -70,7 +70,7 @@ class OutputErrors:
 
     @property
     def freedom(self) -> int:
-        """Samples less starting forces."""
+        """Degrees of freedom of the output errors: samples less starting forces."""
         return sum(one.force.size - Recursion(self.scheme, 1.0).weights.lag for one in self.records)
 
     def columns(self, at: int) -> tuple[Array, Array]:

@@ -37,7 +37,7 @@ class MaxwellSignals(Storable):
 
 @dataclass(frozen=True)
 class Samples:
-    """One record of an element; arrays of shape (N,)."""
+    """Force, length and drive of a Maxwell element in one record; arrays of shape (N,)."""
 
     name: str
     unit: str

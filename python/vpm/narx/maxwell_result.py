@@ -82,7 +82,7 @@ class MaxwellFit(Result):
 
 
 def training_rmse(element: MaxwellNarx, samples: list[Samples]) -> float:
-    """Of free runs over all records, N; infinite where one diverges."""
+    """Root mean square force error of free runs over all records, N; infinite where one diverges."""
     total, count = 0.0, 0
     # Of all records: at some pose the force may be zero.
     bound = FAR * max(float(np.abs(one.force).max()) for one in samples) or np.inf

@@ -67,7 +67,7 @@ class Narx(Result):
         terms: Sequence[Sequence[tuple[int, int]]],
         coefficients: Sequence[float] | Array,
     ) -> Narx:
-        """Model from known terms.
+        """NARX model from known terms and coefficients.
 
         Parameters
         ----------

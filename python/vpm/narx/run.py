@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 def inside(correlation: Correlation) -> bool:
-    """Whether a correlation is what chance gives.
+    """Whether a correlation of a residual is what chance gives.
 
     At most one lag in ten lies outside the band, where one in twenty is expected; and no single lag is larger than the
     largest of all lags would be in 19 of 20 independent signals (Bonferroni's inequality).

@@ -27,7 +27,7 @@ COORDINATES, RATES, DRIVES = 1e-2, 1.0, 0.1
 
 @dataclass(frozen=True)
 class Record:
-    """What an observer takes of a log.
+    """Readings, inputs and first state of a log, as an observer takes them.
 
     Attributes
     ----------
@@ -87,7 +87,7 @@ class Record:
 
 @dataclass(frozen=True)
 class Pass:
-    """What a filter gives of a record, see `vpm._core.System.filter`.
+    """Innovations, gains and states of one pass of the Kalman filter over a record; see `vpm._core.System.filter`.
 
     Attributes
     ----------
@@ -131,7 +131,7 @@ def whitened(covariances: Array, values: Array) -> Array:
 
 
 def filtered(model: Model, record: Record, noise: Noise, *, setup: Setup | None = None) -> Pass:
-    """Filter ``record`` with ``model``.
+    """Pass of the Kalman filter of ``model`` over a ``record``.
 
     Raises
     ------

@@ -55,7 +55,7 @@ class Noise(Storable):
                     raise SimulationError(f'noise of {kind}: "{name}" is {value:g}; give {condition}')
 
     def spreads(self, model: Model, record: Record) -> tuple[Array, Array, Array, Array]:
-        """As the core takes it: of readings, forces and states, and of the first state.
+        """Deviations of readings, forces, states and of the first state, as the core takes them.
 
         Raises
         ------

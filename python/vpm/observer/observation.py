@@ -27,7 +27,7 @@ LAGS = 20
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Observation(Result):
-    """A record beside a model that follows it.
+    """Innovations, their sizes and the states of a record that an observer follows.
 
     Attributes
     ----------

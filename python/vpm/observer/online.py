@@ -151,7 +151,7 @@ class Observer:
 
     @property
     def state(self) -> Array:
-        """Last estimate, shape (nx,)."""
+        """Last state that the observer estimated, shape (nx,)."""
         return self._estimate
 
     @property

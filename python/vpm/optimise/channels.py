@@ -58,7 +58,7 @@ class Channels:
         return np.array(self.evaluated[1].map(len(states))(states.T, commands.T).full()).T
 
     def size(self, limit: Limit, states: Array) -> float:
-        """What counts as large in a channel: its limit, or how far states of their sizes take it from zero."""
+        """Size of a channel that counts as large: its limit, or how far states of their sizes take it from zero."""
         if limit.channel in self.own.states:
             return float(states[self.own.states.index(limit.channel)])
         return limit.size or 1.0

@@ -31,12 +31,12 @@ _POWERS = np.linalg.inv(np.vander(NODES, increasing=True))
 
 
 def values(at: Array) -> Array:
-    """What gives a polynomial at ``at`` from its values at the nodes, shape (at, STAGES + 1)."""
+    """Matrix (at, STAGES + 1) from a polynomial's values at the nodes to those at ``at``."""
     return np.asarray(np.vander(at, STAGES + 1, increasing=True) @ _POWERS)
 
 
 def slopes(at: Array) -> Array:
-    """What gives its derivative by the share of the interval, shape (at, STAGES + 1)."""
+    """Matrix (at, STAGES + 1) from a polynomial's values at the nodes to its slopes at ``at``, by share of interval."""
     powers = np.vander(at, STAGES + 1, increasing=True)
     grown = np.zeros_like(powers)
     grown[:, 1:] = powers[:, :-1] * np.arange(1, STAGES + 1)

@@ -28,7 +28,7 @@ _IGNORED = re.compile(r"\s+\(void\)\w+;|\s*")
 
 
 def casadi() -> ModuleType:
-    """The library.
+    """The library CasADi.
 
     Raises
     ------
@@ -42,7 +42,7 @@ def casadi() -> ModuleType:
 
 @dataclass(frozen=True)
 class Equations:
-    """A model as expressions.
+    """Equations of a model as CasADi expressions.
 
     Attributes
     ----------
@@ -68,7 +68,7 @@ class Equations:
 
 
 def equations(model: Model) -> Equations:
-    """Equations of a model.
+    """Equations of a model as CasADi expressions, from its C source.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def equations(model: Model) -> Equations:
 def _read(
     model: Model, source: str, function: str, result: str, inputs: tuple[Expression, Expression], size: int
 ) -> Expression:
-    """What a function of the C gives, over all its pieces, which hand numbers on in ``w``."""
+    """CasADi expression of a function of the generated C, over all its pieces, which hand numbers on in ``w``."""
     ca = casadi()
     arrays: dict[str, Any] = {"x": inputs[0].elements(), "u": inputs[1].elements(), "w": {}, result: {}}
     pieces = re.finditer(rf"static void {_NAME}_run_{function}(?:_\d+)?\([^)]*\)\n\{{\n(.*?)^\}}", source, re.S | re.M)

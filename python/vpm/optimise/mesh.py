@@ -41,7 +41,7 @@ def errors(channels: Channels, motion: MeshMotion, scales: Scales) -> tuple[Arra
 
 
 def bends(task: Fitted, names: Sequence[str], motion: MeshMotion, scales: Scales) -> tuple[Array, ...]:
-    """What the straight course of commands costs in each interval, as a share of the optimum.
+    """Cost of straight commands in each interval of a mesh, as a share of the optimum.
 
     A jump of a command by its size that is drawn out over a share h of the motion costs h^2/6 of the least time of a
     mass, and less than a jump costs its share. Where the rate of a command is limited, it is the rate that jumps.

@@ -68,7 +68,7 @@ class MeshMotion:
         return states, rates, commands
 
     def on(self, meshes: tuple[Array, ...]) -> MeshMotion:
-        """The same motion on other meshes."""
+        """The motion on other meshes."""
         states = [self.states[:1]]
         commands = []
         for phase, mesh in enumerate(meshes):

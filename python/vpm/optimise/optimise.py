@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 class OptimisationInterruptedError(KeyboardInterrupt):
-    """Ctrl-C during a search.
+    """Ctrl-C during a search for an optimal motion.
 
     Attributes
     ----------
@@ -177,7 +177,7 @@ def _impulse(motion: MeshMotion, times: Array, last: Array) -> Array:
 
 
 def _played(model: Model, optimum: Optimum) -> tuple[dict[str, float], tuple[str, ...]]:
-    """How far a simulation strays from the motion until its end, by channel."""
+    """Largest departure of a simulation from the optimal motion, by channel as a share of its range, and notes."""
     try:
         run = optimum.play(model)
     except VpmError as error:

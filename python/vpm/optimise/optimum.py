@@ -93,7 +93,7 @@ class Optimum(Result):
 
     @property
     def duration(self) -> float:
-        """Of the motion, s."""
+        """Duration of the optimal motion, s."""
         return sum(self.durations.values())
 
     @property

@@ -22,7 +22,7 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Group:
-    """The same function at several points.
+    """One function of a nonlinear program at several points.
 
     Attributes
     ----------

@@ -34,7 +34,7 @@ _GOOD = ("Solve_Succeeded", "Solved_To_Acceptable_Level")
 
 @dataclass
 class Search:
-    """What a search knows: its best motion, and how it came there."""
+    """State of a search for an optimal motion: its best motion, cost, error, and how it came there."""
 
     channels: Channels
     task: Fitted
@@ -121,7 +121,7 @@ def _prefixed(progress: Progress, what: str) -> Progress:
 
 
 def _calm(found: Search, progress: Progress) -> _Run | None:
-    """The same from a motion of least energy in a fixed time, which is found more easily; the longest time first."""
+    """Run that begins with the motion of least energy in a fixed time, which is found more easily; or None."""
     task, start = found.task, found.motion
     for share in (1.0, 0.5):
         times = tuple(part.longest**share * part.shortest ** (1.0 - share) for part in task.phases)
@@ -218,7 +218,7 @@ def _listening(watch: Any) -> Iterator[None]:  # noqa: ANN401
 
 
 def _watch(run: _Run) -> Any:  # noqa: ANN401
-    """What IPOPT calls after every iteration."""
+    """Callback that IPOPT calls after every iteration."""
     ca = casadi()
     nx, ng = run.form.size, len(run.form.rows)
     limits = run.form.bounds(soft=False)

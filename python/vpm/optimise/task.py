@@ -55,7 +55,7 @@ class Limit:
 
 @dataclass(frozen=True)
 class End:
-    """What holds at an instant.
+    """Conditions at the beginning of a motion or at the end of a phase.
 
     Attributes
     ----------

@@ -73,19 +73,19 @@ class Transcription:
     # ---- places of variables -----------------------------------------------------------------------------------------
 
     def x(self, point: int) -> int:
-        """Where the state of a point begins."""
+        """Number of the variable at which the state of a point begins."""
         return point * self.nx
 
     def u(self, phase: int, node: int) -> int:
-        """Where the commands of a node begin."""
+        """Number of the variable at which the commands of a node begin."""
         return int(self._u[phase]) + node * self.nu
 
     def t(self, phase: int, interval: int) -> int:
-        """Where the duration of a phase stands, as an interval sees it."""
+        """Number of the variable of the duration of a phase, as an interval sees it."""
         return int(self._t[phase]) + interval
 
     def r(self, end: int) -> int:
-        """Where the commands of the rest at an end begin."""
+        """Number of the variable at which the commands of the rest at an end begin."""
         return self._r + self.nu * sum(self.rests[:end])
 
     # ---- building ----------------------------------------------------------------------------------------------------
@@ -255,11 +255,11 @@ class Transcription:
 
     @property
     def size(self) -> int:
-        """Variables."""
+        """Number of variables of the nonlinear program."""
         return self._s + self._slacks
 
     def program(self) -> Program:
-        """The program."""
+        """Nonlinear program of a task on a mesh."""
         ng, nz = len(self.rows), self.size
         groups = []
         for results, places, puts in self._groups:
@@ -310,7 +310,7 @@ class Transcription:
         return {"lbx": low, "ubx": high, "lbg": np.maximum(least, -LARGE), "ubg": np.minimum(most, LARGE)}
 
     def pack(self, motion: MeshMotion) -> Array:
-        """Variables of a motion."""
+        """Variables of the nonlinear program from a motion on a mesh."""
         z = np.zeros(self.size)
         z[: self.points * self.nx] = (motion.states / self.scales.states).ravel()
         z[self.points * self.nx : self._t[0]] = np.concatenate(
@@ -324,7 +324,7 @@ class Transcription:
         return z
 
     def unpack(self, z: Array) -> MeshMotion:
-        """Motion of variables."""
+        """Motion on a mesh from variables of the nonlinear program."""
         states = z[: self.points * self.nx].reshape(-1, self.nx) * self.scales.states
         commands = tuple(
             z[self._u[at] : self._u[at + 1]].reshape(-1, self.nu) * self.scales.commands

@@ -29,19 +29,19 @@ class GapLike(Protocol):
 
     @property
     def before(self) -> float:
-        """Of the nominal model."""
+        """Plotted error of the nominal model."""
 
     @property
     def recalibrated(self) -> float:
-        """With fitted parameters."""
+        """Plotted error with fitted parameters."""
 
     @property
     def after(self) -> float:
-        """With the accepted effects."""
+        """Plotted error with the accepted effects."""
 
     @property
     def noise_floor(self) -> float:
-        """What noise alone leaves; may be NaN."""
+        """Plotted error that noise alone leaves; may be NaN."""
 
     @property
     def signal(self) -> float:
@@ -49,19 +49,19 @@ class GapLike(Protocol):
 
 
 class CandidateLike(Protocol):
-    """One candidate effect of a search."""
+    """One candidate effect of a search, as bars show it."""
 
     @property
     def name(self) -> str:
-        """Effect."""
+        """Name of a plotted candidate effect."""
 
     @property
     def site(self) -> str:
-        """Where it would be."""
+        """Component at which a plotted candidate would be."""
 
     @property
     def round(self) -> int:
-        """Round of the search."""
+        """Round of the search in which a plotted candidate was tried."""
 
     @property
     def screened(self) -> float:
@@ -73,7 +73,7 @@ class CandidateLike(Protocol):
 
     @property
     def accepted(self) -> bool:
-        """Whether it was believed."""
+        """Whether a plotted candidate was accepted."""
 
 
 @styled
@@ -278,7 +278,7 @@ class Climbed(Protocol):
 
     @property
     def name(self) -> str:
-        """Of the level."""
+        """Name of a plotted level of a climb."""
 
     @property
     def error(self) -> float:
@@ -290,11 +290,11 @@ class Climbed(Protocol):
 
     @property
     def values(self) -> Mapping[str, float]:
-        """Fitted parameters."""
+        """Fitted parameters at a plotted level of a climb."""
 
     @property
     def std(self) -> Mapping[str, float]:
-        """Their standard deviations."""
+        """Standard deviations of the parameters at a plotted level of a climb."""
 
 
 @styled

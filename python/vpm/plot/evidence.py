@@ -26,59 +26,59 @@ BAND = 1.96
 
 
 class EvidenceLike(Protocol):
-    """Samples of one finding."""
+    """Samples of one finding, as a plot of its evidence shows them."""
 
     @property
     def effect(self) -> str:
-        """Name of the effect."""
+        """Name of the effect whose evidence is plotted."""
 
     @property
     def site(self) -> str:
-        """Where it sits."""
+        """Component at which the plotted effect sits."""
 
     @property
     def record(self) -> str:
-        """Unseen record."""
+        """Validation record whose evidence is plotted."""
 
     @property
     def channel(self) -> str:
-        """Where the residual is taken."""
+        """Channel of the plotted residual."""
 
     @property
     def unit(self) -> str:
-        """Of the residual."""
+        """Unit of the plotted residual."""
 
     @property
     def axis(self) -> str:
-        """What it is drawn over."""
+        """Quantity over which evidence is plotted."""
 
     @property
     def name(self) -> str:
-        """The same in words."""
+        """Quantity over which evidence is plotted, in words."""
 
     @property
     def axis_unit(self) -> str:
-        """Its unit."""
+        """Unit of the quantity over which evidence is plotted."""
 
     @property
     def time(self) -> Array:
-        """Shape (n,), s."""
+        """Time of the plotted evidence, shape (n,), s."""
 
     @property
     def values(self) -> Array:
-        """Shape (n,)."""
+        """Quantity over which evidence is plotted, shape (n,)."""
 
     @property
     def without(self) -> Array:
-        """Residual without the effect."""
+        """Plotted residual without the effect."""
 
     @property
     def repaired(self) -> Array:
-        """Residual with it."""
+        """Plotted residual with the effect."""
 
     @property
     def law_values(self) -> Array:
-        """Shape (k,)."""
+        """Values at which the law of the plotted effect is drawn, shape (k,)."""
 
     @property
     def law(self) -> Array:

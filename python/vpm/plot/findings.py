@@ -34,19 +34,19 @@ class TraceLike(Protocol):
 
     @property
     def channel(self) -> str:
-        """Name."""
+        """Name of a plotted channel, measured and simulated."""
 
     @property
     def unit(self) -> str:
-        """Its unit."""
+        """Unit of a plotted channel, measured and simulated."""
 
     @property
     def time(self) -> Array:
-        """Shape (n,), s."""
+        """Time of a plotted channel, measured and simulated, shape (n,), s."""
 
     @property
     def measured(self) -> Array:
-        """Shape (n,)."""
+        """Measured values of a plotted channel, shape (n,)."""
 
     @property
     def before(self) -> Array:

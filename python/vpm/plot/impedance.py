@@ -17,75 +17,75 @@ Array = NDArray[np.float64]
 
 
 class LoopLike(Protocol):
-    """What `plot_loops` draws."""
+    """Hysteresis loop as `plot_loops` draws it."""
 
     @property
     def name(self) -> str:
-        """Title."""
+        """Title of a plotted hysteresis loop."""
 
     @property
     def frequency(self) -> float:
-        """Hz."""
+        """Frequency of a plotted hysteresis loop, Hz."""
 
     @property
     def stiffness(self) -> float:
-        """N/m."""
+        """Stiffness of a plotted hysteresis loop, N/m."""
 
     @property
     def damping(self) -> float:
-        """N s/m."""
+        """Damping of a plotted hysteresis loop, N s/m."""
 
     @property
     def displacement_harmonics(self) -> NDArray[np.complex128]:
-        """M."""
+        """Harmonics of the motion of a plotted hysteresis loop, m."""
 
     @property
     def displacement(self) -> Array:
-        """M."""
+        """Displacement over a plotted hysteresis loop, m."""
 
     @property
     def force(self) -> Array:
-        """N."""
+        """Force over a plotted hysteresis loop, N."""
 
 
 class QuantityLike(Protocol):
-    """A repeated quantity."""
+    """Mean and interval of a quantity of repeated tests, as plotted."""
 
     @property
     def mean(self) -> float:
-        """Of the tests."""
+        """Plotted mean of repeated tests."""
 
     @property
     def half_width(self) -> float:
-        """Of the interval."""
+        """Half of the plotted interval of repeated tests."""
 
     @property
     def values(self) -> Array:
-        """Of each test."""
+        """Plotted value of each repeated test."""
 
 
 class RowLike(Protocol):
-    """A row of `plot_impedances`."""
+    """Row of an impedance table as `plot_impedances` draws it."""
 
     @property
     def joint(self) -> str:
-        """Name."""
+        """Name of the joint of a plotted impedance."""
 
     @property
     def impedance(self) -> str:
-        """Name."""
+        """Name of a plotted impedance."""
 
     @property
     def test(self) -> str:
-        """Name."""
+        """Name of the kind of test of a plotted impedance."""
 
     @property
     def stiffness(self) -> QuantityLike:
-        """N/m."""
+        """Stiffness of a plotted impedance, N/m."""
 
     @property
     def damping(self) -> QuantityLike:
-        """N s/m."""
+        """Damping of a plotted impedance, N s/m."""
 
 
 @styled

@@ -23,43 +23,43 @@ WIDEST = 3.0
 
 
 class InertialLike(Protocol):
-    """What `plot_inertial` draws."""
+    """Inertial fit as `plot_inertial` draws it."""
 
     @property
     def names(self) -> Sequence[str]:
-        """Parameters."""
+        """Names of the plotted inertial parameters."""
 
     @property
     def nominal(self) -> Array:
-        """CAD values."""
+        """CAD values of the plotted inertial parameters."""
 
     @property
     def values(self) -> Array:
-        """Estimates."""
+        """Estimates of the plotted inertial parameters."""
 
     @property
     def std(self) -> Array:
-        """Deviations; infinite where open."""
+        """Deviations of the plotted inertial parameters; infinite where open."""
 
     @property
     def identifiable(self) -> Sequence[str]:
-        """What data know of each."""
+        """What data know of each plotted inertial parameter."""
 
     @property
     def base_words(self) -> Sequence[str]:
-        """Base parameters."""
+        """Plotted base parameters in words."""
 
     @property
     def base_nominal(self) -> Array:
-        """Their CAD values."""
+        """CAD values of the plotted base parameters."""
 
     @property
     def base_values(self) -> Array:
-        """Their estimates."""
+        """Estimates of the plotted base parameters."""
 
     @property
     def base_std(self) -> Array:
-        """Their deviations."""
+        """Deviations of the plotted base parameters."""
 
     @property
     def quantile(self) -> float:

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 class NarxRunLike(Protocol):
-    """What `plot_narx_run` draws."""
+    """Run of a NARX model as `plot_narx_run` draws it."""
 
     @property
     def kind(self) -> str:
@@ -26,27 +26,27 @@ class NarxRunLike(Protocol):
 
     @property
     def record(self) -> str:
-        """Name of the record."""
+        """Name of the record of a plotted NARX run."""
 
     @property
     def output(self) -> str:
-        """Name of the output."""
+        """Name of the output of a plotted NARX run."""
 
     @property
     def unit(self) -> str:
-        """Its unit."""
+        """Unit of the output of a plotted NARX run."""
 
     @property
     def time(self) -> Array:
-        """Shape (N,)."""
+        """Time of a plotted NARX run, shape (N,)."""
 
     @property
     def measured(self) -> Array:
-        """Shape (N,)."""
+        """Measured output beside a plotted NARX run, shape (N,)."""
 
     @property
     def values(self) -> Array:
-        """Shape (N,)."""
+        """Output of a plotted NARX run, shape (N,)."""
 
 
 @styled

@@ -38,19 +38,19 @@ _READABLE: Mapping[str, tuple[tuple[str, float, float], ...]] = {
 
 
 class ScenarioLike(Protocol):
-    """What `plot_scenario` draws."""
+    """Runs of a scenario as `plot_scenario` draws them."""
 
     @property
     def name(self) -> str:
-        """Of the scenario."""
+        """Name of a plotted scenario."""
 
     @property
     def panels(self) -> Sequence[Sequence[str]]:
-        """Channels of each panel."""
+        """Channels of each panel of a plotted scenario."""
 
     @property
     def runs(self) -> Mapping[str, object]:
-        """By name."""
+        """Runs of a plotted scenario by name."""
 
     @property
     def failures(self) -> Mapping[str, str]:

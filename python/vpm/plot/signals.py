@@ -27,43 +27,43 @@ LEAST_IN_BIN = 0.0005
 
 
 class RunLike(Protocol):
-    """What `plot_run` draws."""
+    """Simulated run as `plot_run` draws it."""
 
     @property
     def model_name(self) -> str:
-        """Name of the model."""
+        """Name of the model of a plotted run."""
 
     @property
     def experiment_name(self) -> str:
-        """Name of the log."""
+        """Name of the log of a plotted run."""
 
     @property
     def mode(self) -> str:
-        """Mode of the simulation."""
+        """Mode of simulation of a plotted run."""
 
     @property
     def time(self) -> Array:
-        """Shape (N,), s."""
+        """Time of a plotted run, shape (N,), s."""
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Names of the C channels."""
+        """Names of the C channels of a plotted run."""
 
     @property
     def units(self) -> tuple[str, ...]:
-        """Their units."""
+        """Units of the channels of a plotted run."""
 
     @property
     def values(self) -> Array:
-        """Shape (N, C)."""
+        """Simulated values of a plotted run, shape (N, C)."""
 
     @property
     def measured(self) -> Array:
-        """Shape (N, C), NaN where not measured."""
+        """Measured values beside a plotted run, shape (N, C), NaN where not measured."""
 
     @property
     def starts(self) -> NDArray[np.int64]:
-        """Rows at which a piece begins."""
+        """Rows at which a piece of a plotted run begins."""
 
     @property
     def notes(self) -> tuple[str, ...]:

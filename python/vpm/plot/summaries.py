@@ -18,55 +18,55 @@ Array = NDArray[np.float64]
 
 
 class ChannelLike(Protocol):
-    """One channel of a comparison."""
+    """One channel of a comparison, as a summary draws it."""
 
     @property
     def channel(self) -> str:
-        """Name."""
+        """Name of a channel of a plotted comparison."""
 
     @property
     def unit(self) -> str:
-        """Unit."""
+        """Unit of a channel of a plotted comparison."""
 
     @property
     def time(self) -> Array:
-        """Shape (N,), s."""
+        """Time of a channel of a plotted comparison, shape (N,), s."""
 
     @property
     def measured(self) -> Array:
-        """Shape (N,)."""
+        """Measured values of a plotted comparison, shape (N,)."""
 
     @property
     def simulated(self) -> Array:
-        """Shape (N,)."""
+        """Simulated values of a plotted comparison, shape (N,)."""
 
     @property
     def residual(self) -> Array:
-        """Shape (N,)."""
+        """Residual of a plotted comparison, shape (N,)."""
 
     @property
     def relative_error(self) -> float:
-        """Percent."""
+        """Relative error of a channel of a plotted comparison, percent."""
 
 
 class ComparisonLike(Protocol):
-    """What `plot_comparison` draws."""
+    """Comparison of a run with a log, as `plot_comparison` draws it."""
 
     @property
     def model_name(self) -> str:
-        """Name of the model."""
+        """Name of the model of a plotted comparison."""
 
     @property
     def experiment_name(self) -> str:
-        """Name of the log."""
+        """Name of the log of a plotted comparison."""
 
     @property
     def mode(self) -> str:
-        """Mode of the simulation."""
+        """Mode of simulation of a plotted comparison."""
 
     @property
     def channels(self) -> Sequence[ChannelLike]:
-        """Compared channels."""
+        """Channels of a plotted comparison."""
 
     @property
     def state(self) -> Mapping[str, Array]:
@@ -74,7 +74,7 @@ class ComparisonLike(Protocol):
 
     @property
     def state_units(self) -> Mapping[str, str]:
-        """Units of the motion."""
+        """Units of the joint motion of a plotted comparison."""
 
 
 class PictureLike(Protocol):

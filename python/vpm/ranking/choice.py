@@ -25,7 +25,7 @@ def weighed(counting: Sequence[Trial], fitter: Fitter) -> list[Trial]:
     is a curve of the same shape: it will be judged again beside what comes after it.
     """
     several, richer = _rivals(counting, fitter.settings)
-    noise = fitted_noise(several[0].fitted.residual, fitter.observed.parts, fitter.settings.order)
+    noise = fitted_noise(several[0].fitted.residual, fitter.tracked.parts, fitter.settings.order)
     told, fits = _with_evidence(several, fitter, noise)
     if not told:
         return [replace(several[0], evidence=-np.inf), *several[1:], *richer]
@@ -50,7 +50,7 @@ def as_good(trial: Trial, first: Trial, settings: Settings) -> bool:
 
 
 def _rivals(counting: Sequence[Trial], settings: Settings) -> tuple[list[Trial], list[Trial]]:
-    """Those that count under the observer of the best of them, the best first, and richer ones of the same curve.
+    """Those that count under the tracker of the best of them, the best first, and richer ones of the same curve.
 
     A richer one fits what the laws of a plainer one are wrong by, so that its evidence says nothing.
     """
@@ -76,12 +76,17 @@ def likely(fitted: Fitted, fitter: Fitter, noise: NoiseModel) -> Fitted:
     return fitter.finished(replace(fitted, cost=cost, ended=False), View(noise))
 
 
+def evidence(fitted: Fitted, fitter: Fitter, noise: NoiseModel) -> float:
+    """Evidence of a fit under a noise model, at the values that are most likely there, nats."""
+    return fitter.evidence(likely(fitted, fitter, noise), noise)
+
+
 def _with_evidence(several: Sequence[Trial], fitter: Fitter, noise: NoiseModel) -> tuple[list[Trial], list[Fitted]]:
     """Trials with the evidence that each adds to what there is without it, and where they are most likely.
 
     Those that run away from the records on the way there are left out.
     """
-    without = fitter.evidence(likely(several[0].look.fitted, fitter, noise), noise)
+    without = evidence(several[0].look.fitted, fitter, noise)
     told, fits = [], []
     for trial in several:
         with contextlib.suppress(*ASTRAY):

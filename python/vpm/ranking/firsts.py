@@ -1,4 +1,4 @@
-"""First states that no channel shows: an observer draws what is measured, and friction may hold the rest for long."""
+"""First states that no channel shows: a tracker draws what is measured, and friction may hold the rest for long."""
 
 from __future__ import annotations
 

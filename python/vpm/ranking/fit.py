@@ -1,4 +1,4 @@
-"""Structures fitted to what an observer leaves of the records, and their evidence."""
+"""Structures fitted to what a tracker leaves of the records, and their evidence."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from scipy.optimize import lsq_linear
 
 from vpm.errors import VpmError
 from vpm.ranking.noise_model import NoiseModel, Parts, white_noise
-from vpm.ranking.observed import NOTHING, By, Observed, Observer
 from vpm.ranking.posterior import log_volume
 from vpm.ranking.settings import FAINT, SHARES, Settings
 from vpm.ranking.structure import Structure
+from vpm.ranking.tracked_records import NOTHING, By, TrackedRecords, Tracker
 
 Array = NDArray[np.float64]
 #: Residuals and derivatives that no record has; their squares are still numbers.
@@ -27,12 +27,12 @@ ASTRAY = (ValueError, ArithmeticError)
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """What an observer leaves of the records under a structure.
+    """What a tracker leaves of the records under a structure.
 
     Attributes
     ----------
     structure : Structure
-    observer : Observer
+    tracker : Tracker
     names : tuple of str
         Unknown parameters by which there are derivatives.
     residual : ndarray, shape (N, m)
@@ -40,7 +40,7 @@ class Followed:
     """
 
     structure: Structure
-    observer: Observer
+    tracker: Tracker
     names: tuple[str, ...]
     residual: Array
     jacobian: Array
@@ -48,12 +48,12 @@ class Followed:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A structure at its most probable values under an observer.
+    """A structure at its most probable values under a tracker.
 
     Attributes
     ----------
     structure : Structure
-    observer : Observer
+    tracker : Tracker
     residual : ndarray, shape (N, m)
     cost : float
         See `Fitter.cost`, under the view of the fit.
@@ -62,7 +62,7 @@ class Fitted:
     """
 
     structure: Structure
-    observer: Observer
+    tracker: Tracker
     residual: Array
     cost: float
     ended: bool = False
@@ -97,18 +97,18 @@ class View:
 
 
 class Fitter:
-    """Fits structures to what an observer leaves of the stretches that are fitted.
+    """Fits structures to what a tracker leaves of the stretches that are fitted.
 
     Derivatives come from as few steps of the integrator as will do: they only show the way, and cost most.
     """
 
-    def __init__(self, observed: Observed, settings: Settings) -> None:
-        self.observed, self.settings = observed, settings
+    def __init__(self, tracked: TrackedRecords, settings: Settings) -> None:
+        self.tracked, self.settings = tracked, settings
 
     def fitted(
         self,
         structure: Structure,
-        observer: Observer,
+        tracker: Tracker,
         view: View,
         goal: float = math.inf,
         residual: Array | None = None,
@@ -125,7 +125,7 @@ class Fitter:
             The structure runs away from the records where it begins.
         """
         names = tuple(name for name in structure.priors if name not in view.known)
-        now = self.followed(structure.at(structure.standard), observer, names, residual)
+        now = self.followed(structure.at(structure.standard), tracker, names, residual)
         return self._descended(now, view, goal)[0]
 
     def moved(self, start: Followed, view: View, anew: bool = False) -> tuple[Fitted, Array]:
@@ -146,7 +146,7 @@ class Fitter:
     ) -> tuple[Fitted, Array]:
         """The descent from known derivatives: ``fresh`` ones, or those of elsewhere, worked out ``anew`` or not."""
         before = self.cost(now.structure, now.residual, view.noise)
-        errors, slopes = view.errors(now, self.observed.parts)
+        errors, slopes = view.errors(now, self.tracked.parts)
         ended = False
         for _ in range(self.settings.iterations if now.structure.priors else 0):
             move, gain = self._step(now.structure, view, errors, slopes)
@@ -157,32 +157,32 @@ class Fitter:
             if better is not None:
                 move = better[0].standard - now.structure.standard
                 now, last, before = replace(now, structure=better[0], residual=better[1]), errors, better[2]
-                errors = view.noise.whitened(now.residual, self.observed.parts)
+                errors = view.noise.whitened(now.residual, self.tracked.parts)
                 slopes = by_secant(slopes, errors - last, move)
             if slow and (fresh or not anew):
                 ended = fresh and hopeful and not view.known
                 break
             fresh = slow
             if fresh:
-                now = self.followed(now.structure, now.observer, now.names, now.residual)
-                errors, slopes = view.errors(now, self.observed.parts)
-        return Fitted(now.structure, now.observer, now.residual, before, ended), slopes
+                now = self.followed(now.structure, now.tracker, now.names, now.residual)
+                errors, slopes = view.errors(now, self.tracked.parts)
+        return Fitted(now.structure, now.tracker, now.residual, before, ended), slopes
 
     def finished(self, found: Fitted, view: View) -> Fitted:
         """Fitted on, by all derivatives, until nothing is gained any more, which a fit may know of itself."""
         for _ in range(self.settings.turns):
             if found.ended:
                 break
-            more = self.fitted(found.structure, found.observer, view, residual=found.residual)
+            more = self.fitted(found.structure, found.tracker, view, residual=found.residual)
             if found.cost - more.cost < self.settings.tolerance:
                 break
             found = more
         return found
 
     def followed(
-        self, structure: Structure, observer: Observer, names: Sequence[str], residual: Array | None = None
+        self, structure: Structure, tracker: Tracker, names: Sequence[str], residual: Array | None = None
     ) -> Followed:
-        """What the observer leaves of the records, with derivatives by some parameters.
+        """What the tracker leaves of the records, with derivatives by some parameters.
 
         Raises
         ------
@@ -190,28 +190,28 @@ class Fitter:
             The structure runs away from the records.
         """
         by = [structure.place(name) for name in names], structure.moves(names)
-        if observer.fine:
+        if tracker.fine:
             if residual is None:
-                residual, _ = self._pass(structure, observer)
+                residual, _ = self._pass(structure, tracker)
             with contextlib.suppress(*ASTRAY):  # contacts may be too stiff for few steps
-                _, jacobian = self._pass(structure, observer.coarse, by)
-                return Followed(structure, observer, tuple(names), residual, jacobian)
-        return Followed(structure, observer, tuple(names), *self._pass(structure, observer, by))
+                _, jacobian = self._pass(structure, tracker.coarse, by)
+                return Followed(structure, tracker, tuple(names), residual, jacobian)
+        return Followed(structure, tracker, tuple(names), *self._pass(structure, tracker, by))
 
-    def noise_of(self, structure: Structure, observer: Observer) -> NoiseModel:
-        """Channels in the root mean squares of what the observer leaves where a fit begins.
+    def noise_of(self, structure: Structure, tracker: Tracker) -> NoiseModel:
+        """Channels in the root mean squares of what the tracker leaves where a fit begins.
 
         Raises
         ------
         VpmError
             The structure runs away from the records.
         """
-        residual, _ = self._pass(structure.at(structure.standard), observer)
-        return white_noise(residual, self.observed.parts)
+        residual, _ = self._pass(structure.at(structure.standard), tracker)
+        return white_noise(residual, self.tracked.parts)
 
     def log_density(self, fitted: Fitted, noise: NoiseModel) -> Array:
         """Logarithm of the density of each sample that is fitted (n,)."""
-        return noise.log_density(noise.whitened(fitted.residual, self.observed.parts))
+        return noise.log_density(noise.whitened(fitted.residual, self.tracked.parts))
 
     def evidence(self, fitted: Fitted, noise: NoiseModel) -> float:
         """Logarithm of the probability density of the records under a structure and a noise model, nats.
@@ -219,8 +219,8 @@ class Fitter:
         Law: Laplace's method about the most probable values (D. MacKay, *Neural Computation* 4, 1992).
         """
         structure = fitted.structure
-        followed = self.followed(structure, fitted.observer, tuple(structure.priors), fitted.residual)
-        errors, slopes = View(noise).errors(followed, self.observed.parts)
+        followed = self.followed(structure, fitted.tracker, tuple(structure.priors), fitted.residual)
+        errors, slopes = View(noise).errors(followed, self.tracked.parts)
         informed = np.repeat(np.sqrt(noise.information()), len(errors) // fitted.residual.shape[1])
         known = slopes * informed[:, None]
         z = structure.standard
@@ -229,7 +229,7 @@ class Fitter:
 
     def cost(self, structure: Structure, residual: Array, noise: NoiseModel) -> float:
         """Negative logarithm of the posterior density but for a constant."""
-        errors = noise.whitened(residual, self.observed.parts)
+        errors = noise.whitened(residual, self.tracked.parts)
         return noise.cost(errors) + 0.5 * float(structure.standard @ structure.standard)
 
     def _step(self, structure: Structure, view: View, errors: Array, slopes: Array) -> tuple[Array, float]:
@@ -245,7 +245,7 @@ class Fitter:
         for share in SHARES:
             tried = now.structure.moved(share * move)
             try:
-                residual, _ = self._pass(tried, now.observer)
+                residual, _ = self._pass(tried, now.tracker)
             except ASTRAY:
                 continue
             after = self.cost(tried, residual, noise)
@@ -253,8 +253,8 @@ class Fitter:
                 return tried, residual, after
         return None
 
-    def _pass(self, structure: Structure, observer: Observer, by: By = NOTHING) -> tuple[Array, Array]:
-        residual, jacobian = self.observed.follow(structure.model, structure.theta, observer, *by)
+    def _pass(self, structure: Structure, tracker: Tracker, by: By = NOTHING) -> tuple[Array, Array]:
+        residual, jacobian = self.tracked.follow(structure.model, structure.theta, tracker, *by)
         if not all(np.max(np.abs(numbers), initial=0.0) < RUNAWAY for numbers in (residual, jacobian)):
             raise VpmError(f"{structure.model.name} runs away from the records")
         return residual, jacobian

@@ -11,7 +11,7 @@ from vpm.results import Storable
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Judgement(Storable):
-    """What an effect removes of the error that an observer leaves.
+    """What an effect removes of the error that a tracker leaves.
 
     Attributes
     ----------
@@ -31,8 +31,8 @@ class Judgement(Storable):
         The same of those that show over the same states at the same place: one curve with two shapes.
     alone : float
         Of an effect that adds inertia, the share of the error power that is left, in the channel in which it removes
-        most, of what the observer leaves of a mass on which nothing acts: too heavy a machine is drawn along by the
-        observer alone.
+        most, of what the tracker leaves of a mass on which nothing acts: too heavy a machine is drawn along by the
+        tracker alone.
     overtone : bool
         Whether it repeats along a whole fraction of the period of another effect at its place.
     """

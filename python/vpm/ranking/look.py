@@ -1,9 +1,9 @@
-"""What an observer leaves of the records, and how much of that another effect removes."""
+"""What a tracker leaves of the records, and how much of that another effect removes."""
 
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 class Look:
-    """What was found, under one observer.
+    """What was found, under one tracker.
 
     Attributes
     ----------
@@ -41,15 +41,15 @@ class Look:
     """
 
     def __init__(self, fitted: Fitted, fitter: Fitter, first: Look | None = None) -> None:
-        observed, self._fitter, self.settings = fitter.observed, fitter, fitter.settings
-        noise = white_noise(fitted.residual, observed.parts)
+        tracked, self._fitter, self.settings = fitter.tracked, fitter, fitter.settings
+        noise = white_noise(fitted.residual, tracked.parts)
         self.coarse = self._followed(fitted)
-        slopes = noise.whitened(self.coarse.jacobian, observed.parts).T
+        slopes = noise.whitened(self.coarse.jacobian, tracked.parts).T
         self.view = View(noise, dict(zip(self.coarse.names, slopes, strict=True)))
         cost = fitter.cost(fitted.structure, fitted.residual, noise)
         self.fitted = replace(fitted, cost=cost)
         self.left = self._squares(fitted.residual)
-        told = observed.structured(fitted.residual, fitted.observer.band, observed.parts)
+        told = tracked.structured(fitted.residual, fitted.tracker.band, tracked.parts)
         self._quiet = np.minimum([one.noise for one in told] / np.array(noise.deviations), 1.0) ** 2
         power, chance = self._above_noise(self.left)
         self._clear = power > SURE * chance
@@ -61,16 +61,15 @@ class Look:
         """With all derivatives if few steps give them; contacts may be too stiff for that."""
         names = tuple(fitted.structure.priors)
         with contextlib.suppress(*ASTRAY):
-            return self._fitter.followed(fitted.structure, fitted.observer.coarse, names)
-        return self._fitter.followed(fitted.structure, fitted.observer, names, fitted.residual)
+            return self._fitter.followed(fitted.structure, fitted.tracker.coarse, names)
+        return self._fitter.followed(fitted.structure, fitted.tracker, names, fitted.residual)
 
     def predicted_gain(self, other: Followed) -> float:
-        """What another structure gains by a step of a fit, or as it stands, with few steps of the integrator, nats.
+        """What another structure gains by a step of a fit, or as it stands, with cheap steps of the integrator, nats.
 
         None where it does most in a channel in which no effect could count any more.
         """
-        view = View(self.view.noise, self._screened[1])
-        return self._gain(self._after_a_step(other.structure, *view.errors(other, self._fitter.observed.parts)))
+        return self._gain(self._after_a_step(other.structure, *self.view.errors(other, self._fitter.tracked.parts)))
 
     def gain_along(self, residual: Array) -> float:
         """What another structure, which leaves this with few steps, promises if more or less of it changes the same.
@@ -78,7 +77,7 @@ class Look:
         All that is unknown without it gives way, and stays within what is known of it.
         """
         noise, (before, slopes) = self.view.noise, self._errors
-        after = noise.whitened(residual, self._fitter.observed.parts)
+        after = noise.whitened(residual, self._fitter.tracked.parts)
         along, z = after - before, self.coarse.structure.standard
         columns = np.column_stack([slopes, along])
         size = max(float(along @ along), 1e-300)
@@ -95,21 +94,8 @@ class Look:
 
     @cached_property
     def _errors(self) -> tuple[Array, Array]:
-        """Of what was found alone, with the cheapest steps, and their slopes; all trials ask for them."""
-        return self.view.errors(self._screened[0], self._fitter.observed.parts)
-
-    @cached_property
-    def _screened(self) -> tuple[Followed, Mapping[str, Array]]:
-        """What was found with the cheapest steps, as others are screened, and its derivatives as those of the view."""
-        observed, observer = self._fitter.observed, self.fitted.observer
-        ways = [observed.method(self.fitted.structure.model, one) for one in (observer.coarse, observer.cheapest)]
-        if ways[0] == ways[1]:
-            return self.coarse, self.view.known
-        with contextlib.suppress(*ASTRAY):
-            cheap = self._fitter.followed(self.fitted.structure, observer.cheapest, self.coarse.names)
-            slopes = self.view.noise.whitened(cheap.jacobian, observed.parts).T
-            return cheap, dict(zip(cheap.names, slopes, strict=True))
-        return self.coarse, self.view.known
+        """Of what was found alone, with cheap steps, and their slopes; all trials ask for them."""
+        return self.view.errors(self.coarse, self._fitter.tracked.parts)
 
     @cached_property
     def _alone(self) -> Array:
@@ -128,7 +114,7 @@ class Look:
     @property
     def follows(self) -> bool:
         """Whether it leaves less of the records than a machine at rest would, in the mean of the channels."""
-        still = self._squares(self._fitter.observed.motion)
+        still = self._squares(self._fitter.tracked.motion)
         return float(np.sum(np.log(self._ratio(still, self.left)))) < 0.0
 
     @property
@@ -193,7 +179,7 @@ class Look:
         """
         with contextlib.suppress(*ASTRAY):
             priors = tuple(fitted.structure.priors)
-            start = self._fitter.followed(fitted.structure, fitted.observer, priors, fitted.residual)
+            start = self._fitter.followed(fitted.structure, fitted.tracker, priors, fitted.residual)
             others = [self._held_back(start, part) for part in range(PARTS - 1)]
             pairs = [(self.left[1], left), *zip(self._of_others, others, strict=True)]
             return _repeated(pairs, self.settings.pieces)
@@ -202,19 +188,19 @@ class Look:
     @cached_property
     def _of_others(self) -> list[Array]:
         """Squares of the other parts of the record, each held back from a fit of what was found."""
-        start = replace(self.coarse, observer=self.fitted.observer, residual=self.fitted.residual)
+        start = replace(self.coarse, tracker=self.fitted.tracker, residual=self.fitted.residual)
         return [self._held_back(start, part) for part in range(PARTS - 1)]
 
     def _held_back(self, start: Followed, part: int) -> Array:
         """Squares of a part of the record that is held back, fitted to the others from where a fit ended."""
-        other = Fitter(self._fitter.observed.holding_back(part), self.settings)
+        other = Fitter(self._fitter.tracked.holding_back(part), self.settings)
         moved, _ = other.moved(start, View(self.view.noise))
-        return other.observed.squares(moved.residual, self.view.noise)[1]
+        return other.tracked.squares(moved.residual, self.view.noise)[1]
 
     @cached_property
     def _drawn(self) -> tuple[Array, Array]:
         """Of masses on which nothing acts; what is left now in channels that are no positions of joints."""
-        drawn = self._squares(self._fitter.observed.drawn(self.fitted.observer.band))
+        drawn = self._squares(self._fitter.tracked.drawn(self.fitted.tracker.band))
         fitted, held = (
             np.where(np.any(new > 0.0, axis=0), new, now) for new, now in zip(drawn, self.left, strict=True)
         )
@@ -255,8 +241,8 @@ class Look:
         if effects:
             with contextlib.suppress(*ASTRAY):
                 bare = self.coarse.structure.bare(effects)
-                left = self._fitter.followed(bare, self.fitted.observer.coarse, ()).residual
-                return np.minimum(self._beside(left), self._beside(self._fitter.observed.motion))
+                left = self._fitter.followed(bare, self.fitted.tracker.coarse, ()).residual
+                return np.minimum(self._beside(left), self._beside(self._fitter.tracked.motion))
         return np.zeros(len(self.view.noise.tails))
 
     def _beside(self, residual: Array) -> Array:
@@ -264,7 +250,7 @@ class Look:
         return np.maximum(1.0 / self._ratio(self._squares(residual), self.left) - 1.0, 0.0)
 
     def _squares(self, residual: Array) -> tuple[Array, Array]:
-        return self._fitter.observed.squares(residual, self.view.noise)
+        return self._fitter.tracked.squares(residual, self.view.noise)
 
 
 def same_curve(one: Key, other: Key) -> bool:

@@ -31,7 +31,7 @@ AT_ONCE = 16
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """An effect at start values, as an observer sees it.
+    """An effect at start values, as a tracker sees it.
 
     Attributes
     ----------
@@ -67,7 +67,7 @@ def proposals(
     each: SideBySide,
     effects: Sequence[str],
 ) -> list[Proposal]:
-    """The best few of these effects beside what was found, that are worth a fit under its observer."""
+    """The best few of these effects beside what was found, that are worth a fit under its tracker."""
     found = look.fitted.structure.repaired
     bare = invertible(found, data.joints)
     residual = data.evaluate(bare, bare.theta)[0]
@@ -82,7 +82,7 @@ def proposals(
         "screening",
         lambda one: _screened(look, one, fitter, extensions),
         groups,
-        lambda one: f"{one.present[0].candidate.label}, {look.fitted.observer.label}",
+        lambda one: f"{one.present[0].candidate.label}, {look.fitted.tracker.label}",
     )
     told = [one for several in screened if not isinstance(several, Failure) for one in several]
     return _seated(sorted(told, key=lambda one: -one.gain), look.promising, fitter.settings)
@@ -135,10 +135,10 @@ def _hopeful(several: Sequence[_Extended], look: Look, fitter: Fitter, each: Sid
     """
 
     def promised(one: _Extended) -> float:
-        residual = fitter.followed(one.structure, look.fitted.observer.cheapest, ()).residual
+        residual = fitter.followed(one.structure, look.fitted.tracker.coarse, ()).residual
         return look.gain_along(residual)
 
-    gains = each("trying", promised, several, lambda one: f"{one.candidate.label}, {look.fitted.observer.label}")
+    gains = each("trying", promised, several, lambda one: f"{one.candidate.label}, {look.fitted.tracker.label}")
     hopes: dict[Key, list[tuple[float, _Extended]]] = defaultdict(list)
     for one, gain in zip(several, gains, strict=True):
         if not isinstance(gain, Failure) and gain >= look.promising:
@@ -178,7 +178,7 @@ def _side_by_side(neutral: Sequence[_Extended], look: Look) -> list[_Pass]:
 
 
 def _screened(look: Look, one_pass: _Pass, fitter: Fitter, extensions: Extensions) -> list[Proposal]:
-    """Effects at start values under one observer; several in one pass where none of them does anything there.
+    """Effects at start values under one tracker; several in one pass where none of them does anything there.
 
     Derivatives by what was unknown without them are taken as they were: a prediction of a gain can do with these.
     """
@@ -188,7 +188,7 @@ def _screened(look: Look, one_pass: _Pass, fitter: Fitter, extensions: Extension
         for one in others:
             together = extensions.extended(together, one.candidate, one.start, one.side)
         names = [name for one in asked for name in one.felt(look)]
-        followed = fitter.followed(together, look.fitted.observer.cheapest, names)
+        followed = fitter.followed(together, look.fitted.tracker.coarse, names)
         return [Proposal(one.structure, _gain(look, followed, one), one.candidate.neutral) for one in asked]
     if not others:
         return []  # it runs away from the records

@@ -40,7 +40,7 @@ def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: SideBySi
 def _fitted(several: Sequence[Proposal], wanted: float, look: Look, fitter: Fitter, each: SideBySide) -> list[Fitted]:
     def one_fitted(one: Proposal) -> Fitted:
         view, residual = one.seen_in(look)
-        return fitter.fitted(one.structure, look.fitted.observer, view, look.fitted.cost - wanted, residual)
+        return fitter.fitted(one.structure, look.fitted.tracker, view, look.fitted.cost - wanted, residual)
 
     ends = each("fitting", one_fitted, several, lambda one: " at ".join(one.structure.effects[-1]))
     return [end for end in ends if isinstance(end, Fitted)]

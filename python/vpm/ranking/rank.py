@@ -11,10 +11,10 @@ from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
 from vpm.model import Model
 from vpm.one_thread import in_one_thread
-from vpm.ranking.observed import Observed
 from vpm.ranking.result import Ranking
 from vpm.ranking.search import Search
 from vpm.ranking.settings import Settings
+from vpm.ranking.tracked_records import TrackedRecords
 from vpm.simulate import Setup
 
 
@@ -33,7 +33,7 @@ def rank(
 ) -> Ranking:
     """Order what ``model`` could be missing by what it removes of the error, and add the best for as long as it counts.
 
-    Every structure, the model with some effects, is kept on the records by a slow observer, and fitted to what that
+    Every structure, the model with some effects, is kept on the records by a slow tracker, and fitted to what that
     leaves of two thirds of each record. What decides is the error power that an effect removes, there and from the
     third that is held back. Nothing is inverted or differentiated, and neither the controller nor a start at rest is
     asked for.
@@ -86,4 +86,4 @@ def rank(
     names = asked_for(effects)
     search = Search(model, records, names, settings or Settings(), setup, each, tell or (lambda _: None))
     # What a validation record lacks is said before the search.
-    return search.run(Observed(model, unseen, search.settings, setup))
+    return search.run(TrackedRecords(model, unseen, search.settings, setup))

@@ -27,7 +27,7 @@ class Ranked(Storable):
     judgement : Judgement
         What it removes of the error.
     band : float
-        Bandwidth of the observer under which it does so, Hz.
+        Bandwidth of the tracker under which it does so, Hz.
     side : {"motor", "link"}
         Of a joint that is split.
     evidence : float
@@ -64,7 +64,7 @@ class Ranked(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Gap(Storable):
-    """Root mean square of what a slow observer leaves of a channel of validation records, at each stage.
+    """Root mean square of what a slow tracker leaves of a channel of validation records, at each stage.
 
     Attributes
     ----------

@@ -13,13 +13,13 @@ from vpm.discrepancy.side_by_side import SideBySide
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
-from vpm.ranking.choice import as_good, likely, weighed
+from vpm.ranking.alike import alike
+from vpm.ranking.choice import as_good, evidence, weighed
 from vpm.ranking.extensions import Extensions
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
 from vpm.ranking.noise_model import fitted_noise
-from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.posterior import robust_probabilities
 from vpm.ranking.proposals import proposals
 from vpm.ranking.race import raced
@@ -28,6 +28,7 @@ from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes, known
 from vpm.ranking.stand_in import shown
 from vpm.ranking.structure import Structure
+from vpm.ranking.tracked_records import TrackedRecords, Tracker
 from vpm.ranking.trial import Trial
 from vpm.ranking.validation import gaps
 from vpm.simulate import Setup
@@ -51,20 +52,20 @@ class Search:
         say: Callable[[str], None],
     ) -> None:
         self.names, self.settings, self.each, self.say = names, settings, each, say
-        self.fitter = Fitter(Observed(model, records, settings, setup), settings)
-        self.data = shown(model, self.fitter.observed)
+        self.fitter = Fitter(TrackedRecords(model, records, settings, setup), settings)
+        self.data = shown(model, self.fitter.tracked)
         self.extensions = Extensions(Sizes(model, self.data))
-        firsts = self.fitter.observed.firsts.priors
+        firsts = self.fitter.tracked.firsts.priors
         values = np.append(model.theta, np.zeros(len(firsts)))
         self.start = Structure(model, values, known(model, self.data) | firsts, firsts=tuple(firsts))
         self.first: dict[float, Look] = {}  # looks at the model as it was, by bandwidth
         self.others: dict[Key, list[Structure]] = {}  # what counted as well when an effect came in
 
-    def run(self, held_out: Observed) -> Ranking:
+    def run(self, held_out: TrackedRecords) -> Ranking:
         """See `rank`."""
         self.say("fitting what is uncertain")
         looks = self._looks(self.start)
-        self.first = {look.fitted.observer.band: look for look in looks}
+        self.first = {look.fitted.tracker.band: look for look in looks}
         named: dict[Key, Ranked] = {}
         rounds: list[tuple[Ranked, ...]] = []
         interrupted = False
@@ -79,12 +80,17 @@ class Search:
                     looks = smooth
                     continue
                 before.append(frozenset(present))
-                rounds.append(self._listed(best, tried))
+                looks, together = self._at_several_places(looks, best, tried)
+                rounds.append(self._listed(None if together else best, tried))
+                if together:
+                    rounds += together
+                    named |= {ranked.key: ranked for ranked, *_ in together}
+                    continue
                 if best is None:
                     break
                 named[best.key] = rounds[-1][0]
                 was, looks = looks, [self._look(best.fitted)]  # known, should the next fits be interrupted
-                self.say(f"{best.label} removes {100.0 * best.judgement.removed:.3g} % of the error power")
+                self.say(f"{best.label} {_removing(best)}")
                 looks = self._all_looks(looks[0])
                 for key in present:
                     looks, several = self._reconsidered(key, looks)
@@ -102,7 +108,7 @@ class Search:
         found = looks[0].fitted.structure
         recalibrated = next(iter(self.first.values())).fitted.structure.repaired
         stages = (self.start.model, recalibrated, found.repaired)
-        hold = self.fitter.observed.setup.course
+        hold = self.fitter.tracked.setup.course
         left = gaps(held_out.with_hold(hold), stages, self.settings.bands[0])
         effects = tuple(replace(named[key], side=found.side(key)) for key in found.effects)
         return Ranking(effects, tuple(rounds), found.repaired, recalibrated, left, interrupted, hold)
@@ -113,39 +119,36 @@ class Search:
         Commands that are held for a sample come half a sample late. A spring takes nearly all of that back, with three
         numbers more, and may leave less because it answers to noise otherwise: samples have to be more probable by it.
         """
-        if self.fitter.observed.setup.hold != AUTOMATIC:
+        if self.fitter.tracked.setup.hold != AUTOMATIC:
             return []
         now, settings = looks[0] if best is None else best.look, self.settings
         ways: list[tuple[Judgement, Fitter, Fitted]] = []
         for course in SMOOTH:
-            smooth, view = Fitter(self.fitter.observed.with_hold(course), settings), View(now.view.noise)
+            smooth, view = Fitter(self.fitter.tracked.with_hold(course), settings), View(now.view.noise)
             with contextlib.suppress(*ASTRAY):
-                fitted = smooth.finished(smooth.fitted(now.fitted.structure, now.fitted.observer, view), view)
+                fitted = smooth.finished(smooth.fitted(now.fitted.structure, now.fitted.tracker, view), view)
                 if (judgement := now.judged(fitted)).counts(settings):
                     ways.append((judgement, smooth, fitted))
             if not ways:
                 return []  # if straight lines are no better, no curve is
         *_, least = max(ways, key=lambda way: way[0].removed)
-        noise = fitted_noise(least.residual, self.fitter.observed.parts, settings.order)
+        noise = fitted_noise(least.residual, self.fitter.tracked.parts, settings.order)
 
-        def evidence(fitted: Fitted, fitter: Fitter) -> float:
-            return fitter.evidence(likely(fitted, fitter, noise), noise)
-
-        told = [evidence(fitted, smooth) for _, smooth, fitted in ways]
+        told = [evidence(fitted, smooth, noise) for _, smooth, fitted in ways]
         rivals = [(now.fitted, settings.odds)] + ([] if best is None else [(best.fitted, 0.0)])
-        if any(max(told) - evidence(one, self.fitter) <= more for one, more in rivals):
+        if any(max(told) - evidence(one, self.fitter, noise) <= more for one, more in rivals):
             return []
         judgement, self.fitter, fitted = ways[told.index(max(told))]
         self.say(
             f"commands that run on from sample to sample remove {100 * judgement.removed:.3g} % of the error power"
         )
-        self.first = {look.fitted.observer.band: look for look in self._looks(self.start)}
+        self.first = {look.fitted.tracker.band: look for look in self._looks(self.start)}
         return self._all_looks(self._look(fitted))
 
     def _looks(self, structure: Structure, known: Look | None = None) -> list[Look]:
-        """A structure under each observer that can follow it, that which is known first.
+        """A structure under each tracker that can follow it, that which is known first.
 
-        A slow observer may lose what hangs behind a contact, or let a leg fall over. What it leaves then says nothing.
+        A slow tracker may lose what hangs behind a contact, or let a leg fall over. What it leaves then says nothing.
 
         Raises
         ------
@@ -155,9 +158,9 @@ class Search:
         looks = [] if known is None else [known]
         reason: Exception = VpmError(f"{structure.model.name} runs away from the records")
         for band in self.settings.bands:
-            if known is None or band != known.fitted.observer.band:
+            if known is None or band != known.fitted.tracker.band:
                 try:
-                    looks.append(self._look(self._fitted(structure, Observer(band))))
+                    looks.append(self._look(self._fitted(structure, Tracker(band))))
                 except ASTRAY as error:
                     reason = error
         if not looks:
@@ -168,12 +171,12 @@ class Search:
         return self._looks(look.fitted.structure, look)
 
     def _look(self, fitted: Fitted) -> Look:
-        return Look(fitted, self.fitter, self.first.get(fitted.observer.band))
+        return Look(fitted, self.fitter, self.first.get(fitted.tracker.band))
 
-    def _fitted(self, structure: Structure, observer: Observer) -> Fitted:
+    def _fitted(self, structure: Structure, tracker: Tracker) -> Fitted:
         """A structure fitted to the end, its channels in the sizes of what it leaves at first."""
-        view = View(self.fitter.noise_of(structure, observer))
-        return self.fitter.finished(self.fitter.fitted(structure, observer, view), view)
+        view = View(self.fitter.noise_of(structure, tracker))
+        return self.fitter.finished(self.fitter.fitted(structure, tracker, view), view)
 
     def _round(self, looks: Sequence[Look]) -> tuple[Trial | None, list[Trial]]:
         """The best effect more, if one counts, and all that were tried."""
@@ -196,13 +199,43 @@ class Search:
             counting = [trial for trial in counting if trial.fitted is not best.fitted]
         return None, told + tried
 
+    def _at_several_places(
+        self, looks: list[Look], best: Trial | None, tried: Sequence[Trial]
+    ) -> tuple[list[Look], list[tuple[Ranked, ...]]]:
+        """With one effect at several places, each counting beside the others, where no effect alone does as well."""
+        room = self.settings.effects - len(looks[0].fitted.structure.effects)
+        if best is not None and not best.look.has_room(best.fitted):
+            return looks, []
+        comparable = [one for one in tried if best is None or one.look is best.look]
+        for trial in alike(comparable, room, self.fitter, self.each):
+            with contextlib.suppress(*ASTRAY):
+                if not trial.counts or (best is not None and not self._is_likelier(trial, best)):
+                    continue
+                look = self._look(trial.fitted)
+                new = [key for key in trial.fitted.structure.effects if key not in trial.look.fitted.structure.effects]
+                found = [weighed([self._beside_others(key, look)], self.fitter)[0] for key in new]
+                if all(one.counts and one.evidence > self.settings.odds for one in found):
+                    self.say(f"{trial.key[0]} at {' and '.join(site for _, site in new)} together {_removing(trial)}")
+                    return self._all_looks(look), [self._listed(one, [one]) for one in found]
+        return looks, []
+
+    def _is_likelier(self, trial: Trial, other: Trial) -> bool:
+        """Whether records are clearly more probable by one fit than by another one under the same observer."""
+        noise = fitted_noise(trial.fitted.residual, self.fitter.tracked.parts, self.settings.order)
+        told = [evidence(one.fitted, self.fitter, noise) for one in (trial, other)]
+        return told[0] - told[1] > self.settings.odds
+
+    def _beside_others(self, key: Key, look: Look) -> Trial:
+        """An effect of a structure, judged against the same without it."""
+        return Trial.of(look.fitted, self._without(key, look), key)
+
     def _tried(self, look: Look) -> list[Trial]:
-        """The most promising effects, fitted under one observer."""
+        """The most promising effects, fitted under one tracker."""
         chosen = proposals(look, self.fitter, self.data, self.extensions, self.each, self.names)
         return [Trial.of(fitted, look, ended=False) for fitted in raced(chosen, look, self.fitter, self.each)]
 
     def _finished(self, tried: Sequence[Trial]) -> list[Trial]:
-        """Those of one observer that are worth it and leave little, fitted to the end."""
+        """Those of one tracker that are worth it and leave little, fitted to the end."""
         worth = [t for t in tried if t.judgement.removed > self.settings.worth and t.fitted.structure.shows(t.key)]
         if not worth:
             return []
@@ -220,18 +253,18 @@ class Search:
         return [end for end in ends if isinstance(end, Trial)]
 
     def _detours(self, fitted: Fitted, view: View) -> list[Fitted]:
-        """Where a fit of an effect that splits a joint ends if it goes on from where a faster observer leads it.
+        """Where a fit of an effect that splits a joint ends if it goes on from where a faster tracker leads it.
 
-        A slow observer lets what hangs behind a play go its own way, so that few of its impacts are in step with those
+        A slow tracker lets what hangs behind a play go its own way, so that few of its impacts are in step with those
         of the record, and fits end in many places. A fast one holds it in step (H. Abarbanel, *Predicting the Future*,
         Springer 2013).
         """
-        detour = Observer(max(self.settings.bands))
-        if detour == fitted.observer:
+        detour = Tracker(max(self.settings.bands))
+        if detour == fitted.tracker:
             return []
         try:
             quick = self._fitted(fitted.structure, detour).structure
-            return [self.fitter.finished(self.fitter.fitted(quick, fitted.observer, view), view)]
+            return [self.fitter.finished(self.fitter.fitted(quick, fitted.tracker, view), view)]
         except ASTRAY:
             return []
 
@@ -250,7 +283,7 @@ class Search:
     def _reconsidered(self, key: Key, looks: list[Look]) -> tuple[list[Look], tuple[Ranked, ...]]:
         """Without an earlier effect that a later one has made needless, or with a better one in its place.
 
-        What was found before the others came in was fitted to what they leave, too. A fast observer hides what a slow
+        What was found before the others came in was fitted to what they leave, too. A fast tracker hides what a slow
         one shows: an effect that counts under any of them stays.
         """
         bare: list[Look] = []
@@ -267,8 +300,8 @@ class Search:
         return self._all_looks(bare[0]), ()
 
     def _without(self, key: Key, look: Look) -> Look:
-        """The same without one of its effects, fitted anew under its observer."""
-        return self._look(self._fitted(look.fitted.structure.without(key), look.fitted.observer))
+        """The same without one of its effects, fitted anew under its tracker."""
+        return self._look(self._fitted(look.fitted.structure.without(key), look.fitted.tracker))
 
     def _exchanged(
         self, now: Trial, counting: Sequence[Trial], looks: list[Look]
@@ -285,7 +318,7 @@ class Search:
 
         def one_fitted(other: Structure) -> Trial:
             structure, view = look.fitted.structure.with_last_of(other), View(look.view.noise)
-            fitted = self.fitter.fitted(structure, look.fitted.observer, view)
+            fitted = self.fitter.fitted(structure, look.fitted.tracker, view)
             return Trial.of(fitted, look, ended=False)
 
         ends = self.each("exchanging", one_fitted, others, lambda other: " at ".join(other.effects[-1]))
@@ -309,7 +342,7 @@ class Search:
     def _ranked(self, trial: Trial, probability: float, class_probability: float) -> Ranked:
         structure, without = trial.fitted.structure, trial.look.fitted.structure
         values = {name: value for name, value in structure.values.items() if name not in without.priors}
-        side, band = structure.side(trial.key), trial.fitted.observer.band
+        side, band = structure.side(trial.key), trial.fitted.tracker.band
         return Ranked(
             *trial.key,
             values,
@@ -323,8 +356,12 @@ class Search:
         )
 
 
+def _removing(trial: Trial) -> str:
+    return f"removes {100.0 * trial.judgement.removed:.3g} % of the error power"
+
+
 def _is_worse(now: Sequence[Look], before: Sequence[Look]) -> bool:
     """Whether as many effects as before, or fewer, leave more of the records than those did, fitted and held back."""
     fewer = len(now[0].fitted.structure.effects) <= len(before[0].fitted.structure.effects)
-    same = [look for look in before if look.fitted.observer == now[0].fitted.observer]
+    same = [look for look in before if look.fitted.tracker == now[0].fitted.tracker]
     return fewer and any(now[0].judged(look.fitted).least > 0.0 for look in same)

@@ -8,12 +8,16 @@ import numpy as np
 
 from vpm.ranking.calibration import shipped
 
-# ---- what an observer is, and what of the records is fitted ------------------------------------------------------
+# ---- what a tracker is, and what of the records is fitted ------------------------------------------------------
 
-#: Damping of the error of an observer: flat up to the bandwidth, and falling off from there (S. Butterworth, 1930).
+#: Damping of the error of a tracker: flat up to the bandwidth, and falling off from there (S. Butterworth, 1930).
 DAMPING = float(np.sqrt(0.5))
 #: Fewest steps of the integrator within a sample where a joint is split: contacts and gears ring fast.
 STEPS = 4
+#: Longest steps where structures are compared and errors are not controlled, of order 2 and of order 4, s.
+LONGEST, LONGEST_OF_FOURTH_ORDER = 6e-4, 2e-3
+#: Short steps that cost as much as one of controlled error.
+CONTROLLED = 3
 #: Stretches into which a record is cut, so that each of its phases is in what is fitted and in what is held back.
 STRETCHES = 3
 #: Parts of a stretch, of which one is held back, the last one unless another is named: two thirds tell the
@@ -60,12 +64,13 @@ class Settings:
     Attributes
     ----------
     bands : tuple of float
-        Bandwidths of the observers, Hz: a slow one, whose error is wide and easy to rank, and one that keeps a load
+        Bandwidths of the trackers, Hz: a slow one, whose error is wide and easy to rank, and one that keeps a load
         behind a backlash in step.
-    longest_step : float
-        Of the integrator where structures are compared, s: its errors must not pass for an effect.
+    exact : float
+        Error of a step where structures are compared, relative to each state and its natural size: it must not pass
+        for an effect.
     settling : float
-        Time at the beginning of each record that is left out, s: what an observer makes of the first state.
+        Time at the beginning of each record that is left out, s: what a tracker makes of the first state.
     pieces : int
         Pieces of the held-back stretches between which an effect has to repeat.
     inexact : float
@@ -85,7 +90,7 @@ class Settings:
     score : float
         Standard deviations between pieces by which that differs from nothing.
     seats : int
-        Effects that do nothing at their start, that are fitted under each observer.
+        Effects that do nothing at their start, that are fitted under each tracker.
     starts : int
         Start values that are fitted, of those that were screened, of each effect.
     finished : float
@@ -121,7 +126,7 @@ class Settings:
     """
 
     bands: tuple[float, ...] = (1.0, 10.0)
-    longest_step: float = 6e-4
+    exact: float = 3e-5
     settling: float = 0.5
     pieces: int = 20
     inexact: float = 0.01

@@ -12,7 +12,7 @@ from vpm.identify import InverseDynamicsProblem
 from vpm.identify.along import SAMPLED_TYPES, Response
 from vpm.identify.following import Following
 from vpm.model import Model
-from vpm.ranking.observed import Observed, Observer
+from vpm.ranking.tracked_records import TrackedRecords, Tracker
 
 Array = NDArray[np.float64]
 
@@ -30,9 +30,9 @@ def why_unbalanced(model: Model) -> str:
     return ""
 
 
-def shown(model: Model, observed: Observed) -> InverseDynamicsProblem:
+def shown(model: Model, tracked: TrackedRecords) -> InverseDynamicsProblem:
     """Motion and efforts that records show: where efforts cannot be balanced, a stand-in that is as large."""
-    return StandIn(model, observed) if why_unbalanced(model) else InverseDynamicsProblem(model, observed.experiments)
+    return StandIn(model, tracked) if why_unbalanced(model) else InverseDynamicsProblem(model, tracked.experiments)
 
 
 class StandIn(InverseDynamicsProblem):
@@ -42,8 +42,8 @@ class StandIn(InverseDynamicsProblem):
     for where fits begin, and nothing is judged by it.
     """
 
-    def __init__(self, model: Model, observed: Observed) -> None:
-        super().__init__(opened(model), _completed(model, observed))
+    def __init__(self, model: Model, tracked: TrackedRecords) -> None:
+        super().__init__(opened(model), _completed(model, tracked))
 
     def _answer(
         self,
@@ -88,15 +88,15 @@ def _idle(joint: str) -> str:
     return f"{joint}_idle"
 
 
-def _completed(model: Model, observed: Observed) -> list[Experiment]:
-    """Records with the positions of all joints: those that no channel tells as an observer has them."""
+def _completed(model: Model, tracked: TrackedRecords) -> list[Experiment]:
+    """Records with the positions of all joints: those that no channel tells as a tracker has them."""
     if not model.loops:
-        return list(observed.experiments)
-    fast = Observer(max(observed.settings.bands), fine=False)
-    motions = observed.states(model, fast)
+        return list(tracked.experiments)
+    fast = Tracker(max(tracked.settings.bands), fine=False)
+    motions = tracked.states(model, fast)
     added = [name for name in opened(model).actuators if name not in model.actuators]
     records = []
-    for record, motion in zip(observed.experiments, motions, strict=True):
+    for record, motion in zip(tracked.experiments, motions, strict=True):
         whole = record
         for place, joint in enumerate(model.joints):
             channel = f"{joint}.position"

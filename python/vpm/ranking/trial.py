@@ -14,7 +14,7 @@ from vpm.ranking.look import Look
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """An effect beside what was found, under one observer."""
+    """An effect beside what was found, under one tracker."""
 
     key: Key
     fitted: Fitted

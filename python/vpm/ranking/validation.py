@@ -10,19 +10,19 @@ from numpy.typing import NDArray
 from vpm.model import Model
 from vpm.ranking.fit import ASTRAY
 from vpm.ranking.noise_model import Parts, Structured
-from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.result import Gap
 from vpm.ranking.structure import approximate, without_sizes
+from vpm.ranking.tracked_records import TrackedRecords, Tracker
 
 Array = NDArray[np.float64]
 
 
-def gaps(held_out: Observed, stages: tuple[Model, Model, Model], band: float) -> dict[str, Gap]:
-    """By channel what an observer of this bandwidth (Hz) leaves of validation records, of three stages of a model.
+def gaps(held_out: TrackedRecords, stages: tuple[Model, Model, Model], band: float) -> dict[str, Gap]:
+    """By channel what a tracker of this bandwidth (Hz) leaves of validation records, of three stages of a model.
 
     Parameters
     ----------
-    held_out : Observed
+    held_out : TrackedRecords
     stages : tuple of Model
         As the user wrote it, with its parameters fitted, with what was found.
     band : float
@@ -57,12 +57,12 @@ def gaps(held_out: Observed, stages: tuple[Model, Model, Model], band: float) ->
     }
 
 
-def _left(observed: Observed, model: Model, theta: Array, band: float) -> Array:
+def _left(tracked: TrackedRecords, model: Model, theta: Array, band: float) -> Array:
     """What is left of each channel (N, m); NaN where the model runs away."""
     try:
-        residual, _ = observed.follow(model, theta, Observer(band))
+        residual, _ = tracked.follow(model, theta, Tracker(band))
     except ASTRAY:
-        return np.full_like(observed.motion, np.nan)
+        return np.full_like(tracked.motion, np.nan)
     return residual
 
 
@@ -72,7 +72,7 @@ def _shares(
     """Share of the power above the noise of each channel (m,) that is left, and the noise.
 
     Of what the better one of two rivals leaves: the model without effects, and masses on which nothing acts. What does
-    no better than these, which follow the record because an observer draws them along, explains no motion.
+    no better than these, which follow the record because a tracker draws them along, explains no motion.
     """
 
     def power(one: Structured, channel: Array) -> float:

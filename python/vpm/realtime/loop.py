@@ -15,7 +15,7 @@ QUANTILES = {"p50": 0.5, "p99": 0.99, "p99.9": 0.999, "p99.99": 0.9999, "max": 1
 
 
 class Tick(NamedTuple):
-    """What a wake-up found."""
+    """Deadline of a real-time loop: its number and time, how late the wake-up was, and how many were missed."""
 
     #: Number of the deadline, from 0; grows by more than one where deadlines were missed.
     number: int
@@ -29,7 +29,7 @@ class Tick(NamedTuple):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class LoopReport(Result):
-    """How a loop went.
+    """Latency, work and missed deadlines of a real-time loop.
 
     Attributes
     ----------
@@ -118,7 +118,7 @@ class Loop:
 
     @property
     def rate(self) -> float:
-        """Hz."""
+        """Rate of the real-time loop, Hz."""
         return self._rate
 
     def wait(self) -> Tick:
@@ -145,7 +145,7 @@ class Loop:
             yield tick
 
     def report(self) -> LoopReport:
-        """How it went until now."""
+        """Latency, work and missed deadlines until now."""
         names, values = list(QUANTILES), list(QUANTILES.values())
         memory, priority = (_told(right) for right in self._rights)
         return LoopReport(

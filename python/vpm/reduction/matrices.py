@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 def read_matrix(path: Path, *, triangle: bool = False) -> Matrix:
-    """Read a sparse matrix.
+    """Read a sparse matrix of finite elements from a file.
 
     Parameters
     ----------

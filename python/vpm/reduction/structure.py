@@ -71,12 +71,12 @@ class Structure:
 
     @property
     def total_mass(self) -> float:
-        """Mass (kg)."""
+        """Mass of a solid of finite elements (kg)."""
         return float(self.scalar_mass.sum())
 
     @cached_property
     def centre(self) -> Array:
-        """Centre of mass (m)."""
+        """Centre of mass of a solid of finite elements (m)."""
         ones = np.ones(len(self.nodes))
         return np.asarray(ones @ (self.scalar_mass @ self.nodes) / self.total_mass)
 

@@ -50,17 +50,17 @@ class Tied:
 
     @property
     def size(self) -> int:
-        """Number of unknowns."""
+        """Number of unknowns of a solid that is tied to its interfaces."""
         return int(self.stiffness.shape[0])
 
     @cached_property
     def free(self) -> Held:
-        """Held at the root alone."""
+        """Factorised stiffness of a solid that is held at the root alone."""
         return Held(self.stiffness, self.rows[:1])
 
     @cached_property
     def fixed(self) -> Held:
-        """Held at all interfaces."""
+        """Factorised stiffness of a solid that is held at all interfaces."""
         return Held(self.stiffness, self.rows)
 
     def constraint_modes(self) -> Array:

@@ -61,7 +61,7 @@ def report(diagnosis: Diagnosis, ladder: Ladder | None = None) -> Report:
 
 
 def render_html(diagnosis: Diagnosis, ladder: Ladder | None = None) -> str:
-    """Render the page.
+    """Render the report as one HTML page.
 
     Parameters
     ----------

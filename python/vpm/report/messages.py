@@ -69,7 +69,7 @@ def last_stage(d: Diagnosis) -> str:
 
 
 def step_name(step: Step) -> str:
-    """``+ coulomb_friction at axis``."""
+    """Name of a step of a diagnosis, such as ``+ coulomb_friction at axis``."""
     signs = {"recalibrated": "recalibrated parameters", "added": "+ ", "removed": "− "}
     return signs[step.change] + (f"{step.effect} at {step.site}" if step.effect else "")
 

@@ -47,7 +47,7 @@ def _effects(d: Diagnosis) -> list[str]:
 
 def _steps(d: Diagnosis) -> list[str]:
     rows = [f"  {step_name(step):44s} {percent(step.unseen_error):>10s}" for step in d.steps]
-    return ["error on validation data, in the order in which the model changed (share of the measured effort):", *rows]
+    return ["error on validation data, in the order in which the model changed (share of what was measured):", *rows]
 
 
 def _gaps(d: Diagnosis) -> list[str]:

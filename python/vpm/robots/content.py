@@ -49,7 +49,7 @@ class Draft:
     names: Names = field(default_factory=Names)
 
     def put(self, section: str, name: str, table: Content, remark: str = "") -> None:
-        """Add a component."""
+        """Add a component to the content of an imported model file."""
         self.content.setdefault(section, {})[name] = table
         if remark:
             self.remarks[section, name] = remark
@@ -105,7 +105,7 @@ def _put_body(draft: Draft, robot: Robot, link: str, lump: Lump, spread: Spread)
 
 
 def _body(inertial: Inertial, spread: Spread) -> Content:
-    """Table of a body."""
+    """Table of a body of an imported robot."""
     table: Content = {"mass": spread.scaled(inertial.mass, "kg")}
     if any(inertial.center) or spread.share:
         table["center_of_mass"] = spread.center(inertial)

@@ -49,7 +49,7 @@ class ExportedRobot:
     notes: tuple[str, ...]
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write the URDF.
+        """Write the URDF with the exported values.
 
         Raises
         ------

@@ -149,7 +149,7 @@ def _afloat(robot: Robot) -> Robot:
 
 
 def drafted(robot: Robot, spread: Spread) -> tuple[Tree, Draft]:
-    """What moves of a robot, and the content of its model but for the ties.
+    """Moving links of a robot, and the content of its model but for the ties.
 
     Raises
     ------

@@ -46,7 +46,7 @@ class Lump:
 
 @dataclass(frozen=True)
 class Tree:
-    """What moves, parents before children.
+    """Moving links of a robot, each with what is fixed to it, parents before children.
 
     Attributes
     ----------

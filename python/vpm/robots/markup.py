@@ -28,7 +28,7 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infin
 
 @dataclass
 class Element:
-    """One element.
+    """One element of an XML file.
 
     Attributes
     ----------
@@ -59,7 +59,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Markup:
-    """A file of XML.
+    """Elements of an XML file, with errors that name file and line.
 
     Attributes
     ----------
@@ -73,7 +73,7 @@ class Markup:
     root: Element
 
     def fail(self, element: Element, text: str) -> NoReturn:
-        """Complain about an element.
+        """Raise an error about an element of an XML file.
 
         Raises
         ------

@@ -87,7 +87,7 @@ class _Reader:
         return found or f"{prefix}{index}"
 
     def robot(self) -> Robot:
-        """The parts."""
+        """Links, joints, drives and ties of an MJCF file."""
         m, robot = self._m, self._robot
         robot.links[WORLD] = None
         for body in range(1, m.nbody):
@@ -198,7 +198,7 @@ class _Reader:
 
 
 def _back(kind: JointType, axis: Any, ref: float) -> Pose:  # noqa: ANN401
-    """From the place at `ref` to that at zero."""
+    """Pose that takes a joint of MJCF from its place at ``ref`` to that at zero."""
     if ref == 0.0:
         return Pose()
     if kind == "prismatic":

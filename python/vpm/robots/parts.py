@@ -123,7 +123,7 @@ class Robot:
 
 
 def moved(inertial: Inertial, place: Pose) -> Inertial:
-    """The same in another frame, where the frame of the link has this place."""
+    """Mass and inertia in another frame, in which the frame of the link has this place."""
     if place == Pose():
         return inertial
     turn = np.reshape(place.rotation, (3, 3))
@@ -132,7 +132,7 @@ def moved(inertial: Inertial, place: Pose) -> Inertial:
 
 
 def together(parts: Sequence[Inertial]) -> Inertial:
-    """Several parts in one frame as one body, by the theorem of parallel axes.
+    """Mass and inertia of several parts of a link in one frame, by the theorem of parallel axes.
 
     (J. Wittenburg, "Dynamics of Multibody Systems", 2008, section 3.1.)
     """
@@ -145,7 +145,7 @@ def together(parts: Sequence[Inertial]) -> Inertial:
 
 
 def without(whole: Inertial, parts: Sequence[Inertial]) -> Inertial:
-    """What is left of a body without some of its parts; its mass has to be above theirs."""
+    """Mass and inertia of a body without some of its parts; its mass has to be above theirs."""
     if not parts:
         return whole
     mass = whole.mass - sum(part.mass for part in parts)

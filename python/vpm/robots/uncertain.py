@@ -39,7 +39,7 @@ class Spread:
         return self._table(value, unit, self.share * value, 0.0, value * (1.0 + REACH * self.share))
 
     def center(self, inertial: Inertial) -> list[Any]:
-        """Centre of mass."""
+        """Centre of mass of an imported body as parameters with uncertainties."""
         size = math.hypot(*inertial.center, inertial.spread)
         return [self._about(value, "m", self.share * size) for value in inertial.center]
 
@@ -51,7 +51,7 @@ class Spread:
         return [self._about(value, "kg m^2", size, low) for value, low in pairs]
 
     def _about(self, value: float, unit: str, deviation: float, lowest: float = -math.inf) -> float | dict[str, Any]:
-        """Parameter of any sign."""
+        """Parameter of either sign with an uncertainty and bounds around its value."""
         if not self.share or deviation == 0.0:
             return value
         low = max(value - REACH * deviation, min(lowest, value))

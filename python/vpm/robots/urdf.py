@@ -62,7 +62,7 @@ def read_urdf(markup: Markup) -> Robot:
 
 
 def _inertial(markup: Markup, link: Element, whose: str, notes: list[str]) -> Inertial | None:
-    """Of a link, in its axes; None where it has no mass."""
+    """Mass and inertia of a link of a URDF, in its axes; None where it has no mass."""
     if (element := link.first("inertial")) is None:
         return None
     mass = markup.need(element, "mass", whose)
@@ -201,7 +201,7 @@ def _check_mimics(markup: Markup, robot: Robot) -> None:
 
 
 def _left_out(root: Element) -> Iterator[str]:
-    """What nobody reads, counted, one sentence for each kind."""
+    """Notes on elements of a URDF that are not imported, counted, one for each kind."""
     drawn = Counter(child.tag for link in root.all("link") for child in link.children if child.tag in _DRAWN)
     if drawn:
         counted = " and ".join(f"{drawn[tag]} {tag}" for tag in ("visual", "collision") if drawn[tag])

@@ -34,7 +34,7 @@ def _limit() -> None:
 
 
 def main(path: str, arguments: Mapping[str, str]) -> str:
-    """Text of the URDF."""
+    """Text of the URDF into which a xacro file expands."""
     import xacro
     from xacrodoc import XacroDoc
 

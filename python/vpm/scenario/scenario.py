@@ -114,7 +114,7 @@ class Scenario:
 
     @property
     def name(self) -> str:
-        """What it is called."""
+        """Name of a scenario."""
         return self._document.scenario
 
     @property
@@ -129,12 +129,12 @@ class Scenario:
 
     @property
     def time_step(self) -> float:
-        """Time between samples, s."""
+        """Time between samples of a scenario, s."""
         return self._clock.time_step
 
     @property
     def setup(self) -> Setup:
-        """Integrator and substeps."""
+        """Integrator and substeps of a scenario."""
         return self._setup
 
     @cached_property

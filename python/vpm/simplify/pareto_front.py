@@ -61,7 +61,7 @@ class Rung(Storable):
         return self.integrator if self.substeps == 1 else f"{self.integrator} x {self.substeps}"
 
     def timed(self, seconds: float, slowest: float) -> Rung:
-        """The same with other times."""
+        """The simplified model with other step times."""
         return replace(self, seconds=seconds, slowest=slowest)
 
     def __str__(self) -> str:

@@ -75,7 +75,7 @@ class Reduction(Storable):
 
     @property
     def site(self) -> tuple[str, str]:
-        """What it excludes: other reductions of the same site."""
+        """Kind and place of a reduction; reductions of one site exclude each other."""
         if self.kind == "terms":
             return (f"terms {self.name}", terms_site(self.name, self.at))
         alone = self.kind in ("level", "drive")
@@ -85,7 +85,7 @@ class Reduction(Storable):
         )
 
     def applied(self, model: Model) -> Model:
-        """Model with this change.
+        """Model with one reduction done.
 
         Parameters
         ----------
@@ -137,7 +137,7 @@ def reductions(model: Model, learnt: Sequence[Reduction] = ()) -> dict[tuple[str
 
 
 def reduced(model: Model, changes: Sequence[Reduction]) -> Model:
-    """Model with several changes.
+    """Model with several reductions done.
 
     Parameters
     ----------

@@ -41,7 +41,7 @@ class Replacement(Reduction):
         return f"{self.at} as {self.name}"
 
     def applied(self, model: Model) -> Model:
-        """Model with this drive.
+        """Model with another drive in the place of its servo-cylinder.
 
         Parameters
         ----------

@@ -173,7 +173,7 @@ def _weigh_terms(trials: Trials, sites: Sites) -> None:
 
 
 def _together(trials: Trials, sites: Sites, limit: float) -> Changes:
-    """All links at the same coarser level: the cheapest that loses next to nothing.
+    """Reductions of all links to one coarser level: the cheapest that loses next to nothing.
 
     The coarsest come first, by the number of coordinates: they are quick to fit, and once one of them loses next to
     nothing, a coarse timing shows that the finer ones need no look.
@@ -266,7 +266,7 @@ def _foreseen(
 
 
 def _polish(trials: Trials, sites: Sites, limit: float, hopeless: set[Reduction]) -> None:
-    """From the cheapest within the limit, single changes as long as one pays."""
+    """Try single further reductions of the cheapest model within the limit, as long as one pays."""
     while True:
         best = _within(trials.rungs, limit)
         base = trials.changes_of(best)
@@ -333,7 +333,7 @@ def _simplest(rungs: Sequence[Rung]) -> Rung:
 
 
 def _dearest(trials: Trials, sites: Sites) -> tuple[tuple[str, float], ...]:
-    """What a step of the full model saves by the last change of each place alone, the most first."""
+    """Time of a step that the last reduction of each place saves alone (s), the largest first."""
     full = min((r for r in trials.rungs if not r.removed), key=lambda r: r.seconds)
     setup = Setup(full.integrator, full.substeps)
     saved = ((str(changes[-1]), trials.saved(changes[-1], setup)) for changes in sites.values())

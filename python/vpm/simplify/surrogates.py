@@ -59,7 +59,7 @@ def surrogates(
 
 
 def _taught(model: Model, record: Experiment, mode: str, rate: float) -> Record:
-    """What the full model does on a record, in samples of the controller."""
+    """Channels of a simulation of the full model on a record, in samples of the controller."""
     fine = _held(record, round(record.dt * rate), model)
     run = simulate(model, fine, mode)
     inputs = {name: fine[name] for name in fine.channels if name.endswith((".reference", ".command"))}
@@ -76,7 +76,7 @@ def _held(record: Experiment, count: int, model: Model) -> Experiment:
 
 
 def _learnt(model: Model, drive: str, taught: Sequence[Record], step: float) -> Iterator[Replacement]:
-    """What stands for one drive: Maxwell and NARX, the one with fewer numbers last."""
+    """Elements learnt in the place of one drive: Maxwell and NARX, the one with fewer numbers last."""
     line = model.line_of_actuator(drive)
     moving = [f"{line}.length", f"{line}.rate"]
     if line is None:

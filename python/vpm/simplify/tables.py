@@ -147,7 +147,7 @@ def _is_of_spool(effect: str) -> bool:
 
 
 def _is_of_oil(effect: str) -> bool:
-    """Whether it is one of a cylinder's oil, which a table contains."""
+    """Whether an effect is one of a cylinder's oil, which a table contains."""
     return EFFECTS[effect].site == "cylinder" and not _is_of_spool(effect)
 
 

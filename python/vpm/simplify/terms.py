@@ -83,7 +83,7 @@ def without_terms(model: Model, name: str, at: str) -> Model:
 
 
 def terms_site(name: str, at: str) -> str:
-    """Where changes exclude each other: sets of parts do, flexible links do not.
+    """Place at which left-out terms of the equations exclude each other: sets of parts do, flexible links do not.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def coupling_joints(content: Mapping[str, Any]) -> tuple[str, ...]:
     beams = content.get("beams", {})
 
     def moves(part: str) -> bool:
-        """Whether anything inward of the part, itself included, has coordinates."""
+        """Whether a body or beam, or anything that carries it, moves by coordinates."""
         if part in beams:
             return size_of(beams[part]["level"], beams[part]) > 0 or moves(beams[part]["parent"])
         if part not in carriers:

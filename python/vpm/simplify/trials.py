@@ -264,7 +264,7 @@ class Trials:
             rung = finer
 
     def _is_hopeless(self, changes: Changes, seconds: float) -> bool:
-        """Whether a way takes so much longer by a coarse timing than one that works that none takes it.
+        """Whether a way of stepping a reduced model is by a coarse timing too slow to be taken.
 
         All that is within reach of the period is tried with the full model: what it errs is the measure of the others.
         """

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 class Modes(NamedTuple):
-    """What steps make of a linear machine's vibrations and of dry friction; see `Resolution`."""
+    """Modes of a linear machine and sites of dry friction as integration steps change them; see `Resolution`."""
 
     limit: float
     frequencies: Array
@@ -54,7 +54,7 @@ class Resolution(Storable):
 
     @property
     def integrator(self) -> str:
-        """Name of the method."""
+        """Name of the integrator whose steps are judged."""
         return self._integrator
 
     @property
@@ -149,7 +149,7 @@ class Resolution(Storable):
         return f"modes above {self.limit:.3g} Hz are not resolved ({self._fate()}{others})"
 
     def _fate(self) -> str:
-        """What becomes of the slowest mode."""
+        """What integration steps make of the slowest mode that they do not resolve, as a few words."""
         frequency, left, time = self.frequencies[0], self.left[0], self.times[0]
         if left > 1.0:
             return f"{frequency:.3g} Hz: grows"

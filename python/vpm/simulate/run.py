@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Run(Result):
-    """What a simulation gave.
+    """Simulated channels over time, with the log's counterpart.
 
     Attributes
     ----------

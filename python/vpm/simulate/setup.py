@@ -23,7 +23,7 @@ MOST_SUBSTEPS = 1_000_000
 
 @dataclass(frozen=True)
 class Setup(Storable):
-    """How a simulation steps.
+    """Settings of how a simulation steps: integrator, substeps, hold.
 
     Attributes
     ----------

@@ -120,7 +120,7 @@ def fold(model: Model) -> Fold:
 
 
 def fold_carton(fineness: int = 4) -> Study:
-    """Run the study.
+    """Run the study of folding a carton.
 
     Parameters
     ----------

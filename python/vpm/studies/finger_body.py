@@ -43,11 +43,11 @@ class Finger:
 
     @property
     def thickness(self) -> float:
-        """Of all layers on the bone, m."""
+        """Thickness of all layers of the finger on the bone, m."""
         return self.radius - self.bone
 
     def body(self, fineness: int, *, pole: float = 0.0) -> SoftBody:
-        """The same as elements.
+        """Finger as a body of finite elements.
 
         Parameters
         ----------

@@ -141,7 +141,7 @@ def classes(step: Pressed) -> Array:
 
 
 def fingertip(fineness: int = 3) -> Study:
-    """Run the study.
+    """Run the study of a soft fingertip.
 
     Parameters
     ----------

@@ -54,7 +54,7 @@ class Jet:
 
 
 def variables(values: Array) -> list[Jet]:
-    """The variables themselves.
+    """Variables as jets, whose own derivatives are one and whose second ones are zero.
 
     Parameters
     ----------

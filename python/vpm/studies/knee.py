@@ -90,7 +90,7 @@ class Stressed:
 
     @property
     def peak(self) -> float:
-        """Its largest value away from held ends and pad, Pa."""
+        """Largest equivalent stress away from held ends and pad, Pa."""
         return float(self.equivalent[self.clear].max())
 
     def line(self, yoke: Yoke) -> tuple[Array, Array]:
@@ -133,7 +133,7 @@ def _stressed(solid: Solid, held: Array, moved: Array, clear: NDArray[np.bool_])
 
 
 def knee(fineness: int = 4) -> Study:
-    """Run the study.
+    """Run the study of a knee.
 
     Parameters
     ----------

@@ -52,7 +52,7 @@ class Material:
 
     @property
     def compliance(self) -> float:
-        """1/K, 1/Pa."""
+        """Compressibility of a material, ``1/K``, 1/Pa."""
         return 0.0 if np.isinf(self.bulk) else 1.0 / self.bulk
 
     @property

@@ -60,7 +60,7 @@ class Pressed:
 
     @property
     def area(self) -> float:
-        """Area of contact, m^2."""
+        """Area of contact of a pressed body, m^2."""
         return float(np.pi * self.contact_radius**2)
 
 
@@ -106,7 +106,7 @@ def press(
 def _advance(
     body: SoftBody, state: State, reached: float, way: float, start: float, curvature: float, augmented: bool
 ) -> tuple[State, int]:
-    """From one indentation to the next, in halves where need be."""
+    """Balance of a pressed body at the next indentation, reached in halved steps where need be."""
     step, smallest, total = way - reached, (way - reached) / 2**CUTS, 0
     while reached < way * (1.0 - 1e-12):
         goal = min(reached + step, way)
@@ -169,7 +169,7 @@ def _newton(body: SoftBody, state: State, obstacle: Obstacle) -> tuple[State, in
 
 
 def _scale(body: SoftBody) -> tuple[int, float, float]:
-    """Number of displacements; force and volume to which those out of balance are compared."""
+    """Number of displacements, and the force and volume that measure how far a balance is met."""
     shear = max(material.shear for material in body.materials)
     extent = float(np.ptp(body.mesh.doflocs, axis=1).max())
     return body.basis.N - body.fixed.size, shear * extent**2, extent**3
@@ -200,7 +200,7 @@ def _searched(
 
 
 def _seen(body: SoftBody, state: State, way: float, obstacle: Obstacle, steps: int) -> Pressed:
-    """What a balance shows."""
+    """Force, energy, contact radius and pressure of a balance."""
     touching = body.touch(state, obstacle) > 0.0
     now = body.gap(state, obstacle)[1]
     edge = float(now[touching].max()) if touching.any() else 0.0

@@ -47,7 +47,7 @@ class Obstacle:
 
 @dataclass
 class State:
-    """Unknowns of a body.
+    """Displacements, pressures and contact multipliers of a soft body.
 
     Attributes
     ----------
@@ -61,7 +61,7 @@ class State:
     multiplier: Array
 
     def copy(self) -> State:
-        """The same numbers, apart."""
+        """Copy of a state of a soft body."""
         return State(self.displacement.copy(), self.pressure.copy(), self.multiplier.copy())
 
 
@@ -126,7 +126,7 @@ class SoftBody:
         return np.stack(parts)
 
     def rest(self) -> State:
-        """Nothing moves, nothing touches."""
+        """State in which nothing moves and nothing touches."""
         points = self.skin.global_coordinates()[0]
         return State(np.zeros(self.basis.N), np.zeros(self.merge.shape[1]), np.zeros(points.shape))
 
@@ -155,7 +155,7 @@ class SoftBody:
         return np.asarray(self.inner.interpolate(self.merge @ state.pressure))
 
     def energy(self, state: State) -> float:
-        """Elastic energy, J."""
+        """Elastic energy of a soft body, J."""
         density = self.energy_density(self.strain(state)).value
         return float(np.sum((density + 0.5 * self.compliance * self.pressures(state) ** 2) * self._measure))
 

@@ -46,7 +46,7 @@ class Solid:
 
     @cached_property
     def stiffness(self) -> Any:  # noqa: ANN401
-        """Stiffness matrix, N/m."""
+        """Stiffness matrix of a linear elastic solid, N/m."""
         from skfem.models.elasticity import lame_parameters, linear_elasticity
 
         return linear_elasticity(*lame_parameters(self.young, self.poisson)).assemble(self.basis).tocsc()
@@ -117,5 +117,5 @@ def brick(first: Array, second: Array, third: Array) -> MeshHex2:
 
 
 def moved(mesh: MeshHex2, places: Array) -> MeshHex2:
-    """The same bricks with their nodes at other places."""
+    """Mesh of the same bricks with its nodes at other places."""
     return finite_elements().MeshHex2(places, mesh.t)

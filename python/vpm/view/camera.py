@@ -44,7 +44,7 @@ class Camera:
         return cls(centre + distance * front, np.array([right, np.cross(front, right), front]), slopes)
 
     def project(self, points: Array) -> Array:
-        """Places in the picture.
+        """Places of points in the picture of a camera.
 
         Parameters
         ----------

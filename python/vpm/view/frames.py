@@ -52,7 +52,7 @@ class Frames:
         return len(self._asked) - 1
 
     def poses(self, coordinates: Array) -> tuple[Array, Array]:
-        """Places of all frames.
+        """Origins and axes of all drawn frames along a motion.
 
         Parameters
         ----------

@@ -207,7 +207,7 @@ class Page:
         return self._stage.corners(role)
 
     def close(self) -> None:
-        """End the server."""
+        """End the server of a live view."""
         with redirect_stdout(StringIO()):
             self.server.stop()
 

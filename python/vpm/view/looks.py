@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Look:
-    """Look of a role.
+    """Colours, word in the legend and transparency of a role in a scene.
 
     Attributes
     ----------

@@ -19,7 +19,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """What is drawn.
+    """Drawn shape of one component.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Tube(Shape):
 
     @property
     def points(self) -> Array:
-        """Its centreline."""
+        """Centreline of a tube."""
         return self.path
 
 
@@ -79,7 +79,7 @@ class Sphere(Shape):
 
     @property
     def points(self) -> Array:
-        """Its centre."""
+        """Centre of a sphere."""
         return self.centre[:, None, :]
 
 
@@ -125,13 +125,13 @@ class Arrow(Shape):
 
     @property
     def points(self) -> Array:
-        """Start and end."""
+        """Start and end of an arrow."""
         return np.stack([self.start, self.end], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """A machine in motion.
+    """Shapes of a machine in motion.
 
     Attributes
     ----------

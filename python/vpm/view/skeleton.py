@@ -74,7 +74,7 @@ class Skeleton:
         return Pose(origins, axes, coordinates, size)
 
     def shapes(self, pose: Pose) -> tuple[Shape, ...]:
-        """All parts."""
+        """Drawn shapes of all parts in a pose."""
         return tuple(shape for draw in self._draws for shape in draw(pose))
 
     def ghost(self, pose: Pose) -> tuple[Shape, ...]:

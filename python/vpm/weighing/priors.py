@@ -27,7 +27,7 @@ NATURAL = (0.0, 1.0)
 
 @dataclass(frozen=True)
 class Prior:
-    """What is known of a parameter before the records.
+    """Prior of a parameter: what is known of it before the records.
 
     Attributes
     ----------
@@ -62,7 +62,7 @@ class Prior:
 
     @property
     def ends(self) -> tuple[float, float]:
-        """What is possible, in deviations from the centre."""
+        """Bounds of a parameter, in deviations from the centre of its prior."""
         low = -np.inf if self.logarithmic and self.low <= 0.0 else self.standard(self.low)
         return low, self.standard(self.high)
 
@@ -121,7 +121,7 @@ def priors_of(model: Model, data: PredictionErrorProblem) -> dict[str, Prior]:
 
 
 class _Sizes:
-    """How large what the records show is, by kind: the natural sizes of effects."""
+    """Natural sizes of effects, from how large the outputs of the records are."""
 
     def __init__(self, model: Model, data: PredictionErrorProblem) -> None:
         self.model = model

@@ -164,7 +164,7 @@ class _Known:
         self.blocks = tuple(blocks)
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
-        """See `vpm.identify.Problem`."""
+        """Residual and derivative with prior knowledge as rows; see `vpm.identify.Problem`."""
         residual, jacobian = self.data.evaluate(model, theta, columns)
         off, slopes = self.standard(model, theta)
         rows = np.zeros((len(off), len(columns)))

@@ -24,7 +24,7 @@ MOST_COLUMNS = 64
 
 
 class ArrayLog(Log):
-    """A file of arrays.
+    """A log in a file of arrays, such as MAT or HDF5.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ class ArrayLog(Log):
         return f"{array}[{index}, :]" if row else f"{array}[:, {index}]"
 
     def _read(self, columns: Sequence[str], clock: str) -> Table:
-        """Columns by name; see `Log.read`."""
+        """Columns of a file of arrays by name; see `Log.read`."""
         found = {column: self._values(column) for column in columns}
         expected = found[clock].size
         for column, values in found.items():

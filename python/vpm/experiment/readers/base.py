@@ -89,5 +89,5 @@ class Log(ABC):
         return self.error(f'{self.path}: "{column}"{use} {reason}', channel)
 
     def error(self, message: str, channel: str = "") -> ExperimentError:
-        """Error that carries the path."""
+        """Error about a log that carries the path of its file."""
         return ExperimentError(message, path=str(self.path), channel=channel or None)

@@ -95,7 +95,7 @@ class ClockedLog(Log):
 
     @abstractmethod
     def values(self, column: str) -> Array:
-        """Numbers of a column."""
+        """Numbers of a column of a log whose groups have clocks."""
 
 
 def readable_unit(unit: str) -> bool:

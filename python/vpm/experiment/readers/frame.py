@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 class Frame(Protocol):
-    """Columns by name."""
+    """Table with columns by name, such as a pandas one, as `FrameLog` reads it."""
 
     @property
     def columns(self) -> Iterable[Hashable]:
@@ -67,7 +67,7 @@ class FrameLog(Log):
         self.units: Mapping[str, str] = {}
 
     def _read(self, columns: Sequence[str], clock: str) -> Table:  # noqa: ARG002
-        """Columns by name; see `Log.read`."""
+        """Columns of a data frame by name; see `Log.read`."""
         stamps = frozenset(column for column in columns if self._columns[column].dtype.kind in "mM")
         found = {column: self._seconds(column) if column in stamps else self._numbers(column) for column in columns}
         return Table(self.header, found, None, stamps=stamps)

@@ -84,7 +84,7 @@ class GuardedLog(Log):
         return self.error(told["message"], channel)
 
     def _read(self, columns: Sequence[str], clock: str) -> Table:
-        """Columns by name; see `Log.read`."""
+        """Columns by name from the process that reads the file; see `Log.read`."""
         told, arrays = self._ask({"read": list(columns), "clock": clock})
         names: list[str] = told["columns"]
         found, own = dict(zip(names, arrays, strict=False)), arrays[len(names) :]
@@ -113,7 +113,7 @@ class GuardedLog(Log):
         return told, arrays
 
     def _end(self, code: int) -> str:
-        """Why a reader ended."""
+        """Sentence on why the process that reads a file ended: out of time, or by a signal."""
         if code in {-getattr(signal, "SIGXCPU", 0), -getattr(signal, "SIGKILL", 0)}:
             by_clock = PATIENCE * self._seconds
             return f"reading took more than {self._seconds:.0f} s of processor time, or {by_clock:.0f} s by the clock"

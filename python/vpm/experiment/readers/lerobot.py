@@ -97,11 +97,11 @@ class EpisodeLog(Log):
             self._aliases[f"{name}[{at}]"] = column
 
     def find(self, column: str) -> str | None:
-        """Name of a column, a component also by its number; see `Log.find`."""
+        """Name of a column of an episode of LeRobot, a component also by its number; see `Log.find`."""
         return super().find(self._aliases.get(column, column))
 
     def _read(self, columns: Sequence[str], clock: str) -> Table:
-        """Columns by name; see `Log.read`."""
+        """Columns of an episode of LeRobot by name; see `Log.read`."""
         found = {column: self._values(*self._places[column]) for column in columns}
         notes: tuple[str, ...] = ()
         rate = self._info.get("fps")
@@ -126,7 +126,7 @@ class EpisodeLog(Log):
 
 
 def _info(folder: Path) -> dict[str, Any]:
-    """What ``meta/info.json`` says."""
+    """Content of ``meta/info.json`` of a data set of LeRobot."""
     told = json.loads((folder / "meta" / "info.json").read_text(encoding="utf-8"))
     if not isinstance(told, dict):
         raise ExperimentError(f"{folder}/meta/info.json is no table; copy the data set anew", path=str(folder))

@@ -35,7 +35,7 @@ class _Element:
 
 
 class _Broken(Exception):  # noqa: N818
-    """What is wrong; never leaves this module."""
+    """A damaged MAT file; the message says how, and never leaves this module."""
 
 
 def check_tags(path: str | PathLike[str]) -> None:

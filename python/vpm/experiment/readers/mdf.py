@@ -34,7 +34,7 @@ UNFINISHED = b"UnFinMF"
 
 
 class _Place(NamedTuple):
-    """Where a channel is."""
+    """Group and channel number at which an MDF file holds a channel."""
 
     group: int
     channel: int
@@ -104,7 +104,7 @@ class MdfLog(ClockedLog):
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """The file open; see `ClockedLog.held`."""
+        """MDF file held open while it is read; see `ClockedLog.held`."""
         with self._opened() as self._file:
             yield
 
@@ -113,7 +113,7 @@ class MdfLog(ClockedLog):
         return np.array(self._file.get_master(self._numbers[group]), dtype=np.float64)
 
     def values(self, column: str) -> Array:
-        """Numbers of a channel; those that are invalid are NaN."""
+        """Numbers of a channel of an MDF file; those that are invalid are NaN."""
         place = self._places[column]
         samples, invalid = _samples(self._file, place)
         if reason := _value_reason(samples):  # conversions may give numbers and text by turns

@@ -58,7 +58,7 @@ class ParquetLog(Log):
         self._table = table
 
     def _read(self, columns: Sequence[str], clock: str) -> Table:  # noqa: ARG002
-        """Columns by name; see `Log.read`."""
+        """Columns of a Parquet file by name; see `Log.read`."""
         stamps = frozenset(column for column in columns if column in self._stamps)
         found = {column: self._seconds(column) if column in stamps else self._numbers(column) for column in columns}
         return Table(self.header, found, None, stamps=stamps)

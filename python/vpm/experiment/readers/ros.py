@@ -92,7 +92,7 @@ class BagLog(Log):
         return super().missing(topic if topic in self.refused else column, channel)
 
     def _read(self, columns: Sequence[str], clock: str) -> Table:
-        """Columns by name, each with its own times; see `Log.read`."""
+        """Columns of a ROS bag by name, each with its own times; see `Log.read`."""
         wanted = [column for column in columns if column != clock]
         for column in wanted:
             if column == "time" or column.partition(".")[2] in {STAMP, RECEIVED}:

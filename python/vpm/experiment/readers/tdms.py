@@ -118,7 +118,7 @@ class TdmsLog(ClockedLog):
 
     @contextmanager
     def held(self) -> Iterator[None]:
-        """The file open; see `ClockedLog.held`."""
+        """TDMS file held open while it is read; see `ClockedLog.held`."""
         with self._opened() as self._file:
             yield
 
@@ -128,7 +128,7 @@ class TdmsLog(ClockedLog):
         return offset + step * np.arange(self.sizes[group], dtype=np.float64)
 
     def values(self, column: str) -> Array:
-        """Numbers of a channel; times are seconds from the first."""
+        """Numbers of a channel of a TDMS file; times are seconds from the first."""
         group, name = self._places[column]
         samples = self._file[group][name][:]
         if column in self._stamps:

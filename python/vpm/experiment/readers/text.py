@@ -22,5 +22,5 @@ class TextLog(Log):
         self.units = dict(zip(self.header, self.dialect.units, strict=False))
 
     def _read(self, columns: Sequence[str], clock: str) -> Table:  # noqa: ARG002
-        """Columns by name; see `Log.read`."""
+        """Columns of a text file by name; see `Log.read`."""
         return read_table(self.path, self.dialect, columns)

@@ -72,7 +72,7 @@ class UlogLog(ClockedLog):
         return np.asarray((self._stamps[group] - self._start) * 1e-6, dtype=np.float64)
 
     def values(self, column: str) -> Array:
-        """Numbers of a field."""
+        """Numbers of a field of a ULog file."""
         return np.asarray(self._values[column], dtype=np.float64)
 
 

@@ -40,7 +40,7 @@ class Rest(Entry):
     torsion: Number = 0.0
 
     def described(self) -> Described:
-        """What the core reads of it."""
+        """What the core reads of the curvature at rest of a beam, at one place."""
         return {"at": self.at or 0.0, "curvature": [self.bending_x, self.bending_y, self.torsion]}
 
 
@@ -92,7 +92,7 @@ class Beam(Component):
 
     @property
     def is_of_one_material(self) -> bool:
-        """Whether all of its sections are made of its material."""
+        """Whether all sections of a beam are made of the beam's material."""
         sections = [section for _, section in self.keyed_sections]
         return self.material is not None and all(one.solid and one.material is None for one in sections)
 
@@ -103,7 +103,7 @@ class Beam(Component):
 
     @property
     def detail(self) -> Level:
-        """Level of detail."""
+        """Level of detail of a flexible link."""
         return parse_level(self.level)
 
     @cached_property
@@ -277,7 +277,7 @@ class Beam(Component):
     # ---- what the model and the core are told ------------------------------------------------------------------------
 
     def with_solid(self, folder: Path) -> Beam:
-        """The same with the numbers of its reduced solid, if it is one; those of a file take the place of its name.
+        """The beam with the numbers of its reduced solid, if it is one; those of a file take the place of its name.
 
         Raises
         ------
@@ -306,7 +306,7 @@ class Beam(Component):
             yield Slot((*keys, "damping", "ratios", i), quantity, "1", NOT_NEGATIVE, FEEDING)
 
     def described(self, name: str, structure: Structure, index: Index) -> Described:
-        """What the core reads of it."""
+        """What the core reads of a beam."""
         level, damping = self.detail, f"{name}.damping"
         own = _FACTORS if self.solid is not None else () if self.material is None else tuple(Material.model_fields)
         material = {key: index[f"{name}.{of_beam}"] for key, of_beam in zip(Material.model_fields, own, strict=False)}

@@ -59,6 +59,6 @@ class Gauge(Component):
                 yield Problem(place("gauges", name, key), rest)
 
     def described(self, name: str, structure: Structure, index: Index) -> Described:  # noqa: ARG002
-        """What the core reads of it."""
+        """What the core reads of a strain gauge."""
         at = min(self.at, structure.document.beams[self.beam].reach)
         return {"name": name, "beam": structure.beams.index(self.beam), "at": at, "x": self.x, "y": self.y}

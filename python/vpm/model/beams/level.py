@@ -64,7 +64,7 @@ class Level:
         return self.name if self.name == "rigid" else f"{self.name}({self.number})"
 
     def count(self, component: str) -> int:
-        """Coordinates of a component.
+        """Number of coordinates of one component of a beam at a level of detail.
 
         Deflections start from a clamp: a Bezier curve has two control points less for bending, which is clamped in
         value and slope, and one less for the others; the elements of a deflection that does not bend are linear.
@@ -105,7 +105,7 @@ class Level:
 
 
 def parse_level(text: str) -> Level:
-    """Level from its text.
+    """Level of detail of a beam from its text.
 
     Parameters
     ----------

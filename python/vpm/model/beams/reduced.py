@@ -96,7 +96,7 @@ class ReducedLink:
 
     @property
     def mass(self) -> float:
-        """Mass (kg)."""
+        """Mass of a reduced solid (kg)."""
         return float(self.masses.sum())
 
     @property
@@ -110,7 +110,7 @@ class ReducedLink:
         return bool(self.point_curved.shape[1])
 
     def to_bytes(self) -> bytes:
-        """Content of a file."""
+        """Content of a file of a reduced solid."""
         content = io.BytesIO()
         arrays = {name: getattr(self, name) for name in _ARRAYS}
         np.savez_compressed(content, allow_pickle=False, interfaces=np.array(self.interfaces), **arrays)
@@ -166,7 +166,7 @@ class ReducedLink:
 
     @property
     def text(self) -> str:
-        """What may stand for the name of a file in ``reduced`` of a model's content: the numbers themselves."""
+        """Numbers of a reduced solid as text, which may stand for the name of a file in a model's content."""
         return embedded(self.to_bytes())
 
     def content(self) -> Mapping[str, Any]:

@@ -53,7 +53,7 @@ class _Section(Entry):
 
         @property
         def shape(self) -> str:
-            """Its kind."""
+            """Kind of a cross-section."""
 
     @property
     def numbers(self) -> Numbers:
@@ -67,7 +67,7 @@ class _Section(Entry):
         return None
 
     def described(self, places: Mapping[Way, int]) -> Described:
-        """What the core reads of it, with the numbers of its parameters by the way to each."""
+        """What the core reads of a cross-section, with the numbers of its parameters by the way to each."""
         shape = {str(way[0]): number for way, number in places.items() if len(way) == 1}
         own = {str(way[1]): number for way, number in places.items() if way[0] == "material"}
         return {"at": self.at or 0.0, "shape": {"shape": self.shape, **shape}, **({"material": own} if own else {})}
@@ -83,7 +83,7 @@ class Rectangle(_Section):
 
 
 class Circle(_Section):
-    """Full circle."""
+    """Cross-section that is a full circle."""
 
     across: ClassVar[tuple[str, ...]] = ("diameter", "diameter")
     shape: Literal["circle"]
@@ -167,7 +167,7 @@ class Layers(_Section):
         return found
 
     def described(self, places: Mapping[Way, int]) -> Described:
-        """What the core reads of it, with the numbers of its parameters by the way to each."""
+        """What the core reads of a laminate, with the numbers of its parameters by the way to each."""
         described = super().described(places)
         described["shape"]["layers"] = [
             {

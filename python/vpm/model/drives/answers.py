@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
 from vpm.errors import ModelError, near_match
-from vpm.model.checked import Checked
+from vpm.model.checked_document import Checked
 from vpm.model.drives.actuator import Actuator
 from vpm.model.drives.spring import Compliant
 from vpm.model.drives.table import Table, beyond
@@ -27,7 +27,7 @@ class DriveComponents:
 
     @property
     def supplies(self) -> tuple[str, ...]:
-        """Hydraulic supplies."""
+        """Hydraulic supplies of a model, by name."""
         return tuple(self._checked.document.supplies)
 
     @cached_property
@@ -64,7 +64,7 @@ class DriveComponents:
         return bool(document.contacts) or any(entry.type == "hydraulic" for entry in document.actuators.values())
 
     def actuator_type(self, actuator: str) -> str:
-        """Type of an actuator.
+        """Type of an actuator of a model.
 
         "ideal", "dc_motor", "spring_damper", "maxwell", "hydraulic", "table", "narx" or "maxwell_narx".
 

@@ -38,7 +38,7 @@ class Drive(Component):
 
         @property
         def command_unit(self) -> str:
-            """Unit of the command."""
+            """Unit of the command of a drive."""
 
     @property
     def acted_on(self) -> str:
@@ -97,15 +97,15 @@ class Drive(Component):
 
     @property
     def states(self) -> Mapping[str, str]:
-        """What it holds beside its lag, in the order of the core, with SI units; "" is that of the command."""
+        """States of a drive beside its lag, in the order of the core, with SI units; "" is that of the command."""
         return {}
 
     @abstractmethod
     def law(self, name: str, structure: Structure, index: Index) -> Described:
-        """Its law for the core."""
+        """What the core reads of the law of a drive."""
 
     def described(self, name: str, structure: Structure, index: Index) -> Described:
-        """What the core reads of it."""
+        """What the core reads of a drive."""
         friction = group(f"{name}.friction", ("driving", "driven", "transition_velocity"), index)
         # What spoils a command is a key of its drive, called like the group of its one parameter.
         numbers = {effect.group: effect.parameters for effect in effects_for_site("actuator")}
@@ -131,7 +131,7 @@ class Drive(Component):
 
 
 def group(way: str, keys: tuple[str, ...], index: Index) -> dict[str, int] | None:
-    """What an effect adds, if it is there."""
+    """Indices of the parameters of an effect of a drive, by key; None where the drive does not have it."""
     return {key: index[f"{way}.{key}"] for key in keys} if f"{way}.{keys[0]}" in index else None
 
 

@@ -290,7 +290,7 @@ class Hydraulic(Drive):
         return {**dict.fromkeys(("stroke", "overlap", "clearance"), command), "flow_gain": flow_gain_unit(command)}
 
     def slots(self, keys: Keys, structure: Structure) -> Iterator[Slot]:
-        """Its parameters; the gain of its valve is known."""
+        """Parameters of a hydraulic drive; the gain of its valve is known."""
         idle = set() if self.friction is None else self.friction.idle
         for slot in super().slots(keys, structure):
             if slot.keys[-1] == "retracted_length" and self.line is None:
@@ -300,12 +300,12 @@ class Hydraulic(Drive):
 
     @property
     def states(self) -> Mapping[str, str]:
-        """What it holds."""
+        """States of a hydraulic drive with their SI units."""
         spool = {"spool": "", "spool_rate": "/s"} if self.valve.spool == "second_order" else {}
         return {**spool, **dict.fromkeys(_OIL[self.cylinder.pressures], "Pa")}
 
     def law(self, name: str, structure: Structure, index: Index) -> Described:
-        """Its law for the core."""
+        """What the core reads of the law of a hydraulic drive."""
         valve, size = f"{name}.valve", ("area", "area_ratio") if self.cylinder.bore is None else ("bore", "rod")
         cleared = {} if self.valve.clearance is None else numbers(valve, ("clearance",), index)
         pressures = {} if self.cylinder.pressures == "chambers" else {"pressures": self.cylinder.pressures}

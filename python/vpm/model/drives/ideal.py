@@ -34,5 +34,5 @@ class Ideal(Drive):
         return {"gain": si_unit(f"{effort}/({self.command_unit})"), "limit": effort}
 
     def law(self, name: str, structure: Structure, index: Index) -> Described:  # noqa: ARG002
-        """Its law for the core."""
+        """What the core reads of the law of an ideal drive."""
         return {**numbers(name, ("gain", "limit"), index)}

@@ -87,7 +87,7 @@ class MaxwellNarx(Sampled):
                 yield Problem(place("actuators", name), f"{rest}put it on a line, or on a prismatic joint")
 
     def law(self, name: str, structure: Structure, index: Index) -> Described:  # noqa: ARG002
-        """Its law for the core; all its numbers are there."""
+        """What the core reads of the law of a Maxwell-NARX drive; all its numbers are there."""
         law: Described = {key: getattr(self, key) for key in ("sample_time", *self.SAVED, "scheme", "limit")}
         for key in ("k0", "s0"):
             law[key] = [*law[key], *[0.0] * (SIZES[-1] - len(law[key]))]

@@ -63,18 +63,18 @@ class DcMotor(Drive):
         return {"gear_ratio": "1", "transition_velocity": "rad/s"}
 
     def slots(self, keys: Keys, structure: Structure) -> Iterator[Slot]:
-        """Its parameters; those whose unit depends on the model come last."""
+        """Parameters of a direct-current motor; those whose unit depends on the model come last."""
         yield from sorted(
             super().slots(keys, structure), key=lambda slot: not rules_of(DcMotor)[str(slot.keys[-1])].unit
         )
 
     @property
     def states(self) -> Mapping[str, str]:
-        """What it holds."""
+        """States of a direct-current motor with their SI units."""
         return {"current": "A"}
 
     def law(self, name: str, structure: Structure, index: Index) -> Described:  # noqa: ARG002
-        """Its law for the core; in SI both constants of a motor are one number."""
+        """What the core reads of the law of a direct-current motor; in SI both constants of a motor are one number."""
         keys = ("resistance", "time_constant", "torque_constant", "back_emf", "gear_ratio", "efficiency")
         law = numbers(name, (*keys, "transition_velocity", "rotor_inertia"), index)
         return {**law, "back_emf": law["torque_constant"] if law["back_emf"] is None else law["back_emf"]}

@@ -109,7 +109,7 @@ class Narx(Sampled):
             yield Problem(place("actuators", name, "terms"), rest)
 
     def law(self, name: str, structure: Structure, index: Index) -> Described:  # noqa: ARG002
-        """Its law for the core."""
+        """What the core reads of the law of a NARX drive."""
         terms = self.terms or {}
         return {
             "sample_time": self.sample_time,

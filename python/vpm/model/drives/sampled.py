@@ -54,7 +54,7 @@ class Sampled(Drive):
         return [key for key in self.SAVED if getattr(self, key) is not None]
 
     def with_file(self, path: Path) -> Self:
-        """The same with the numbers of a file.
+        """The drive with the numbers of a saved result.
 
         Raises
         ------
@@ -68,4 +68,4 @@ class Sampled(Drive):
 
     @abstractmethod
     def read(self, saved: Mapping[str, Any]) -> dict[str, Any]:
-        """What a saved result says, by key."""
+        """Fields of a drive from a saved result, by key."""

@@ -39,7 +39,7 @@ class Compliant(Drive):
         yield from super().carrier_problems(name, structure)
 
     def law(self, name: str, structure: Structure, index: Index) -> Described:  # noqa: ARG002
-        """Its law for the core."""
+        """What the core reads of the law of an elastic drive along a line."""
         return {**numbers(name, tuple(rules_of(type(self))), index)}
 
 
@@ -74,5 +74,5 @@ class Maxwell(Compliant):
 
     @property
     def states(self) -> Mapping[str, str]:
-        """What it holds."""
+        """State of a Maxwell element with its SI unit."""
         return {"stretch": "m"}

@@ -120,7 +120,7 @@ def commanded_states(model: Evaluations, theta: Array, inputs: Array, dt: float)
 
 
 def _through_links(command: Array, name: str, value: Value, dt: float) -> Array:
-    """What is left of a command after delay, dead zone and saturation."""
+    """Command (N,) after delay, dead zone and saturation of a drive."""
     samples = np.arange(command.size, dtype=np.float64)
     late = np.interp(samples - value(f"{name}.delay.time", 0.0) / dt, samples, command)
     width = value(f"{name}.dead_zone.width", 0.0)

@@ -42,7 +42,7 @@ class Air(Entry):
 
 
 class Oil(Entry):
-    """What the pressures act through."""
+    """Oil of a hydraulic supply: bulk modulus, vapour pressure and entrained air."""
 
     bulk_modulus: Annotated[ParameterValue, Rule("Pa", (1e5, math.inf), "less would be oil softer than air at one bar")]
     vapour_pressure: Annotated[
@@ -99,14 +99,14 @@ class Supply(Component):
             yield Problem(place("supplies", name, "tank_pressure"), rest)
 
     def states(self, name: str, document: Document) -> Iterator[str]:
-        """Its pressure (Pa) if it sags, and what is lost (Pa) on the way to the valves if anything is."""
+        """States of a supply: pressure (Pa) if it sags, and the loss (Pa) on the way to the valves if there is any."""
         if self.source == "sagging":
             yield "pressure"
         if any(EFFECTS[effect.type].group == DROP and effect.at == name for effect in document.effects):
             yield DROP
 
     def described(self, name: str, structure: Structure, index: Index) -> Described:  # noqa: ARG002
-        """What the core reads of it."""
+        """What the core reads of a hydraulic supply."""
         air = tuple(Air.model_fields)
         sagging = self.source == "sagging"
         return {

@@ -59,7 +59,7 @@ class Table(Drive):
                 yield Problem(place(*keys, "efforts", number), rest)
 
     def law(self, name: str, structure: Structure, index: Index) -> Described:  # noqa: ARG002
-        """Its law for the core."""
+        """What the core reads of the law of a table."""
         efforts = [effort for row in self.efforts for effort in row]
         return {"commands": list(self.commands), "velocities": list(self.velocities), "efforts": efforts}
 

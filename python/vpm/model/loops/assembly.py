@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
-    from vpm.model.loops.loops import Loops
+    from vpm.model.loops.closure import Loops
 
 Array = NDArray[np.float64]
 
@@ -58,7 +58,7 @@ def _moved(loops: Loops, q: Array, fixed: Mapping[int, float], free: Sequence[in
 
 
 def _put(loops: Loops, q: Array, fixed: Mapping[int, float], free: Sequence[int]) -> Array:
-    """Closed by the other joints, with some put where they have to be at once."""
+    """Coordinates with some put where they have to be at once, and the loops closed by the other joints."""
     q = q.copy()
     for place, value in fixed.items():
         q[place] = value

@@ -40,7 +40,7 @@ class Loop(Component):
 
     @property
     def equations(self) -> int:
-        """Number of its equations."""
+        """Number of equations by which a joint closes its loop."""
         return {"spherical": 3, "revolute": 5, "rigid": 6}[self.type]
 
     def problems(self, name: str, structure: Structure) -> Iterator[Problem]:
@@ -67,7 +67,7 @@ class Loop(Component):
             yield Problem(where, "cannot stay closed without velocity_terms; put them back, or remove it")
 
     def described(self, name: str, structure: Structure, index: Index) -> Described:  # noqa: ARG002
-        """What the core reads of it; it turns a revolute one about the z axes of its frames."""
+        """What the core reads of a joint that closes a loop; a revolute one turns about the z axes of its frames."""
         axis = unit(self.axis or (0.0, 0.0, 1.0))
         columns = (*plane(axis), axis)
         axes = [column[row] for row in range(3) for column in columns]

@@ -13,7 +13,7 @@ from vpm.errors import ModelError
 from vpm.model.loops.assembly import least, null_space
 
 if TYPE_CHECKING:
-    from vpm.model.loops.loops import Loops
+    from vpm.model.loops.closure import Loops
 
 Array = NDArray[np.float64]
 

@@ -17,7 +17,7 @@ from vpm.numbers import array_of
 
 if TYPE_CHECKING:
     from vpm.model.evaluation import Evaluations
-    from vpm.model.loops.loops import Loops
+    from vpm.model.loops.closure import Loops
 
 Array = NDArray[np.float64]
 
@@ -42,7 +42,7 @@ def resting(model: Evaluations, position: ArrayLike) -> tuple[Array, Array]:
 def rest(
     model: Evaluations, held: Mapping[str, float], guess: Mapping[str, float] | None = None
 ) -> tuple[Array, dict[str, float]]:
-    """See `Loops.rest`.
+    """Pose of rest of closed loops under gravity, and efforts on the held joints; see `Loops.rest`.
 
     Notes
     -----

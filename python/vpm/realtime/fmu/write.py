@@ -151,7 +151,7 @@ def write_fmu(
 
 
 def _steps(rate: float, integrator: str, substeps: int) -> tuple[str, float]:
-    """Which steps, and how long."""
+    """Integrator and step length (s) of an FMU."""
     if not 0.0 < rate < math.inf:
         raise SimulationError(f"a rate of {rate:g} Hz is not possible; give a positive number")
     if substeps % 1 or not 1 <= substeps <= MOST_STEPS:
@@ -197,7 +197,7 @@ def _token(*texts: str) -> str:
 
 
 def _notes(model: Model) -> list[str]:
-    """What a simulation of the model does and its FMU does not."""
+    """Notes on what a simulation of the model does and its FMU does not."""
     notes = []
     if model.is_abrupt:
         notes.append(

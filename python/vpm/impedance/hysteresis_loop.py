@@ -26,7 +26,7 @@ from vpm.errors import IdentificationError
 from vpm.impedance.channels import RecordLike, Sense, check_moves, check_sense, columns
 from vpm.impedance.cycles import FEWEST_PER_CYCLE, Sums, parts, visible, whole_cycles
 from vpm.impedance.harmonics import Complex, evaluate, fourier
-from vpm.impedance.loop_notes import loop_notes
+from vpm.impedance.hysteresis_notes import loop_notes
 from vpm.results import Result
 
 if TYPE_CHECKING:
@@ -40,7 +40,7 @@ MOST_HARMONICS = 20
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Loop(Result):
-    """What a hysteresis loop says.
+    """Stiffness, damping and energy that a hysteresis loop shows.
 
     Attributes
     ----------

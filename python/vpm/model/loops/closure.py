@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LoopState:
-    """Where the closed loops of a machine are.
+    """Closure equations of all loops at a state: gap, Jacobian, drift, and which are independent.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class LoopState:
 
     @property
     def rank(self) -> int:
-        """Number of independent equations."""
+        """Number of independent closure equations."""
         return int(self.independent.sum())
 
 
@@ -70,7 +70,7 @@ class Loops:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names."""
+        """Names of the joints that close loops."""
         return tuple(self._model.loop_entries)
 
     def __len__(self) -> int:

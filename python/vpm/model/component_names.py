@@ -9,7 +9,7 @@ from types import MappingProxyType
 from vpm.catalogue import JointKind
 from vpm.errors import ModelError
 from vpm.model.channels import ChannelEntry
-from vpm.model.checked import Checked
+from vpm.model.checked_document import Checked
 from vpm.model.drives.answers import DriveComponents
 from vpm.model.loops.loop import Loop
 from vpm.model.sensor import stated_noise
@@ -73,17 +73,17 @@ class Components(DriveComponents):
 
     @property
     def bodies(self) -> tuple[str, ...]:
-        """Bodies, parents before children."""
+        """Bodies of a model by name, parents before children."""
         return self._checked.structure.bodies
 
     @property
     def beams(self) -> tuple[str, ...]:
-        """Flexible links, parents before children."""
+        """Flexible links of a model by name, parents before children."""
         return self._checked.structure.beams
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Lines between two points."""
+        """Lines between two points of a model, by name."""
         return tuple(self._checked.document.lines)
 
     @property
@@ -104,12 +104,12 @@ class Components(DriveComponents):
 
     @property
     def gauges(self) -> tuple[str, ...]:
-        """Strain gauges."""
+        """Strain gauges of a model, by name."""
         return tuple(self._checked.document.gauges)
 
     @property
     def markers(self) -> tuple[str, ...]:
-        """Frames to watch."""
+        """Frames to watch of a model, by name."""
         return tuple(self._checked.document.markers)
 
     @cached_property
@@ -159,12 +159,12 @@ class Components(DriveComponents):
 
     @property
     def sensors(self) -> tuple[str, ...]:
-        """Sensors."""
+        """Sensors of a model, by name."""
         return tuple(self._checked.document.sensors)
 
     @property
     def controllers(self) -> tuple[str, ...]:
-        """Controllers."""
+        """Controllers of a model, by name."""
         return tuple(self._checked.document.controllers)
 
     @property

@@ -17,7 +17,7 @@ WORTH = 0.05
 
 
 class LoopLike(Protocol):
-    """What the sentences are about."""
+    """Stiffness, damping, energy and harmonics of a loop, as `loop_notes` needs them."""
 
     @property
     def amplitude(self) -> float:
@@ -25,47 +25,47 @@ class LoopLike(Protocol):
 
     @property
     def stiffness(self) -> float:
-        """N/m."""
+        """Stiffness of the loop, N/m."""
 
     @property
     def damping(self) -> float:
-        """N s/m."""
+        """Damping of the loop, N s/m."""
 
     @property
     def damping_std(self) -> float:
-        """N s/m."""
+        """Deviation of the loop's damping, N s/m."""
 
     @property
     def energy(self) -> float:
-        """J."""
+        """Energy lost in one cycle, J."""
 
     @property
     def cycle_energy(self) -> Array:
-        """J."""
+        """Energy lost in each cycle, J."""
 
     @property
     def frequency(self) -> float:
-        """Hz."""
+        """Frequency of the cycles, Hz."""
 
     @property
     def displacement_harmonics(self) -> Complex:
-        """Of the motion, m."""
+        """Harmonics of the loop's motion, m."""
 
     @property
     def force_harmonics(self) -> Complex:
-        """Of the force, N."""
+        """Harmonics of the loop's force, N."""
 
     @property
     def force_noise(self) -> float:
-        """N."""
+        """Deviation of the noise of the loop's force, N."""
 
     @property
     def force(self) -> Array:
-        """N."""
+        """Force over the loop, N."""
 
     @property
     def energy_std(self) -> float:
-        """J."""
+        """Deviation of the energy lost in one cycle, J."""
 
 
 def loop_notes(loop: LoopLike, displacement: Array, step: float, delay_std: float, explained: float) -> tuple[str, ...]:

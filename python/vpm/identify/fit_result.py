@@ -28,7 +28,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Fit(Result):
-    """Identified parameters.
+    """Result of a fit: identified parameters with their deviations.
 
     Attributes
     ----------
@@ -168,7 +168,7 @@ def fit_of(
     experiments: Sequence[str],
     ties: Mapping[str, str] | None = None,
 ) -> Fit:
-    """Dress an estimate as a result.
+    """Fit result of an estimate, with names, units and records.
 
     Parameters
     ----------

@@ -96,12 +96,12 @@ class Checked:
     changed: frozenset[str] = frozenset()
 
     def with_values(self, values: Mapping[str, float]) -> Checked:
-        """The same with other values (SI) of parameters that there are; nothing is checked."""
+        """The checked document with other values (SI) of parameters that there are; nothing is checked."""
         moved = {name: replace(self.parameters[name], value=value) for name, value in values.items()}
         return replace(self, parameters={**self.parameters, **moved}, changed=self.changed.union(values))
 
     def admitted(self, values: Mapping[str, float]) -> Checked | None:
-        """The same with other values (SI); None where only a check of the whole document can tell."""
+        """The checked document with other values (SI); None where only a check of the whole document can tell."""
         for name, value in values.items():
             parameter = self.parameters[name]
             inside = parameter.minimum <= value <= parameter.maximum and abs(value) <= LARGEST
@@ -121,7 +121,7 @@ class Checked:
 
     @cached_property
     def slots_by_name(self) -> Mapping[str, Slot]:
-        """Places by dotted name."""
+        """Places of the parameters in the document, by dotted name."""
         return {slot.name: slot for slot in self.slots}
 
     @cached_property
@@ -147,7 +147,7 @@ def _moved(quantity: Quantity, value: float) -> Quantity:
 
 
 def _reshapes(slot: Slot, value: float) -> bool:
-    """Whether a value decides what a machine is made of.
+    """Whether a value of a parameter may change what a machine is made of, or the unit of another parameter.
 
     A zero may take away the inertia before a spring or the joint of a shaft; an exponent of a contact is in the unit of
     its stiffness.

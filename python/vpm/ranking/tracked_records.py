@@ -1,4 +1,4 @@
-"""Records beside a model that an observer of stated bandwidth keeps on them."""
+"""Trackers, observers of fixed bandwidth without a noise model, and what a model that they keep on records leaves."""
 
 from __future__ import annotations
 
@@ -20,7 +20,16 @@ from vpm.model import Model
 from vpm.observer import Record
 from vpm.ranking.firsts import STEP, Firsts, hidden_states
 from vpm.ranking.noise_model import NoiseModel, Parts, Structured, frequencies
-from vpm.ranking.settings import DAMPING, PARTS, STEPS, STRETCHES, Settings
+from vpm.ranking.settings import (
+    CONTROLLED,
+    DAMPING,
+    LONGEST,
+    LONGEST_OF_FOURTH_ORDER,
+    PARTS,
+    STEPS,
+    STRETCHES,
+    Settings,
+)
 from vpm.simulate import Setup
 from vpm.simulate.setup import AUTOMATIC
 
@@ -31,43 +40,35 @@ NOTHING: By = ((), None)
 
 
 @dataclass(frozen=True)
-class Observer:
-    """How a model is kept on its records.
+class Tracker:
+    """An observer of fixed bandwidth that keeps a model on its records; `vpm.observer` has that of least variance.
 
     Attributes
     ----------
     band : float
         Bandwidth, Hz.
     fine : bool
-        Whether it takes steps that are short enough to compare structures by what they leave, or as few as it can.
-    cheap : bool
-        Whether steps may have a lower order besides: enough to screen by, but a fit would end beside its place.
+        Whether its steps are exact enough to compare structures by what they leave, or cost as little as they can.
     """
 
     band: float
     fine: bool = True
-    cheap: bool = False
 
     @property
-    def coarse(self) -> Observer:
-        """The same with as few steps as it can do with."""
-        return Observer(self.band, fine=False)
-
-    @property
-    def cheapest(self) -> Observer:
-        """The same with the cheapest steps."""
-        return Observer(self.band, fine=False, cheap=True)
+    def coarse(self) -> Tracker:
+        """The tracker of this bandwidth with the cheapest steps that it can do with."""
+        return Tracker(self.band, fine=False)
 
     @property
     def label(self) -> str:
-        """For people."""
+        """The bandwidth of the tracker, for people."""
         return f"{self.band:g} Hz"
 
 
-class Observed:
-    """Records, and what a model leaves of them under an observer.
+class TrackedRecords:
+    """Records, and what a model leaves of them under a tracker.
 
-    The observer knows no noise: each measured joint is drawn to its encoder with the bandwidth, as by a soft spring
+    The tracker knows no noise: each measured joint is drawn to its encoder with the bandwidth, as by a soft spring
     with a damper between the machine and its log. All structures are compared under the same one. Where a joint is
     split, what hangs behind its spring or backlash is drawn along with the motor: else both would answer to noise, and
     to what is missing elsewhere, otherwise than a rigid joint does. A deflection that the logs hold is compared and not
@@ -100,19 +101,19 @@ class Observed:
         #: Samples that are fitted, and those that are held back.
         self.parts, self.held_back = _divided(self._stretches, PARTS - 1)
 
-    def with_hold(self, hold: str) -> Observed:
+    def with_hold(self, hold: str) -> TrackedRecords:
         """The same with commands that do this between samples."""
         if hold == self.setup.course:
             return self
-        return Observed(self.model, self.experiments, self.settings, replace(self.setup, hold=hold))
+        return TrackedRecords(self.model, self.experiments, self.settings, replace(self.setup, hold=hold))
 
-    def holding_back(self, part: int) -> Observed:
+    def holding_back(self, part: int) -> TrackedRecords:
         """The same with another part of each stretch held back, counted from 0."""
         other = copy.copy(self)
         other.parts, other.held_back = _divided(self._stretches, part)
         return other
 
-    def whole(self) -> Observed:
+    def whole(self) -> TrackedRecords:
         """The same with nothing held back."""
         other = copy.copy(self)
         other.parts, other.held_back = [slice(int(ends[0]), int(ends[-1])) for ends in self._stretches], []
@@ -125,7 +126,7 @@ class Observed:
         if not states:
             return Firsts()
         try:
-            motion = np.concatenate(self.states(self.model, Observer(self.settings.bands[0], fine=False)))
+            motion = np.concatenate(self.states(self.model, Tracker(self.settings.bands[0], fine=False)))
         except (VpmError, ArithmeticError):
             return Firsts()
         sizes = np.std(motion[:, [self.model.state_names.index(state) for state in states]], axis=0)
@@ -138,7 +139,7 @@ class Observed:
         return np.concatenate([record.readings - np.mean(record.readings, axis=0) for record in self.records])
 
     def drawn(self, band: float) -> Array:
-        """What an observer leaves of masses on which nothing acts (N, m); zero of channels that are no positions.
+        """What a tracker leaves of masses on which nothing acts (N, m); zero of channels that are no positions.
 
         Of a machine that is far too heavy it leaves the same, for no force of its model does anything any more.
         """
@@ -154,14 +155,14 @@ class Observed:
         return left
 
     def structured(self, residual: Array, band: float, parts: Parts) -> list[Structured]:
-        """What stands out of the noise of each channel of a residual (N, m) that an observer leaves in these parts."""
+        """What stands out of the noise of each channel of a residual (N, m) that a tracker leaves in these parts."""
         return [
             Structured.of([values[part] for part in parts], self._passed(band, parts, channel))
             for values, channel in zip(residual.T, self.records[0].channels, strict=True)
         ]
 
     def _passed(self, band: float, parts: Parts, channel: str) -> list[Array]:
-        """Share of the power of white noise of a sensor that an observer leaves, at the lines of each part.
+        """Share of the power of white noise of a sensor that a tracker leaves, at the lines of each part.
 
         It draws the model to what is slow, noise among that: less than all of it is left there.
         """
@@ -176,16 +177,16 @@ class Observed:
             found.append(np.abs(zeros / poles) ** 2)
         return found
 
-    def states(self, model: Model, observer: Observer) -> list[Array]:
+    def states(self, model: Model, tracker: Tracker) -> list[Array]:
         """States (N, nx) along each record."""
         begun = zip(self.records, self._begun(model), strict=True)
-        return [self._run(model, model.theta, observer, NOTHING, *one)[1] for one in begun]
+        return [self._run(model, model.theta, tracker, NOTHING, *one)[1] for one in begun]
 
     def follow(
         self,
         model: Model,
         theta: Array,
-        observer: Observer,
+        tracker: Tracker,
         columns: Sequence[int] = (),
         moves: Array | None = None,
     ) -> tuple[Array, Array]:
@@ -203,14 +204,14 @@ class Observed:
         slopes: list[Array] = []
         for record, begun, shift in zip(self.records, self._begun(model), shifts, strict=True):
             start = firsts.added(model, begun, shift)
-            outputs, _, slope = self._run(model, theta[:own], observer, by, record, start)
+            outputs, _, slope = self._run(model, theta[:own], tracker, by, record, start)
             whole = np.zeros((*outputs.shape, len(columns)))
             whole[:, :, places] = -slope
             before = own + len(residuals) * len(firsts.states)
             for number, size in enumerate(firsts.sizes):
                 if before + number in columns:
                     moved = firsts.added(model, start, STEP * size * (np.arange(len(firsts.sizes)) == number))
-                    others, _, _ = self._run(model, theta[:own], observer, NOTHING, record, moved)
+                    others, _, _ = self._run(model, theta[:own], tracker, NOTHING, record, moved)
                     whole[:, :, columns.index(before + number)] = (outputs - others) / (STEP * size)
             residuals.append(record.readings - outputs)
             slopes.append(whole)
@@ -221,19 +222,23 @@ class Observed:
         fitted, held = (noise.by_channel(noise.whitened(residual, part)) ** 2 for part in (self.parts, self.held_back))
         return fitted.T, held.T
 
-    def method(self, model: Model, observer: Observer) -> str:
-        """Integrator; of flexible machines order 2 costs less than half of order 4, with derivatives or without."""
-        if observer.cheap and self.setup.integrator == AUTOMATIC:
-            return "linearly_implicit"
-        return self.setup.method(model, drawn=True)
+    def stepping(self, model: Model, tracker: Tracker, dt: float) -> tuple[str, int]:
+        """Integrator, and its steps within a sample of ``dt`` seconds.
 
-    def _steps(self, model: Model, observer: Observer, record: Record) -> int:
-        """Steps of the integrator within a sample."""
-        fewest = STEPS if model.added_joints else 1
-        return max(fewest, int(np.ceil(record.dt / self.settings.longest_step))) if observer.fine else fewest
+        Structures are compared by short steps, or by steps of controlled error where that takes fewer. These need the
+        exact Jacobian, which flexible links make large. Derivatives and proposals only show the way.
+        """
+        own, fewest = self.setup.method(model, drawn=True), STEPS if model.added_joints else 1
+        automatic, linear = self.setup.integrator == AUTOMATIC, own == "additive"
+        if not tracker.fine:
+            return ("crank_nicolson" if automatic and linear else own), fewest
+        short = int(np.ceil(dt / (LONGEST_OF_FOURTH_ORDER if linear else LONGEST)))
+        if automatic and short > CONTROLLED * fewest and not model.levels:
+            return f"adaptive({self.settings.exact:g})", 1
+        return own, max(fewest, short)
 
     def _begun(self, model: Model) -> list[Array]:
-        """First states, by a model's own values: an observer soon forgets them.
+        """First states, by a model's own values: a tracker soon forgets them.
 
         Raises
         ------
@@ -252,7 +257,7 @@ class Observed:
         self,
         model: Model,
         theta: Array,
-        observer: Observer,
+        tracker: Tracker,
         by: By,
         record: Record,
         start: Array,
@@ -260,8 +265,9 @@ class Observed:
         """Outputs of the channels of a record (N, m), states (N, nx), derivatives ``by`` some numbers (N, m, k)."""
         known = [column for column, name in enumerate(record.channels) if name in model.output_channels]
         channels = [record.channels[column] for column in known]
-        gain = observer_gain(model, channels, observer.band, record.dt, theta)
+        gain = tracker_gain(model, channels, tracker.band, record.dt, theta)
         gain[:, [name not in self.drawn_to for name in channels]] = 0.0
+        method, steps = self.stepping(model, tracker, record.dt)
         outputs, states, slopes = model.core.observe(
             theta,
             start,
@@ -270,8 +276,8 @@ class Observed:
             record.readings[:, known],
             np.tile(gain.ravel(), (len(record.time), 1)),
             record.dt,
-            self.setup.substeps * self._steps(model, observer, record),
-            self.method(model, observer),
+            self.setup.substeps * steps,
+            method,
             list(by[0]),
             self.setup.course,
             alone=True,
@@ -324,7 +330,7 @@ def _divided(stretches: Sequence[NDArray[np.int_]], held: int) -> tuple[Parts, P
     return fitted, [slice(int(ends[held]), int(ends[held + 1])) for ends in stretches]
 
 
-def observer_gain(model: Model, channels: Sequence[str], band: float, dt: float, theta: Array) -> Array:
+def tracker_gain(model: Model, channels: Sequence[str], band: float, dt: float, theta: Array) -> Array:
     """By how much the reading of each channel moves each state at a sample (nx, m).
 
     The gain of a mass without friction whose error dies away with the bandwidth (Hz) and `DAMPING`. A sensor that shows
@@ -342,9 +348,9 @@ def observer_gain(model: Model, channels: Sequence[str], band: float, dt: float,
 
 
 def is_position(model: Model, channel: str) -> bool:
-    """Whether a channel is the position of a joint, to which an observer draws the model.
+    """Whether a channel is the position of a joint, to which a tracker draws the model.
 
-    None that an effect has split off: another structure does not have it, and all have to be under the same observer.
+    None that an effect has split off: another structure does not have it, and all have to be under the same tracker.
     """
     joint, _, quantity = channel.rpartition(".")
     return quantity == "position" and joint in model.coordinates and joint not in model.added_joints
@@ -357,7 +363,7 @@ def _gains(band: float, dt: float) -> tuple[float, float]:
 
 
 def _free_mass(band: float, dt: float) -> tuple[list[float], list[float]]:
-    """What an observer leaves of the position of a mass on which nothing acts: zeros and poles as polynomials."""
+    """What a tracker leaves of the position of a mass on which nothing acts: zeros and poles as polynomials."""
     place, rate = _gains(band, dt)
     return [1.0, -2.0, 1.0], [1.0, place + dt * rate - 2.0, 1.0 - place]
 

@@ -1,0 +1,210 @@
+"""Diagnoses of machines whose efforts nobody can balance: a ranking names, and its tracker measures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.catalogue import EFFECTS
+from vpm.discrepancy.ambiguity import listed
+from vpm.discrepancy.assembled import classes, of_search, step
+from vpm.discrepancy.by_ranking import fitted_in, staged, tracker_gaps
+from vpm.discrepancy.candidates import Candidate, asked_for, candidates
+from vpm.discrepancy.confirmation import Judged, Trial, is_clear
+from vpm.discrepancy.diagnosis import Diagnosis, Trace
+from vpm.discrepancy.preparation import Records
+from vpm.discrepancy.prior_departure import moved_far
+from vpm.discrepancy.screening import Probe
+from vpm.discrepancy.search import ambiguities
+from vpm.discrepancy.verdict import verdict
+from vpm.errors import VpmError
+from vpm.experiment import Experiment
+from vpm.identify import Estimate, InverseDynamicsProblem, estimate, gain, gaps, segments
+from vpm.identify.estimation import standing
+from vpm.initial import invertible
+from vpm.model import Model
+from vpm.ranking.residual import TrackerResidual
+from vpm.ranking.result import Ranked, Ranking
+from vpm.ranking.settings import Settings
+from vpm.ranking.stand_in import shown
+from vpm.ranking.tracked_records import TrackedRecords
+from vpm.simulate import Setup
+
+Array = NDArray[np.float64]
+
+#: Said of machines whose efforts do not follow from their motion.
+BY_TRACKER = (
+    "{reason}: all is measured by what an observer of {band:g} Hz leaves of the logged channels, and residuals over "
+    "states, pictures of efforts and discriminating experiments are left out"
+)
+
+
+@dataclass(frozen=True)
+class _Followed:
+    """What a tracker leaves of the records that are fitted and of those that are not, and a stand-in of efforts."""
+
+    training: TrackerResidual
+    validation: TrackerResidual
+    stand_in: InverseDynamicsProblem
+
+
+def diagnosed_by_tracker(
+    ranking: Ranking,
+    model: Model,
+    records: Records,
+    asked: tuple[Sequence[str] | None, int],
+    setup: Setup,
+    reason: str,
+) -> Diagnosis:
+    """What a ranking says of the records, with the verdict of its gaps.
+
+    Parameters
+    ----------
+    ranking : Ranking
+        Of the training records, measured on the validation records.
+    model : Model
+        As the user wrote it.
+    records : tuple
+        See `vpm.discrepancy.preparation`; notes are added.
+    asked : tuple
+        Effects to try, all if None, and how many at most.
+    setup : Setup
+        With the hold that the ranking found.
+    reason : str
+        Why no efforts can be balanced.
+
+    Raises
+    ------
+    VpmError
+        The model runs away from the records under every tracker.
+    """
+    (training, validation, notes), (effects, limit) = records, asked
+    settings = Settings(effects=limit)
+    data, band = _followed(ranking, model, (training, validation), settings, setup)
+    nominal, recalibrated = _judged(model, (), data), _judged(ranking.recalibrated, model.adjustable, data)
+    found = staged(
+        ranking,
+        recalibrated,
+        lambda current, with_it, one: _beside(current, with_it, one, data, refit=with_it is not ranking.model),
+        lambda final: _offered(final, data, effects),
+        settings,
+    )
+    notes.extend([BY_TRACKER.format(reason=reason, band=band), *moved_far(model, recalibrated)])
+    told = of_search(model, records, nominal, found, data.training, 0.0)
+    if not ranking.gaps:
+        return told
+    gap = tracker_gaps(ranking, None)
+    word, summary, _ = verdict(None, nominal, recalibrated, found, gap, None, None)
+    return replace(
+        told,
+        verdict=word,
+        summary=f"Stopped before every candidate was tried. {summary}" if found.interrupted else summary,
+        gap=gap,
+        ambiguous_with=listed(ambiguities(found.accepted), ()),
+        steps=tuple(step(data.training, data.validation, stage) for stage in found.stages),
+        classes=classes(found.accepted, ()),
+        traces=_traces(data.validation, nominal, found.final),
+        stated={name: parameter.value for name, parameter in model.parameters.items()},
+    )
+
+
+def _followed(
+    ranking: Ranking,
+    model: Model,
+    records: tuple[Sequence[Experiment], Sequence[Experiment]],
+    settings: Settings,
+    setup: Setup,
+) -> tuple[_Followed, float]:
+    """Residuals of the slowest tracker that keeps the model on the records, and its bandwidth, Hz.
+
+    Raises
+    ------
+    VpmError
+        There is none.
+    """
+    fitted, kept = (TrackedRecords(model, several, settings, setup) for several in records)
+    *others, last = settings.bands
+    for band in (*others, last):
+        training, validation = TrackerResidual(fitted, band), TrackerResidual(kept, band)
+        try:
+            for one in (model, ranking.recalibrated, ranking.model):
+                training.evaluate(one, one.theta)
+                validation.evaluate(one, one.theta)
+        except (VpmError, ArithmeticError):
+            if band == last:
+                raise
+            continue
+        break
+    return _Followed(training, validation, shown(model, fitted)), band
+
+
+def _judged(model: Model, free: tuple[str, ...], data: _Followed) -> Judged:
+    """A model at its values, and how sure these are."""
+    validation, _ = data.validation.evaluate(model, model.theta)
+    return Judged(model, free, _standing(model, free, data.training), validation, None)
+
+
+def _standing(model: Model, free: tuple[str, ...], training: TrackerResidual) -> Estimate:
+    """How sure values are; deviations are unknown where derivatives leave all bounds, as behind a backlash they may."""
+    try:
+        with np.errstate(over="ignore", invalid="ignore"):
+            return standing(model, training, free)
+    except (ValueError, ArithmeticError):
+        still, unknown = standing(model, training, ()), np.full((len(free), len(free)), np.nan)
+        values = model.theta[[model.index(name) for name in free]]
+        jacobian = np.full((len(still.residual), len(free)), np.nan)
+        return replace(still, names=free, values=values, jacobian=jacobian, covariance=unknown)
+
+
+def _beside(current: Judged, model: Model, one: Ranked, data: _Followed, *, refit: bool) -> Trial:
+    """An effect in a model at the values of a ranking, measured on validation records.
+
+    Values of the ranking are those beside all that it found. Where a part of that is left out, one linear step fits the
+    rest to it, if that leaves less of the training records.
+
+    Raises
+    ------
+    VpmError
+        The model runs away from the records.
+    """
+    known, own = fitted_in(current, model, one)
+    judged = _judged(model, (*known, *own), data)
+    if refit:
+        moved = _judged(estimate(model, data.training, judged.free, linear_only=True).on(model), judged.free, data)
+        judged = min(judged, moved, key=lambda each: float(each.fit.residual @ each.fit.residual))
+    values = {name: model.parameters[name].value for name in own}
+    candidate = Candidate(EFFECTS[one.effect], one.site, ({},))
+    return Trial(
+        Probe(candidate, model, own, (), (), values, dict.fromkeys(own, np.nan), np.nan),
+        judged,
+        own,
+        (),
+        gain(current.fit.residual, judged.fit.residual, segments(data.training)),
+        gain(current.validation, judged.validation, segments(data.validation)),
+        None,
+        None,
+        "",
+        not np.isnan(judged.fit.covariance).any() and is_clear(judged, own),
+        error=max(share for _, share, _ in gaps(data.validation, current.validation).values()),
+    )
+
+
+def _offered(final: Judged, data: _Followed, effects: Sequence[str] | None) -> tuple[Candidate, ...]:
+    """All that could still be missing of a model."""
+    bare = invertible(final.model, data.stand_in.joints)
+    residual, _ = data.stand_in.evaluate(bare, bare.theta)
+    return candidates(final.model, data.stand_in, residual, asked_for(effects), simulated=True)
+
+
+def _traces(problem: TrackerResidual, nominal: Judged, final: Judged) -> tuple[Trace, ...]:
+    """Channels of the first validation record beside what the tracker makes of the model."""
+    record = problem.tracked.experiments[0]
+    found = []
+    for block in problem.blocks[: len(problem.blocks) // len(problem.tracked.experiments)]:
+        measured = np.interp(block.time, record.time, record[block.channel])
+        before, after = (measured - one.validation[block.samples] / block.weight for one in (nominal, final))
+        found.append(Trace(record.name, block.channel, block.unit, problem.mode, block.time, measured, before, after))
+    return tuple(found)
