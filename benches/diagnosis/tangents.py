@@ -27,8 +27,8 @@ from markdown import table  # noqa: E402
 from second_suite.cases import NONE  # noqa: E402
 from second_suite.cases import make_case as make_other  # noqa: E402
 from vpm import Experiment, Model  # noqa: E402
-from vpm.ranking.observed import Observed, Observer  # noqa: E402
 from vpm.ranking.settings import Settings  # noqa: E402
+from vpm.ranking.tracked_records import TrackedRecords, Tracker  # noqa: E402
 
 Array = NDArray[np.float64]
 BAND, SEED, COUNTS = 10.0, 9571, (3, 6, 16)
@@ -51,12 +51,12 @@ def machines(samples: int) -> Iterator[tuple[str, Model, Experiment]]:
 
 
 def timed(
-    observed: Observed, model: Model, observer: Observer, columns: list[int], moves: Array | None = None
+    tracked: TrackedRecords, model: Model, tracker: Tracker, columns: list[int], moves: Array | None = None
 ) -> tuple[float, Array]:
     """Milliseconds of a pass that comes again, and its derivatives."""
-    observed.follow(model, model.theta, observer, columns, moves)
+    tracked.follow(model, model.theta, tracker, columns, moves)
     begin = process_time()
-    _, slopes = observed.follow(model, model.theta, observer, columns, moves)
+    _, slopes = tracked.follow(model, model.theta, tracker, columns, moves)
     return 1e3 * (process_time() - begin), slopes
 
 
@@ -65,13 +65,13 @@ def main() -> None:
     parser.add_argument("--samples", type=int, default=800)
     rows = []
     for name, model, log in machines(parser.parse_args().samples):
-        observed, observer = Observed(model, [log], Settings()), Observer(BAND)
-        plain, _ = timed(observed, model, observer.coarse, [])
+        tracked, tracker = TrackedRecords(model, [log], Settings()), Tracker(BAND)
+        plain, _ = timed(tracked, model, tracker.coarse, [])
         nonzero = [int(place) for place in np.flatnonzero(model.theta)]
         for columns in (nonzero[:count] for count in COUNTS):
             moves = 1e-6 * np.abs(model.theta[columns])
-            screened, slopes = timed(observed, model, observer.cheapest, columns, moves)
-            exact, true = timed(observed, model, observer.coarse, columns)
+            screened, slopes = timed(tracked, model, tracker.coarse, columns, moves)
+            exact, true = timed(tracked, model, tracker.coarse, columns)
             off, true = (slopes - true) * moves, true * moves
             sizes = np.maximum(np.abs(true).max(axis=(0, 2)), 1e-300)
             gap = float((np.abs(off).max(axis=(0, 2)) / sizes).max())

@@ -48,7 +48,7 @@ def tried(effect: str, values: dict[str, float], least: float, **more: Any) -> R
     return Ranked(effect, "axis", values, Judgement(least, least, 9.0, 0.1, 1.0, 1.0), 1.0, **more)
 
 
-def seen_by_observer(recalibrated: float, after: float) -> Gap:
+def seen_by_tracker(recalibrated: float, after: float) -> Gap:
     """What an observer leaves of a channel without noise, the model as it was a half worse."""
     left = (after / recalibrated) ** 2 if recalibrated else float("nan")
     return Gap(1.5 * recalibrated, recalibrated, after, "m", left=left, noise=0.0, signal=10.0)
@@ -151,7 +151,7 @@ def test_a_ranking_learns_from_the_training_records_alone(
 def test_names_that_leave_more_of_validation_records_are_no_explanation(
     after: float, word: str, monkeypatch: pytest.MonkeyPatch, records: list[Experiment]
 ) -> None:
-    told = {"axis.position": seen_by_observer(1.0, after), "tip.position": seen_by_observer(0.0, 0.0)}
+    told = {"axis.position": seen_by_tracker(1.0, after), "tip.position": seen_by_tracker(0.0, 0.0)}
     seen = replace(two(), gaps=told)
     assert seen.left == {"axis": after**2}
     monkeypatch.setattr(naming, "rank", lambda *_, **__: seen)
@@ -165,7 +165,7 @@ def test_names_that_explain_validation_records_stand_whatever_the_balance_leaves
     small = ranking(tried("bias_force", BIAS, 0.9, evidence=900.0, probability=0.99))
     words = []
     for left in (float("nan"), 0.1):
-        seen = replace(small, gaps={"axis.position": seen_by_observer(1.0, left**0.5)})
+        seen = replace(small, gaps={"axis.position": seen_by_tracker(1.0, left**0.5)})
         monkeypatch.setattr(naming, "rank", lambda *_, seen=seen, **__: seen)
         words.append(diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict)
     assert words == ["unexplained", "effect_found"]
@@ -178,7 +178,7 @@ def test_names_that_leave_more_of_an_effort_than_it_is_explain_nothing(
     words = []
     for mass in (1.0, 1e4):
         heavy = ranking(tried("rotor_inertia", {"axis.rotor.inertia": mass}, 0.9, evidence=900.0, probability=0.99))
-        seen = replace(heavy, gaps={"axis.position": seen_by_observer(1.0, 0.1)})
+        seen = replace(heavy, gaps={"axis.position": seen_by_tracker(1.0, 0.1)})
         monkeypatch.setattr(naming, "rank", lambda *_, seen=seen, **__: seen)
         monkeypatch.setattr(by_ranking, "judged_anyhow", unmoved)
         words.append(diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict)
@@ -223,7 +223,7 @@ def test_a_name_that_no_balance_can_carry_is_reported(monkeypatch: pytest.Monkey
     monkeypatch.setattr(naming, "rank", lambda *_, **__: Ranking((one,), ((one,),), warm, model))
     why = diagnose(model, case.train, case.holdout, names="ranking", workers=1)
     (told,) = [note for note in why.notes if note.startswith("the ranking names warming_friction at lift")]
-    assert "no inverse-dynamics residual can be computed" in told
+    assert "no residual can be computed" in told
 
 
 def test_machines_that_a_ranking_does_not_cover_say_why() -> None:

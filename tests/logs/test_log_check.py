@@ -203,7 +203,7 @@ def mistakes_of(model: vpm.Model, columns: Columns) -> list[tuple[str, tuple[str
         ("slide.acceleration", -1.0, "sign"),
     ],
 )
-def test_a_channel_that_no_observer_compares_is_judged_by_what_tells_it(channel: str, factor: float, kind: str) -> None:
+def test_a_channel_that_no_tracker_compares_is_judged_by_what_tells_it(channel: str, factor: float, kind: str) -> None:
     model, columns = held_slide()
     assert not mistakes_of(model, columns)
     ((found, channels, repair),) = mistakes_of(model, scaled(channel, factor)(columns))

@@ -61,6 +61,7 @@ MODULES = {
 #: Modules that keep such a name, with the reason.
 MODULES_THAT_STAY = {
     "python/vpm/climb": "the package of the public function `vpm.climb`, which needs a deprecation first",
+    "python/vpm/climb_command.py": "the command `vpm climb`",
     "crates/vpm-core/src/model/place.rs": "places bodies in the order of the tree; no parameter of an effect",
 }
 

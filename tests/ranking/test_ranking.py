@@ -20,8 +20,8 @@ from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.noise_model import Colour, NoiseModel, Structured, fitted_noise, log_student, scale_of, white_noise
-from vpm.ranking.observed import Observed, Observer, observer_gain
 from vpm.ranking.settings import DAMPING, PARTS, Settings
+from vpm.ranking.tracked_records import TrackedRecords, Tracker, tracker_gain
 
 Array = NDArray[np.float64]
 
@@ -45,7 +45,7 @@ def test_an_autoregression_is_found_again_and_its_density_is_the_exact_one() -> 
 
 
 def test_what_is_slow_beside_a_short_past_is_white_all_the_same() -> None:
-    """What an observer of 0.2 Hz leaves of a force that wanders, at 1 kHz, beside the noise of a fine encoder."""
+    """What a tracker of 0.2 Hz leaves of a force that wanders, at 1 kHz, beside the noise of a fine encoder."""
     random, count = np.random.default_rng(6), 30_000
     pole = np.exp(2e-3 * np.pi * 0.2 * (-0.7 + 0.7j))
     slow = lfilter([1.0], [1.0, -2.0 * pole.real, abs(pole) ** 2], random.standard_normal(count))
@@ -79,16 +79,16 @@ def test_of_white_noise_hardly_anything_stands_out() -> None:
 
 
 @pytest.mark.parametrize("band", [1.0, 10.0])
-def test_noise_is_told_where_an_observer_follows_what_is_slow_of_it(band: float) -> None:
+def test_noise_is_told_where_a_tracker_follows_what_is_slow_of_it(band: float) -> None:
     """It draws the model to slow noise, too, and leaves less of that."""
     record, level = pushed(seed=4), 2e-3
     shaken = level * np.random.default_rng(4).standard_normal(len(record.time))
     record = record.with_channel("way.position", record["way.position"] + shaken, "m")
     true = Model.from_toml(SLEDGE).with_parameters({"sledge.mass": MASS, "way.friction.viscous": OIL})
-    observed = Observed(true, [record], Settings())
-    residual, _ = observed.follow(true, true.theta, Observer(band))
-    left = np.std(np.concatenate([residual[part, 0] for part in observed.parts]))
-    (told,) = observed.structured(residual, band, observed.parts)
+    tracked = TrackedRecords(true, [record], Settings())
+    residual, _ = tracked.follow(true, true.theta, Tracker(band))
+    left = np.std(np.concatenate([residual[part, 0] for part in tracked.parts]))
+    (told,) = tracked.structured(residual, band, tracked.parts)
     assert told.noise == pytest.approx(left, rel=0.15)
 
 
@@ -140,10 +140,10 @@ def test_channels_are_whitened_each_by_its_own_past() -> None:
 
 
 @pytest.mark.parametrize("band", [0.5, 1.0, 10.0])
-def test_the_error_of_an_observer_dies_away_with_its_bandwidth(band: float) -> None:
+def test_the_error_of_a_tracker_dies_away_with_its_bandwidth(band: float) -> None:
     """Poles of a free mass under the gain, against ``w (-d +- i sqrt(1 - d^2))`` of continuous time."""
     model = Model.from_toml(SLEDGE)
-    gain = observer_gain(model, ("way.position",), band, 1e-4, model.theta)
+    gain = tracker_gain(model, ("way.position",), band, 1e-4, model.theta)
     free = np.array([[1.0, 1e-4], [0.0, 1.0]])
     poles = np.log(np.linalg.eigvals(free @ (np.eye(2) - gain @ [[1.0, 0.0]]))) / 1e-4
     wanted = 2.0 * np.pi * band * (-DAMPING + 1j * np.sqrt(1.0 - DAMPING**2))
@@ -151,11 +151,11 @@ def test_the_error_of_an_observer_dies_away_with_its_bandwidth(band: float) -> N
 
 
 def test_what_a_sensor_multiplies_leaves_the_bandwidth_as_it_is() -> None:
-    """Else the best gain of a sensor would be the one that makes the observer quick."""
+    """Else the best gain of a sensor would be the one that makes the tracker quick."""
     model = Model.from_toml(SEEN)
-    plain = observer_gain(model, ("way.position",), 2.0, 1e-3, model.theta)
+    plain = tracker_gain(model, ("way.position",), 2.0, 1e-3, model.theta)
     tripled = model.with_effect("sensor_gain", "encoder", value=3.0)
-    gain = observer_gain(tripled, ("way.position",), 2.0, 1e-3, tripled.theta)
+    gain = tracker_gain(tripled, ("way.position",), 2.0, 1e-3, tripled.theta)
     assert 3.0 * gain == pytest.approx(plain, rel=1e-12)
 
 
@@ -294,10 +294,10 @@ def test_no_effect_comes_in_that_makes_no_sample_more_probable() -> None:
 
 
 def test_each_part_of_a_record_is_held_back_once() -> None:
-    observed = Observed(
+    tracked = TrackedRecords(
         Model.from_toml(SLEDGE), [pushed(seed=1, duration=3.0), pushed(seed=2, duration=2.0)], Settings()
     )
-    turns = [observed, *(observed.holding_back(part) for part in range(PARTS))]
+    turns = [tracked, *(tracked.holding_back(part) for part in range(PARTS))]
     fitted = [np.concatenate([np.r_[part] for part in turn.parts]) for turn in turns]
     held = [np.concatenate([np.r_[part] for part in turn.held_back]) for turn in turns]
     for one, other in zip(fitted, held, strict=True):

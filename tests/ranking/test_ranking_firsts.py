@@ -17,11 +17,11 @@ from vpm.initial import invertible
 from vpm.model import Model
 from vpm.ranking.firsts import hidden_states
 from vpm.ranking.fit import Fitter, View
-from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.settings import Settings
 from vpm.ranking.sizes import Sizes
 from vpm.ranking.starts import started
 from vpm.ranking.structure import Structure
+from vpm.ranking.tracked_records import TrackedRecords, Tracker
 
 LOAD, STIFFNESS, DAMPING, DRY = 1.0, 400.0, 6.0, 1.2
 #: The sledge carries a load on a spring.
@@ -89,20 +89,20 @@ def test_first_states_are_unknown_where_no_channel_tells_them() -> None:
     assert hidden_states(model, ("way.position", "tail.position")) == ()
     split = model.with_effect("joint_compliance", "way", stiffness=1e5)
     assert hidden_states(split, ("way.position",)) == ("tail.position", "tail.velocity")
-    firsts = Observed(model, records(), Settings()).firsts
+    firsts = TrackedRecords(model, records(), Settings()).firsts
     assert list(firsts.priors)[2:] == ["tail.position where record 2 begins", "tail.velocity where record 2 begins"]
     assert 1e-4 < firsts.priors["tail.position where record 1 begins"].spread < 0.1
 
 
 def test_derivatives_by_first_states_are_those_of_differences() -> None:
     model = Model.from_toml(CARRYING)  # without friction it is linear, and differences are exact
-    observed = Observed(model, records(), Settings())
+    tracked = TrackedRecords(model, records(), Settings())
     theta = np.append(model.theta, [1e-3, 0.0, -5e-4, 1e-2])
     columns = [*range(len(model.theta), len(theta)), 0]
-    _, slopes = observed.follow(model, theta, Observer(1.0), columns)
+    _, slopes = tracked.follow(model, theta, Tracker(1.0), columns)
     for place, column in enumerate(columns[:-1]):
         ahead, behind = (theta + side * 1e-3 * (np.arange(len(theta)) == column) for side in (1.0, -1.0))
-        differences = [observed.follow(model, one, Observer(1.0))[0] for one in (ahead, behind)]
+        differences = [tracked.follow(model, one, Tracker(1.0))[0] for one in (ahead, behind)]
         expected = (differences[0] - differences[1]) / 2e-3
         assert np.abs(slopes[:, :, place] - expected).max() < 1e-6 * np.abs(expected).max()
         # A record knows nothing of where another one begins.
@@ -113,18 +113,18 @@ def test_derivatives_by_first_states_are_those_of_differences() -> None:
 def test_a_fit_makes_as_much_of_balance_as_of_the_true_first_states() -> None:
     """Before the settled part of a record, several pairs of place and speed lead to the same rest.
 
-    The slower observer leaves so much of what friction does that a fit may end on the way.
+    The slower tracker leaves so much of what friction does that a fit may end on the way.
     """
-    model, observer = rubbing(), Observer(Settings().bands[-1])
-    fitter = Fitter(Observed(model, records(), Settings()), Settings())
-    firsts = fitter.observed.firsts.priors
+    model, tracker = rubbing(), Tracker(Settings().bands[-1])
+    fitter = Fitter(TrackedRecords(model, records(), Settings()), Settings())
+    firsts = fitter.tracked.firsts.priors
     balanced = Structure(model, model.theta.copy(), {})
     begun = [
         Structure(model, np.append(model.theta, moves), firsts, firsts=tuple(firsts))
         for moves in (np.zeros(4), np.array([BEGINS[0], 0.0, BEGINS[1], 0.0]))
     ]
-    view = View(fitter.noise_of(balanced, observer))
-    known, found, true = (fitter.finished(fitter.fitted(one, observer, view), view) for one in (balanced, *begun))
+    view = View(fitter.noise_of(balanced, tracker))
+    known, found, true = (fitter.finished(fitter.fitted(one, tracker, view), view) for one in (balanced, *begun))
     assert found.cost < known.cost - 200.0
     assert known.cost - found.cost > 0.99 * (known.cost - true.cost)
     assert found.structure.values == {}

@@ -26,13 +26,13 @@ from vpm.ranking.extensions import Extensions
 from vpm.ranking.fit import Fitter, View, by_secant
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
-from vpm.ranking.observed import Observed, Observer, observer_gain
 from vpm.ranking.proposals import Proposal, _seated, proposals
 from vpm.ranking.search import _is_worse
 from vpm.ranking.settings import PLACES, Settings
 from vpm.ranking.sizes import Sizes
 from vpm.ranking.starts import started
 from vpm.ranking.structure import Structure
+from vpm.ranking.tracked_records import TrackedRecords, Tracker, tracker_gain
 from vpm.weighing import Prior
 
 #: An arm on a vertical hinge, without friction.
@@ -95,7 +95,7 @@ def records() -> list[Experiment]:
 
 
 def fitter_of(model: Model) -> Fitter:
-    return Fitter(Observed(model, records(), Settings()), Settings())
+    return Fitter(TrackedRecords(model, records(), Settings()), Settings())
 
 
 def structure_of(model: Model) -> Structure:
@@ -109,10 +109,10 @@ def structure_of(model: Model) -> Structure:
 def test_derivatives_by_what_is_known_stay_where_an_effect_does_nothing(effect: str) -> None:
     model = Model.from_toml(SLEDGE)
     shapes = {"hysteresis": {"displacement": 0.05}, "spring": {"rest": 0.1}}
-    fitter, observer = fitter_of(model), Observer(1.0)
+    fitter, tracker = fitter_of(model), Tracker(1.0)
     without = structure_of(model)
     beside = without.carried(model.with_effect(effect, "way", **shapes.get(effect, {})))
-    plain, more = (fitter.followed(one, observer, tuple(one.priors)) for one in (without, beside))
+    plain, more = (fitter.followed(one, tracker, tuple(one.priors)) for one in (without, beside))
     scale = np.abs(plain.jacobian).max(axis=(0, 1))
     assert np.abs(more.residual - plain.residual).max() < 1e-12
     np.testing.assert_allclose(more.jacobian / scale, plain.jacobian / scale, atol=1e-9)
@@ -124,7 +124,7 @@ def test_derivatives_without_those_of_the_matrix_miss_the_exact_ones_by_the_orde
     channels = [f"{joint}.position" for joint in model.joints]
     time = 0.004 * np.arange(150)
     swing = np.sin(np.outer(time, 4.0 + np.arange(6.0)))
-    gain = np.tile(observer_gain(model, channels, 3.0, 0.004, model.theta).ravel(), (len(time), 1))
+    gain = np.tile(tracker_gain(model, channels, 3.0, 0.004, model.theta).ravel(), (len(time), 1))
     places = [model.output_channels.index(channel) for channel in channels]
     columns = [model.index(name) for name in ("link3.mass", "m2.gain", "m4.gain")]
 
@@ -145,11 +145,11 @@ def test_derivatives_without_those_of_the_matrix_miss_the_exact_ones_by_the_orde
 def test_structures_are_compared_by_steps_whose_errors_are_small() -> None:
     model = Model.from_toml(SLEDGE).with_effect("end_stop", "way", low=-0.5, high=0.5, stiffness=4e4, damping=0.01)
     structure, fitter = structure_of(model), fitter_of(Model.from_toml(SLEDGE))
-    exact = Fitter(Observed(Model.from_toml(SLEDGE), records(), Settings(longest_step=2e-5)), Settings())
-    truth = exact.followed(structure, Observer(1.0), ()).residual
+    exact = Fitter(TrackedRecords(Model.from_toml(SLEDGE), records(), Settings(exact=1e-8)), Settings())
+    truth = exact.followed(structure, Tracker(1.0), ()).residual
     off = [
         np.abs(fitter.followed(structure, one, ()).residual - truth).max()
-        for one in (Observer(1.0).coarse, Observer(1.0))
+        for one in (Tracker(1.0).coarse, Tracker(1.0))
     ]
     assert off[0] > 4.0 * off[1]
 
@@ -174,15 +174,15 @@ def test_the_size_of_an_effect_is_its_amplitude_beside_all_effects() -> None:
         )
         for one in records()
     ]
-    fitter = Fitter(Observed(model, pulled, Settings()), Settings())
+    fitter = Fitter(TrackedRecords(model, pulled, Settings()), Settings())
     wrong, right = (
         replace(structure_of(model.with_effect("bias_force", "way", force=share * 0.5 * GAIN)), priors={})
         for share in (0.9, 1.0)
     )
     oily = model.effects[0]
     assert wrong.bare([oily]).theta[model.index("way.friction.viscous")] == 0.0
-    view = View(fitter.noise_of(wrong, Observer(1.0)))
-    begun, better = (fitter.fitted(one, Observer(1.0), view) for one in (wrong, right))
+    view = View(fitter.noise_of(wrong, Tracker(1.0)))
+    begun, better = (fitter.fitted(one, Tracker(1.0), view) for one in (wrong, right))
     look = Look(begun, fitter)
     pulling = wrong.model.effect("bias_force", "way")
     assert look._removed([pulling]) == pytest.approx(10.0**2 - 1.0, rel=0.01)
@@ -227,8 +227,8 @@ def test_effects_that_a_diagnosis_does_not_try_are_candidates_where_they_are_ask
 
 def test_a_view_prefers_derivatives_that_are_there() -> None:
     fitter, structure = fitter_of(Model.from_toml(SLEDGE)), structure_of(Model.from_toml(SLEDGE))
-    followed = fitter.followed(structure, Observer(1.0), tuple(structure.priors))
-    noise, parts = fitter.noise_of(structure, Observer(1.0)), fitter.observed.parts
+    followed = fitter.followed(structure, Tracker(1.0), tuple(structure.priors))
+    noise, parts = fitter.noise_of(structure, Tracker(1.0)), fitter.tracked.parts
     known = dict(zip(followed.names, noise.whitened(followed.jacobian, parts).T, strict=True))
     bare = replace(followed, names=(), jacobian=followed.jacobian[:, :, :0])
     for one, other in zip(View(noise, known).errors(bare, parts), View(noise).errors(followed, parts), strict=True):
@@ -269,26 +269,26 @@ def test_what_remembers_behind_a_spring_begins_with_nothing_to_remember() -> Non
         model = bare.with_effect("hysteresis", "way", side=side, force=1.0, displacement=0.05)
         fitter = fitter_of(model)
         carried = structure_of(Model.from_toml(SLEDGE)).carried(model)
-        found = fitter.fitted(carried, Observer(1.0), View(fitter.noise_of(carried, Observer(1.0))))
+        found = fitter.fitted(carried, Tracker(1.0), View(fitter.noise_of(carried, Tracker(1.0))))
         rest, plain = (
-            observed._begun(one)[0] for one, observed in ((model, fitter.observed), (bare, fitter_of(bare).observed))
+            tracked._begun(one)[0] for one, tracked in ((model, fitter.tracked), (bare, fitter_of(bare).tracked))
         )
         assert rest[: len(plain)] == pytest.approx(plain)
         assert rest[len(plain) :] == pytest.approx(0.0)
     data = InverseDynamicsProblem(Model.from_toml(SLEDGE), records())
-    few = Fitter(fitter.observed, Settings(seats=1, starts=1))
+    few = Fitter(fitter.tracked, Settings(seats=1, starts=1))
     listed = proposals(Look(found, few), few, data, Extensions(Sizes(bare, data)), SideBySide(1), tuple(EFFECTS))
     assert all(proposal.structure.model.effect("hysteresis", "way", "link") for proposal in listed)
 
 
 def test_a_stiff_joint_answers_as_a_rigid_one() -> None:
-    """Noise and what is missing elsewhere included: an observer that moved the motor alone would pass for an effect."""
+    """Noise and what is missing elsewhere included: a tracker that moved the motor alone would pass for an effect."""
     rigid = fitter_of(Model.from_toml(SLEDGE))
     split = Model.from_toml(SLEDGE).with_effect("joint_compliance", "way", stiffness=1e6, damping=2e3, inertia=0.3)
-    lighter = split.with_parameters({"sledge.mass": rigid.observed.model.parameters["sledge.mass"].value - 0.3})
+    lighter = split.with_parameters({"sledge.mass": rigid.tracked.model.parameters["sledge.mass"].value - 0.3})
     for band in (1.0, 10.0):
-        one, _ = rigid.observed.follow(rigid.observed.model, rigid.observed.model.theta, Observer(band))
-        other, _ = fitter_of(lighter).observed.follow(lighter, lighter.theta, Observer(band))
+        one, _ = rigid.tracked.follow(rigid.tracked.model, rigid.tracked.model.theta, Tracker(band))
+        other, _ = fitter_of(lighter).tracked.follow(lighter, lighter.theta, Tracker(band))
         assert np.std(other - one) < 0.01 * np.std(one)
 
 
@@ -353,20 +353,20 @@ def test_effects_that_do_nothing_share_a_pass_and_promise_the_same(monkeypatch: 
     model = Model.from_toml(SLEDGE)
     pulled = [pushed(seed=1, dry=1.0, late=0.004, duration=2.0)]
     data = InverseDynamicsProblem(model, pulled)
-    fitter = Fitter(Observed(model, pulled, Settings()), Settings(seats=99, patience=1e9))
+    fitter = Fitter(TrackedRecords(model, pulled, Settings()), Settings(seats=99, patience=1e9))
     structure = structure_of(model)
-    view = View(fitter.noise_of(structure, Observer(1.0)))
-    look = Look(fitter.fitted(structure, Observer(1.0), view), fitter)
+    view = View(fitter.noise_of(structure, Tracker(1.0)))
+    look = Look(fitter.fitted(structure, Tracker(1.0), view), fitter)
     effects = ("bias_force", "coulomb_friction", "quadratic_drag", "spring", "hysteresis", "input_delay", "payload")
     promised: list[dict[object, float]] = []
     passes: list[int] = []
-    follow = Observed.follow
+    follow = TrackedRecords.follow
 
     def counted(*given: object) -> object:
         passes[-1] += 1
         return follow(*given)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(Observed, "follow", counted)
+    monkeypatch.setattr(TrackedRecords, "follow", counted)
     for at_once in (1, 4, 12):
         monkeypatch.setattr("vpm.ranking.proposals.AT_ONCE", at_once)
         passes.append(0)
@@ -382,21 +382,21 @@ def test_effects_that_do_nothing_share_one_model_at_all_start_values(monkeypatch
     model = Model.from_toml(SLEDGE)
     data, fitter = InverseDynamicsProblem(model, records()), fitter_of(model)
     structure = structure_of(model)
-    look = Look(fitter.fitted(structure, Observer(1.0), View(fitter.noise_of(structure, Observer(1.0)))), fitter)
+    look = Look(fitter.fitted(structure, Tracker(1.0), View(fitter.noise_of(structure, Tracker(1.0)))), fitter)
     passes: list[tuple[Model, int]] = []
-    follow = Observed.follow
+    follow = TrackedRecords.follow
 
-    def noted(observed: Observed, told: Model, theta: Any, observer: Observer, columns: Any = (), *by: Any) -> Any:
-        if observer.cheap:
+    def noted(tracked: TrackedRecords, told: Model, theta: Any, tracker: Tracker, columns: Any = (), *by: Any) -> Any:
+        if not tracker.fine:
             passes.append((told, len(columns)))
-        return follow(observed, told, theta, observer, columns, *by)
+        return follow(tracked, told, theta, tracker, columns, *by)
 
-    monkeypatch.setattr(Observed, "follow", noted)
+    monkeypatch.setattr(TrackedRecords, "follow", noted)
     proposals(look, fitter, data, Extensions(Sizes(model, data)), SideBySide(1), ("spring", "cubic_spring"))
     models, columns = {told for told, _ in passes}, [count for _, count in passes]
     assert (len(passes), len(models), columns) == (len(PLACES), 1, [2] * len(PLACES))
     pulled = model.with_effect("spring", "way", stiffness=0.0, rest=0.1)
-    _, slopes = follow(fitter.observed, pulled, pulled.theta, Observer(1.0), [pulled.index("way.spring.rest")])
+    _, slopes = follow(fitter.tracked, pulled, pulled.theta, Tracker(1.0), [pulled.index("way.spring.rest")])
     assert not np.any(slopes)
 
 
@@ -405,13 +405,13 @@ def test_more_or_less_of_an_effect_promises_what_it_would_gain() -> None:
     model = Model.from_toml(SLEDGE).with_parameters({"sledge.mass": MASS, "way.friction.viscous": OIL})
     motion = {"motor.command": records()[0]["motor.command"] + 0.5, "way.position": records()[0]["way.position"]}
     pulled = Experiment.from_arrays(records()[0].time, motion, model=model, name="pulled")
-    fitter = Fitter(Observed(model, [pulled], Settings()), Settings())
+    fitter = Fitter(TrackedRecords(model, [pulled], Settings()), Settings())
     fixed = replace(structure_of(model), priors={})
-    look = Look(fitter.fitted(fixed, Observer(1.0), View(fitter.noise_of(fixed, Observer(1.0)))), fitter)
+    look = Look(fitter.fitted(fixed, Tracker(1.0), View(fitter.noise_of(fixed, Tracker(1.0)))), fitter)
     left = {}
     for share in (-0.5, 0.5, 1.0):
         pulls = replace(structure_of(model.with_effect("bias_force", "way", force=share * 0.5 * GAIN)), priors={})
-        left[share] = fitter.followed(pulls, Observer(1.0).coarse, ()).residual
+        left[share] = fitter.followed(pulls, Tracker(1.0).coarse, ()).residual
     whole = look.gain_along(left[1.0])
     assert whole > 100.0 * look.promising
     assert look.gain_along(left[0.5]) == pytest.approx(whole, rel=0.05)
@@ -434,26 +434,26 @@ def test_an_effect_counts_as_much_on_one_of_two_machines() -> None:
     told = []
     for model, channels in ((alone, motion), (two, both)):
         record = Experiment.from_arrays(pulled.time, channels, model=model, name="record")
-        fitter = Fitter(Observed(model, [record], Settings()), Settings())
+        fitter = Fitter(TrackedRecords(model, [record], Settings()), Settings())
         one, dry = structure_of(model), model.with_effect("coulomb_friction", "way", coulomb=0.5)
         rubbed = replace(one.carried(dry), priors={**one.priors, "way.friction.coulomb": Prior(0.0, 1.0, 0.0, np.inf)})
-        view = View(fitter.noise_of(one, Observer(1.0)))
-        look = Look(fitter.fitted(one, Observer(1.0), view), fitter)
-        told.append(look.judged(fitter.fitted(rubbed, Observer(1.0), view), ("coulomb_friction", "way")))
+        view = View(fitter.noise_of(one, Tracker(1.0)))
+        look = Look(fitter.fitted(one, Tracker(1.0), view), fitter)
+        told.append(look.judged(fitter.fitted(rubbed, Tracker(1.0), view), ("coulomb_friction", "way")))
     for number in ("removed", "least", "size", "beside", "shape"):
         assert getattr(told[1], number) == pytest.approx(getattr(told[0], number), rel=0.02)
 
 
-def test_an_observer_that_lets_a_machine_fall_is_not_looked_at() -> None:
+def test_a_tracker_that_lets_a_machine_fall_is_not_looked_at() -> None:
     """A rod that stands on its end: at 1 Hz it falls over and leaves more than a rod at rest would."""
     model = Model.from_toml(STANDING)
     record = stood()
-    fitter = Fitter(Observed(model, [record], Settings()), Settings())
+    fitter = Fitter(TrackedRecords(model, [record], Settings()), Settings())
     structure = replace(structure_of(model), priors={})
     looks = {}
     for band in Settings().bands:
-        view = View(fitter.noise_of(structure, Observer(band)))
-        looks[band] = Look(fitter.fitted(structure, Observer(band), view), fitter)
+        view = View(fitter.noise_of(structure, Tracker(band)))
+        looks[band] = Look(fitter.fitted(structure, Tracker(band), view), fitter)
     assert {band: look.follows for band, look in looks.items()} == {1.0: False, 10.0: True}
 
 
@@ -489,25 +489,25 @@ def test_a_fit_stays_where_bodies_are_real() -> None:
     angle = 2.0 / 0.3 * (1.0 - np.cos(9.0 * time)) / 81.0
     channels = {"motor.command": 2.0 * np.cos(9.0 * time), "hinge.position": angle}
     record = Experiment.from_arrays(time, channels, model=model, name="swing")
-    fitter = Fitter(Observed(model, [record], Settings()), Settings())
+    fitter = Fitter(TrackedRecords(model, [record], Settings()), Settings())
     known = {"arm.inertia.zz": Prior(0.15, 0.1, 0.0, np.inf)}
     structure = Structure(model, model.theta.copy(), known)
-    found = fitter.fitted(structure, Observer(2.0), View(fitter.noise_of(structure, Observer(2.0))))
+    found = fitter.fitted(structure, Tracker(2.0), View(fitter.noise_of(structure, Tracker(2.0))))
     assert 0.17 < found.structure.values["arm.inertia.zz"] <= 0.2
 
 
 def test_a_fit_that_has_ended_is_not_worked_out_again(monkeypatch: pytest.MonkeyPatch) -> None:
     """One that was given up, or whose derivatives were taken as known, has not ended."""
-    structure, observer = structure_of(Model.from_toml(SLEDGE)), Observer(1.0)
+    structure, tracker = structure_of(Model.from_toml(SLEDGE)), Tracker(1.0)
     fitter = fitter_of(structure.model)
-    noise = fitter.noise_of(structure, observer)
-    followed = fitter.followed(structure.at(structure.standard), observer, tuple(structure.priors))
-    slopes = noise.whitened(followed.jacobian, fitter.observed.parts).T
+    noise = fitter.noise_of(structure, tracker)
+    followed = fitter.followed(structure.at(structure.standard), tracker, tuple(structure.priors))
+    slopes = noise.whitened(followed.jacobian, fitter.tracked.parts).T
     known = View(noise, dict(zip(followed.names, slopes, strict=True)))
-    found = fitter.fitted(structure, observer, View(noise))
+    found = fitter.fitted(structure, tracker, View(noise))
     assert found.ended
-    assert not fitter.fitted(structure, observer, known).ended
-    assert not fitter.fitted(structure, observer, View(noise), goal=-1e9).ended
+    assert not fitter.fitted(structure, tracker, known).ended
+    assert not fitter.fitted(structure, tracker, View(noise), goal=-1e9).ended
     assert fitter.finished(replace(found, ended=False), View(noise)).cost == pytest.approx(found.cost, abs=0.5)
 
     def no_pass(*_: object) -> None:
@@ -543,12 +543,12 @@ def test_a_place_is_moved_as_it_is_where_nothing_pulls() -> None:
 
 
 @pytest.mark.parametrize("band", [1.0, 10.0])
-def test_a_machine_that_is_too_heavy_is_drawn_along_by_the_observer_alone(band: float) -> None:
+def test_a_machine_that_is_too_heavy_is_drawn_along_by_the_tracker_alone(band: float) -> None:
     model = Model.from_toml(SLEDGE).with_parameters({"sledge.mass": 1e9})
-    observed = Observed(model, records(), Settings())
-    left, _ = observed.follow(model, model.theta, Observer(band))
-    drawn = observed.drawn(band)
-    for part in observed.parts[2::3]:  # by then the first rate, which an encoder does not tell, is forgotten
+    tracked = TrackedRecords(model, records(), Settings())
+    left, _ = tracked.follow(model, model.theta, Tracker(band))
+    drawn = tracked.drawn(band)
+    for part in tracked.parts[2::3]:  # by then the first rate, which an encoder does not tell, is forgotten
         assert drawn[part] == pytest.approx(left[part], abs=1e-4 * float(np.std(left[part])))
 
 
@@ -556,9 +556,7 @@ def test_an_effect_that_makes_another_one_needless_has_to_do_its_work() -> None:
     """One came in beside another, which went. The same number of effects as before leaves more, or it does not."""
 
     def look(effects: int, band: float, left: float) -> Any:
-        fitted = SimpleNamespace(
-            structure=SimpleNamespace(effects=(None,) * effects), observer=Observer(band), left=left
-        )
+        fitted = SimpleNamespace(structure=SimpleNamespace(effects=(None,) * effects), tracker=Tracker(band), left=left)
         return SimpleNamespace(fitted=fitted, judged=lambda other: SimpleNamespace(least=1.0 - other.left / left))
 
     was = [look(2, 1.0, 1.0), look(2, 10.0, 1.0)]

@@ -10,11 +10,10 @@ import pytest
 import vpm
 from sledge import POLE, SAMPLED, SLEDGE, STIFFNESS, pushed, wound
 from slider_crank import OIL, SLIDER, SLIDER_CRANK, turned
-from vpm.errors import DiagnosisError
 from vpm.model import Model
-from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.settings import Settings
 from vpm.ranking.stand_in import opened, shown
+from vpm.ranking.tracked_records import TrackedRecords, Tracker
 
 
 def test_friction_behind_a_drive_that_goes_by_its_own_samples_is_named() -> None:
@@ -31,14 +30,14 @@ def test_nothing_is_named_where_such_a_drive_is_right() -> None:
 
 def test_a_deflection_that_a_model_lacks_is_left_as_it_was_read() -> None:
     model, record = Model.from_toml(SLEDGE), wound(1, logged=True)
-    observed = Observed(model, [record], Settings())
-    assert observed.records[0].channels[-1] == "way_deflection.position"
-    residual, slopes = observed.follow(model, model.theta, Observer(1.0), [0])
+    tracked = TrackedRecords(model, [record], Settings())
+    assert tracked.records[0].channels[-1] == "way_deflection.position"
+    residual, slopes = tracked.follow(model, model.theta, Tracker(1.0), [0])
     assert np.array_equal(residual[:, -1], record["way_deflection.position"])
     assert not slopes[:, -1].any()
     assert slopes[:, 0].any()
     soft = model.with_effect("joint_compliance", at="way", stiffness=STIFFNESS, damping=40.0, inertia=0.8)
-    left, _ = observed.follow(soft, soft.theta, Observer(1.0))
+    left, _ = tracked.follow(soft, soft.theta, Tracker(1.0))
     assert np.std(left[500:, -1]) < 0.5 * np.std(residual[500:, -1])
 
 
@@ -52,28 +51,28 @@ def test_a_stiff_spring_is_named_where_the_log_holds_its_deflection_and_only_the
 
 def test_records_of_which_one_lacks_the_deflection_are_compared_without() -> None:
     records = [wound(1, logged=True), wound(2, logged=False)]
-    assert Observed(Model.from_toml(SLEDGE), records, Settings()).records[0].channels == ("way.position",)
+    assert TrackedRecords(Model.from_toml(SLEDGE), records, Settings()).records[0].channels == ("way.position",)
 
 
-def test_an_observer_keeps_a_slider_crank_on_the_equation_of_another_hand() -> None:
+def test_a_tracker_keeps_a_slider_crank_on_the_equation_of_another_hand() -> None:
     true = Model.from_toml(SLIDER_CRANK).with_parameters({"slider.mass": SLIDER, "crank.friction.viscous": OIL})
     for seed, band in product((1, 2), (1.0, 10.0)):
-        observed = Observed(true, [turned(seed=seed, channels=("guide.position",))], Settings())
-        residual, _ = observed.follow(true, true.theta, Observer(band))
-        # Of noise an observer leaves no more than all, and less of the guide, which the crank moves along.
+        tracked = TrackedRecords(true, [turned(seed=seed, channels=("guide.position",))], Settings())
+        residual, _ = tracked.follow(true, true.theta, Tracker(band))
+        # Of noise a tracker leaves no more than all, and less of the guide, which the crank moves along.
         assert np.all(np.std(residual[500:], axis=0) < np.array([1e-4, 1e-5]))
 
 
 def test_derivatives_of_a_slider_crank_are_those_of_differences() -> None:
     model, record = Model.from_toml(SLIDER_CRANK), turned(seed=2, dry=2.0, duration=1.0)
     model = model.with_effect("coulomb_friction", at="guide", coulomb=1.5, transition_velocity=0.02)
-    observed = Observed(model, [record], Settings())
+    tracked = TrackedRecords(model, [record], Settings())
     columns = [model.index(name) for name in ("slider.mass", "crank.friction.viscous", "guide.friction.coulomb")]
-    _, slopes = observed.follow(model, model.theta, Observer(1.0), columns)
+    _, slopes = tracked.follow(model, model.theta, Tracker(1.0), columns)
     for place, column in enumerate(columns):
         step = 1e-6 * max(1.0, abs(model.theta[column]))
         ends = [model.theta + sign * step * (np.arange(len(model.theta)) == column) for sign in (1.0, -1.0)]
-        ahead, behind = (observed.follow(model, theta, Observer(1.0))[0] for theta in ends)
+        ahead, behind = (tracked.follow(model, theta, Tracker(1.0))[0] for theta in ends)
         exact, difference = slopes[:, 0, place], (ahead - behind)[:, 0] / (2.0 * step)
         assert np.max(np.abs(exact - difference)) < 1e-5 * np.max(np.abs(difference))
 
@@ -104,7 +103,7 @@ def test_nothing_is_named_of_a_loop_without_friction_on_its_guide() -> None:
 def test_the_stand_in_of_a_loop_moves_as_the_loop_does_and_weighs_what_its_inertia_weighs() -> None:
     model, record = Model.from_toml(SLIDER_CRANK), turned(seed=1, channels=("guide.position",))
     alone = record.select(["motor.command", "crank.position"])
-    data = shown(model, Observed(model, [alone], Settings()))
+    data = shown(model, TrackedRecords(model, [alone], Settings()))
     assert data.joints == ("crank", "pin", "guide")
     assert not opened(model).loops
     position, _, acceleration = data.state(0)
@@ -114,10 +113,3 @@ def test_the_stand_in_of_a_loop_moves_as_the_loop_does_and_weighs_what_its_inert
     assert not applied[:, 2].any()
     wanted = 1.05 * SLIDER * acceleration[:, 2]
     assert np.std(required[:, 2] - wanted) < 0.03 * np.std(wanted)
-
-
-@pytest.mark.parametrize(("model", "why"), [(SLIDER_CRANK, "closed loops"), (SAMPLED, "samples of its own")])
-def test_a_diagnosis_of_such_machines_points_to_the_ranking(model: str, why: str) -> None:
-    record = turned(seed=1, duration=1.0) if model is SLIDER_CRANK else pushed(seed=1, pole=POLE, duration=1.0)
-    with pytest.raises(DiagnosisError, match=rf"{why}.*vpm\.rank"):
-        vpm.diagnose(Model.from_toml(model), record)

@@ -13,10 +13,10 @@ from sledge import SLEDGE, pushed
 from vpm.model import Model
 from vpm.ranking.fit import Fitted, Fitter, View
 from vpm.ranking.noise_model import fitted_noise
-from vpm.ranking.observed import Observed, Observer
 from vpm.ranking.posterior import apart, log_volume, probabilities
 from vpm.ranking.settings import Settings
 from vpm.ranking.structure import Structure
+from vpm.ranking.tracked_records import TrackedRecords, Tracker
 from vpm.weighing import Prior
 
 Array = NDArray[np.float64]
@@ -73,19 +73,19 @@ def test_nats_between_models_tell_how_often_anybody_could_choose(distance: float
 def test_two_names_of_one_inertia_are_alike_and_a_lag_is_not() -> None:
     """A payload on a sledge, and a rotor that turns with it, are both mass; a lag of the drive is not."""
     bare = Model.from_toml(SLEDGE)
-    fitter = Fitter(Observed(bare, [pushed(seed=1, lag=0.008, duration=4.0)], Settings()), Settings())
+    fitter = Fitter(TrackedRecords(bare, [pushed(seed=1, lag=0.008, duration=4.0)], Settings()), Settings())
 
     def fitted(effect: str, at: str, name: str, size: float, value: float) -> Fitted:
         model = bare.with_effect(effect, at, **{name: value})
         priors = {"sledge.mass": Prior(3.3, 0.33, 0.0, np.inf), "way.friction.viscous": Prior(7.0, 1.5, 0.0, np.inf)}
         priors[model.effect(effect, at).parameter_names[name]] = Prior(value, size, 1e-4, np.inf)
-        structure, observer = Structure(model, model.theta.copy(), priors), Observer(5.0)
-        return fitter.fitted(structure, observer, View(fitter.noise_of(structure, observer)))
+        structure, tracker = Structure(model, model.theta.copy(), priors), Tracker(5.0)
+        return fitter.fitted(structure, tracker, View(fitter.noise_of(structure, tracker)))
 
     payload = fitted("payload", "sledge", "mass", 1.0, 0.01)
     rotor = fitted("rotor_inertia", "way", "inertia", 1.0, 0.01)
     lag = fitted("actuator_lag", "motor", "time_constant", 0.01, 0.004)
-    of_payload, of_lag = (fitted_noise(one.residual, fitter.observed.parts, 12) for one in (payload, lag))
+    of_payload, of_lag = (fitted_noise(one.residual, fitter.tracked.parts, 12) for one in (payload, lag))
     assert fitter.evidence(payload, of_payload) == pytest.approx(fitter.evidence(rotor, of_payload), abs=1e-3)
     of_rotor, from_payload = (
         apart(fitter.log_density(payload, of_payload), fitter.log_density(other, of_payload)) for other in (rotor, lag)
