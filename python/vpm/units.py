@@ -5,6 +5,9 @@ A unit is written as products, quotients, powers and parentheses of symbols: ``N
 because readers disagree about it: write ``J/(kg K)``. A power may be a decimal number: the gain of an orifice is in
 ``m^3/(s A Pa^0.5)``, a contact stiffness in ``N/m^1.1``; such powers are kept as exact fractions.
 
+Logs write units in other ways, too, which mean the same: ``Nm``, ``N-m`` and ``N.m``, ``m/s2`` and ``m/s²``, ``s-1``,
+``sec``, ``RPM``, ``Volt``. A temperature in ``°C`` or ``°F`` counts from a zero of its own, and stands alone.
+
 Angles have no dimension, and ``rad`` is 1 (SI brochure, 9th edition, section 2.3.3), so ``N m`` and ``N m/rad`` are of
 one kind; so are ``Hz`` and ``rad/s``, and no factor of 2 pi stands between these two. Write ``rev/s`` for turns.
 """
@@ -48,9 +51,16 @@ _PREFIXES = {
 }
 
 _TOKEN = re.compile(
-    r"\s*(?:(?P<name>[^\W\d_]+|[°%])|(?P<power>\^|\*\*)|(?P<number>[+-]?[0-9]+(?:\.[0-9]+)?)|(?P<mark>[*·/()]))"
+    r"\s*(?:(?P<name>°[CF]\b|[^\W\d_]+|[°%])|(?P<power>\^|\*\*)|(?P<number>[+-]?[0-9]+(?:\.[0-9]+)?)|(?P<mark>[*·/()]))"
 )
 _NUMBER = re.compile(r"[+-]?[0-9]+(?:\.[0-9]+)?")
+#: Other ways to write a power and a product, as in ``m²``, ``s-1``, ``m2`` and ``N-m``, ``N.m``, ``N⋅m``.
+_RAISED = re.compile(r"([⁺⁻]?[⁰¹²³⁴-⁹]+)")
+_FROM_RAISED = str.maketrans("⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "+-0123456789")
+_ATTACHED_POWER = re.compile(r"(?<=[^\W\d_])(-?[1-9])(?![\d.])")
+_PRODUCT = re.compile(r"(?<=[^\W\d_])[-.](?=[^\W\d_])|[⋅∙•×]")
+#: Torques and moments of inertia whose symbols run together, as in ``Nm``, ``Nms``, ``kNm`` and ``kgcm``.
+_RUN_TOGETHER = re.compile(r"([uµμmkM]?N|kg)([mc]?m)(s?)")
 
 #: Power of a unit; a whole one is an int.
 Power = int | Fraction
@@ -70,12 +80,15 @@ class Unit:
         Powers of `BASE_UNITS`.
     si_terms : tuple of (str, int or Fraction)
         The same unit with every symbol replaced by its SI symbol; symbols and powers.
+    zero : float
+        SI value of zero of it, which is not zero of temperatures in ``°C`` and ``°F``.
     """
 
     text: str
     factor: float
     dimension: tuple[Power, ...]
     si_terms: tuple[tuple[str, Power], ...]
+    zero: float = 0.0
 
     @property
     def si(self) -> str:
@@ -126,6 +139,8 @@ _SYMBOLS: Mapping[str, _Symbol] = {
     "deg": _symbol(math.pi / 180, (0, 0, 0, 0, 0), "rad"),
     "°": _symbol(math.pi / 180, (0, 0, 0, 0, 0), "rad"),
     "rev": _symbol(2 * math.pi, (0, 0, 0, 0, 0), "rad"),
+    "r": _symbol(2 * math.pi, (0, 0, 0, 0, 0), "rad"),  # a turn in "r/min" (ISO 80000-3)
+    "U": _symbol(2 * math.pi, (0, 0, 0, 0, 0), "rad"),  # a turn in "U/min" (DIN 1301-2)
     "%": _symbol(1e-2, (0, 0, 0, 0, 0), ""),
     "N": _symbol(1.0, (1, 1, -2, 0, 0), "N", "uµμmckM"),
     "lbf": _symbol(_POUND * _STANDARD_GRAVITY, (1, 1, -2, 0, 0), "N"),
@@ -146,6 +161,40 @@ _SYMBOLS: Mapping[str, _Symbol] = {
     "T": _symbol(1.0, (0, 1, -2, -1, 0), "T", "um"),
     "Wb": _symbol(1.0, (2, 1, -2, -1, 0), "Wb", "m"),
     "K": _symbol(1.0, (0, 0, 0, 0, 1), "K", "m"),
+}
+
+#: Words for symbols, in whatever letters.
+_WORDS: Mapping[str, str] = {
+    word: symbol
+    for symbol, words in {
+        "s": "sec secs second seconds",
+        "ms": "msec millisecond milliseconds",
+        "us": "usec microsecond microseconds",
+        "min": "minute minutes",
+        "h": "hr hour hours",
+        "m": "meter meters metre metres",
+        "rad": "rad radian radians",
+        "deg": "deg degs degree degrees",
+        "rev": "rev revs turn turns revolution revolutions",
+        "rpm": "rpm",
+        "Hz": "hz hertz",
+        "N": "newton newtons",
+        "Pa": "pascal pascals",
+        "bar": "bar bars",
+        "psi": "psi",
+        "kg": "kg",
+        "V": "volt volts",
+        "A": "amp amps ampere amperes",
+        "Ohm": "ohm ohms",
+        "%": "percent pct",
+    }.items()
+    for word in words.split()
+}
+
+#: Size of a degree, K, and temperature at zero degrees, K (BIPM, SI brochure, 9th edition, 2.3.1; NIST SP 811, B.8).
+_TEMPERATURES: Mapping[str, tuple[float, float]] = {
+    **dict.fromkeys(("°C", "degC", "deg C"), (1.0, 273.15)),
+    **dict.fromkeys(("°F", "degF", "deg F"), (1.0 / 1.8, 459.67 / 1.8)),
 }
 
 _DIMENSIONLESS: tuple[Power, ...] = (0,) * len(BASE_UNITS)
@@ -173,6 +222,9 @@ def parse_unit(text: str) -> Unit:
         return Unit(text, 1.0, _DIMENSIONLESS, ())
     if len(text) > LONGEST:
         raise _unreadable(text, f"it has {len(text)} characters, and at most {LONGEST} make sense")
+    if (temperature := _TEMPERATURES.get(text.strip())) is not None:
+        size, zero = temperature
+        return Unit(text, size, _SYMBOLS["K"].dimension, _SYMBOLS["K"].si, zero)
     reader = _Reader(text)
     try:
         factor, dimension, terms = reader.expression()
@@ -186,7 +238,7 @@ def parse_unit(text: str) -> Unit:
 
 
 def factor_to_si(unit: str) -> float:
-    """SI value of one `unit`: 0.001 for ``"mm"``.
+    """SI value of a difference of one `unit`: 0.001 for ``"mm"``.
 
     Raises
     ------
@@ -255,8 +307,10 @@ def convert(value: float | NDArray[np.float64], from_unit: str, to_unit: str) ->
         The dimensions differ, or a unit cannot be read.
     """
     require_dimension(from_unit, to_unit)
-    given, wanted = factor_to_si(from_unit), factor_to_si(to_unit)
-    return value if given == wanted else value * (given / wanted)
+    given, wanted = parse_unit(from_unit), parse_unit(to_unit)
+    if (given.factor, given.zero) == (wanted.factor, wanted.zero):
+        return value
+    return value * (given.factor / wanted.factor) + (given.zero - wanted.zero) / wanted.factor
 
 
 _Parsed = tuple[float, tuple[Power, ...], dict[str, Power]]
@@ -267,7 +321,7 @@ class _Reader:
 
     def __init__(self, text: str) -> None:
         self.text = text
-        self.tokens = _tokens(text)
+        self.tokens = _tokens(text, _usual(text))
         self.at = 0
 
     @property
@@ -322,7 +376,7 @@ class _Reader:
             return inside
         if symbol is None:
             raise _unreadable(self.text, "it ends where a symbol is needed")
-        if not (symbol.isalpha() or symbol in {"°", "%"}):
+        if not (symbol.isalpha() or symbol[0] in "°%"):
             raise _unreadable(self.text, f'"{symbol}" stands where a symbol is needed')
         return _look_up(symbol, self.text)
 
@@ -332,22 +386,31 @@ def _whole(power: Power) -> Power:
     return int(power) if power.denominator == 1 else power
 
 
-def _tokens(text: str) -> list[str]:
-    tokens, at, end = [], 0, len(text.rstrip())
+def _usual(text: str) -> str:
+    """The same unit with powers after a ``^`` and a ``*`` for each other sign of a product."""
+    powers = _RAISED.sub(lambda raised: "^" + raised.group().translate(_FROM_RAISED), text)
+    return _PRODUCT.sub("*", _ATTACHED_POWER.sub(r"^\1", powers))
+
+
+def _tokens(text: str, usual: str) -> list[str]:
+    tokens, at, end = [], 0, len(usual.rstrip())
     while at < end:
-        match = _TOKEN.match(text, at)
+        match = _TOKEN.match(usual, at)
         if match is None:
-            raise _unreadable(text, f'"{text[at:].strip()[0]}" is not part of a unit')
-        tokens.append(match.group().strip())
-        at = match.end()
+            raise _unreadable(text, f'"{usual[at:].strip()[0]}" is not part of a unit')
+        token, at = match.group().strip(), match.end()
+        parts = _RUN_TOGETHER.fullmatch(token) if _find(token) is None else None
+        tokens += [token] if parts is None else list(filter(None, parts.groups()))
     return tokens
 
 
 def _look_up(name: str, text: str) -> _Parsed:
     """Find a symbol, or raise with the repair."""
-    found = _find(name)
+    found = _find(name) or _find(_WORDS.get(name.lower(), name))
     if found is not None:
         return found
+    if name in _TEMPERATURES:
+        raise _unreadable(text, f"{name} counts from a zero of its own; write K, which a difference is as well")
     repair = near_match(name, _SYMBOLS, what="known symbols are")
     for at in range(1, len(name)):
         if _find(name[:at]) and _find(name[at:]):

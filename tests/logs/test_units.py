@@ -87,6 +87,55 @@ def test_derived_units_follow_from_their_definitions(unit: str, definition: str)
     assert factor_to_si(unit) == factor_to_si(definition) == 1.0
 
 
+@pytest.mark.parametrize(
+    ("written", "unit"),
+    [
+        ("Nm", "N m"),
+        ("mNm", "mN m"),
+        ("Nmm", "N mm"),
+        ("kNm/deg", "kN m/deg"),
+        ("Nms/rad", "N m s/rad"),
+        ("N-m", "N m"),
+        ("N.m", "N m"),
+        ("N⋅m", "N m"),
+        ("N•m-s/rad", "N m s/rad"),
+        ("kgm^2", "kg m^2"),
+        ("kgm2", "kg m^2"),
+        ("kgcm²", "kg cm^2"),
+        ("m/s²", "m/s^2"),
+        ("m/s2", "m/s^2"),
+        ("rad s⁻¹", "rad/s"),
+        ("rad.s-1", "rad/s"),
+        ("cm3/min", "cm^3/min"),
+        ("deg/sec", "deg/s"),
+        ("RPM", "rpm"),
+        ("r/min", "rpm"),
+        ("U/min", "rpm"),
+        ("revs/minute", "rpm"),
+        ("msec", "ms"),
+        ("Volts", "V"),
+        ("Amps", "A"),
+        ("Bar", "bar"),
+        ("percent", "%"),
+    ],
+)
+def test_units_as_logs_write_them(written: str, unit: str) -> None:
+    assert parse_unit(written).dimension == parse_unit(unit).dimension
+    assert parse_unit(written).si == parse_unit(unit).si
+    assert factor_to_si(written) == factor_to_si(unit)
+
+
+@pytest.mark.parametrize("unit", ["°{}", "deg{}", "deg {}"])
+def test_temperatures_count_from_their_own_zero(unit: str) -> None:
+    celsius, fahrenheit = unit.format("C"), unit.format("F")
+    assert convert(0.0, celsius, "K") == constants.zero_Celsius
+    assert convert(-40.0, fahrenheit, celsius) == pytest.approx(-40.0, rel=1e-13)
+    assert convert(212.0, fahrenheit, "K") == pytest.approx(constants.zero_Celsius + 100.0, rel=1e-14)
+    assert convert(constants.zero_Celsius, "K", celsius) == 0.0
+    assert parse_unit(celsius).si == parse_unit(fahrenheit).si == "K"
+    assert factor_to_si(fahrenheit) == pytest.approx(constants.degree_Fahrenheit, rel=1e-15)
+
+
 @given(expressions(), st.floats(-1e12, 1e12))
 def test_there_and_back(unit: str, value: float) -> None:
     target = si_unit(unit)
@@ -141,10 +190,13 @@ def test_a_minute_is_no_milli_inch() -> None:
 @pytest.mark.parametrize(
     ("unit", "words"),
     [
-        ("Nm", '"N m", with a space'),
-        ("kNm", '"kN m", with a space'),
+        ("Vs", '"V s", with a space'),
+        ("kWh", '"kW h", with a space'),
+        ("W/°C", "counts from a zero of its own"),
+        ("J degC", "counts from a zero of its own"),
+        ("m10", "stands where a symbol is needed"),
         ("foo", 'unknown symbol "foo"'),
-        ("volt", "known symbols are"),
+        ("knot", "known symbols are"),
         ("rpn", '"rpm"'),
         ("J/kg K", "put the divisor into parentheses"),
         ("(N", 'a ")" is missing'),

@@ -491,7 +491,7 @@ REFUSALS = [
     ('"kg"', '"N"', "bodies.carriage.mass", 'unit "N" is of the kind kg m/s^2, but kg is needed'),
     ('"kg"', '"kgs"', "bodies.carriage.mass", 'unknown symbol "kgs"'),
     ('"N/V"', '"N/A"', "actuators.drive.gain", '"N/V"'),
-    ('command_unit = "V"', 'command_unit = "Volt"', "actuators.drive.command_unit", '"Volt"'),
+    ('command_unit = "V"', 'command_unit = "Vlt"', "actuators.drive.command_unit", '"Vlt"'),
     ('"q_m", unit = "m"', '"q_m", unit = "V"', 'channels."axis.position".unit', "but m is needed"),
     ('"q_m", unit = "m"', '"q_m", unit = "mtr"', 'channels."axis.position".unit', '"mtr"'),
     # names and references
@@ -607,7 +607,7 @@ def test_a_channel_table_of_its_own(tmp_path: Path) -> None:
     ("entry", "words"),
     [
         ({"column": "q"}, 'channels."axis.position".unit is missing'),
-        ({"column": "q", "unit": "metre"}, 'unknown symbol "metre"'),
+        ({"column": "q", "unit": "mtr"}, 'unknown symbol "mtr"'),
         ({"column": "q", "unit": "m", "colum": "x"}, 'did you mean "column" or "columns"?'),
         ({"column": "q", "unit": "m", "delay": math.inf}, "finite number"),
         ("q", "has to be a table"),

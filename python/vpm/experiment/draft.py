@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from vpm.errors import ExperimentError, UnitError, VpmError
 from vpm.experiment.grid import Source, check_finite
 from vpm.experiment.readers import open_log
-from vpm.experiment.readers.base import Log
+from vpm.experiment.readers.base import Log, bracketed
 from vpm.experiment.table import Table
 from vpm.expression import PURE, Quantity, read_expression
 from vpm.units import parse_unit
@@ -52,7 +52,7 @@ def mapped_draft(log: Log, table: Mapping[str, ChannelEntry], model: Model | Non
     content = log.read(columns, present["time"][""])
     source = Source(str(path), content.lines, str(path))
     entry = table["time"]
-    clock_factor, _ = to_si(entry.unit, "time", None, str(path), expected="s")
+    clock_factor, _, _ = to_si(entry.unit, "time", None, str(path), expected="s")
     clock = present["time"][""]
     if clock in content.stamps and clock_factor * entry.scale != 1.0:
         raise ExperimentError(
@@ -117,7 +117,7 @@ def _map_channel(
     model: Model | None,
 ) -> None:
     """Scale, shift and convert one channel: (column or value * scale + offset) in the unit of the entry."""
-    factor, unit = to_si(entry.unit, channel, model, draft.source.name)
+    factor, zero, unit = to_si(entry.unit, channel, model, draft.source.name)
     draft.units[channel] = unit
     if columns is None:
         draft.columns[channel] = np.zeros(draft.time.size)
@@ -133,7 +133,7 @@ def _map_channel(
             content.columns[columns[name]], draft.time if own is None else own, what, draft.source, channel=channel
         )
     raw = _built(draft, content, channel, entry, columns) if entry.value else content.columns[columns[""]]
-    draft.columns[channel] = (raw * entry.scale + entry.offset) * factor
+    draft.columns[channel] = (raw * entry.scale + entry.offset) * factor + zero
     words = [f"{channel} is {entry.told}"]
     if entry.value:
         words[0] += " of " + " and ".join(f'column "{part.column}" in {part.unit}' for part in entry.columns.values())
@@ -141,7 +141,7 @@ def _map_channel(
         words.append(f"times {entry.scale:.9g}")
     if entry.offset != 0.0:
         words.append(f"plus {entry.offset:.9g} {entry.unit}")
-    words.append(f"in {entry.unit}" if factor == 1.0 else f"converted from {entry.unit} to {unit}")
+    words.append(f"in {entry.unit}" if (factor, zero) == (1.0, 0.0) else f"converted from {entry.unit} to {unit}")
     draft.history.append(", ".join(words) + ".")
     if entry.delay != 0.0:
         draft.delays[channel] = entry.delay
@@ -165,7 +165,7 @@ def _built(draft: Draft, content: Table, channel: str, entry: ChannelEntry, colu
     """Value over several columns, in the unit of the entry."""
     units = {name: parse_unit(part.unit) for name, part in entry.columns.items()}
     parts = {
-        name: Quantity(content.columns[column] * units[name].factor, units[name].dimension)
+        name: Quantity(content.columns[column] * units[name].factor + units[name].zero, units[name].dimension)
         for name, column in columns.items()
     }
     given = parse_unit(entry.unit)
@@ -181,7 +181,7 @@ def _built(draft: Draft, content: Table, channel: str, entry: ChannelEntry, colu
         raise ExperimentError(
             f"{draft.source.name}, channel {channel}: {error}", path=draft.source.path, channel=channel
         ) from error
-    return np.asarray(value.values / given.factor, dtype=np.float64)
+    return np.asarray((value.values - given.zero) / given.factor, dtype=np.float64)
 
 
 def plain_draft(log: Log) -> Draft:
@@ -189,7 +189,7 @@ def plain_draft(log: Log) -> Draft:
     path, (names, clock) = log.path, _plain_columns(log)
     content = log.read(log.header, clock)
     source = Source(str(path), content.lines, str(path))
-    factor, _ = to_si(names[clock][1] or "s", "time", None, str(path), expected="s")
+    factor, _, _ = to_si(names[clock][1] or "s", "time", None, str(path), expected="s")
     draft = Draft(source, content.columns[clock] * factor, clocks=dict(content.clocks))
     draft.history.append(f'Read {draft.time.size} rows of {Path(path).name}; the clock is column "{clock}".')
     draft.history += content.notes
@@ -198,8 +198,8 @@ def plain_draft(log: Log) -> Draft:
             continue
         own = content.clocks.get(column, draft.time)
         check_finite(content.columns[column], own, f'column "{column}"', source, channel=name)
-        factor, draft.units[name] = to_si(stated or "1", name, None, str(path))
-        draft.columns[name] = content.columns[column] * factor
+        factor, zero, draft.units[name] = to_si(stated or "1", name, None, str(path))
+        draft.columns[name] = content.columns[column] * factor + zero
         how = f"converted from {stated} to {draft.units[name]}" if stated else "as it is, its unit is not stated"
         draft.history.append(f'{name} is column "{column}", {how}.')
     return draft
@@ -250,24 +250,26 @@ def _stated(column: str, log: Log) -> tuple[str, str]:
     """Name and unit of a column: the unit that the file states, or in brackets behind the name."""
     if column in log.units:
         return column, log.units[column]
-    return _bracketed(column) if log.bracketed_units else (column, "")
+    return bracketed(column) if log.bracketed_units else (column, "")
 
 
-def _bracketed(column: str) -> tuple[str, str]:
-    """Name and unit of ``q [mm]``; no unit without brackets."""
-    name, bracket, rest = column.partition("[")
-    return (name.strip(), rest[:-1].strip()) if bracket and rest.endswith("]") else (column, "")
+def to_si(
+    unit: str, channel: str, model: Model | None, where: str, expected: str | None = None
+) -> tuple[float, float, str]:
+    """Factor to SI, the SI value of zero, and the SI unit, which is of the kind that the channel has in the model.
 
-
-def to_si(unit: str, channel: str, model: Model | None, where: str, expected: str | None = None) -> tuple[float, str]:
-    """Factor to SI and the SI unit, which has to be of the kind that the channel has in the model."""
+    Raises
+    ------
+    ExperimentError, UnitError
+        It is not, or the unit cannot be read.
+    """
     wanted = model.channel_unit(channel) if model is not None else expected
     try:
         given = parse_unit(unit)
     except UnitError as error:
         raise UnitError(f"{where}, channel {channel}: {error}", unit=unit, expected=wanted) from error
     if wanted is None:
-        return given.factor, given.si
+        return given.factor, given.zero, given.si
     target = parse_unit(wanted)
     if given.dimension != target.dimension:
         raise ExperimentError(
@@ -275,4 +277,4 @@ def to_si(unit: str, channel: str, model: Model | None, where: str, expected: st
             f"({target.kind}); correct the unit or the column of its entry in the channel table",
             channel=channel,
         )
-    return given.factor / target.factor, wanted
+    return given.factor / target.factor, given.zero, wanted

@@ -81,9 +81,9 @@ def array_parts(
                 channel=channel,
             )
         unit = units.get(channel) or (model.channel_unit(channel) if model is not None else "1")
-        factor, draft.units[channel] = to_si(unit, channel, model, name)
-        draft.columns[channel] = column * factor
-        if factor != 1.0:
+        factor, zero, draft.units[channel] = to_si(unit, channel, model, name)
+        draft.columns[channel] = column * factor + zero
+        if (factor, zero) != (1.0, 0.0):
             draft.history.append(f"{channel} was converted from {unit} to {draft.units[channel]}.")
     return _finish(draft, name, irregular, resample)
 

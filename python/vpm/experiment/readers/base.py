@@ -55,8 +55,14 @@ class Log(ABC):
     bracketed_units = False
 
     def find(self, column: str) -> str | None:
-        """Name in `header` of what a channel table calls ``column``; None where the file does not have it."""
-        return column if column in self.header else None
+        """Name in `header` of what a channel table calls ``column``; None where the file does not have it.
+
+        A table may leave out the unit that the header states in brackets.
+        """
+        if column in self.header:
+            return column
+        named = [name for name in self.header if self.bracketed_units and bracketed(name)[0] == column]
+        return named[0] if len(named) == 1 else None
 
     def read(self, columns: Sequence[str], clock: str) -> Table:
         """Columns by their names in the header.
@@ -91,3 +97,9 @@ class Log(ABC):
     def error(self, message: str, channel: str = "") -> ExperimentError:
         """Error about a log that carries the path of its file."""
         return ExperimentError(message, path=str(self.path), channel=channel or None)
+
+
+def bracketed(column: str) -> tuple[str, str]:
+    """Name and unit of ``q [mm]``; no unit without brackets."""
+    name, bracket, rest = column.partition("[")
+    return (name.strip(), rest[:-1].strip()) if bracket and rest.endswith("]") else (column, "")
