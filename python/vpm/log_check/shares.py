@@ -13,16 +13,18 @@ from numpy.typing import NDArray
 from vpm.catalogue import EFFECTS
 from vpm.catalogue.effects import BUILT_IN
 from vpm.experiment import Experiment
+from vpm.identify import InverseDynamicsProblem
 from vpm.initial import initial_state
 from vpm.log_check.correction import Correction
 from vpm.log_check.delay import Delayed, with_delay, without_delay
 from vpm.log_check.settings import Settings
 from vpm.model import Model
 from vpm.observer import measured_outputs
-from vpm.ranking.fit import ASTRAY, Fitter, Followed, View
+from vpm.ranking.fit import ASTRAY, Fitter, Followed, View, bounded_step
 from vpm.ranking.noise_model import white_noise
 from vpm.ranking.settings import Settings as RankingSettings
 from vpm.ranking.sizes import stated
+from vpm.ranking.stand_in import why_unbalanced
 from vpm.ranking.structure import Structure
 from vpm.ranking.tracked_records import TrackedRecords, Tracker, is_position
 from vpm.simulate import Setup
@@ -37,6 +39,8 @@ FORCES = tuple(effect.name for effect in BUILT_IN if effect.usual)
 TRANSITION = 0.02
 #: How often derivatives are worked out in a fit of all forces.
 TURNS = 2
+#: Steps of a regression, and the share of an error that is noise in the first one.
+REGRESSIONS, QUIET = 3, 0.01
 #: Pieces of a record between whose ends speeds are measured, which noise hardly moves.
 PIECES = 200
 
@@ -133,7 +137,10 @@ class Judge:
         return self._shares(tracked, residual, tracker, values)
 
     def guessed(self, record: Experiment) -> Shares:
-        """Shares at the values of the model, with no dry friction or as much as is usual, whichever leaves less."""
+        """Shares where a fit would begin, whichever leaves least: at the values of the model, with friction or without.
+
+        Dry friction is as large as is usual, or all is as the inverse-dynamics residual has it.
+        """
         plain, dry = self.measured(record), [key for key in self.added if EFFECTS[key[0]].sticks]
         if not dry:
             return plain
@@ -142,11 +149,29 @@ class Judge:
         for key in dry:
             parameter = self.model.effect(*key).parameter_names["coulomb"]
             values[self.model.index(parameter)] = structure.priors[parameter].spread
-        return min(plain, self.measured(record, values), key=lambda shares: shares.order)
+        tried = [plain, self.measured(record, values)]
+        if plain.above(self.settings.doubtful) and (near := self._regressed(record, structure)) is not None:
+            tried.append(self.measured(record, near))
+        return min(tried, key=lambda shares: shares.order)
 
     def fitted(self, record: Experiment) -> Shares:
-        """Shares when the uncertain parameters of the model, and friction of its joints, have been fitted."""
-        tracker, structure, tracked = self._tracker(record), self._structure(record), self._tracked(record)
+        """Shares when the uncertain parameters of the model, and friction of its joints, have been fitted.
+
+        What a slow tracker leaves is not linear in a friction that is missing: where the model as it is does not follow
+        the record, another fit begins where the inverse-dynamics residual is least.
+        """
+        structure = self._structure(record)
+        found = [self._fitted(record, structure)]
+        if (
+            self.measured(record).above(self.settings.doubtful)
+            and (near := self._regressed(record, structure)) is not None
+        ):
+            found.append(self._fitted(record, replace(structure, theta=near)))
+        return min(found, key=lambda shares: shares.order)
+
+    def _fitted(self, record: Experiment, structure: Structure) -> Shares:
+        """Shares where a fit ends that begins at the values of a structure."""
+        tracker, tracked = self._tracker(record), self._tracked(record)
         try:
             fitter = Fitter(tracked, tracked.settings)
             found = fitter.fitted(structure, tracker, View(fitter.noise_of(structure, tracker)))
@@ -154,6 +179,29 @@ class Judge:
             return self.measured(record)
         shares = self._shares(tracked, found.residual, tracker, found.structure.theta)
         return self._with_departure(shares, found.structure)
+
+    def _regressed(self, record: Experiment, structure: Structure) -> Array | None:
+        """Values that leave least of the inverse-dynamics residual, which is linear in masses and friction.
+
+        The first step takes nearly all of the error for an error of the parameters, and each one after it what the one
+        before has left for noise. None where no efforts follow from the motion, or where the model file rules such
+        values out: commands that are far too small ask for masses that are far too small.
+        """
+        if why_unbalanced(self.model):
+            return None
+        try:
+            data = InverseDynamicsProblem(self.model, [record])
+            residual, jacobian = data.evaluate(self.model, structure.theta, structure.columns)
+            variance = QUIET**2 * float(np.mean(residual**2))
+            for _ in range(REGRESSIONS):
+                slopes = jacobian * structure.slopes
+                move = bounded_step(structure, residual, slopes, np.inf, variance)
+                structure, residual = structure.moved(move), residual + slopes @ move
+                variance = float(np.mean(residual**2))
+        except ASTRAY:
+            return None
+        farthest = max(self._departures(structure).values(), default=0.0)
+        return None if farthest > self.settings.far else structure.theta
 
     def tangent(self, record: Experiment, at: Shares, forces: Collection[str] = FRICTION) -> Tangent | None:
         """Change of the error with the parameters, about some values of them; None where that cannot be computed."""
@@ -219,12 +267,16 @@ class Judge:
         """Shares with how far the parameters of the model are from what its file states."""
         from scipy.stats import chi2  # slow to import, and seldom needed
 
-        moved = zip(structure.priors, np.abs(structure.standard).tolist(), strict=True)
-        own = {name: far for name, far in moved if not self._is_added(name)}
+        own = self._departures(structure)
         farthest = max(own, key=lambda name: own[name], default="")
         unlikely = sum(far**2 for far in own.values()) / 2.0
         chance = float(chi2.sf(2.0 * unlikely, max(len(own), 1)))
         return replace(shares, far=own.get(farthest, 0.0), farthest=farthest, unlikely=unlikely, chance=chance)
+
+    def _departures(self, structure: Structure) -> dict[str, float]:
+        """By how many of its stated deviations each parameter of the model was moved."""
+        moved = zip(structure.priors, np.abs(structure.standard).tolist(), strict=True)
+        return {name: far for name, far in moved if not self._is_added(name)}
 
     def undetermined(self, tangent: Tangent) -> list[str]:
         """Uncertain parameters of the model of which a record says next to nothing."""

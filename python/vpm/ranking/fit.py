@@ -274,9 +274,14 @@ def by_secant(slopes: Array, change: Array, move: Array) -> Array:
     return np.asarray(slopes + np.outer(missed, move))
 
 
-def bounded_step(structure: Structure, errors: Array, slopes: Array, reach: float) -> Array:
-    """Gauss-Newton step in deviations of the priors, within what is possible (bounded least squares)."""
-    z, scale = structure.standard, max(float(np.mean(errors**2)), 1e-300)
+def bounded_step(
+    structure: Structure, errors: Array, slopes: Array, reach: float, variance: float | None = None
+) -> Array:
+    """Gauss-Newton step in deviations of the priors, within what is possible (bounded least squares).
+
+    Errors have the ``variance`` that is given, or else their own.
+    """
+    z, scale = structure.standard, max(float(np.mean(errors**2)) if variance is None else variance, 1e-300)
     far = np.isin(np.arange(len(z)), [place for _, place in structure.leaning])
     known = np.where(far, FAINT, 1.0)
     with np.errstate(over="ignore", invalid="ignore"):
