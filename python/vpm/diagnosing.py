@@ -10,24 +10,24 @@ from functools import partial
 from itertools import chain
 from typing import TypedDict, get_args
 
-from vpm.discrepancy.ambiguity import Rivals, listed
-from vpm.discrepancy.assembled import accepted_effect, classes, examined, gaps_of, of_search, step
-from vpm.discrepancy.by_ranking import tracker_gaps
-from vpm.discrepancy.candidates import asked_for
-from vpm.discrepancy.choice import Accepted
-from vpm.discrepancy.confirmation import Data, Judged
+from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis, Empirical
-from vpm.discrepancy.discriminating_experiment import experiments as experiments_for
-from vpm.discrepancy.empirical import beside
+from vpm.discrepancy.diagnosis_fields import accepted_effect, classes, examined, gaps_of, of_search, step
 from vpm.discrepancy.evidence import gather
+from vpm.discrepancy.parallel_candidates import Progress, SideBySide
 from vpm.discrepancy.plot_samples import pictures, traces, where
 from vpm.discrepancy.preparation import Records, data_of, nominal_of, recalibrated_of, records_of
 from vpm.discrepancy.provenance import own_settings, provenance
+from vpm.discrepancy.ranked_effects import tracker_gaps
 from vpm.discrepancy.recorded_calls import recorded
-from vpm.discrepancy.remainder import Remainder, remainder
-from vpm.discrepancy.residual_by_joint import only_where_closed
-from vpm.discrepancy.search import Search, ambiguities
-from vpm.discrepancy.side_by_side import Progress, SideBySide
+from vpm.discrepancy.remainder.empirical_formula import beside
+from vpm.discrepancy.remainder.remainder import Remainder, remainder
+from vpm.discrepancy.remainder.residual_by_joint import only_where_closed
+from vpm.discrepancy.rivals.ambiguity import Rivals, listed
+from vpm.discrepancy.rivals.discriminating_experiment import experiments as experiments_for
+from vpm.discrepancy.screening.candidates import asked_for
+from vpm.discrepancy.search.candidate_choice import Accepted
+from vpm.discrepancy.search.search import Search, ambiguities
 from vpm.discrepancy.verdict import is_negligible, verdict
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records
@@ -40,7 +40,7 @@ from vpm.naming import BROKEN, FAILED, RANKING, Names, Tell, named, ranked_notes
 from vpm.one_thread import in_one_thread
 from vpm.ranking import Ranking
 from vpm.ranking.by_tracker import diagnosed_by_tracker
-from vpm.ranking.stand_in import why_unbalanced
+from vpm.ranking.substitute_records import why_unbalanced
 from vpm.simulate import Setup, judging_mode
 from vpm.tasks import done_by
 

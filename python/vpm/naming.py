@@ -7,22 +7,22 @@ from functools import partial
 from typing import Literal, TypeVar
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.ambiguity import Rivals, rivals
-from vpm.discrepancy.by_ranking import free_joints, searched, why_not_ranked
-from vpm.discrepancy.by_ranking import notes as notes_of
-from vpm.discrepancy.confirmation import Data, Judged
-from vpm.discrepancy.contacts import with_predicted_contacts
+from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import RefusedEffect
-from vpm.discrepancy.forward_step import forward_step
-from vpm.discrepancy.rival_discrimination import discriminated
-from vpm.discrepancy.rival_exchange import in_order, replaced, timed_again
-from vpm.discrepancy.search import Search, further, search
-from vpm.discrepancy.side_by_side import SideBySide
+from vpm.discrepancy.parallel_candidates import SideBySide
+from vpm.discrepancy.ranked_effects import free_joints, searched, why_not_ranked
+from vpm.discrepancy.ranked_effects import notes as notes_of
+from vpm.discrepancy.rivals.ambiguity import Rivals, rivals
+from vpm.discrepancy.rivals.rival_discrimination import discriminated
+from vpm.discrepancy.rivals.rival_exchange import in_order, replaced, timed_again
+from vpm.discrepancy.search.backlash_contacts import with_predicted_contacts
+from vpm.discrepancy.search.forward_step import forward_step
+from vpm.discrepancy.search.search import Search, further, search
 from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.ranking import Ranking, Settings, rank
-from vpm.ranking.stand_in import why_unbalanced
+from vpm.ranking.substitute_records import why_unbalanced
 from vpm.simulate import Setup
 
 #: What an interrupted diagnosis says of itself.

@@ -45,7 +45,7 @@ import numpy as np
 from vpm.errors import VpmError, needs
 from vpm.fields import misfit
 from vpm.files import replacing, unreadable
-from vpm.plain import plain
+from vpm.json_values import plain
 
 if TYPE_CHECKING:
     import pandas as pd

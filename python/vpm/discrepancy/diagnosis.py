@@ -15,8 +15,8 @@ from vpm.discrepancy.evidence import Evidence
 from vpm.discrepancy.provenance import Provenance
 from vpm.files import write_text
 from vpm.identify import Fit
+from vpm.json_values import plain
 from vpm.model import Model
-from vpm.plain import plain
 from vpm.results import Result, Storable
 
 if TYPE_CHECKING:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.discrepancy.view import View
+from vpm.discrepancy.site_states import View
 from vpm.errors import VpmError
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from vpm.compare import compare
-from vpm.discrepancy.confirmation import Data, Judged
+from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import Picture, Trace
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model

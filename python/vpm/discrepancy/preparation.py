@@ -8,12 +8,12 @@ from functools import partial
 
 import numpy as np
 
-from vpm.discrepancy.candidates import slow_speeds
-from vpm.discrepancy.confirmation import Data, Judged, judge, judged_anyhow
-from vpm.discrepancy.filters import filters
-from vpm.discrepancy.moving import check_moving, check_stuck
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge, judged_anyhow
+from vpm.discrepancy.motion_filters import filters
+from vpm.discrepancy.parallel_candidates import SideBySide
 from vpm.discrepancy.prior_departure import moved_far
-from vpm.discrepancy.side_by_side import SideBySide
+from vpm.discrepancy.screening.candidates import slow_speeds
+from vpm.discrepancy.stuck_channels import check_moving, check_stuck
 from vpm.errors import DiagnosisError, DivergedError
 from vpm.experiment import Experiment, joints_from_shafts
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem

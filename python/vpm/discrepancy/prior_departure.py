@@ -7,7 +7,7 @@ a hardening spring.
 
 from __future__ import annotations
 
-from vpm.discrepancy.confirmation import Judged
+from vpm.discrepancy.confirmation.confirmation import Judged
 from vpm.model import Model, Parameter
 from vpm.numbers import NORMAL_95, short
 

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from vpm.discrepancy.diagnosis import Diagnosis
-from vpm.discrepancy.side_by_side import Progress
+from vpm.discrepancy.parallel_candidates import Progress
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,15 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import ndtri
 
-from vpm.discrepancy.candidates import joint_at
-from vpm.discrepancy.confirmation import Data, Judged
+from vpm.discrepancy.confirmation.confirmation import Data, Judged
+from vpm.discrepancy.confirmation.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN, MOST_OF_IT, NEGLIGIBLE
 from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap
+from vpm.discrepancy.noise.residual_structure import Structure
 from vpm.discrepancy.prior_departure import driven_away
-from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN, MOST_OF_IT, NEGLIGIBLE
-from vpm.discrepancy.remainder import Remainder
-from vpm.discrepancy.residual_by_joint import FLOOR_FACTOR, MOSTLY_OPEN, Joints
-from vpm.discrepancy.search import Search
-from vpm.discrepancy.structure import Structure
+from vpm.discrepancy.remainder.remainder import Remainder
+from vpm.discrepancy.remainder.residual_by_joint import FLOOR_FACTOR, MOSTLY_OPEN, Joints
+from vpm.discrepancy.screening.candidates import joint_at
+from vpm.discrepancy.search.search import Search
 from vpm.identify import gain, segments
 from vpm.numbers import percent, short
 

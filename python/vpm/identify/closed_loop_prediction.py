@@ -24,9 +24,9 @@ from scipy.optimize import nnls
 
 from vpm.errors import VpmError
 from vpm.experiment import Experiment, Motion, noise_std
-from vpm.identify.along import bends, has_hidden, has_own_drives
 from vpm.identify.first_states import begun_again
 from vpm.identify.inverse_dynamics import InverseDynamicsProblem
+from vpm.identify.response_along_motion import bends, has_hidden, has_own_drives
 from vpm.identify.settings import OwnSimulation
 from vpm.initial import initial_state, measured_states
 from vpm.model import Model

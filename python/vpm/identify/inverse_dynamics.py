@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, IdentificationError
 from vpm.experiment import Experiment, Motion
-from vpm.identify.along import (
+from vpm.identify.first_states import BegunAnywhere
+from vpm.identify.following import Following, Memo, gauge_gains, hold_of
+from vpm.identify.parallel import in_order
+from vpm.identify.parts import Bending
+from vpm.identify.problem import FEWEST_SAMPLES, Block
+from vpm.identify.response_along_motion import (
     Response,
     bending_of,
     bends,
@@ -23,11 +28,6 @@ from vpm.identify.along import (
     respond,
     shown_channels,
 )
-from vpm.identify.first_states import BegunAnywhere
-from vpm.identify.following import Following, Memo, gauge_gains, hold_of
-from vpm.identify.parallel import in_order
-from vpm.identify.parts import Bending
-from vpm.identify.problem import FEWEST_SAMPLES, Block
 from vpm.identify.sample_mask import SampleMask, settled
 from vpm.initial import joint_motion
 from vpm.model import Model
@@ -48,9 +48,9 @@ class InverseDynamicsProblem(BegunAnywhere):
     filtering of the inverse dynamic identification model (M. Gautier, *Annual Reviews in Control*, 1997; A. Janot et
     al., *IEEE Trans. Control Systems Technology* 22, 2014).
 
-    What nobody measures is worked out along the motion, see `vpm.identify.along`: states inside of drives, elastic
-    coordinates, joints without a sensor. Of what shows of it, all that the logs hold is compared too: pressures,
-    currents, strains.
+    What nobody measures is worked out along the motion, see `vpm.identify.response_along_motion`: states inside of
+    drives, elastic coordinates, joints without a sensor. Of what shows of it, all that the logs hold is compared too:
+    pressures, currents, strains.
 
     Samples at which a joint stands still do not count, as long as half of them remain: friction at rest takes whatever
     value holds the joint, which nothing here can predict. Nor do those at which a piston touches an end of its stroke.

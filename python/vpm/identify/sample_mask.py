@@ -15,8 +15,8 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, Motion
-from vpm.identify.along import bends
 from vpm.identify.problem import FEWEST_SAMPLES
+from vpm.identify.response_along_motion import bends
 from vpm.model import Model
 
 Array = NDArray[np.float64]

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import DivergedError
-from vpm.identify.along import bends, has_hidden, has_own_drives, shows_drives_alone
 from vpm.identify.estimation import Estimate, Worth, estimate
 from vpm.identify.inverse_dynamics import InverseDynamicsProblem
+from vpm.identify.response_along_motion import bends, has_hidden, has_own_drives, shows_drives_alone
 from vpm.model import Model
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vpm.discrepancy.side_by_side import Progress, SideBySide
+from vpm.discrepancy.parallel_candidates import Progress, SideBySide
 from vpm.errors import ExperimentError, VpmError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
 from vpm.log_check.correction import TIME, Correction

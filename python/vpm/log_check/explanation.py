@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from vpm.discrepancy.side_by_side import Failure, SideBySide
+from vpm.discrepancy.parallel_candidates import Failure, SideBySide
 from vpm.experiment import Experiment
 from vpm.log_check.correction import Correction, Pair
 from vpm.log_check.shares import FORCES, Judge, Shares, Tangent

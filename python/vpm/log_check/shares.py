@@ -20,10 +20,10 @@ from vpm.log_check.settings import Settings
 from vpm.model import Model
 from vpm.observer import measured_outputs
 from vpm.ranking.fit import ASTRAY, Fitter, Followed, View
+from vpm.ranking.model_structure import Structure
 from vpm.ranking.noise_model import white_noise
+from vpm.ranking.parameter_priors import stated
 from vpm.ranking.settings import Settings as RankingSettings
-from vpm.ranking.sizes import stated
-from vpm.ranking.structure import Structure
 from vpm.ranking.tracked_records import TrackedRecords, Tracker, is_position
 from vpm.simulate import Setup
 from vpm.weighing.priors import Prior, natural_sizes

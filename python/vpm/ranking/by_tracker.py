@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.ambiguity import listed
-from vpm.discrepancy.assembled import classes, of_search, step
-from vpm.discrepancy.by_ranking import fitted_in, staged, tracker_gaps
-from vpm.discrepancy.candidates import Candidate, asked_for, candidates
-from vpm.discrepancy.confirmation import Judged, Trial, is_clear
+from vpm.discrepancy.confirmation.confirmation import Judged, Trial, is_clear
 from vpm.discrepancy.diagnosis import Diagnosis, Trace
+from vpm.discrepancy.diagnosis_fields import classes, of_search, step
 from vpm.discrepancy.preparation import Records
 from vpm.discrepancy.prior_departure import moved_far
-from vpm.discrepancy.screening import Probe
-from vpm.discrepancy.search import ambiguities
+from vpm.discrepancy.ranked_effects import fitted_in, staged, tracker_gaps
+from vpm.discrepancy.rivals.ambiguity import listed
+from vpm.discrepancy.screening.candidates import Candidate, asked_for, candidates
+from vpm.discrepancy.screening.probe import Probe
+from vpm.discrepancy.search.search import ambiguities
 from vpm.discrepancy.verdict import verdict
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
@@ -26,11 +26,11 @@ from vpm.identify import Estimate, InverseDynamicsProblem, estimate, gain, gaps,
 from vpm.identify.estimation import standing
 from vpm.initial import invertible
 from vpm.model import Model
-from vpm.ranking.residual import TrackerResidual
 from vpm.ranking.result import Ranked, Ranking
 from vpm.ranking.settings import Settings
-from vpm.ranking.stand_in import shown
+from vpm.ranking.substitute_records import shown
 from vpm.ranking.tracked_records import TrackedRecords
+from vpm.ranking.tracker_residual import TrackerResidual
 from vpm.simulate import Setup
 
 Array = NDArray[np.float64]

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from vpm.errors import VpmError
+from vpm.ranking.model_structure import Structure
 from vpm.ranking.noise_model import NoiseModel, Parts, white_noise
 from vpm.ranking.posterior import log_volume
 from vpm.ranking.settings import FAINT, SHARES, Settings
-from vpm.ranking.structure import Structure
 from vpm.ranking.tracked_records import NOTHING, By, TrackedRecords, Tracker
 
 Array = NDArray[np.float64]

@@ -11,13 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.candidates import Key
+from vpm.discrepancy.screening.candidates import Key
 from vpm.model import Effect
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.judgement import Judgement
+from vpm.ranking.model_structure import Structure, approximate
 from vpm.ranking.noise_model import white_noise
 from vpm.ranking.settings import PARTS, SURE
-from vpm.ranking.structure import Structure, approximate
 
 Array = NDArray[np.float64]
 

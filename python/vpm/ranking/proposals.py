@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue.kinds import Side
-from vpm.discrepancy.candidates import Candidate, Key, candidates
-from vpm.discrepancy.side_by_side import Failure, SideBySide
+from vpm.discrepancy.parallel_candidates import Failure, SideBySide
+from vpm.discrepancy.screening.candidates import Candidate, Key, candidates
 from vpm.identify import InverseDynamicsProblem
 from vpm.initial import invertible
-from vpm.ranking.extensions import Extensions, sides_of
 from vpm.ranking.fit import ASTRAY, Fitter, Followed, View
 from vpm.ranking.look import Look
+from vpm.ranking.model_structure import Structure
 from vpm.ranking.settings import Settings
-from vpm.ranking.starts import started
-from vpm.ranking.structure import Structure
+from vpm.ranking.start_values import started
+from vpm.ranking.structure_extensions import Extensions, sides_of
 
 Array = NDArray[np.float64]
 

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from vpm.discrepancy.candidates import asked_for
-from vpm.discrepancy.moving import check_moving
-from vpm.discrepancy.side_by_side import Progress, SideBySide
+from vpm.discrepancy.parallel_candidates import Progress, SideBySide
+from vpm.discrepancy.screening.candidates import asked_for
+from vpm.discrepancy.stuck_channels import check_moving
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
 from vpm.model import Model
 from vpm.one_thread import in_one_thread
+from vpm.ranking.ranking_search import Search
 from vpm.ranking.result import Ranking
-from vpm.ranking.search import Search
 from vpm.ranking.settings import Settings
 from vpm.ranking.tracked_records import TrackedRecords
 from vpm.simulate import Setup

@@ -18,7 +18,7 @@ from vpm.experiment import Experiment
 from vpm.initial import initial_state
 from vpm.model import Model
 from vpm.observer import Record
-from vpm.ranking.firsts import STEP, Firsts, hidden_states
+from vpm.ranking.hidden_first_states import STEP, Firsts, hidden_states
 from vpm.ranking.noise_model import NoiseModel, Parts, Structured, frequencies
 from vpm.ranking.settings import (
     CONTROLLED,

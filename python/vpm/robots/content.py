@@ -13,11 +13,11 @@ from vpm.catalogue import POSITIVE
 from vpm.catalogue.traits import Plain
 from vpm.model.joint import SUFFIXES
 from vpm.model.pose import Pose
+from vpm.robots.joint_effects import plain_effect
 from vpm.robots.lumping import WORLD, Lump, Tree
 from vpm.robots.markup import clean
-from vpm.robots.naming import Names
 from vpm.robots.parts import SINGLE, Drive, Inertial, Joint, Mimic, Robot, angles_of, rounded
-from vpm.robots.plain import plain_effect
+from vpm.robots.robot_names import Names
 from vpm.robots.transmissions import drives_of
 from vpm.robots.uncertain import Spread
 

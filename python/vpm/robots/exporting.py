@@ -17,10 +17,10 @@ from vpm.model.pose import Pose, pose
 from vpm.robots.content import Draft
 from vpm.robots.edits import Changes, Edits
 from vpm.robots.importing import FLOATING, drafted, robot_of
+from vpm.robots.joint_effects import plain_effect
 from vpm.robots.lumping import Lump
 from vpm.robots.markup import Element, Markup, clean, read_markup
 from vpm.robots.parts import SINGLE, Inertial, Joint, Robot, moved, without
-from vpm.robots.plain import plain_effect
 from vpm.robots.uncertain import Spread
 from vpm.robots.urdf import inertia_of, origin_of
 from vpm.robots.xacro import is_xacro

@@ -8,7 +8,7 @@ from dataclasses import replace
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, Problem, estimate, gaps
-from vpm.identify.along import SAMPLED_TYPES, has_own_drives
+from vpm.identify.response_along_motion import SAMPLED_TYPES, has_own_drives
 from vpm.model import Model
 from vpm.one_thread import in_one_thread
 from vpm.simplify.replacement import commanded

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vpm.files import make_folder, replacing, write_text
-from vpm.plain import plain
+from vpm.json_values import plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

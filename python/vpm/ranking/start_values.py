@@ -1,0 +1,59 @@
+"""Where a fit of an effect begins, beside what the candidates of the catalogue say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from vpm.discrepancy.screening.candidates import Candidate
+from vpm.discrepancy.screening.compliance_and_stop_start import moved
+from vpm.discrepancy.screening.location_parameter import ANYWHERE
+from vpm.model import Model
+from vpm.ranking.parameter_priors import Sizes
+from vpm.ranking.settings import LOSS, PLACES
+
+
+def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
+    """A candidate whose contacts begin closed and stiff, where a fit can see them, and whose waves may be long."""
+    ends = dict(candidate.bounds)
+    if "period" in ends and candidate.site in sizes.ways:
+        # One wave on all of the way that is seen: a longer one is a slope.
+        (low, high), (first, last) = ends["period"], sizes.ways[candidate.site]
+        ends["period"] = low, max(high, last - first)
+    candidate = _placed(replace(candidate, bounds=ends), sizes)
+    if candidate.effect.has_play:
+        return replace(candidate, starts=tuple(_backlash(start) for start in candidate.starts), fixed=())
+    if candidate.effect.stops:
+        # Nobody knows where a joint ends that nobody sees, or that stands.
+        seen = sizes.moves(candidate.site)
+        starts = tuple(_stop(start, candidate.site, model, sizes) for start in candidate.starts if seen)
+        return replace(candidate, starts=starts, neutral=False)
+    return candidate
+
+
+def _placed(candidate: Candidate, sizes: Sizes) -> Candidate:
+    """With several starts of its place where an effect has one that may lie anywhere, such as where a spring rests.
+
+    An effect without size does not feel its place, so that a first step gives it a size and leaves the place: a spring
+    that rests far away pulls nearly the same everywhere.
+    """
+    anywhere = [one.name for one in candidate.effect.parameters if one.shape and tuple(one.physical) == ANYWHERE]
+    if not candidate.neutral or len(anywhere) != 1 or len(candidate.starts) != 1 or candidate.site not in sizes.ways:
+        return candidate
+    (start,), (place,) = candidate.starts, anywhere
+    low, high = sizes.ways[candidate.site]
+    starts = tuple({**start, place: 0.5 * (low + high + share * (high - low))} for share in PLACES)
+    return replace(candidate, starts=starts)
+
+
+def _backlash(start: Mapping[str, float]) -> Mapping[str, float]:
+    """What rubs within the gap is friction, not the contact."""
+    return {**start, "contact_damping": start["damping"], "damping": 0.0}
+
+
+def _stop(start: Mapping[str, float], site: str, model: Model, sizes: Sizes) -> Mapping[str, float]:
+    """Stiff enough to turn the fastest motion round on the way that is seen beyond the end."""
+    low, high, speed = sizes.ways[site][0], sizes.ways[site][1], sizes.joints[site][1]
+    beyond = max(high - start.get("high", high), start.get("low", low) - low, 1e-3 * (high - low))
+    stiffness = moved(model, site) * (speed / beyond) ** 2
+    return {**start, "stiffness": stiffness, "damping": LOSS / speed}
