@@ -1,4 +1,4 @@
-"""How a command speaks: its consoles, and what ``--json``, ``--quiet`` and ``--verbose`` make of all commands."""
+"""Output of commands: consoles, and what ``--json``, ``--quiet`` and ``--verbose`` make of it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ TOLD = (ValidityWarning, PluginWarning, MissingExtraWarning)
 
 
 class Output(Console):
-    """A console that falls silent where its file or its disk takes no more: what a command writes elsewhere counts.
+    """Output console that falls silent where its file or disk takes no more; other work goes on.
 
     Attributes
     ----------
@@ -41,7 +41,7 @@ class Output(Console):
     trouble: OSError | None = None
 
     def print(self, *objects: Any, **options: Any) -> None:  # noqa: ANN401
-        """Print to the console as any console does, until its file takes no more."""
+        """Print to the output console, until its file takes no more."""
         try:
             super().print(*objects, **options)
         except BrokenPipeError:  # whoever read it has seen enough
@@ -65,7 +65,7 @@ FLAGS = {
 
 @dataclass
 class Manner:
-    """How the command that runs now speaks, and what it has told.
+    """Manner of output of the command that runs now, and what it has printed.
 
     Attributes
     ----------
@@ -94,19 +94,19 @@ _now = Manner()
 
 
 def asked(words: Sequence[str], command: str = "") -> Manner:
-    """Manner that the words of a command line ask for; they may be at fault otherwise."""
+    """Manner of output that a command line asks for, even a faulty one."""
     flags = list(takewhile(lambda word: word != "--", words))
     short = "".join(word for word in flags if re.fullmatch("-[qv]+", word))
     return Manner("--json" in flags, "--quiet" in flags or "q" in short, "--verbose" in flags or "v" in short, command)
 
 
 def give(**parts: object) -> None:
-    """Results of the command, by the names that they have in a JSON document; texts for people are printed beside."""
+    """Output of a command's results: by name in a JSON document; texts for people are printed beside."""
     _now.result |= parts
 
 
 def wrote(*paths: object) -> None:
-    """Say which files were written."""
+    """Output of the files that a command wrote."""
     _now.files += map(str, paths)
     if not _now.quiet:
         for path in paths:
@@ -114,30 +114,30 @@ def wrote(*paths: object) -> None:
 
 
 def note(text: str) -> None:
-    """Say what a user should know beside the results, once."""
+    """Output of a note that a user should know beside the results, once."""
     if text not in _now.notes:
         _now.notes.append(text)
         notes.print(text, markup=False)
 
 
 def detail(text: str) -> None:
-    """Say what is done, where that was asked for."""
+    """Output of what a command does now, with ``--verbose``."""
     if _now.verbose:
         progressed(text)
 
 
 def progressed(text: str) -> None:
-    """A line of progress; with the time since the command began, where details were asked for."""
+    """Output of a line of progress; with the time since the command began for ``--verbose``."""
     notes.print(f"[{perf_counter() - _now.begin:8.2f} s] {text}" if _now.verbose else text, markup=False)
 
 
 def in_lines() -> bool:
-    """Whether a command tells its progress in lines, not by a bar that moves."""
+    """Whether progress is output in lines, not by a bar that moves."""
     return _now.verbose or not notes.is_terminal
 
 
 def speak(run: Callable[[bool], object], manner: Manner) -> object:
-    """Run a command in a manner.
+    """Run a command with a manner of output.
 
     Parameters
     ----------
@@ -159,7 +159,7 @@ def speak(run: Callable[[bool], object], manner: Manner) -> object:
 
 
 def _documented(run: Callable[[bool], object]) -> object:
-    """Run a command whose output is one document, also where it fails."""
+    """Run a command whose output is one JSON document, also where it fails."""
     trouble: BaseException | None = None
     code: object = 0
     with redirect_stdout(sys.stderr), console.capture() as said:  # libraries print too
@@ -190,7 +190,7 @@ def _document(lines: list[str], trouble: BaseException | None) -> str:
 
 
 def _told(trouble: BaseException) -> dict[str, object]:
-    """An error as data: its class, its sentence, and the facts that it carries."""
+    """JSON output of an error: its class, sentence and facts."""
     if isinstance(trouble, VpmError):
         facts = {k: v for k, v in vars(trouble).items() if v is None or isinstance(v, str | int | float | tuple)}
         return {"kind": type(trouble).__name__, **facts, "message": str(trouble)}
@@ -202,7 +202,7 @@ def _told(trouble: BaseException) -> dict[str, object]:
 
 
 def unexpected(trouble: BaseException) -> str:
-    """A sentence about an error that vpm should have made one of its own."""
+    """Output sentence for an error that vpm should have made one of its own."""
     return (
         f"vpm met an unexpected {type(trouble).__name__} ({trouble}), which is a mistake of vpm: run this again with "
         "--verbose for the place of it, and report both"
@@ -211,7 +211,7 @@ def unexpected(trouble: BaseException) -> str:
 
 @contextmanager
 def _warnings_told() -> Iterator[None]:
-    """Warnings of vpm as one sentence each, without the line of the program that they come from."""
+    """Output of vpm's warnings as one sentence each, without lines of code."""
     with warnings.catch_warnings():
         for kind in TOLD:
             warnings.simplefilter("always", kind)
@@ -238,7 +238,7 @@ def _times_told() -> Iterator[None]:
 
 
 def add_flags(app: typer.Typer) -> None:
-    """Give the options of `FLAGS` to every command of an application and of its groups; `asked` reads them."""
+    """Add the output options `FLAGS` to every command of an application; `asked` reads them."""
     for group in app.registered_groups:
         if group.typer_instance is not None:
             add_flags(group.typer_instance)
@@ -248,7 +248,7 @@ def add_flags(app: typer.Typer) -> None:
 
 
 def with_flags(command: Callable[..., Any]) -> Callable[..., Any]:
-    """A command that takes the options of `FLAGS` too."""
+    """Command that takes the output options `FLAGS` too."""
 
     @wraps(command)
     def run(**given: Any) -> Any:  # noqa: ANN401

@@ -1,4 +1,4 @@
-"""Whatever a result holds, as JSON has it."""
+"""JSON values of whatever a result holds."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy as np
 
 
 def plain(value: object) -> object:
-    """Numbers, text, lists and tables of a value.
+    """JSON values: numbers, text, lists and tables of a Python value.
 
     Parameters
     ----------

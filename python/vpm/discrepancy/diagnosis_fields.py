@@ -1,4 +1,4 @@
-"""What a diagnosis says in the end: gaps at all stages, each effect with its evidence, steps that led there."""
+"""Fields of a diagnosis, computed after the search: channel errors at all stages, accepted effects, rivals, steps."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ ALIKE = "predicts the validation data as well"
 def of_search(
     model: Model, records: Records, start: Judged, found: Search, fitted: Problem, seconds: float
 ) -> Diagnosis:
-    """What a search found, where nothing after it can be computed: nobody waits for it twice.
+    """Diagnosis with the fields of the search alone, where nothing after it could be computed.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def of_search(
 def gaps_of(
     data: Data, nominal: Judged, recalibrated: Judged, final: Judged, floor: dict[str, float]
 ) -> dict[str, ChannelGap]:
-    """Gap of each channel of the residual, and of the simulation, at three stages, and its noise floor."""
+    """Field of a diagnosis: error and noise floor of each channel, of residual and simulation, at three stages."""
     judged = (nominal, recalibrated, final)
     stages = [gaps(data.validation, stage.validation) for stage in judged]
     # Of efforts as the drives of the nominal model give them: no drive may shrink them together with its error.
@@ -108,7 +108,7 @@ def gaps_of(
 def examined(
     nominal: Judged, recalibrated: Judged, data: Data, mode: str, setup: Setup, final: Judged
 ) -> tuple[dict[str, float], dict[str, ChannelGap], Structure]:
-    """Noise floor of each channel, gaps at all stages, and what is left of the last one."""
+    """Noise floor, errors at all stages and residual structure of the final model: fields of a diagnosis."""
     floor = noise_floor(final.model, data.validation, final.validation, mode, setup)
     timed = in_time(final, data)
     left = structure(final.model, data.training, data.validation, timed.fitted, timed.validation)
@@ -121,7 +121,7 @@ def _signal(problem: InverseDynamicsProblem | OutputErrorProblem, channel: str) 
 
 
 def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
-    """An accepted effect with its estimates in the final model, and its evidence."""
+    """Field of a diagnosis: an accepted effect with its estimates in the final model, and its evidence."""
     candidate = entry.trial.probe.candidate
     effect = final.model.effect(*candidate.key, entry.side)
     estimates = []
@@ -150,7 +150,7 @@ def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
 
 
 def classes(accepted: Sequence[Accepted], ambiguous: Sequence[Rivals]) -> tuple[tuple[str, ...], ...]:
-    """Each accepted effect with all that would do in its place, where something would."""
+    """Field of a diagnosis: classes of an accepted effect and its rivals that predict as well."""
     beside = {(rivals.effect, rivals.site): rivals.trials for rivals in ambiguous}
     found = []
     for entry in accepted:
@@ -161,7 +161,7 @@ def classes(accepted: Sequence[Accepted], ambiguous: Sequence[Rivals]) -> tuple[
 
 
 def step(training: Problem, validation: Problem, stage: Stage) -> Step:
-    """A stage of the search with its values, and the largest shares that it leaves."""
+    """Field of a diagnosis: one stage of the search with its parameter values and its largest channel errors."""
     fit, model = stage.judged.fit, stage.judged.model
     names = stage.judged.free
     return Step(

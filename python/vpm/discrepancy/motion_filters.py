@@ -1,4 +1,4 @@
-"""The filters of a diagnosis: one for the states that laws depend on, one for the band that is compared.
+"""Motion filters of a diagnosis: one for the states that laws depend on, one for the compared band.
 
 The customary preparation filters the motion just above the band that is kept (M. Gautier, ICRA 1997). At a reversal so
 smooth a motion passes through rest sooner or later than the joint did. Dry friction, hysteresis or backlash along it
@@ -27,7 +27,7 @@ QUICKER = 4.0
 def filters(
     model: Model, training: InverseDynamicsProblem, cutoff: float | None
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    """Cut-off frequency of the motion filter and highest frequency that is compared, of each record, Hz.
+    """Cut-off frequency of the motion filter and highest compared frequency of each record, Hz.
 
     Parameters
     ----------
@@ -48,7 +48,7 @@ def filters(
 
 
 def quickest(record: Experiment, m: Motion, joints: Sequence[str]) -> float:
-    """Cut-off frequency up to which noise of the velocity does not pass for motion, Hz.
+    """Highest cut-off frequency of a motion filter at which velocity noise does not look like motion, Hz.
 
     White noise of the position with deviation ``s`` at the rate ``r`` has the density ``2 s^2 / r``; its derivative
     below ``f`` the mean square ``(2 pi)^2 (2 s^2 / r) f^3 / 3``. Two deviations are to stay below the speed under which

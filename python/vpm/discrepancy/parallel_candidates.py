@@ -1,4 +1,4 @@
-"""Candidates in parallel on all cores, reported in an order that does not depend on the number of cores."""
+"""Parallel computation of candidates on all cores, reported in an order independent of the number of cores."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ Progress = Callable[[str, str, int, int], None]
 
 @dataclass(frozen=True)
 class Failure:
-    """A candidate that cannot be computed with this machine or on these records, and why.
+    """Failure of a candidate in the parallel computation: it cannot be computed, and why.
 
     It is one that is refused, and no reason to give up all the others.
     """
@@ -29,7 +29,7 @@ class Failure:
 
 @dataclass(frozen=True)
 class SideBySide:
-    """How many candidates are computed at a time, and where progress is reported.
+    """Number of candidates computed in parallel, and where progress is reported.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class SideBySide:
         name: Callable[[Item], str],
         effort: Callable[[Item], float] | None = None,
     ) -> list[Outcome | Failure]:
-        """Outcomes in the order of the items. Ctrl-C stops all of them and raises KeyboardInterrupt here.
+        """Compute candidates in parallel, in the order of the items. Ctrl-C stops all and raises KeyboardInterrupt.
 
         Those with the largest ``effort``, where it can be guessed, begin first: one long item at the end would keep the
         other cores waiting (R. Graham, *SIAM J. Applied Mathematics* 17, 1969: longest processing time first).

@@ -41,7 +41,7 @@ BEHIND = ".link."
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Numbers that decide how a diagnosis takes a ranking over.
+    """Settings by which a diagnosis takes names from a ranking and refits them.
 
     Attributes
     ----------
@@ -80,12 +80,12 @@ def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
 
 
 def free_joints(model: Model) -> tuple[str, ...]:
-    """Joints without a drive, so that no inverse-dynamics residual shows what acts there."""
+    """Joints without a drive: only the tracker of a ranking measures effects there, no inverse-dynamics residual."""
     return tuple(name for name in model.joints if name not in {*model.driven_joints, *model.added_joints})
 
 
 def tracker_gaps(ranking: Ranking, balanced: Sequence[str] | None) -> dict[str, ChannelGap]:
-    """Errors of a tracker on validation records, of joints that the inverse-dynamics residual does not show.
+    """Errors of the ranking's tracker on validation records at joints without an inverse-dynamics residual.
 
     Of all channels where there is no such residual, and so no joint of which the efforts are ``balanced``.
     """
@@ -106,7 +106,7 @@ def searched(
     settings: RankingSettings,
     effects: Sequence[str] | None = None,
 ) -> tuple[Search, tuple[Rivals, ...]]:
-    """What a ranking found as a search, and the models in which a rival does the work of an effect.
+    """Outcome of a ranking in the form of a search, with rivals of each ranked effect.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def staged(
     offered: Callable[[Judged], tuple[Candidate, ...]],
     settings: RankingSettings,
 ) -> Search:
-    """What a ranking found as a search, effect by effect.
+    """Stages of a search from a ranking: its effects are added and refitted one by one.
 
     Parameters
     ----------
@@ -192,14 +192,14 @@ def staged(
 
 
 def _without(model: Model, gone: Sequence[Ranked]) -> Model:
-    """A model without some of its effects, the last ones first: others may rest on the earlier ones."""
+    """Model without some ranked effects; the last ones go first, because they may rest on earlier ones."""
     for one in reversed(gone):
         model = model.without_effect(*one.key, one.side)
     return model
 
 
 def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
-    """An effect in a model at the values of a ranking, refitted as far as an inverse-dynamics residual shows them.
+    """Model with one more ranked effect, refitted as far as the inverse-dynamics residual shows its parameters.
 
     A parameter moves if the residual tells it from all others at these values, and stays where it is if not. The refit
     counts if the training records are left no more and the validation ones are simulated no worse than by those values.
@@ -227,7 +227,7 @@ def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
 
 
 def _has_derivatives(columns: Array) -> NDArray[np.bool_]:
-    """Whether the residual has derivatives by each parameter; behind a backlash a motion may diverge."""
+    """Whether the residual has finite derivatives by each parameter of a ranked model."""
     with np.errstate(over="ignore", invalid="ignore"):
         return np.asarray(np.isfinite(np.sum(columns**2, axis=0)))
 
@@ -235,7 +235,7 @@ def _has_derivatives(columns: Array) -> NDArray[np.bool_]:
 def _refitted(
     current: Judged, model: Model, candidate: Candidate, one: Ranked, free: tuple[str, ...], data: Data
 ) -> tuple[Judged, str]:
-    """The refit, or the values of the ranking where that predicts worse; with what stopped its simulation, if any."""
+    """Refit of ranked effects, or the ranking's own values where these predict better."""
     bounds = _bounds(current, model, candidate, one)
     still, stopped = unmoved(model, free, data, bounds)
     judged, diverged = judged_anyhow(model, free, data, bounds)
@@ -251,14 +251,14 @@ def _refitted(
 
 
 def _candidate(current: Judged, one: Ranked, data: Data) -> Candidate:
-    """The effect as a search would try it, with the bounds that data give its shape; none where it would not."""
+    """Candidate of the search for a ranked effect, with the bounds that data give its shape, or None."""
     listed = candidates(current.model, data.training, current.fit.residual, [one.effect], simulated=True)
     plain = Candidate(EFFECTS[one.effect], one.site, ({},))
     return next((each for each in listed if each.key == one.key), plain)
 
 
 def fitted_in(current: Judged, model: Model, one: Ranked) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Parameters that are fitted without an effect, and those of it that a ranking fitted, by their names with it."""
+    """Parameters to refit without a ranked effect, and those that it adds, by their dotted names."""
     renamed = _renamed(current.model, model)
     known = (renamed.get(name, name) for name in current.free)
     fitted = {_anywhere(name) for name in one.values}
@@ -268,12 +268,12 @@ def fitted_in(current: Judged, model: Model, one: Ranked) -> tuple[tuple[str, ..
 
 
 def _anywhere(name: str) -> str:
-    """A dotted name on either side of a joint."""
+    """Dotted name of a ranked effect's parameter on either side of a joint."""
     return name.replace(BEHIND, ".")
 
 
 def _renamed(old: Model, new: Model) -> dict[str, str]:
-    """New names of the parameters of effects that are on the other side of their joint in another model."""
+    """New parameter names of ranked effects that are on the other side of their joint in another model."""
     names: dict[str, str] = {}
     there: dict[Key, list[Effect]] = {}
     for effect in new.effects:
@@ -287,7 +287,7 @@ def _renamed(old: Model, new: Model) -> dict[str, str]:
 
 
 def _bounds(current: Judged, model: Model, candidate: Candidate, one: Ranked) -> dict[str, tuple[float, float]]:
-    """Bounds of shapes that the data give, wide enough for the values of the ranking."""
+    """Bounds of a ranked effect's shape from the data, wide enough for the values of the ranking."""
     renamed = _renamed(current.model, model)
     given = {renamed.get(name, name): pair for name, pair in current.bounds.items()}
     names = model.effect(*one.key, one.side).parameter_names
@@ -308,7 +308,7 @@ def _power(judged: Judged) -> float:
 
 
 def _rivals(ranking: Ranking, final: Judged, accepted: Sequence[Accepted], data: Data) -> tuple[Rivals, ...]:
-    """Each effect that has rivals, with the models in which these do its work."""
+    """Ranked effects that have rivals in the ranking, with the models in which these take their place."""
     found = []
     for entry in accepted:
         trials = []
@@ -323,13 +323,13 @@ def _rivals(ranking: Ranking, final: Judged, accepted: Sequence[Accepted], data:
 
 
 def _tried(ranking: Ranking, key: Key, label: str) -> Ranked:
-    """A rival as it was tried in the round in which an effect came in."""
+    """Trial of a rival as the ranking tried it in the round in which an effect came in."""
     several = next(listed for listed in ranking.rounds if listed and listed[0].key == key)
     return next(one for one in several if f"{one.effect} at {one.site}" == label)
 
 
 def _placed(rival: Ranked, final: Judged, entry: Accepted, data: Data) -> Trial:
-    """A rival in the place of an effect, beside all others.
+    """Model with a rival in the place of a ranked effect, beside all others.
 
     Raises
     ------
@@ -351,7 +351,7 @@ def _placed(rival: Ranked, final: Judged, entry: Accepted, data: Data) -> Trial:
 
 @dataclass(frozen=True)
 class _Last:
-    """An effect as it was tried for the last time: what it added, and what came in then, if anything did."""
+    """Last trial of an effect in a ranking: what it added, and which effect came in then."""
 
     one: Ranked
     winner: Ranked | None
@@ -359,7 +359,7 @@ class _Last:
 
 
 def _refused(ranking: Ranking, outside: Mapping[Key, str], settings: RankingSettings) -> tuple[RefusedEffect, ...]:
-    """Effects that did not come in, or went out again, with the reason; the most hopeful of the last round first."""
+    """Effects that a ranking refused or removed again, with the reason; the most hopeful of its last round first."""
     last: dict[Key, _Last] = {}
     for several in ranking.rounds:
         for one in several:
@@ -371,14 +371,14 @@ def _refused(ranking: Ranking, outside: Mapping[Key, str], settings: RankingSett
 
 
 def _unpromising(ranking: Ranking, offered: Sequence[Candidate]) -> dict[Key, str]:
-    """Effects that could be there and that no round of a ranking fitted, with the reason."""
+    """Effects that no round of a ranking fitted, with the reason."""
     tried = {one.key for several in ranking.rounds for one in several}
     reason = "the first step of a fit predicted less evidence than others did, or too little for a fit"
     return {candidate.key: reason for candidate in offered if candidate.key not in tried}
 
 
 def _accepts(several: Sequence[Ranked], settings: RankingSettings) -> bool:
-    """Whether the first effect of a round came in: only accepted effects have evidence."""
+    """Whether the first effect of a ranking's round came in: only accepted effects have evidence."""
     return bool(several) and several[0].evidence > settings.odds
 
 
@@ -403,7 +403,7 @@ def _reason(entry: _Last, settings: RankingSettings) -> str:
 
 
 def _candidates(ranking: Ranking, gains: Mapping[Key, float], settings: RankingSettings) -> tuple[RankedCandidate, ...]:
-    """All that was tried, round by round, the most probable first."""
+    """Candidates of all rounds of a ranking for the result, the most probable first."""
     found = []
     for number, several in enumerate(ranking.rounds):
         for place, one in enumerate(several):
@@ -418,6 +418,6 @@ def _candidates(ranking: Ranking, gains: Mapping[Key, float], settings: RankingS
 
 
 def notes(accepted: Sequence[Accepted]) -> list[str]:
-    """Parameters that the ranking alone knows."""
+    """Notes on parameters that only the ranking could estimate."""
     blind = [", ".join(entry.trial.probe.invisible) for entry in accepted if entry.trial.probe.invisible]
     return [f"{names}: as the ranking fitted it, for the inverse-dynamics residual does not show it" for names in blind]

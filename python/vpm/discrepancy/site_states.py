@@ -1,4 +1,4 @@
-"""States of a record at the site of an effect, over which its residual is drawn."""
+"""States at the site of an effect along a record, over which its residual is drawn."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ _STATE = {"position": (0, ""), "velocity": (1, "/s"), "acceleration": (2, "/s²"
 
 @dataclass(frozen=True)
 class View:
-    """One record of a problem, seen from a site.
+    """View of one record from the site of an effect: states there, and the residual.
 
     Attributes
     ----------
@@ -51,11 +51,11 @@ class View:
     fine: bool = False
 
     def at_full_rate(self) -> View:
-        """The same on all samples, without the filter of the residual."""
+        """View of the site's states at all samples, without the filter of the residual."""
         return replace(self, fine=True)
 
     def best(self, part: Array, counts: NDArray[np.bool_]) -> ExcitationRange:
-        """The axis of the effect's signature that explains most of ``part``; the earlier one if it hardly matters."""
+        """State at the site, of the effect's signature, that explains most of ``part``; the earlier one if close."""
         best: ExcitationRange | None = None
         most = 0.0
         entry = EFFECTS.get(self.key[0])
@@ -69,12 +69,12 @@ class View:
         return best if best is not None else ("time", *self._time())
 
     def values(self, axis: str) -> Array:
-        """Values along an axis that is there."""
+        """Values of a state at the site."""
         found = self.along(axis)
         return found[2] if found is not None else self._time()[2]
 
     def channel(self, model: Model) -> Array:
-        """Residual of the channel under a model, but for what was measured: applied - required, or minus what shows."""
+        """Residual of the site's channel under a model: applied - required effort, or the negative output."""
         owner, _, quantity = self.channel_name.rpartition(".")
         shown = () if quantity == "effort" else (self.channel_name,)
         m = self.problem.motions[self.record]
@@ -85,7 +85,7 @@ class View:
         return np.asarray(answer.applied[:, column] - answer.required[:, column])
 
     def along(self, axis: str) -> tuple[str, str, Array] | None:
-        """Words, unit and values of one axis; None if this machine or this record has no such thing."""
+        """Label, unit and values of one state at the site; None if machine or record has no such state."""
         if axis in {"time", "frequency"}:
             return self._time()
         if axis in _STATE:
@@ -131,7 +131,7 @@ class View:
         return None
 
     def _shown(self, channel: str) -> Array | None:
-        """A channel as logged, else as the repaired model works it out along the motion; None if it cannot."""
+        """Channel at the site as logged, else as the repaired model computes it; None if it cannot."""
         experiment = self.problem.experiments[self.record]
         if channel in experiment:
             return self._kept(experiment[channel])
@@ -140,12 +140,12 @@ class View:
         return self._kept(self._response((channel,)).seen[:, 0])
 
     def _response(self, shown: tuple[str, ...]) -> Response:
-        """What the repaired model answers at every sample of the record."""
+        """Response of the repaired model at every sample of the record, for states at the site."""
         whole = replace(self.problem.motions[self.record], edge=0)
         return respond(self.model, self.model.theta, whole, self.problem.experiments[self.record], (), shown)
 
     def _kept(self, values: Array) -> Array:
-        """Of values at every sample of the record those of this view."""
+        """Values of the site's states at the samples of this view."""
         m = self.problem.motions[self.record]
         return values[m.kept] if self.fine else m.parallel(values)
 
@@ -156,7 +156,7 @@ class View:
         return next((name for name in own if name in self.problem.joints), self.problem.joints[0])
 
     def _actuator(self) -> str | None:
-        """The actuator at the site, or that of the channel, or the first one of the supply or of the joint."""
+        """Actuator at the site, or of the channel, or the first one of the supply or joint."""
         model, site, owner = self.model, self.key[1], self.channel_name.rpartition(".")[0]
         for name in (site, owner):
             if name in model.actuators:
@@ -167,7 +167,7 @@ class View:
 
 
 def explained(values: Array, part: Array) -> float:
-    """Share of the variance of ``part`` that its mean in bins of ``values`` explains (correlation ratio).
+    """Share of the variance of ``part`` that bins of a state's ``values`` explain (correlation ratio).
 
     0 for a part that hardly varies: nothing has to explain a constant.
     """

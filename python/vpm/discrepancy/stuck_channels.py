@@ -1,4 +1,4 @@
-"""Checks that records show the motion: channels that stand still although the machine moves."""
+"""Stuck channels of records: positions or sensors that stand still although the machine moves."""
 
 from __future__ import annotations
 
@@ -20,12 +20,12 @@ STEPS = 256
 
 
 def is_moving(record: Experiment, channel: str) -> bool:
-    """Whether a channel changes by more than rounding."""
+    """Whether a channel moves by more than rounding, so that it is not stuck."""
     return _changes(record[channel])
 
 
 def check_moving(model: Model, records: Sequence[Experiment]) -> None:
-    """Complain where records do not show the motion: any effect would explain that as well as any other.
+    """Raise an error where records show no motion: all channels are stuck, and any effect would explain them.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def check_moving(model: Model, records: Sequence[Experiment]) -> None:
 
 
 def check_stuck(model: Model, records: Sequence[Experiment]) -> None:
-    """Complain about a channel that stands while the model, driven as the machine was, moves it by what a sensor shows.
+    """Raise an error about a channel that is stuck while the simulated model moves it measurably.
 
     Raises
     ------
@@ -75,7 +75,7 @@ def _check_record(model: Model, record: Experiment) -> None:
 
 
 def _step(record: Experiment, channel: str) -> float:
-    """Largest step that a sensor may have, by what it and those of its unit show; zeros of positions mean nothing."""
+    """Largest quantisation step of a channel that looks stuck, from channels of its unit."""
     unit, own = record.unit(channel), 0.0 if channel.endswith(".position") else abs(float(record[channel][0]))
     alike = (float(np.ptp(record[name])) for name in record.channels if record.unit(name) == unit)
     return max(own, *alike) / STEPS

@@ -1,4 +1,4 @@
-"""What a machine does along a measured motion: the effort the motion needs, that of the drives, and what shows of them.
+"""Response of a machine along a measured motion: required efforts, efforts of drives, and other outputs.
 
 Nothing here integrates the motion itself, so that no error of a force adds up: every sample balances by itself, but for
 what nobody measures and what therefore has to be worked out along the motion, elastic coordinates of links, joints
@@ -37,7 +37,7 @@ IN_PLAY = 5e-4
 
 @dataclass(frozen=True)
 class Response:
-    """Efforts required and applied and other outputs along one record, with their derivatives.
+    """Response along one record: efforts required and applied, other outputs, and their derivatives.
 
     Attributes
     ----------
@@ -59,22 +59,22 @@ class Response:
 
 
 def has_own_drives(model: Model) -> bool:
-    """Whether the effort of any drive does not follow from its command alone."""
+    """Whether drives have states of their own, so that their response does not follow from the command alone."""
     return not all(model.follows_command(name) for name in model.actuators)
 
 
 def bends(model: Model) -> bool:
-    """Whether any link of a model is elastic."""
+    """Whether any link of a model is elastic and responds by bending."""
     return bool(model.core.n_elastic)
 
 
 def has_hidden(model: Model, joints: Sequence[str]) -> bool:
-    """Whether a model moves in ways beside the measured ``joints``: elastic links, or joints that nobody measures."""
+    """Whether a model has motion beside the measured ``joints``: elastic links or unmeasured joints."""
     return bends(model) or tuple(model.joints) != tuple(joints)
 
 
 def check_along(model: Model, joints: Sequence[str]) -> None:
-    """Complain about a machine whose efforts cannot be balanced along a measured motion.
+    """Raise an error for a machine without a response along a measured motion, because efforts do not follow.
 
     Raises
     ------
@@ -104,7 +104,7 @@ def check_along(model: Model, joints: Sequence[str]) -> None:
 
 
 def shown_channels(model: Model, joints: Sequence[str], experiments: Sequence[Experiment]) -> tuple[str, ...]:
-    """What every log holds beside the inverse-dynamics residual and this machine works out along the motion, or lacks.
+    """Channels that every log holds and the response along the motion gives beside efforts.
 
     It lacks the coordinates that effects would split off: where a log holds the deflection of a link or of a joint that
     the machine takes for rigid, it says zero.
@@ -140,7 +140,7 @@ def respond(
     known: Following | None = None,
     origin: Array | None = None,
 ) -> Response:
-    """Let a machine answer to a measured motion and to its commands.
+    """Response of a machine to a measured motion and to its commands.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def respond(
 
 @dataclass(frozen=True)
 class Asked:
-    """Model, parameters and record of which `respond` works out efforts and derivatives."""
+    """Model, parameters and record for a response along a motion."""
 
     model: Model
     theta: Array
@@ -196,7 +196,7 @@ class Asked:
 
 
 def _responded(ask: Asked, channels: Sequence[str]) -> Response:
-    """The sum of what the motion needs, of what the drives deliver, and of what shows of either."""
+    """Response along the motion as a sum: required efforts, drive efforts and other outputs."""
     model, own, hidden = ask.model, has_own_drives(ask.model), has_hidden(ask.model, ask.m.joints)
     if not own and not hidden:
         return _rigid(ask, channels)
@@ -228,7 +228,7 @@ def _rigid(ask: Asked, channels: Sequence[str]) -> Response:
 
 
 def _carried(ask: Asked) -> Pair:
-    """Effort that the motion needs at the joints, all of which were measured."""
+    """Required effort at the joints along the motion, all of which were measured."""
     part = ask.known.memo.once(("carried", ask.model.structure), partial(carried, ask.model))
     return ask.known.answer(part, ask.theta, ask.columns, partial(_required, part.model, ask.m))
 
@@ -239,7 +239,7 @@ def _required(model: Model, m: Motion, theta: Array, columns: Sequence[int]) -> 
 
 
 def _bent(ask: Asked, channels: Sequence[str]) -> Pair:
-    """Channels, then efforts at the measured joints, where links bend or joints move that nobody measures."""
+    """Outputs and joint efforts along the motion where links bend or unmeasured joints move."""
     known, origin, split = ask.known, ask.origin, None
     if not has_own_drives(ask.model):
         split = bending_of(ask.model, ask.m.joints, known)
@@ -265,17 +265,17 @@ def _bent(ask: Asked, channels: Sequence[str]) -> Pair:
 
 
 def read_where_bent(joints: Sequence[str], channels: Sequence[str]) -> tuple[str, ...]:
-    """Outputs that are read of a motion that is worked out, in their order."""
+    """Outputs read from a response with bending links, in their order."""
     return (*channels, *(f"{joint}.effort" for joint in joints))
 
 
 def bending_of(model: Model, joints: tuple[str, ...], known: Following, *, wound: bool | None = None) -> Bending | None:
-    """`vpm.identify.parts.bending`, built once for all models of one structure."""
+    """`vpm.identify.parts.bending`, built once for the responses of all models of one structure."""
     return known.memo.once(("bending", model.structure, joints, wound), partial(bending, model, joints, wound=wound))
 
 
 def _of_laws(ask: Asked, laws: Model, shell: Part, theta: Array, columns: Sequence[int]) -> Pair:
-    """Efforts of the laws of joints of a rigid machine (n, joints), and their derivative."""
+    """Efforts of joint laws along the motion of a rigid machine (n, joints), and their derivative."""
     efforts, slopes = _required(laws, ask.m, theta, columns)
     names = [laws.parameter_names[column] for column in columns]
     common = [place for place, name in enumerate(names) if name in shell.model.parameter_names]
@@ -286,19 +286,19 @@ def _of_laws(ask: Asked, laws: Model, shell: Part, theta: Array, columns: Sequen
 
 
 def _delivered(ask: Asked) -> Pair:
-    """Efforts of drives that follow from their commands, on the measured joints."""
+    """Efforts along the motion of drives without states, on the measured joints."""
     efforts, slopes = ask.model.core.delivered(ask.theta, ask.m.inputs, ask.m.dt, list(ask.columns))
     measured = [place for place, joint in enumerate(ask.model.joints) if joint in ask.m.joints]
     return ask.known.filtered(efforts[:, measured], slopes[:, measured])
 
 
 def shows_drives_alone(model: Model, channels: Sequence[str]) -> bool:
-    """Whether none of the channels is of anything but drives: a load cell, say, feels the machine as well."""
+    """Whether all given channels are responses of drives alone; a load cell also measures the machine."""
     return all(channel.rpartition(".")[0] in model.actuators for channel in channels)
 
 
 def _driven(ask: Asked, channels: Sequence[str]) -> Pair:
-    """Channels, then efforts at the measured joints, of drives with states of their own, which feel these alone."""
+    """Outputs and joint efforts along the motion of drives with states of their own."""
     model, joints = ask.model, ask.m.joints
     drives = None
     if shows_drives_alone(model, channels):
@@ -307,7 +307,7 @@ def _driven(ask: Asked, channels: Sequence[str]) -> Pair:
 
 
 def _one_by_one(ask: Asked, channels: Sequence[str], drives: Drives) -> Pair:
-    """Drives that do not feel each other, one after the other."""
+    """Response along the motion of drives that do not influence each other, one after the other."""
     start, m, rows = ask.theta if ask.origin is None else ask.origin, ask.m, len(channels)
     internal = first_drives(drives.bare.model, start[drives.bare.places], m, ask.experiment)
     answers = []
@@ -326,7 +326,7 @@ def _one_by_one(ask: Asked, channels: Sequence[str], drives: Drives) -> Pair:
 
 
 def _together(ask: Asked, channels: Sequence[str]) -> Pair:
-    """Drives of the machine as a whole, on the motion of all its joints."""
+    """Response along the motion of all drives of a machine together."""
     model, m = ask.model, ask.m
     motion = whole_motion(model, ask.experiment, ask.theta, m.cutoff) if has_hidden(model, m.joints) else m
     internal = first_drives(model, ask.theta, m, ask.experiment)
@@ -337,7 +337,7 @@ def _together(ask: Asked, channels: Sequence[str]) -> Pair:
 
 
 def _run(ask: Asked, part: Part, m: Motion, channels: Sequence[str], internal: Array, origin: Array | None) -> Pair:
-    """Channels, then efforts at all joints, of the drives of a part that begin in some states."""
+    """Outputs and joint efforts of one part's drives along the motion, from given first states."""
     known = ask.known
     work = partial(
         shown_and_efforts,
@@ -353,7 +353,7 @@ def _run(ask: Asked, part: Part, m: Motion, channels: Sequence[str], internal: A
 
 
 def _swung(model: Model, theta: Array, columns: Sequence[int], m: Motion, known: Following) -> Pair:
-    """Outputs of `guided`, with derivatives on fewer samples where gauges hold links: each costs as much as they do.
+    """Outputs of `guided` along the motion, with derivatives on fewer samples where gauges hold links.
 
     What rings freely would lose its phase by that.
     """
@@ -374,7 +374,7 @@ def _swung(model: Model, theta: Array, columns: Sequence[int], m: Motion, known:
 def guided(
     model: Model, theta: Array, m: Motion, columns: Sequence[int], known: Following
 ) -> tuple[Array, Array, Array]:
-    """Outputs along the motion of the measured joints, all else free or held by gauges, states, and derivative."""
+    """Outputs along the motion of the measured joints, with all else free or held by gauges; states, derivatives."""
     hold, coordinates = known.hold, len(model.coordinates)
     setup = Setup()
     measured = [place for place, joint in enumerate(model.joints) if joint in m.joints]

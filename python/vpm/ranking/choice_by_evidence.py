@@ -1,4 +1,4 @@
-"""Which of several effects that count comes in: they are weighed under one noise model, at their likely values."""
+"""Choice by evidence among several effects that count: they are weighed under one noise model."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vpm.ranking.tried_effect import Trial
 
 
 def weighed(counting: Sequence[Trial], fitter: Fitter) -> list[Trial]:
-    """The best of those that count, then the others, with the evidence that each adds under one noise model.
+    """Chosen effect, then its rivals, with the evidence that each adds under one noise model.
 
     What nobody can tell from each other is probable together. The best is the plainest one of the most probable class;
     a part of the machine comes before an instrument, and what a law contains before the law, if that may be enough or
@@ -44,13 +44,13 @@ def weighed(counting: Sequence[Trial], fitter: Fitter) -> list[Trial]:
 
 
 def as_good(trial: Trial, first: Trial, settings: Settings) -> bool:
-    """Whether it leaves no more than what the laws of the curves that either is a part of are wrong by."""
+    """Whether an effect is as good a choice as the first: the difference is within the errors of their laws."""
     told = (trial.judgement, first.judgement)
     return trial.left - first.left < max(one.removed * (settings.inexact / one.shape) ** 2 for one in told)
 
 
 def _rivals(counting: Sequence[Trial], settings: Settings) -> tuple[list[Trial], list[Trial]]:
-    """Those that count under the tracker of the best of them, the best first, and richer ones of the same curve.
+    """Effects to choose from under the tracker of the best one, and richer ones of the same curve.
 
     A richer one fits what the laws of a plainer one are wrong by, so that its evidence says nothing.
     """
@@ -65,24 +65,24 @@ def _rivals(counting: Sequence[Trial], settings: Settings) -> tuple[list[Trial],
 
 
 def _is_richer(trial: Trial, other: Trial, settings: Settings) -> bool:
-    """Whether an effect does the work of another one of the same curve with more numbers, and hardly better."""
+    """Whether an effect of the same curve has more numbers and is hardly better, so that it is not chosen."""
     alike = same_curve(trial.key, other.key) and trial.numbers > other.numbers
     return alike and as_good(other, trial, settings)
 
 
 def likely(fitted: Fitted, fitter: Fitter, noise: NoiseModel) -> Fitted:
-    """At the values that are most likely under the noise, about which evidence is told; others leave least power."""
+    """Fit at the most likely values under a noise model, where its evidence is computed."""
     cost = fitter.cost(fitted.structure, fitted.residual, noise)
     return fitter.finished(replace(fitted, cost=cost, ended=False), View(noise))
 
 
 def evidence(fitted: Fitted, fitter: Fitter, noise: NoiseModel) -> float:
-    """Evidence of a fit under a noise model, at the values that are most likely there, nats."""
+    """Evidence of a fit under a noise model, at its most likely values, nats."""
     return fitter.evidence(likely(fitted, fitter, noise), noise)
 
 
 def _with_evidence(several: Sequence[Trial], fitter: Fitter, noise: NoiseModel) -> tuple[list[Trial], list[Fitted]]:
-    """Trials with the evidence that each adds to what there is without it, and where they are most likely.
+    """Trials with the evidence that each adds, and their fits; those that diverge are left out.
 
     Those that run away from the records on the way there are left out.
     """
@@ -97,14 +97,14 @@ def _with_evidence(several: Sequence[Trial], fitter: Fitter, noise: NoiseModel) 
 
 
 def _credible(shares: Sequence[float], sure: float) -> list[int]:
-    """Places of the most probable ones that are as probable together, the credible set."""
+    """Credible set of the choice: indices of the most probable effects up to a total probability."""
     ordered = sorted(range(len(shares)), key=lambda place: -shares[place])
     before = np.cumsum([0.0, *(shares[place] for place in ordered)])
     return [place for place, sum_before in zip(ordered, before, strict=False) if sum_before < sure]
 
 
 def _most_probable(shares: Sequence[float], fits: Sequence[Fitted], fitter: Fitter, noise: NoiseModel) -> list[int]:
-    """Places of the most probable class of what the records do not tell apart."""
+    """Most probable class in the choice: indices of effects that the records do not discriminate."""
     settings = fitter.settings
     told = [fitter.log_density(fit, noise) for fit in fits]
     classes = [[place for place, other in enumerate(told) if apart(one, other) < settings.same] for one in told]

@@ -1,4 +1,4 @@
-"""First states that no channel shows: a tracker draws what is measured, and friction may hold the rest for long."""
+"""Hidden first states: no channel shows where unmeasured joints begin, and friction may hold them there."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ STEP = 1e-3
 
 
 def hidden_states(model: Model, channels: Sequence[str]) -> tuple[str, ...]:
-    """Positions and velocities of joints of which these channels tell no position; not of those that effects add.
+    """Hidden states of a model: positions and velocities of joints without a position channel.
 
     Of machines with closed loops none: first states next to one another would leave their loops open.
     """
@@ -31,7 +31,7 @@ def hidden_states(model: Model, channels: Sequence[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class Firsts:
-    """Unknown first states, record by record: by how much they differ from those of balance.
+    """Hidden first states of each record, as differences from equilibrium.
 
     Attributes
     ----------
@@ -47,7 +47,7 @@ class Firsts:
 
     @property
     def priors(self) -> dict[str, Prior]:
-        """What is known of each in each record."""
+        """Priors of the hidden first states in each record."""
         return {
             f"{state} where record {record + 1} begins": Prior(0.0, size, -np.inf, np.inf)
             for record in range(self.records)
@@ -55,7 +55,7 @@ class Firsts:
         }
 
     def added(self, model: Model, start: Array, moves: Array) -> Array:
-        """A first state (nx,) of a model with these moved by ``moves`` (len(states),)."""
+        """First state (nx,) of a model with the hidden ones moved by ``moves`` (len(states),)."""
         start = start.copy()
         start[[model.state_names.index(state) for state in self.states]] += moves
         return start

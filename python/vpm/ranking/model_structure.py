@@ -1,4 +1,4 @@
-"""A model with effects, and what is known of its parameters before the records."""
+"""Structure: a model with effects, parameter values, and priors of its unknown parameters."""
 
 from __future__ import annotations
 
@@ -24,17 +24,17 @@ OVERTONE = 0.02
 
 
 def sides_taken(model: Model, joint: str) -> set[Side]:
-    """Sides of a joint on which there are effects that may be on either."""
+    """Sides of a joint in a structure that hold effects with a choice of side."""
     return {effect.side for effect in model.effects if effect.at == joint and effect.type.has_sides}
 
 
 def approximate(model: Model) -> list[Effect]:
-    """Effects of a model whose laws are not exact."""
+    """Effects of a structure's model whose laws are not exact."""
     return [effect for effect in model.effects if not effect.type.exact]
 
 
 def without_sizes(model: Model, theta: Array, effects: Collection[Effect]) -> Array:
-    """Values of the parameters of a model where none of these effects of it does anything; shapes stay."""
+    """Parameter values of a structure at which some effects do nothing; shapes stay."""
     theta = theta.copy()
     for effect in effects:
         for short, name in effect.parameter_names.items():
@@ -46,7 +46,7 @@ def without_sizes(model: Model, theta: Array, effects: Collection[Effect]) -> Ar
 
 @dataclass(frozen=True, eq=False)
 class Structure:
-    """Effects in a model, the values of its parameters, and what is known of the unknown ones beforehand.
+    """Structure: effects in a model, parameter values, and priors of the unknown ones.
 
     Attributes
     ----------
@@ -75,19 +75,19 @@ class Structure:
     free_places: bool = True
 
     def place(self, name: str) -> int:
-        """Where a parameter, or a first state, stands among the values."""
+        """Index of a parameter or first state among a structure's values."""
         if name in self.model.parameters:
             return self.model.index(name)
         return len(self.model.theta) + self.firsts.index(name)
 
     def shows(self, key: Key) -> bool:
-        """Whether each shape of an effect lies inside of what the records can show."""
+        """Whether records can show each shape of an effect in a structure."""
         own = set(self.model.effect(*key, self.side(key)).parameter_names.values())
         values = {name: float(self.theta[self.model.index(name)]) for name in self.range_limited if name in own}
         return all(self.priors[name].low < value < self.priors[name].high for name, value in values.items())
 
     def is_overtone(self, key: Key) -> bool:
-        """Whether an effect repeats along a whole fraction of the period of another one at its place.
+        """Whether an effect's period in a structure is a whole fraction of another's at its place.
 
         A law that repeats along the way has one tone, and what it stands for has overtones: those are no other effect.
         """
@@ -97,54 +97,54 @@ class Structure:
         return any(round(ratio) > 1 and abs(ratio / round(ratio) - 1.0) < OVERTONE for ratio in ratios)
 
     def _period(self, effect: Effect) -> float:
-        """Of what repeats along the way; zero of what does not."""
+        """Period of an effect in a structure; zero without one."""
         name = effect.parameter_names.get("period")
         return 0.0 if name is None else abs(float(self.theta[self.model.index(name)]))
 
     @cached_property
     def columns(self) -> list[int]:
-        """Places of the unknown ones."""
+        """Indices of a structure's unknown parameters."""
         return [self.place(name) for name in self.priors]
 
     @cached_property
     def ends(self) -> Array:
-        """What is possible (k, 2), in deviations of the priors."""
+        """Bounds of a structure's unknown parameters (k, 2), in deviations of the priors."""
         return np.array([prior.ends for prior in self.priors.values()]).reshape(-1, 2)
 
     @cached_property
     def standard(self) -> Array:
-        """The unknown parameters in deviations of their priors (k,)."""
+        """Unknown parameters of a structure in deviations of their priors (k,)."""
         pairs = zip(self.priors.values(), self.columns, strict=True)
         return np.array([prior.standard(float(self.theta[column])) for prior, column in pairs])
 
     @cached_property
     def slopes(self) -> Array:
-        """Change of each unknown parameter by a deviation (k,)."""
+        """Change of each unknown parameter of a structure by one prior deviation (k,)."""
         pairs = zip(self.priors.values(), self.columns, strict=True)
         return np.array([prior.slope(float(self.theta[column])) for prior, column in pairs])
 
     def moves(self, names: Sequence[str]) -> Array:
-        """By how much each of these parameters may be moved for a difference (len(names),)."""
+        """Step of each parameter of a structure for a difference quotient (len(names),)."""
         slopes = dict(zip(self.priors, np.abs(self.slopes), strict=True))
         return MOVE * np.array([slopes[name] or 1.0 for name in names])
 
     @property
     def values(self) -> dict[str, float]:
-        """Unknown parameters by name, SI."""
+        """Unknown parameters of a structure by name, SI."""
         own = zip(self.priors, self.columns, strict=True)
         return {name: float(self.theta[column]) for name, column in own if name not in self.firsts}
 
     @property
     def repaired(self) -> Model:
-        """The model with its effects, at these values."""
+        """Model of a structure with its effects, at its values."""
         return self.model.with_parameters(self.values)
 
     def bare(self, effects: Collection[Effect]) -> Structure:
-        """The same where none of these effects of the model does anything; shapes stay."""
+        """Structure in which some effects do nothing; shapes stay."""
         return replace(self, theta=without_sizes(self.model, self.theta, effects), priors={})
 
     def at(self, standard: Array) -> Structure:
-        """With unknown parameters at these deviations of their priors, as far as they are possible."""
+        """Structure with unknown parameters at given prior deviations, within bounds."""
         inside = np.clip(standard, self.ends[:, 0], self.ends[:, 1])
         theta = self.theta.copy()
         for prior, column, z in zip(self.priors.values(), self.columns, inside, strict=True):
@@ -153,7 +153,7 @@ class Structure:
 
     @cached_property
     def leaning(self) -> list[tuple[int, int]]:
-        """Sizes of effects that do something, and the places beside them that may lie anywhere, among the unknown.
+        """Sizes of a structure's effects and location parameters that may lie anywhere, among the unknown.
 
         Of a spring records tell the stiffness, and the product of that and the place where it rests.
         """
@@ -167,7 +167,7 @@ class Structure:
         return found
 
     def moved(self, move: Array) -> Structure:
-        """With unknown parameters moved by deviations of their priors; products of sizes and places move straight."""
+        """Structure moved by prior deviations; products of size and location move linearly."""
         to, change = self.at(self.standard + move), move * self.slopes
         for size, place in self.leaning:
             before, where = (float(self.theta[self.columns[one]]) for one in (size, place))
@@ -177,7 +177,7 @@ class Structure:
         return to
 
     def carried(self, model: Model, renamed: Mapping[str, str] = MappingProxyType({})) -> Structure:
-        """The same in another model, as far as that has the parameters; some have new names there."""
+        """Structure carried to another model, for parameters that it has too."""
         names = {name: renamed.get(name, name) for name in self.model.parameter_names}
         kept = {name: new for name, new in names.items() if new in model.parameters}
         theta = np.concatenate([model.theta, self.theta[len(self.model.theta) :]])
@@ -189,7 +189,7 @@ class Structure:
         return Structure(model, theta, priors, self.effects, range_limited, self.firsts)
 
     def beside(self, joint: str, side: Side) -> Structure:
-        """The same with what rubs, pulls or stops at a joint on one of its sides."""
+        """Structure with friction, springs or stops of a joint on one of its sides."""
         content, renamed = self.model.to_dict(), {}
         for entry, effect in zip(content["effects"], self.model.effects, strict=True):
             if effect.at == joint and effect.type.has_sides:
@@ -200,11 +200,11 @@ class Structure:
         return self.carried(model, renamed)
 
     def side(self, key: Key) -> Side:
-        """On which side of its joint an effect is."""
+        """Side of its joint on which an effect of a structure is."""
         return next(effect.side for effect in reversed(self.model.effects) if (effect.name, effect.at) == key)
 
     def without(self, key: Key) -> Structure:
-        """The same without one of its effects.
+        """Structure without one of its effects.
 
         Raises
         ------
@@ -215,7 +215,7 @@ class Structure:
         return replace(rest, effects=tuple(effect for effect in self.effects if effect != key))
 
     def with_last_of(self, other: Structure) -> Structure:
-        """The same with the last effect of another structure, as it is there.
+        """Structure with the last effect of another structure added.
 
         Raises
         ------

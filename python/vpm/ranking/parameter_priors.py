@@ -1,4 +1,4 @@
-"""What is known of parameters before the fit: as the model file says, and in natural sizes read off the records."""
+"""Priors of parameters before a ranking's fit: from the model file, or natural sizes of the records."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LEAST = 1e-9
 
 
 class Sizes:
-    """How large what the records show is, by joint and transmission: effort, speed and way."""
+    """Natural sizes for priors by joint and transmission: effort, speed and way in the records."""
 
     def __init__(self, model: Model, data: InverseDynamicsProblem) -> None:
         self.model = model
@@ -56,11 +56,11 @@ class Sizes:
                 self.readings[sensor] = 0.5 * float(np.ptp(np.concatenate(shown)))
 
     def moves(self, site: str) -> bool:
-        """Whether a joint or a transmission is seen to move."""
+        """Whether a joint or a transmission moves in the records, so that its priors have a size."""
         return site in self.moving
 
     def prior(self, candidate: Candidate, parameter: EffectParameter, value: float) -> Prior:
-        """Prior of a parameter of an effect that begins at ``value``."""
+        """Prior of an effect's parameter that starts at ``value``."""
         low, high = candidate.bounds.get(parameter.name, parameter.physical)
         size = self._size(candidate.site, parameter)
         neutral = np.nan if parameter.shape or parameter.neutral is None else parameter.neutral
@@ -81,7 +81,7 @@ class Sizes:
         return sizes.get(parameter.scale, parameter.typical)
 
     def _shown(self, site: str) -> tuple[float, float, float]:
-        """Effort, speed and way at a site; the largest of all joints where it is at none of them."""
+        """Effort, speed and way at a site for its priors; the largest of all joints for other sites."""
         if (joint := joint_at(self.model, site) or site) in self.joints:
             return self.joints[joint]
         effort, speed, way = np.max(list(self.joints.values()), axis=0)
@@ -93,7 +93,7 @@ def _strength(values: Array) -> float:
 
 
 def stated(model: Model) -> dict[str, Prior]:
-    """What the model file says of its parameters."""
+    """Priors of a model's parameters as its file states them."""
     return {
         p.name: Prior(p.value, p.uncertainty, p.minimum, p.maximum)
         for p in model.parameters.values()
@@ -102,7 +102,7 @@ def stated(model: Model) -> dict[str, Prior]:
 
 
 def known(model: Model, data: InverseDynamicsProblem) -> dict[str, Prior]:
-    """What the model file says of its parameters, and the speeds at which its dry friction turns round.
+    """Priors of a model as its file states them, and of the transition velocities of its dry friction.
 
     Nobody knows these, and a wrong one leaves a gap at every reversal, where the finer effects live.
     """

@@ -1,4 +1,4 @@
-"""Fits of many proposals, of which those are given up that cannot win."""
+"""Fits of many proposals in a race: those that cannot win are given up."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from vpm.ranking.tried_effect import is_part
 
 
 def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: SideBySide) -> list[Fitted]:
-    """Fits of proposals that may win.
+    """Fits of the proposals that may win the race.
 
     Each has to gain what makes it worth while. The most promising one is fitted first, and another one has to save a
     share of the cost that this one saved (O. Maron and A. Moore, *Advances in Neural Information Processing Systems* 6,

@@ -1,4 +1,4 @@
-"""What a model is most probably missing, by one criterion."""
+"""Rank the effects that a model is most probably missing, by one criterion."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def rank(
     tell: Callable[[str], None] | None = None,
     progress: Progress | None = None,
 ) -> Ranking:
-    """Order what ``model`` could be missing by what it removes of the error, and add the best for as long as it counts.
+    """Rank what ``model`` could be missing by the error that it removes; add the best effect as long as it counts.
 
     Every structure, the model with some effects, is kept on the records by a slow tracker, and fitted to what that
     leaves of two thirds of each record. What decides is the error power that an effect removes, there and from the

@@ -1,4 +1,4 @@
-"""Structures that grow by one effect at a time."""
+"""Search of a ranking: structures grow by one effect at a time."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ SMOOTH = ("first_order", "cubic")
 
 
 class Search:
-    """Structures that grow by one effect at a time."""
+    """Search of a ranking over structures that grow by one effect at a time."""
 
     def __init__(
         self,
@@ -62,7 +62,7 @@ class Search:
         self.others: dict[Key, list[Structure]] = {}  # what counted as well when an effect came in
 
     def run(self, held_out: TrackedRecords) -> Ranking:
-        """See `rank`."""
+        """Run the search of a ranking, see `rank`."""
         self.say("fitting what is uncertain")
         looks = self._looks(self.start)
         self.first = {look.fitted.tracker.band: look for look in looks}
@@ -114,7 +114,7 @@ class Search:
         return Ranking(effects, tuple(rounds), found.repaired, recalibrated, left, interrupted, hold)
 
     def _held(self, looks: list[Look], best: Trial | None) -> list[Look]:
-        """The same under commands that run on from sample to sample, where no effect does as well; else none.
+        """Search again with commands that change between samples, where no effect does as well; else none.
 
         Commands that are held for a sample come half a sample late. A spring takes nearly all of that back, with three
         numbers more, and may leave less because it answers to noise otherwise: samples have to be more probable by it.
@@ -146,7 +146,7 @@ class Search:
         return self._all_looks(self._look(fitted))
 
     def _looks(self, structure: Structure, known: Look | None = None) -> list[Look]:
-        """A structure under each tracker that can follow it, that which is known first.
+        """Looks of the search at a structure under each tracker that can follow it.
 
         A slow tracker may lose what hangs behind a contact, or let a leg fall over. What it leaves then says nothing.
 
@@ -174,12 +174,12 @@ class Search:
         return Look(fitted, self.fitter, self.first.get(fitted.tracker.band))
 
     def _fitted(self, structure: Structure, tracker: Tracker) -> Fitted:
-        """A structure fitted to the end, its channels in the sizes of what it leaves at first."""
+        """Fit of a structure to the end in the search, with channels scaled by their first residual."""
         view = View(self.fitter.noise_of(structure, tracker))
         return self.fitter.finished(self.fitter.fitted(structure, tracker, view), view)
 
     def _round(self, looks: Sequence[Look]) -> tuple[Trial | None, list[Trial]]:
-        """The best effect more, if one counts, and all that were tried."""
+        """Round of the search: the best additional effect, if one counts, and all that were tried."""
         tried: list[Trial] = []
         counting: list[Trial] = []
         for look in (look for look in looks if look.has_room()):
@@ -202,7 +202,7 @@ class Search:
     def _at_several_places(
         self, looks: list[Look], best: Trial | None, tried: Sequence[Trial]
     ) -> tuple[list[Look], list[tuple[Ranked, ...]]]:
-        """With one effect at several places, each counting beside the others, where no effect alone does as well."""
+        """Search round with one effect at several places, where no effect alone does as well."""
         room = self.settings.effects - len(looks[0].fitted.structure.effects)
         if best is not None and not best.look.has_room(best.fitted):
             return looks, []
@@ -220,22 +220,22 @@ class Search:
         return looks, []
 
     def _is_likelier(self, trial: Trial, other: Trial) -> bool:
-        """Whether records are clearly more probable by one fit than by another one under the same observer."""
+        """Whether a fit of the search is clearly more probable than another one under the same tracker."""
         noise = fitted_noise(trial.fitted.residual, self.fitter.tracked.parts, self.settings.order)
         told = [evidence(one.fitted, self.fitter, noise) for one in (trial, other)]
         return told[0] - told[1] > self.settings.odds
 
     def _beside_others(self, key: Key, look: Look) -> Trial:
-        """An effect of a structure, judged against the same without it."""
+        """Effect of a searched structure, judged against the structure without it."""
         return Trial.of(look.fitted, self._without(key, look), key)
 
     def _tried(self, look: Look) -> list[Trial]:
-        """The most promising effects, fitted under one tracker."""
+        """Most promising effects of a search round, fitted under one tracker."""
         chosen = proposals(look, self.fitter, self.data, self.extensions, self.each, self.names)
         return [Trial.of(fitted, look, ended=False) for fitted in raced(chosen, look, self.fitter, self.each)]
 
     def _finished(self, tried: Sequence[Trial]) -> list[Trial]:
-        """Those of one tracker that are worth it and leave little, fitted to the end."""
+        """Fits of one tracker in a search round that are worth it, finished to the end."""
         worth = [t for t in tried if t.judgement.removed > self.settings.worth and t.fitted.structure.shows(t.key)]
         if not worth:
             return []
@@ -253,7 +253,7 @@ class Search:
         return [end for end in ends if isinstance(end, Trial)]
 
     def _detours(self, fitted: Fitted, view: View) -> list[Fitted]:
-        """Where a fit of an effect that splits a joint ends if it goes on from where a faster tracker leads it.
+        """Fits of a splitting effect in the search, continued from where a faster tracker leads.
 
         A slow tracker lets what hangs behind a play go its own way, so that few of its impacts are in step with those
         of the record, and fits end in many places. A fast one holds it in step (H. Abarbanel, *Predicting the Future*,
@@ -269,7 +269,7 @@ class Search:
             return []
 
     def _out_of_a_dead_end(self, last: Trial, looks: list[Look]) -> list[Look]:
-        """Without the last effect, if all that it did was to help a fit of the others out of a dead end."""
+        """Search without its last effect, if that only led the fit of others out of a dead end."""
         try:
             bare = self._without(last.key, looks[0])
         except ASTRAY:
@@ -281,7 +281,7 @@ class Search:
         return self._all_looks(bare)
 
     def _reconsidered(self, key: Key, looks: list[Look]) -> tuple[list[Look], tuple[Ranked, ...]]:
-        """Without an earlier effect that a later one has made needless, or with a better one in its place.
+        """Search with an earlier effect dropped or replaced by a better one.
 
         What was found before the others came in was fitted to what they leave, too. A fast tracker hides what a slow
         one shows: an effect that counts under any of them stays.
@@ -300,13 +300,13 @@ class Search:
         return self._all_looks(bare[0]), ()
 
     def _without(self, key: Key, look: Look) -> Look:
-        """The same without one of its effects, fitted anew under its tracker."""
+        """Searched structure without one effect, fitted again under its tracker."""
         return self._look(self._fitted(look.fitted.structure.without(key), look.fitted.tracker))
 
     def _exchanged(
         self, now: Trial, counting: Sequence[Trial], looks: list[Look]
     ) -> tuple[list[Look], tuple[Ranked, ...]]:
-        """With the best of those that count in the place of an effect, which may be that one itself."""
+        """Searched structure with the best counting effect in the place of another, or that one itself."""
         ordered = [now] if list(counting) == [now] else weighed(counting, self.fitter)
         if ordered[0].key == now.key:
             return looks, ()
@@ -314,7 +314,7 @@ class Search:
         return self._all_looks(self._look(ordered[0].fitted)), self._listed(ordered[0], ordered)
 
     def _in_its_place(self, look: Look, others: Sequence[Structure]) -> list[Trial]:
-        """The last effects of other structures here; those that leave little, fitted to the end."""
+        """Last effects of other structures in the place of a searched one, fitted."""
 
         def one_fitted(other: Structure) -> Trial:
             structure, view = look.fitted.structure.with_last_of(other), View(look.view.noise)
@@ -325,7 +325,7 @@ class Search:
         return self._finished([end for end in ends if isinstance(end, Trial)])
 
     def _listed(self, best: Trial | None, tried: Sequence[Trial]) -> tuple[Ranked, ...]:
-        """All effects that were tried, what was added first, then those that leave least."""
+        """All effects that the search tried: accepted ones, then by the error that they leave."""
         several: dict[Key, Ranked] = {}
         told = [trial for trial in tried if np.isfinite(trial.evidence)]
         gains = [trial.evidence - self.settings.odds for trial in told]
@@ -361,7 +361,7 @@ def _removing(trial: Trial) -> str:
 
 
 def _is_worse(now: Sequence[Look], before: Sequence[Look]) -> bool:
-    """Whether as many effects as before, or fewer, leave more of the records than those did, fitted and held back."""
+    """Whether a searched structure with no more effects leaves more of fitted and held-back records."""
     fewer = len(now[0].fitted.structure.effects) <= len(before[0].fitted.structure.effects)
     same = [look for look in before if look.fitted.tracker == now[0].fitted.tracker]
     return fewer and any(now[0].judged(look.fitted).least > 0.0 for look in same)

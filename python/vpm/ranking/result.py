@@ -1,4 +1,4 @@
-"""What a ranking gives back."""
+"""Result of a ranking."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vpm.simulate.setup import HOLDS
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Ranked(Storable):
-    """An effect that was tried.
+    """Ranked effect in the result: it was tried, and judged.
 
     Attributes
     ----------
@@ -53,18 +53,18 @@ class Ranked(Storable):
 
     @property
     def key(self) -> tuple[str, str]:
-        """Effect and site."""
+        """Effect and site of a ranked effect."""
         return self.effect, self.site
 
     @property
     def place(self) -> str:
-        """Site and side in words."""
+        """Site and side of a ranked effect in words."""
         return in_words(self.site, self.side)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Gap(Storable):
-    """Root mean square of what a slow tracker leaves of a channel of validation records, at each stage.
+    """Error in the result of a ranking: root mean square of a tracked validation channel at each stage.
 
     Attributes
     ----------
@@ -93,13 +93,13 @@ class Gap(Storable):
     explained: float = float("nan")
 
     def is_within_laws(self, settings: Settings) -> bool:
-        """Whether what is left is less than what the laws of the model may be wrong by: no effect could count there."""
+        """Whether a channel error in a ranking result is within the errors of the model's laws."""
         return self.after <= settings.slight * self.explained
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Ranking(Result):
-    """What a model is missing, in the order in which it was found.
+    """Ranking result: the effects that a model is missing, in the order in which they were found.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ class Ranking(Result):
 
     @property
     def left(self) -> dict[str, float]:
-        """By joint, or what else has a channel, the share of the error power of validation records that effects leave.
+        """Share of validation error power that ranked effects leave, by joint or other owner of a channel.
 
         Of its channel that they explain best.
         """
@@ -141,7 +141,7 @@ class Ranking(Result):
         return found
 
     def is_within_laws(self, settings: Settings) -> bool:
-        """Whether nothing more could be told to be missing of validation records, in none of their channels."""
+        """Whether all channel errors of a ranking result are within the errors of laws."""
         return bool(self.gaps) and all(gap.is_within_laws(settings) for gap in self.gaps.values())
 
     def _headline(self) -> Mapping[str, object]:

@@ -1,4 +1,4 @@
-"""Every number that decides in a ranking."""
+"""Settings of a ranking: every number that decides."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ OVERTONE = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Numbers that decide.
+    """Settings that decide in a ranking.
 
     Attributes
     ----------

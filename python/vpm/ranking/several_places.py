@@ -1,4 +1,4 @@
-"""One effect at several places at once: what one drive lacks, drives of its kind may all lack."""
+"""One effect at several places at once: drives of one kind may all lack the same effect."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from vpm.ranking.tried_effect import Trial
 
 
 def alike(tried: Sequence[Trial], most: int, fitter: Fitter, each: SideBySide) -> list[Trial]:
-    """Effects at all places where each was tried, ``most`` at a time, fitted together; what leaves least comes first.
+    """Fits of one effect at several places together, ``most`` effects at a time, by the error that they leave.
 
     Joints that move each other hide such an effect from each other: a command that is late at one drive alone asks the
     next drive for a force that nobody logged.
@@ -47,7 +47,7 @@ def alike(tried: Sequence[Trial], most: int, fitter: Fitter, each: SideBySide) -
 
 
 def _joined(group: Sequence[Trial]) -> Structure:
-    """The effects of several trials in one structure, each with the values of its own fit.
+    """Structure with one effect at several places, each with the values of its own fit.
 
     Where that led nowhere they begin at a size that is nothing unusual, one deviation of what is known of them.
     """

@@ -1,4 +1,4 @@
-"""Where a fit of an effect begins, beside what the candidates of the catalogue say."""
+"""Start values of a ranking's fits, beside those of the catalogue's candidates."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vpm.ranking.settings import LOSS, PLACES
 
 
 def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
-    """A candidate whose contacts begin closed and stiff, where a fit can see them, and whose waves may be long."""
+    """Candidate with start values for a ranking: closed stiff contacts, and long waves too."""
     ends = dict(candidate.bounds)
     if "period" in ends and candidate.site in sizes.ways:
         # One wave on all of the way that is seen: a longer one is a slope.
@@ -32,7 +32,7 @@ def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
 
 
 def _placed(candidate: Candidate, sizes: Sizes) -> Candidate:
-    """With several starts of its place where an effect has one that may lie anywhere, such as where a spring rests.
+    """Candidate with several start values of a location parameter, such as where a spring rests.
 
     An effect without size does not feel its place, so that a first step gives it a size and leaves the place: a spring
     that rests far away pulls nearly the same everywhere.
@@ -47,12 +47,12 @@ def _placed(candidate: Candidate, sizes: Sizes) -> Candidate:
 
 
 def _backlash(start: Mapping[str, float]) -> Mapping[str, float]:
-    """What rubs within the gap is friction, not the contact."""
+    """Start values of a backlash: friction acts within the gap, its contact is closed."""
     return {**start, "contact_damping": start["damping"], "damping": 0.0}
 
 
 def _stop(start: Mapping[str, float], site: str, model: Model, sizes: Sizes) -> Mapping[str, float]:
-    """Stiff enough to turn the fastest motion round on the way that is seen beyond the end."""
+    """Start values of an end stop: stiff enough to reverse the fastest motion on the way seen beyond it."""
     low, high, speed = sizes.ways[site][0], sizes.ways[site][1], sizes.joints[site][1]
     beyond = max(high - start.get("high", high), start.get("low", low) - low, 1e-3 * (high - low))
     stiffness = moved(model, site) * (speed / beyond) ** 2

@@ -1,4 +1,4 @@
-"""Structures with an effect more."""
+"""Extensions of a structure by one effect."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ _Kind = tuple[Key, Side, frozenset[str]]
 
 
 class Extensions:
-    """Structures with an effect more, in models that are made and checked once for all start values of an effect.
+    """Extensions of structures by one effect; their models are built once for all start values.
 
     Parameters
     ----------
@@ -33,7 +33,7 @@ class Extensions:
         self._made: WeakKeyDictionary[Model, dict[_Kind, Model]] = WeakKeyDictionary()
 
     def extended(self, structure: Structure, candidate: Candidate, start: Mapping[str, float], side: Side) -> Structure:
-        """A structure with one more effect, on one side of a joint that is split.
+        """Extension of a structure by one effect, on one side of a joint that is split.
 
         What splits a joint takes the friction and the like that was there to that side.
 
@@ -72,7 +72,7 @@ class Extensions:
 
 
 def sides_of(candidate: Candidate, model: Model) -> tuple[Side, ...]:
-    """Sides of a joint on which an effect may sit, or what it splits there may stay."""
+    """Sides of a joint for an extension: where the effect sits, or where other effects stay after a split."""
     site = candidate.site
     if candidate.effect.splits:
         return SIDES if sides_taken(model, site) else SIDES[:1]

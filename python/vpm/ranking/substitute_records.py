@@ -1,4 +1,4 @@
-"""What records show of machines whose efforts nobody can balance: with closed loops, or drives by their own samples."""
+"""Substitute records for machines without inverse dynamics: closed loops opened, sampled drives idle."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PLACES = ("joint", "line", "transmission")
 
 
 def why_unbalanced(model: Model) -> str:
-    """Why no efforts follow from a motion, or ""."""
+    """Why a machine needs substitute records, because no efforts follow from its motion, or ""."""
     if model.loops:
         return f"the closed loops ({', '.join(model.loops)}) share efforts among them"
     for name in model.actuators:
@@ -31,12 +31,12 @@ def why_unbalanced(model: Model) -> str:
 
 
 def shown(model: Model, tracked: TrackedRecords) -> InverseDynamicsProblem:
-    """Motion and efforts that records show: where efforts cannot be balanced, a stand-in that is as large."""
+    """Motion and efforts of the records, or those of substitute records that are as large."""
     return StandIn(model, tracked) if why_unbalanced(model) else InverseDynamicsProblem(model, tracked.experiments)
 
 
 class StandIn(InverseDynamicsProblem):
-    """Records of a machine with its loops open, all joints measured, and nothing where drives go by their own samples.
+    """Problem on substitute records: loops opened, all joints measured, sampled drives without effort.
 
     Motions are those of the machine, and efforts as large as its inertia needs. That is enough for natural sizes and
     for where fits begin, and nothing is judged by it.
@@ -61,7 +61,7 @@ class StandIn(InverseDynamicsProblem):
 
 
 def opened(model: Model) -> Model:
-    """A machine with its loops open and drives without effort at the joints that these moved."""
+    """Substitute machine: its loops are opened, and drives without effort act at the freed joints."""
     if not why_unbalanced(model):
         return model
     content = model.to_dict()
@@ -79,17 +79,17 @@ def opened(model: Model) -> Model:
 
 
 def _opened_at(model: Model, theta: Array) -> Model:
-    """The same at other values of the parameters."""
+    """Substitute machine at other values of the parameters."""
     return opened(model.with_parameters(dict(zip(model.parameter_names, theta.tolist(), strict=True))))
 
 
 def _idle(joint: str) -> str:
-    """Name of a drive without effort."""
+    """Name of an idle drive in a substitute machine."""
     return f"{joint}_idle"
 
 
 def _completed(model: Model, tracked: TrackedRecords) -> list[Experiment]:
-    """Records with the positions of all joints: those that no channel tells as a tracker has them."""
+    """Substitute records with positions of all joints; a tracker estimates unmeasured ones."""
     if not model.loops:
         return list(tracked.experiments)
     fast = Tracker(max(tracked.settings.bands), fine=False)

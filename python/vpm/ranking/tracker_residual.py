@@ -1,4 +1,4 @@
-"""What a tracker leaves of records, as a problem whose residual all stages of a model share."""
+"""Tracker residual: the error that a tracker leaves of records, as a fit problem for all stages of a model."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 
 
 class TrackerResidual:
-    """Readings less outputs of a model that a tracker keeps on records, without what it makes of the first state.
+    """Tracker residual: readings minus outputs of a tracked model, after its first state is forgotten.
 
     Parameters
     ----------
@@ -34,12 +34,12 @@ class TrackerResidual:
         self.blocks: tuple[Block, ...] = tuple(self._blocks(sizes))
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
-        """Residual, shape (n,), and its derivative by the named parameters, shape (n, len(columns))."""
+        """Tracker residual, shape (n,), and its derivative by the named parameters, shape (n, len(columns))."""
         residual, slopes = self.tracked.follow(model, theta, self._tracker, list(columns))
         return self._stacked(residual), self._stacked(slopes)
 
     def _stacked(self, values: Array) -> Array:
-        """Channels (N, m, ...) of one record after the other, weighted."""
+        """Channels (N, m, ...) of the tracker residual, stacked and weighted."""
         channels = range(values.shape[1])
         return np.concatenate([values[rows, place] * self._weights[place] for rows in self._rows for place in channels])
 
@@ -57,7 +57,7 @@ class TrackerResidual:
 
 
 def _settled(tracked: TrackedRecords) -> list[slice]:
-    """Samples of each record among those of all, from where its first state is forgotten."""
+    """Samples of each record in the tracker residual, from where its first state is forgotten."""
     parts, ends = tracked.whole().parts, np.cumsum([len(record.time) for record in tracked.records])
     return [
         slice(min(part.start for part in parts if part.stop > end - len(record.time)), int(end))

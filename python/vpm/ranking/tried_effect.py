@@ -1,4 +1,4 @@
-"""An effect that was tried beside what had been found."""
+"""Tried effect: its fit beside a structure, and its judgement."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from vpm.ranking.look import Look
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """An effect beside what was found, under one tracker."""
+    """Trial of an effect beside a structure, under one tracker."""
 
     key: Key
     fitted: Fitted
@@ -25,43 +25,43 @@ class Trial:
 
     @classmethod
     def of(cls, fitted: Fitted, look: Look, key: Key | None = None, *, ended: bool = True) -> Trial:
-        """One of the effects of a structure, the last one if not told; of a fit that has ``ended``, or only begun."""
+        """Trial from the fit of a structure, of its last effect by default; the fit has ``ended`` or only begun."""
         key = key or fitted.structure.effects[-1]
         return cls(key, fitted, look, look.judged(fitted, key, ended=ended))
 
     @property
     def counts(self) -> bool:
-        """Whether it is shown, and does more than chance and more than what laws are wrong by."""
+        """Whether a tried effect counts: beyond chance and beyond errors of laws."""
         return self.fitted.structure.shows(self.key) and self.judgement.counts(self.look.settings)
 
     @property
     def splits(self) -> bool:
-        """Whether it splits a joint."""
+        """Whether a tried effect splits a joint."""
         now, before = (one.structure.model.added_joints for one in (self.fitted, self.look.fitted))
         return len(now) > len(before)
 
     @property
     def left(self) -> float:
-        """Share of the error power that it leaves."""
+        """Share of the error power that a tried effect leaves."""
         return 1.0 - self.judgement.removed
 
     @property
     def label(self) -> str:
-        """``effect at site``."""
+        """Label of a tried effect: ``effect at site``."""
         return " at ".join(self.key)
 
     @property
     def is_instrument(self) -> bool:
-        """Whether it is a fault of a sensor, and none of the machine."""
+        """Whether a tried effect is an error of a sensor, not of the machine."""
         return EFFECTS[self.key[0]].site == "sensor"
 
     def contains(self, other: Trial) -> bool:
-        """Whether it is the other effect at some values of its parameters."""
+        """Whether a tried effect contains another one at some values of its parameters."""
         return is_part(self.look.fitted.structure.model, other.key, self.key)
 
     @property
     def order(self) -> tuple[bool, int, int]:
-        """Which comes first where records cannot tell: parts of the machine, then the plainest, then the commonest.
+        """Order of tried effects that records do not discriminate: machine before sensors, then the simplest.
 
         The catalogue lists commoner effects first.
         """
@@ -69,11 +69,11 @@ class Trial:
 
     @property
     def numbers(self) -> int:
-        """How many are unknown in it."""
+        """Number of unknown parameters of a tried effect."""
         return len(self.fitted.structure.priors)
 
 
 def is_part(model: Model, plainer: Key, richer: Key) -> bool:
-    """Whether an effect is what a richer one is at some values of its parameters, at its joint or that of its body."""
+    """Whether an effect is contained in a richer one that was tried at its joint or that of its body."""
     (name, site), (other, place) = plainer, richer
     return name in EFFECTS[other].contains and (site == place or model.joint_of_body(place) == site)

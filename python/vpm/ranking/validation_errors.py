@@ -1,4 +1,4 @@
-"""Errors of a model on validation records."""
+"""Errors of a model on validation records, as a tracker leaves them."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 
 def gaps(held_out: TrackedRecords, stages: tuple[Model, Model, Model], band: float) -> dict[str, Gap]:
-    """By channel what a tracker of this bandwidth (Hz) leaves of validation records, of three stages of a model.
+    """Validation errors by channel under a tracker of this bandwidth (Hz), at three stages of a model.
 
     Parameters
     ----------
@@ -58,7 +58,7 @@ def gaps(held_out: TrackedRecords, stages: tuple[Model, Model, Model], band: flo
 
 
 def _left(tracked: TrackedRecords, model: Model, theta: Array, band: float) -> Array:
-    """What is left of each channel (N, m); NaN where the model runs away."""
+    """Residual of validation records by channel (N, m); NaN where the model diverges."""
     try:
         residual, _ = tracked.follow(model, theta, Tracker(band))
     except ASTRAY:
@@ -69,7 +69,7 @@ def _left(tracked: TrackedRecords, model: Model, theta: Array, band: float) -> A
 def _shares(
     rivals: tuple[Array, Array], after: Array, parts: Parts, filters: Sequence[Structured]
 ) -> tuple[Array, Array]:
-    """Share of the power above the noise of each channel (m,) that is left, and the noise.
+    """Share of validation error power above noise by channel (m,), and the noise.
 
     Of what the better one of two rivals leaves: the model without effects, and masses on which nothing acts. What does
     no better than these, which follow the record because a tracker draws them along, explains no motion.

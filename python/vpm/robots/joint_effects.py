@@ -1,4 +1,4 @@
-"""Effects that other descriptions of robots have as a number of a joint: damping, friction, stiffness."""
+"""Joint effects that robot files give as a number: damping, friction, stiffness."""
 
 from __future__ import annotations
 
@@ -7,6 +7,6 @@ from vpm.catalogue.traits import Plain
 
 
 def plain_effect(plain: Plain) -> tuple[str, str]:
-    """Name of the effect of the catalogue that is one of them, and of the parameter that is its number."""
+    """Joint effect of the catalogue that a robot file gives as one number, and its parameter."""
     effect = next(one for one in EFFECTS.values() if one.plain == plain)
     return effect.name, effect.parameters[0].name

@@ -1,4 +1,4 @@
-"""Names of a robot as names that a model file takes, each once."""
+"""Names of a robot's parts, changed to what a model file takes, each once."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ _RESERVED = ("world", "time")
 
 @dataclass
 class Names:
-    """Names that are given, and notes of those that had to be changed."""
+    """Names of robot parts given so far, and notes of those that had to be changed."""
 
     taken: set[str] = field(default_factory=lambda: set(_RESERVED))
     notes: list[str] = field(default_factory=list)
 
     def of(self, what: str, name: str, suffixes: Sequence[str] = ("",)) -> str:
-        """Name in a model file of what the robot calls so.
+        """Model-file name for a robot's name.
 
         Parameters
         ----------
@@ -43,11 +43,11 @@ class Names:
         return wanted
 
     def joint(self, name: str, kind: JointType) -> str:
-        """Name of a joint, with those of its coordinates."""
+        """Model-file name for a robot's joint, with those of its coordinates."""
         return self.of("joint", name, SUFFIXES[kind])
 
     def made(self, name: str) -> str:
-        """Name of something that the file does not name itself, so that no note is due."""
+        """Model-file name of a part without a name in the robot file; it needs no note."""
         before = len(self.notes)
         given = self.of("part", name)
         del self.notes[before:]

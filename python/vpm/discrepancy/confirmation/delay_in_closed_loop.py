@@ -27,7 +27,7 @@ def timed_in_closed_loop(
     simulation: OutputErrorProblem | None,
     bounds: Mapping[str, tuple[float, float]],
 ) -> tuple[Timed | None, ClosedLoopPrediction | None]:
-    """A delay fitted to samples in motion, within the interval of a prediction of training records if there is one.
+    """Delay fitted in motion, narrowed by the interval of a closed-loop prediction of training records.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def timed_in_closed_loop(
 def gain_in_closed_loop(
     model: Model, free: Sequence[str], late: ClosedLoopPrediction, simulation: OutputErrorProblem
 ) -> Gain | None:
-    """Gain of a delay in simulations of validation records, each model with the parameters of its own prediction.
+    """Validation gain of a delay in closed-loop simulations, each model with the parameters of its own prediction.
 
     A transition of friction that is too wide imitates the delay in a simulation without it, and doubles it with it.
     None where the model without it has no prediction.

@@ -1,4 +1,4 @@
-"""Delays of drives and instruments, fitted to samples at which every joint is clearly in motion.
+"""Delays of drives and instruments, fitted to samples in motion: every joint moves clearly.
 
 At a reversal a joint with dry friction sticks for a while, and filtered samples do not show when it breaks away. The
 residual there is several times as large as elsewhere, and looks like a delay. A delay fitted to all samples is often
@@ -35,7 +35,7 @@ TOLERANCE = 1e-6
 
 
 class InMotion:
-    """An inverse-dynamics residual of which only samples count at which every joint is clearly in motion."""
+    """Inverse-dynamics residual of the samples in motion, on which a delay is fitted."""
 
     mode = InverseDynamicsProblem.mode
 
@@ -43,14 +43,14 @@ class InMotion:
         self.data, self.blocks, self.counted = data, data.blocks, in_motion(data)
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
-        """See `vpm.identify.problem.Problem`."""
+        """Residual in motion, see `vpm.identify.problem.Problem`."""
         residual, jacobian = self.data.evaluate(model, theta, columns)
         return self.counted * residual, self.counted[:, None] * jacobian
 
 
 @dataclass(frozen=True)
 class Timed:
-    """An effect that was timed in motion.
+    """Delay that was fitted in motion, with its interval.
 
     Attributes
     ----------
@@ -65,7 +65,7 @@ class Timed:
 
 
 def is_dry(model: Model) -> bool:
-    """Whether a joint of a model can stick."""
+    """Whether a joint of a model has dry friction and can stick, so that delays are fitted in motion."""
     return any(effect.type.sticks for effect in model.effects)
 
 
@@ -75,7 +75,7 @@ def is_late(effect: EffectType, model: Model) -> bool:
 
 
 def in_motion(problem: InverseDynamicsProblem) -> Array:
-    """1 for samples at which every joint is clearly in motion as far as the filters reach, else 0, shape (n,)."""
+    """Mask of samples in motion: 1 where every joint moves clearly as far as the filters reach, else 0, shape (n,)."""
     speeds = [np.abs(m.velocity) for m in problem.motions]
     largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
     counted = np.zeros(sum(block.time.size for block in problem.blocks))
@@ -132,7 +132,7 @@ def _near(
 
 
 def _shown(model: Model, free: Sequence[str], problem: InMotion, own: Sequence[str]) -> list[str]:
-    """Free parameters that samples in motion show, and those of the delay."""
+    """Free parameters that samples in motion identify, and those of the delay."""
     columns = [model.index(name) for name in free]
     _, whole = problem.data.evaluate(model, model.theta, columns)
     shares = np.sum((problem.counted[:, None] * whole) ** 2, axis=0) / column_lengths(whole) ** 2

@@ -1,4 +1,4 @@
-"""Friction close to rest, judged by closed-loop predictions of the model.
+"""Friction near rest, judged by closed-loop predictions of the model.
 
 Such friction acts for milliseconds while a joint breaks away. The filter of a measured motion smears that instant, so
 the inverse-dynamics residual hardly shows it and takes part of it for friction at small speeds. In closed loop a
@@ -47,7 +47,7 @@ SIZES = (0.1, 0.4, 1.6)
 
 @dataclass(frozen=True)
 class Support:
-    """What records say of the change from one run of a model to another.
+    """Support of records for friction near rest: share of the change between two predictions.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ class Support:
 
 
 def needs_prediction(current: Judged, data: Data, probe: Probe) -> bool:
-    """Whether a candidate acts close to rest, is possible, and the model can say by itself what it does there.
+    """Whether a candidate is friction near rest that a closed-loop prediction has to judge.
 
     Links that bend and drives with states take too long for that.
     """
@@ -75,7 +75,7 @@ def needs_prediction(current: Judged, data: Data, probe: Probe) -> bool:
 
 
 def prediction_without(current: Judged, data: Data) -> ClosedLoopPrediction | None:
-    """The model at hand, run along the training records; None if it cannot follow its references."""
+    """Closed-loop prediction without friction near rest; None if the model cannot follow its references."""
     if data.simulation is None:
         return None
     try:
@@ -87,7 +87,7 @@ def prediction_without(current: Judged, data: Data) -> ClosedLoopPrediction | No
 def judged_by_prediction(
     current: Judged, data: Data, before: ClosedLoopPrediction, thresholds: Thresholds, probe: Probe
 ) -> Trial | str:
-    """A trial of friction close to rest that closed-loop predictions show, or why they do not.
+    """Trial of friction near rest that closed-loop predictions support, or reasons of refusal.
 
     Parameters
     ----------
@@ -108,7 +108,7 @@ def judged_by_prediction(
 
 
 def _refused(answer: Support, probe: Probe, thresholds: Thresholds) -> str:
-    """Why friction close to rest is not accepted by its prediction, or "".
+    """Reason to refuse friction near rest by its closed-loop prediction, or "".
 
     The model creeps where a machine sticks, so that as much is asked of a run as of what explains a modest part only.
     """
@@ -127,7 +127,7 @@ def _refused(answer: Support, probe: Probe, thresholds: Thresholds) -> str:
 
 
 def support_of(before: ClosedLoopPrediction, trial: Trial, data: Data) -> Support | None:
-    """Run a model with the effect of a trial, and ask all records for the change from the run ``before`` to that.
+    """Support of all records for friction near rest: the change from the run ``before`` to one with the effect.
 
     None if there is no such run that fits the training records better.
     """
@@ -151,7 +151,7 @@ def support_of(before: ClosedLoopPrediction, trial: Trial, data: Data) -> Suppor
 
 
 def is_supported(before: ClosedLoopPrediction, trial: Trial, data: Data, thresholds: Thresholds) -> bool:
-    """Whether closed-loop predictions of validation records support an effect of the size that the residual says.
+    """Whether validation records support friction near rest of the size that the residual gives.
 
     Training records do not count: the friction was fitted to them and may imitate a part of the delay.
 
@@ -181,7 +181,7 @@ def is_supported(before: ClosedLoopPrediction, trial: Trial, data: Data, thresho
 
 
 def _fitted_trial(current: Judged, trial: Trial, answer: Support, data: Data) -> Trial:
-    """The trial with its refit near the values of the predictions, and with their gain on the validation records."""
+    """Trial of friction near rest, refitted near its predicted values, with the validation gain of predictions."""
     own = [name for name in answer.run.free if name not in current.free]
     values = {name: answer.run.estimated(name) for name in own}
     model = current.model
@@ -205,13 +205,13 @@ def _fitted_trial(current: Judged, trial: Trial, answer: Support, data: Data) ->
 
 
 def _with_effect(model: Model, candidate: Candidate, values: dict[str, float]) -> Model:
-    """A model with friction close to rest, of which the sign changes with the speed as that of its Coulomb friction."""
+    """Model with friction near rest whose sign changes with speed as its Coulomb friction does."""
     transition = model.parameters[f"{candidate.site}.friction.transition_velocity"].value
     return model.with_effect(*candidate.key, transition_velocity=transition).with_parameters(values)
 
 
 def _starts(before: ClosedLoopPrediction, trial: Trial) -> list[tuple[float, Model]]:
-    """Models with which a fit may begin and how ill they fit, the best first, of those that fit better than without."""
+    """Start models for the fit of friction near rest that beat the model without it, the best first."""
     candidate, model = trial.probe.candidate, before.model
     size, fades = _own_names(candidate.site)
     balance = trial.judged.model.parameters
@@ -234,7 +234,7 @@ def _own_names(site: str) -> tuple[str, str]:
 
 
 def gain_of_predictions(before: ClosedLoopPrediction, after: ClosedLoopPrediction) -> Gain:
-    """Share of the change between two predictions of the same records that the error of the first one supports."""
+    """Gain by predictions of friction near rest: the share of their change that the first error supports."""
     apart, score = part(against(before, after))
     _, noise, _ = least(after.spectra())
     left = [

@@ -1,4 +1,4 @@
-"""The low-frequency part of a residual, in which errors of single impacts in a backlash average out.
+"""Low-frequency part of a residual, in which errors of single impacts in a backlash average out.
 
 Simulated flights along a measured motion miss the moment and the size of single impacts, because errors accumulate
 between elastic contacts. These errors dominate the residual of a model with backlash and hide smaller effects. The mean
@@ -20,12 +20,12 @@ AVERAGED = 0.25
 
 
 def has_impacts(model: Model) -> bool:
-    """Whether links hit their contacts in it, in which single impacts are known less well than their mean."""
+    """Whether links of a model hit contacts, so that only the low-frequency residual is reliable."""
     return any(effect.type.has_play for effect in model.effects)
 
 
 def low_frequency(problem: InverseDynamicsProblem, residual: Array) -> Array:
-    """A residual averaged over ``AVERAGED`` twice, each channel of each record by itself."""
+    """Low-frequency residual: averaged over ``AVERAGED`` twice, each channel of each record by itself."""
     from scipy.ndimage import uniform_filter1d
 
     averaged = residual.copy()

@@ -1,4 +1,4 @@
-"""Closed-loop predictions of two models, compared where the inverse-dynamics residual leaves two answers open.
+"""Comparison of closed-loop predictions of two models where the inverse-dynamics residual leaves two answers open.
 
 The residual covers a few hertz along a filtered, noisy motion. Where a joint sticks, one reversal may outweigh all
 else. A closed-loop prediction is compared at every frequency with the noise that is left there
@@ -30,7 +30,7 @@ WORTH_A_FIT = 10.0
 
 @dataclass(frozen=True)
 class Comparison:
-    """What records say of the change from one run of a model to another.
+    """Comparison of two closed-loop predictions: support of training and validation records for the change.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Comparison:
     better: float
 
     def sure(self, thresholds: Thresholds) -> bool:
-        """Whether both sets of records support all of the change, beyond chance and what models leave out."""
+        """Whether both sets of records support the change between two predictions beyond chance and model errors."""
         return self.better > 0.0 and all(
             LEAST_SUPPORT <= gained.weight <= 1.0 / LEAST_SUPPORT
             and gained.score >= MODEST_FACTOR * thresholds.score(gained.pieces)
@@ -57,13 +57,13 @@ class Comparison:
 
 
 def can_predict(model: Model, data: Data) -> bool:
-    """Whether a model can be asked: in closed loop, with nothing in it that takes long or falls into chaos."""
+    """Whether a model can be compared by closed-loop prediction: in closed loop, fast enough, not chaotic."""
     closed = data.simulation is not None and data.simulation.mode == "closed_loop"
     return closed and not bends(model) and not has_own_drives(model) and not has_impacts(model)
 
 
 def predicted(judged: Judged, data: Data) -> ClosedLoopPrediction | None:
-    """A fitted model as it is, run along the training records; None if it cannot follow its references."""
+    """Closed-loop prediction of training records by a fitted model as it is; None if it cannot follow."""
     if data.simulation is None or not can_predict(judged.model, data):
         return None
     try:
@@ -73,7 +73,7 @@ def predicted(judged: Judged, data: Data) -> ClosedLoopPrediction | None:
 
 
 def fitted_prediction(run: ClosedLoopPrediction, data: Data) -> ClosedLoopPrediction | None:
-    """A run with the parameters that suit the training records best."""
+    """Closed-loop prediction with the parameters that fit the training records best, for a comparison."""
     if data.simulation is None:
         return None
     try:
@@ -83,7 +83,7 @@ def fitted_prediction(run: ClosedLoopPrediction, data: Data) -> ClosedLoopPredic
 
 
 def compared(first: ClosedLoopPrediction, second: ClosedLoopPrediction, data: Data) -> Comparison | None:
-    """Support of all records for the change from one run to another; None where one of them diverges."""
+    """Comparison of two predictions on all records; None where one of them diverges."""
     if data.simulation is None:
         return None
     try:
@@ -97,5 +97,5 @@ def compared(first: ClosedLoopPrediction, second: ClosedLoopPrediction, data: Da
 
 
 def criterion(run: ClosedLoopPrediction) -> float:
-    """Information criterion of a run: minus the logarithm of its likelihood, and what each fitted number costs."""
+    """Information criterion of a prediction: negative log-likelihood, and a cost for each fitted number."""
     return misfit(run) + 0.5 * len(run.free) * float(np.log(max(run.left.size, 2)))

@@ -1,4 +1,4 @@
-"""Delay or lag of a drive, discriminated by the response to the reference alone.
+"""Reference response: delay or lag of a drive, discriminated by the closed-loop response to the reference alone.
 
 A delay and a lag of one time constant differ in second order only. Feedback disturbs the inverse-dynamics residual by
 more than that: within the filter's band the command reacts to the disturbances that remain in the residual. The
@@ -34,7 +34,7 @@ ODDS = 2.0
 
 @dataclass(frozen=True)
 class Verdict:
-    """What the reference says of two models.
+    """Verdict of the reference response on two models.
 
     Attributes
     ----------
@@ -52,7 +52,7 @@ class Verdict:
 
     @property
     def evidence(self) -> float:
-        """Logarithm of how many times as likely the data are with the first model as with the second.
+        """Log-likelihood ratio of two models by their reference responses.
 
         No model is exact: beside the noise there is what it leaves out, of a size that nobody knows. With as much of
         it as of noise, give or take, an error has Student's distribution with one degree of freedom (a normal one of
@@ -62,19 +62,19 @@ class Verdict:
         return float(np.log1p(self.second**2) - np.log1p(self.first**2))
 
     def prefers_first(self, odds: float = ODDS) -> bool:
-        """Whether the data make the first model more likely by more than the odds of the second, known beforehand."""
+        """Whether the reference response makes the first model more likely beyond the prior odds."""
         return self.evidence > float(np.log(odds))
 
 
 class Runs:
-    """Models along their references, as well as each can, each worked out once; all but the first beside another."""
+    """Reference responses of models, each fitted and computed once; all but the first start beside another."""
 
     def __init__(self, data: Data) -> None:
         self.data = data
         self._known: list[tuple[Judged, ClosedLoopPrediction | None]] = []
 
     def __call__(self, judged: Judged) -> ClosedLoopPrediction | None:
-        """The run of a model; None where it cannot follow its references."""
+        """Reference response of a model; None where it cannot follow its references."""
         for known, run in self._known:
             if known is judged:
                 return run
@@ -95,7 +95,7 @@ class Runs:
 
 
 def compare_driven(first: Judged, second: Judged, data: Data, runs: Runs | None = None) -> Verdict | None:
-    """Let two models run the records by themselves, as well as each can, and ask which of them did what was measured.
+    """Compare two models by their reference responses, each with its best parameters.
 
     The part of the difference to the rival in the error of one model is estimated together with changes of its fitted
     parameters: 0 for a right model, 1 if its rival is right. None where one of them cannot follow its references. With
@@ -111,12 +111,12 @@ def compare_driven(first: Judged, second: Judged, data: Data, runs: Runs | None 
 
 
 def against(mine: ClosedLoopPrediction, rival: ClosedLoopPrediction) -> Spectra:
-    """Transforms of what one run leaves, of the gap to its rival, and of its slopes."""
+    """Spectra of a reference response: its error, the difference to its rival, and its derivatives."""
     return spectra(mine.model, mine.problem, np.column_stack([mine.left, mine.left - rival.left, mine.slopes]))
 
 
 def inexact(run: ClosedLoopPrediction) -> Spectra | None:
-    """Transforms of the share of each reading that no model of oil is exact to; None of drives without states.
+    """Spectra of the model error that oil drives cause in a reference response; None without drive states.
 
     A motion of a few hertz is far above noise. Pressures depend on how a held command changes within a sample, how a
     valve shuts and how much oil pipes hold. That exceeds the difference of a delay and a lag there.
@@ -133,7 +133,7 @@ def inexact(run: ClosedLoopPrediction) -> Spectra | None:
 
 
 def part(transforms: Spectra, floor: Spectra | None = None) -> tuple[float, float]:
-    """Size of the rival's gap beside the parameters, and its part in what is left, both in standard deviations.
+    """Size of the difference of two reference responses, and its part in the error, in standard deviations.
 
     ``floor`` is what no model is exact to, see `inexact`.
     """

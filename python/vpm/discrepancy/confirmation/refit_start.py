@@ -1,4 +1,4 @@
-"""Start values for the refit of a candidate: the recalibrated parameters, or those of the model file.
+"""Start values for the refit with a candidate: the recalibrated parameters, or those of the model file.
 
 A drive with states integrates its command. Without an effect of that command, a recalibration can only weaken the
 drive: it softens the oil and closes the valve, up to the bounds of the prior. From there the true values lie behind a
@@ -19,7 +19,7 @@ from vpm.model import Model
 
 
 def nearer_start(start: Model, added: Sequence[str], known: Sequence[str], data: InverseDynamicsProblem) -> Model:
-    """The start, or the same with the ``known`` parameters of the model file, if that leaves less of the records.
+    """Start of a refit: recalibrated, or with the ``known`` parameters of the model file if that fits better.
 
     Where nothing of the drives changes, or they have no states, a fit is linear enough to end at one place from both.
 
@@ -43,7 +43,7 @@ def nearer_start(start: Model, added: Sequence[str], known: Sequence[str], data:
 
 
 def _left(model: Model, data: InverseDynamicsProblem) -> float:
-    """Sum of squares that a model leaves; infinite where it cannot follow the motion."""
+    """Sum of squares at a start of the refit; infinite where the model cannot follow the motion."""
     try:
         residual, _ = data.evaluate(model, model.theta)
     except DivergedError:

@@ -1,4 +1,4 @@
-"""Why a candidate is not accepted, in words with numbers."""
+"""Refusal of a candidate: the reason in words with numbers."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ LEAST_SCREENED = 0.005
 
 @dataclass(frozen=True)
 class Thresholds:
-    """What an effect has to show.
+    """Thresholds below which an effect is refused.
 
     Attributes
     ----------
@@ -61,21 +61,21 @@ class Thresholds:
     interval: float
 
     def score(self, pieces: int) -> float:
-        """Least standard deviations of validation gain, by Student's t with one degree of freedom less than pieces."""
+        """Threshold of the validation gain, in standard deviations by Student's t for so few pieces."""
         return float(stdtrit(max(1, pieces - 1), 1.0 - FALSE_ALARM_LEVEL / max(1, self.candidates)))
 
     def needed(self, validation: Gain, *, supported: bool = False) -> float:
-        """Standard deviations that a gain has to have: more where most of the residual stays and no run supports it."""
+        """Standard deviations of gain below which an effect is refused; more where most of the residual stays."""
         modest = validation.relative < MODEST_GAIN and not supported
         return self.score(validation.pieces) * (MODEST_FACTOR if modest else 1.0)
 
     def met(self, validation: Gain) -> bool:
-        """Whether a gain is worth a name, and sure."""
+        """Whether a gain meets the thresholds: it is large enough and sure."""
         return validation.relative >= WORTH_A_NAME and validation.score >= self.needed(validation)
 
 
 def refuse_probe(probe: Probe) -> str:
-    """Reason to drop a candidate after screening, or ""."""
+    """Reason of refusal after screening, or ""."""
     if not probe.free:
         if probe.held:
             partners = ", ".join(dict.fromkeys(alias.partner for alias in probe.held))
@@ -92,7 +92,7 @@ def refuse_probe(probe: Probe) -> str:
 
 
 def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
-    """Reason not to accept a refitted candidate, or ""."""
+    """Reason of refusal of a refitted candidate, or ""."""
     reasons = (
         _too_short(trial, thresholds.interval),
         _no_way(trial),
@@ -109,12 +109,12 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
 
 
 def impossible_trial(trial: Trial, interval: float) -> str:
-    """Reason for which an effect is none, whatever its gain, or ""."""
+    """Reason of refusal of an effect whose estimates are physically impossible, whatever its gain, or ""."""
     return _too_short(trial, interval) or _no_way(trial) or _creeps(trial) or _trifling_size(trial)
 
 
 def refuse_ringing(share: float, trial: Trial) -> str:
-    """Reason not to accept a candidate under which links ring less with the noise of the measured motion, or "".
+    """Reason of refusal of a candidate that only lowers the ringing of links with measurement noise, or "".
 
     ``share`` of the mean square of noise alone goes with that, by simulation.
     """
@@ -129,7 +129,7 @@ def refuse_ringing(share: float, trial: Trial) -> str:
 
 
 def explains_most(trial: Trial) -> bool:
-    """Whether a delay explains so much that it is named even where the times of samples leave it open.
+    """Whether a delay explains so much that uncertain sample times are no reason of refusal.
 
     Where there are peers on its clock, a shift of all commands tells what is physics.
     """
@@ -139,7 +139,7 @@ def explains_most(trial: Trial) -> bool:
 
 
 def refuse_timing(timed: Gain, shift: float, thresholds: Thresholds, *, beside: float) -> str:
-    """Reason not to accept a candidate that does no more than a shift of the commands within the sampling interval.
+    """Reason of refusal of a candidate that does no more than shifted commands within a sampling interval.
 
     Parameters
     ----------
@@ -170,7 +170,7 @@ def _impossible(probe: Probe, name: str) -> str:
 
 
 def _too_short(trial: Trial, interval: float) -> str:
-    """A delay or lag below one sampling interval that explains little is as well a matter of how commands are logged.
+    """Refusal of a delay or lag below one sampling interval: how commands are logged may explain it.
 
     The hold is that of all commands. Where one of several drives or instruments has a delay and the others have none,
     `refuse_timing` judges it beside a shift of them all, if it explains more than an imitation would. The time of a
@@ -193,13 +193,13 @@ def _too_short(trial: Trial, interval: float) -> str:
 
 
 def has_peers(model: Model, site: str) -> bool:
-    """Whether a drive is one of several, or an instrument of a joint's position one of several, on one clock."""
+    """Whether several drives, or several position sensors, share one clock, so that a delay of one is no refusal."""
     encoders = {model.sensor_of(f"{joint}.position") for joint in model.joints} - {None}
     return any(site in group and len(group) > 1 for group in (set(model.actuators), encoders))
 
 
 def _no_way(trial: Trial) -> str:
-    """A hysteresis that turns round within the way of one sample is dry friction, as far as the data can see.
+    """Refusal of a hysteresis that turns round within the way of one sample: it is dry friction.
 
     So is one within the way of two, unless its way is clearly longer than that of one. If the joint's dry friction is
     fitted beside it and it explains most of the remaining error, the data discriminate the two: joints reverse slowly,
@@ -225,7 +225,7 @@ def _no_way(trial: Trial) -> str:
 
 
 def _creeps(trial: Trial) -> str:
-    """A spring in series that its damper holds back does not deflect: it slips as a fluid coupling does."""
+    """Refusal of a spring in series whose damper holds it: it creeps as a fluid coupling does."""
     candidate, model = trial.probe.candidate, trial.judged.model
     if not candidate.effect.winds_up:
         return ""
@@ -241,7 +241,7 @@ def _creeps(trial: Trial) -> str:
 
 
 def _trifling_gain(trial: Trial) -> str:
-    """An instrument that would be right within what no instrument and no model of its link is better than.
+    """Refusal of a sensor error that is smaller than any sensor or link model is accurate to.
 
     A gain scales whatever else of its signal the model has not quite right, and imitates some of it.
     """
@@ -260,7 +260,7 @@ def _trifling_gain(trial: Trial) -> str:
 
 
 def _trifling_size(trial: Trial) -> str:
-    """An instrument's gain that is none.
+    """Refusal of a sensor gain that is nearly one.
 
     An effort may be the small difference of large readings, as of the pressures on both sides of a piston. A small
     error of a gain then leaves a large error of the effort; a gain that explains most of it is accepted.
@@ -298,7 +298,7 @@ def _not_clear(trial: Trial) -> str:
 
 
 def _only_impacts(trial: Trial) -> str:
-    """Beside a backlash: a right law also helps low frequencies, where impacts hardly show."""
+    """Refusal beside a backlash of an effect that does not help at low frequencies, without impacts."""
     if trial.low_frequency is None or trial.low_frequency.relative >= -LEAST_GAIN:
         return ""
     return (
@@ -308,7 +308,7 @@ def _only_impacts(trial: Trial) -> str:
 
 
 def low_frequency_shows_it(trial: Trial, thresholds: Thresholds) -> bool:
-    """Whether low frequencies, and not they alone, show an effect that single impacts of a backlash cover."""
+    """Whether low frequencies support an effect that impacts of a backlash hide, which would be refused."""
     validation, sure = trial.validation, NORMAL_95_ONE_SIDED
     whole = validation.relative >= LEAST_GAIN and validation.score >= sure
     return trial.low_frequency is not None and whole and thresholds.met(trial.low_frequency)
@@ -340,7 +340,7 @@ def _only_reversals(trial: Trial) -> str:
 
 
 def worse_in_simulation(trial: Trial) -> str:
-    """Why the simulation speaks against a trial, or ""."""
+    """Reason of refusal by the simulation: the trial predicts it worse; or ""."""
     if trial.diverged:
         return f"with it the simulation of the validation record fails: {trial.diverged}"
     simulated = trial.simulated
@@ -357,13 +357,13 @@ def worse_in_simulation(trial: Trial) -> str:
 
 
 def parameter_text(model: Model, name: str, std: float) -> str:
-    """``name = value ± std unit``."""
+    """Parameter in the text of a refusal: ``name = value ± std unit``."""
     parameter = model.parameters[name]
     return f"{name} = {parameter.value:.5g} ± {std:.2g} {parameter.unit}"
 
 
 def _moves(what: str, change: Gain, little: str = "") -> str:
-    """``lowers the validation error by 3.00 % of its mean square (0.2 to 0.197)``, or raises it, as its numbers say."""
+    """Text of a refusal: ``lowers the validation error by 3.00 % of its mean square (0.2 to 0.197)``, or raises it."""
     numbers = f"of its mean square ({short(change.before)} to {short(change.after)})"
     if change.relative < 0.0:
         return f"raises {what} by {percent(-change.relative)} {numbers}"

@@ -1,4 +1,4 @@
-"""Sensor errors, judged by the predicted reading of the sensor itself.
+"""Sensor prediction: sensor errors are judged by the predicted reading of the sensor itself.
 
 Along a measured motion no load changes the output of a drive. A constant force and the offset of a pressure gauge may
 therefore leave the same torque residual. The reading of the gauge itself follows from the commands and discriminates
@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 def preferred_sensor(chosen: Trial, equals: Sequence[Trial], data: Data) -> Trial:
-    """Of what explains the data as well as ``chosen``, the instrument whose own reading supports it; else ``chosen``.
+    """Sensor error whose predicted reading supports it, of trials as good as ``chosen``; else ``chosen``.
 
     On training and on validation records it has to predict its channel clearly better than ``chosen`` does, by as much
     as is worth a name, and to leave no more of all channels together.

@@ -1,4 +1,4 @@
-"""Closed-loop predictions of a model, fitted to records by the Whittle likelihood.
+"""Whittle likelihood: closed-loop predictions of a model are fitted to records by it, frequency by frequency.
 
 The inverse-dynamics residual covers a few hertz and takes the measured motion as given. It confuses stiction with
 delay, and delay with lag. A closed-loop prediction along the reference confuses neither, provided its own parameters
@@ -52,7 +52,7 @@ LEAP, TRIES, SHORTER = 3.0, 3, 0.4
 
 @dataclass(frozen=True)
 class ClosedLoopPrediction:
-    """Closed-loop prediction of records by a model.
+    """Closed-loop prediction of records by a model, fitted by the Whittle likelihood.
 
     Attributes
     ----------
@@ -74,11 +74,11 @@ class ClosedLoopPrediction:
     slopes: Array
 
     def spectra(self) -> Spectra:
-        """Transforms of what is left and of the slopes."""
+        """Spectra of the prediction error and of its derivatives."""
         return spectra(self.model, self.problem, np.column_stack([self.left, self.slopes]))
 
     def estimated(self, name: str) -> tuple[float, float]:
-        """A fitted parameter, and its standard deviation: infinite where nothing in the run depends on it."""
+        """Parameter fitted by Whittle likelihood, and its standard deviation: infinite without influence."""
         _, _, rows = least(self.spectra())
         lengths, place = column_lengths(rows[:, 1:]), self.free.index(name)
         if not np.any(rows[:, 1 + place]):
@@ -95,7 +95,7 @@ def fit_prediction(
     setup: Setup,
     beside: ClosedLoopPrediction | None = None,
 ) -> ClosedLoopPrediction:
-    """Prediction of a model, its free parameters fitted to records; they begin at those of one ``beside`` it.
+    """Fit the free parameters of a closed-loop prediction by Whittle likelihood, starting from one ``beside`` it.
 
     Where links bend, which takes a hundred times as long, they stay those of the residual. Derivatives by what both
     have are those of the run ``beside`` until a step is made.
@@ -116,7 +116,7 @@ def fit_prediction(
 
 
 def spectra(model: Model, problem: OutputErrorProblem, columns: Array) -> Spectra:
-    """Transforms of columns over all samples, for the readings of each joint and its drives (frequencies, k, columns).
+    """Spectra of prediction-error columns over all samples, for each joint and its drives (frequencies, k, columns).
 
     A command is what the controller made of readings, and is left out.
     """
@@ -132,7 +132,7 @@ def spectra(model: Model, problem: OutputErrorProblem, columns: Array) -> Spectr
 
 
 def _read_with(model: Model, channel: str) -> str:
-    """What a reading goes with: of a drive with states of its own the joint that it moves."""
+    """Joint with whose readings another reading shares its noise spectrum: that which its drive moves."""
     owner = channel.rpartition(".")[0]
     if owner in model.actuators:
         return model.joints_of_actuator(owner)[0]
@@ -142,7 +142,7 @@ def _read_with(model: Model, channel: str) -> str:
 def weighted(
     spectrum: NDArray[np.complex128], left: NDArray[np.complex128], inexact: NDArray[np.complex128] | None = None
 ) -> Array:
-    """Real and imaginary parts relative to the noise, whose spectrum is the mean of what is left near a frequency.
+    """Spectra weighted by the noise near each frequency, as real and imaginary parts for the Whittle likelihood.
 
     What no model is exact to, ``inexact``, adds to it where it is given, at the very frequency and to each reading.
 
@@ -156,7 +156,7 @@ def weighted(
 
 
 def misfit(run: ClosedLoopPrediction, left: Array | None = None) -> float:
-    """Minus the logarithm of the likelihood of what a run leaves, but for a constant, if that is noise.
+    """Negative Whittle log-likelihood of a prediction error, but for a constant.
 
     With what another run of these records would leave instead, as if that model were as linear in the known parameters
     and they suited it best.
@@ -173,7 +173,7 @@ def misfit(run: ClosedLoopPrediction, left: Array | None = None) -> float:
 def _noise(
     left: NDArray[np.complex128], inexact: NDArray[np.complex128] | None = None
 ) -> tuple[Array, NDArray[np.complex128]]:
-    """Deviations (f, readings) of the noise at each frequency, and the triangle of what its readings share there."""
+    """Noise spectrum for the Whittle likelihood: deviations (f, readings), and the triangle that readings share."""
     readings = left.shape[1]
     power = left[:, :, None] * left[:, None, :].conj()
     length = max(FEWEST * readings, int(SMOOTHED * len(power)))
@@ -191,7 +191,7 @@ def _noise(
 
 
 def least(transforms: Spectra, inexact: Spectra | None = None) -> tuple[Array, Spectra, Array]:
-    """The change that makes the first column least by all others, the noise that is left then, and weighted rows.
+    """Least-squares change of the parameters, remaining noise spectrum and weighted rows.
 
     ``inexact`` is what no model is exact to, see `weighted`.
     """
@@ -206,7 +206,7 @@ def least(transforms: Spectra, inexact: Spectra | None = None) -> tuple[Array, S
 
 
 def _like(model: Model, free: Sequence[str], beside: ClosedLoopPrediction) -> Model:
-    """A model with the parameters of another one's run; a time that only one of them has is that of the other."""
+    """Model with the parameters of another closed-loop prediction; a delay that only one has stays."""
     theirs = beside.model.parameters
     values = {name: theirs[name].value for name in free if name in beside.free}
     mine = [name for name in free if name not in beside.free]
@@ -223,7 +223,7 @@ def predict(
     setup: Setup,
     beside: ClosedLoopPrediction | None = None,
 ) -> ClosedLoopPrediction:
-    """Prediction of a model with the parameters that it has; see `fit_prediction` for what is ``beside`` it.
+    """Closed-loop prediction with a model's own parameters; see `fit_prediction` for ``beside``.
 
     Raises
     ------
@@ -243,7 +243,7 @@ def _with_slopes(
     setup: Setup,
     beside: ClosedLoopPrediction | None = None,
 ) -> ClosedLoopPrediction:
-    """A run with its derivatives, which are worth few digits: no shorter steps, and those that are known ``beside`` it.
+    """Closed-loop prediction with derivatives by coarse steps; those known ``beside`` it are reused.
 
     Each takes as long as the run itself, and models of which one is a little later or slower share all but their own.
     """
@@ -259,7 +259,7 @@ def _with_slopes(
 
 
 def _fine(model: Model, free: Sequence[str], records: Sequence[Experiment], setup: Setup) -> Setup:
-    """Steps as short as the time constants of a model need."""
+    """Integration steps of a prediction, as short as the model's time constants need."""
     times = [model.parameters[name] for name in free]
     shortest = min((time.value for time in times if time.unit == "s" and time.value > 0.0), default=np.inf)
     interval, steps = max(record.dt for record in records), DRY_STEPS if is_dry(model) else STEPS
@@ -267,7 +267,7 @@ def _fine(model: Model, free: Sequence[str], records: Sequence[Experiment], setu
 
 
 def _step(run: ClosedLoopPrediction, setup: Setup) -> ClosedLoopPrediction | None:
-    """A better run, or None where none is near."""
+    """Better prediction after one Gauss-Newton step of the Whittle fit, or None."""
     step, noise, rows = least(run.spectra())
     cost = float(rows[:, 0] @ rows[:, 0])
     if cost - float(np.sum((rows[:, 0] + rows[:, 1:] @ step) ** 2)) < WORTH_A_STEP:
@@ -288,7 +288,7 @@ def _step(run: ClosedLoopPrediction, setup: Setup) -> ClosedLoopPrediction | Non
 
 
 def _moved(run: ClosedLoopPrediction, step: Array) -> dict[str, float]:
-    """Values after a step, within their bounds and within a leap of what they were if they cannot be negative."""
+    """Parameters after a Gauss-Newton step of the Whittle fit, within bounds and a largest factor."""
     values = {}
     for name, change in zip(run.free, map(float, step), strict=True):
         parameter = run.model.parameters[name]

@@ -1,4 +1,4 @@
-"""Noise of a measured motion that rings in flexible links: not white in the residual, and no missing physics.
+"""Ringing of flexible links by noise of the measured motion: not white in the residual, and no missing physics.
 
 Its size follows from simulations of the model with noise like that of the records; see
 `vpm.discrepancy.noise.noise_floor`.
@@ -23,7 +23,7 @@ NOISE_ONLY = 1.2
 
 
 def noise_alone(model: Model, data: Data, validation: Array) -> bool:
-    """Whether links bend and the ``validation`` residual is no more than the noise that rings in them."""
+    """Whether the ``validation`` residual of flexible links is no more than ringing by noise."""
     if not bends(model) or data.simulation is None:
         return False
     allowed = _ringing(model, data)
@@ -31,7 +31,7 @@ def noise_alone(model: Model, data: Data, validation: Array) -> bool:
 
 
 def only_ringing(current: Judged, data: Data, trial: Trial) -> str:
-    """Why a trial that would be accepted only damps what noise makes ring, or ""."""
+    """Why a trial only damps the ringing of links by noise, or ""."""
     if data.simulation is None or not bends(current.model) or not trial.probe.candidate.effect.damps:
         return ""
     before, after = _ringing(current.model, data), _ringing(trial.judged.model, data)
@@ -42,7 +42,7 @@ def only_ringing(current: Judged, data: Data, trial: Trial) -> str:
 
 
 def _ringing(model: Model, data: Data) -> dict[str, float]:
-    """Root mean square that noise of the records leaves of a model's own simulation, by channel."""
+    """Root mean square ringing by noise of the records in a model's own simulation, by channel."""
     if data.simulation is None:
         return {}
     nothing = np.zeros(data.validation.blocks[-1].samples.stop)

@@ -1,4 +1,4 @@
-"""The frequency band of the motion: forces that depend on the motion are in it, noise of accelerations above."""
+"""Frequency band of the motion: forces that depend on the motion lie in it, noise of accelerations above it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ WHOLE = 0.9
 
 
 def motion_band(problem: InverseDynamicsProblem, model: Model) -> float:
-    """Frequency in Hz below which the efforts of all records and joints have nearly all of their power.
+    """Upper frequency of the motion band, Hz: efforts of all records have nearly all of their power below it.
 
     The noise of the residual comes from twice differentiated positions, so it grows with the square of the frequency.
     In a mean over all frequencies it hides what follows the motion; in this band it may not.
@@ -35,7 +35,7 @@ def motion_band(problem: InverseDynamicsProblem, model: Model) -> float:
 
 
 def below(problem: InverseDynamicsProblem, values: Array, frequency: float) -> Array:
-    """A residual without what is faster than ``frequency``, Hz, block by block and without any shift in time."""
+    """Residual within the motion band: without frequencies above ``frequency``, Hz, and without a time shift."""
     from scipy.signal import butter, sosfiltfilt
 
     kept = values.copy()

@@ -1,4 +1,4 @@
-"""Noise floor of the residual: noise, and the error of the comparison itself."""
+"""Noise floor of a residual: instrument noise, and the error of the comparison itself."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ QUIET_SHARE = 0.4
 def noise_floor(
     model: Model, validation: InverseDynamicsProblem, residual: Array, mode: str, setup: Setup | None = None
 ) -> dict[str, float]:
-    """Root mean square that would remain in the residual of the right model, by channel.
+    """Noise floor by channel: root mean square residual that the right model would leave.
 
     The larger of two. The first is known beforehand. The model predicts the records, in closed loop where that is
     possible, and noise of the measured size is added. The residual of that log is noise and the error of filters and
@@ -67,7 +67,7 @@ def noise_floor(
 
 
 def white_level(residual: Array, moving: Array, shape: Array | None = None) -> float:
-    """Root mean square of what is white in one channel of a residual.
+    """Root mean square of the white noise in one channel of a residual.
 
     Power of white noise is the same at every frequency of the retained band and is distributed exponentially from one
     to the next, so its mean follows from any quantile of the periodogram. A low one is taken, which what follows the
@@ -109,7 +109,7 @@ def _white(problem: InverseDynamicsProblem, residual: Array, shapes: tuple[Array
 def own_log(
     model: Model, experiment: Experiment, setup: Setup | None, generator: np.random.Generator | None = None
 ) -> Experiment | None:
-    """The log that the model itself would have left, with noise from a generator; None where it cannot follow."""
+    """Simulated log of the model itself with generated noise, for its noise floor; None where it cannot follow."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")

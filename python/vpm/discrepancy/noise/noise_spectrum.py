@@ -1,4 +1,4 @@
-"""Noise spectrum of residuals: noise of instruments, and noise of a drive's command filtered by its dynamics.
+"""Noise spectrum of residuals: instrument noise, and noise of a command filtered by its drive.
 
 The command that a valve or a winding receives differs a little from the logged one. Pressures and currents integrate
 that difference to a slow disturbance that no effect explains. Its spectrum follows from the model of the drive.
@@ -36,7 +36,7 @@ _LOCK = Lock()
 
 
 def noise_shapes(model: Model, problem: InverseDynamicsProblem) -> tuple[Array | None, ...]:
-    """Spectrum of the noise of each block: power by frequency, one of them for instruments and one for the drives.
+    """Noise spectrum of each block: power by frequency, of instruments and of drives.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def noise_shapes(model: Model, problem: InverseDynamicsProblem) -> tuple[Array |
 
 
 def _alike(model: Model, known: Model) -> bool:
-    """Whether drives of two models colour noise alike: they have the same parameters, at nearly the same values."""
+    """Whether drives of two models give the same noise spectrum: their parameters are nearly equal."""
     own, others = (
         {name: entry.value for name, entry in one.parameters.items() if moves_drives(one, name)}
         for one in (model, known)
@@ -72,7 +72,7 @@ def _alike(model: Model, known: Model) -> bool:
 
 
 def noise_spectrum(residual: Array, shape: Array, quiet: float) -> Array:
-    """Spectrum of the noise in a residual: that of instruments, and as much of the drives' as its quiet part shows.
+    """Noise spectrum of a residual: instruments, and the share of drives that its quiet part shows.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def noise_spectrum(residual: Array, shape: Array, quiet: float) -> Array:
 
 
 def periodogram(residual: Array) -> Array:
-    """Power by frequency under a Hann window, that of white noise being its variance at each."""
+    """Noise spectrum under a Hann window: power by frequency, equal to the variance for white noise."""
     window = np.hanning(residual.size)
     return np.asarray(np.abs(np.fft.rfft(residual * window)) ** 2 / float(window @ window))
 
@@ -134,7 +134,7 @@ def _of_record(
 def _of_instruments(
     model: Model, problem: InverseDynamicsProblem, record: int, generator: np.random.Generator
 ) -> list[Array]:
-    """Powers of what the noise of all instruments makes of each shown channel, by adding it once more."""
+    """Noise spectrum that all instruments cause in each channel, found by adding their noise again."""
     one = problem.experiments[record]
     m, steps = problem.motions[record], problem.integrators[record]
     clean, noisy = (
@@ -151,12 +151,12 @@ def _of_instruments(
 
 
 def _weights(problem: InverseDynamicsProblem) -> Array:
-    """Weight of each number of a residual."""
+    """Weight of each number of a residual in its noise spectrum."""
     return np.concatenate([np.full(block.time.size, block.weight) for block in problem.blocks])
 
 
 def with_noise(model: Model, experiment: Experiment, generator: np.random.Generator) -> Experiment:
-    """The record with noise of every logged output once more; commands are exact, for the controller wrote them."""
+    """Record with noise added to every logged output again, for its spectrum; commands are exact."""
     for channel in model.output_channels:
         if channel in experiment and not channel.endswith(".command"):
             values = experiment[channel]

@@ -1,4 +1,4 @@
-"""Does the residual still follow something? A test that does not need to know what."""
+"""Structure in a residual that noise does not have: a test that needs no candidate effect."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ GROWING = 4.0
 
 @dataclass(frozen=True)
 class Structure:
-    """What is left to explain.
+    """Structure of a residual: tests on states, frequency, white noise, effort and validation records.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Structure:
 
     @property
     def present(self) -> bool:
-        """Whether the residual is more than noise."""
+        """Whether the residual has more structure than noise."""
         follows = self.predicted > PREDICTED_SHARE or self.growing > GROWING
         return follows or self.low_frequency > LOW_FREQUENCY_SHARE or self.above_white > ABOVE_WHITE or self.new > NEW
 
@@ -72,7 +72,7 @@ def structure(
     fitted: Array,
     residual: Array,
 ) -> Structure:
-    """Examine the residuals of a fitted model on training and validation data."""
+    """Examine the structure of residuals of a fitted model on training and validation data."""
     training_shapes, validation_shapes = noise_shapes(model, training), noise_shapes(model, validation)
     joints = range(len(training.joints))
     predicted = max(_predicted(model, training, validation, fitted, residual, joint) for joint in joints)
@@ -88,7 +88,7 @@ def structure(
 
 
 def _above_white(problem: InverseDynamicsProblem, residual: Array, shapes: tuple[Array | None, ...]) -> float:
-    """Largest ratio of any channel between its residual and the noise in it."""
+    """Largest ratio of any channel between its residual and the white noise in it."""
     ratios = []
     for channel in dict.fromkeys(block.channel for block in problem.blocks):
         mine = [(b, s) for b, s in zip(problem.blocks, shapes, strict=True) if b.channel == channel]
@@ -100,7 +100,7 @@ def _above_white(problem: InverseDynamicsProblem, residual: Array, shapes: tuple
 
 
 def _growing(model: Model, problem: InverseDynamicsProblem, residual: Array) -> float:
-    """Largest over the joints, as if every other sample were independent."""
+    """Rank correlation of the residual's size with the effort, in standard deviations; the largest of all joints."""
     from scipy.stats import spearmanr
 
     scores = []
@@ -151,7 +151,7 @@ def _state(model: Model, problem: InverseDynamicsProblem, record: int, joint: in
 
 
 def _features(state: Array, edges: list[Array], reference: Array) -> Array:
-    """Membership in bins of position and of velocity, acceleration, and effort with and against the motion."""
+    """Features for the structure of a residual: bins of position, velocity, acceleration and effort."""
     columns = []
     for quantity in range(2):
         place = np.digitize(state[:, quantity], edges[quantity])

@@ -1,4 +1,4 @@
-"""Uncertain times of samples: commands may hold up to one sampling interval earlier or later than stated.
+"""Timing of samples is uncertain: commands may hold up to one sampling interval earlier or later than stated.
 
 A logged command may hold from its sample on, until its sample, or as the mean over the interval; the log does not tell.
 What a shift within one interval explains is therefore no missing physics.
@@ -23,7 +23,7 @@ MATTERS = 0.02
 
 @dataclass(frozen=True)
 class InTime:
-    """Residuals of a fitted model, with the shift of all commands within one interval that suits the training records.
+    """Residuals of a fitted model with the best shift in the timing of all commands, within one interval.
 
     Attributes
     ----------
@@ -39,7 +39,7 @@ class InTime:
 
 
 def in_time(judged: Judged, data: Data) -> InTime:
-    """Residuals with the best shift of the commands, to first order; free parameters move with it."""
+    """Residuals after the best shift of command timing, to first order; free parameters move with it."""
     predict = InTime(judged.fit.residual, judged.validation, 0.0)
     model = judged.model
     later, _ = data.training.later().evaluate(model, model.theta)

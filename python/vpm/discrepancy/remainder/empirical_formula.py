@@ -1,4 +1,4 @@
-"""Description of a residual that no effect explains: the states that it depends on, and an empirical formula."""
+"""Empirical formula for a residual that no effect explains, and the states that it depends on."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ PERIOD_RANGE = 1.15
 
 
 def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
-    """Describe what a model leaves, and add a formula for it to the model where one predicts the validation data.
+    """Describe a residual: the states that it depends on, and an empirical formula if one predicts validation data.
 
     A drift or a rhythm depends on the time of the record and is described in words: as a force of the machine's state
     it would be wrong in the next record.
@@ -80,7 +80,7 @@ def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
 
 
 def beside(base: Judged, described: Empirical, joint_fit: Judged, data: Data) -> tuple[Empirical, Judged]:
-    """The same formula beside effects that were found, which keep their numbers.
+    """Empirical formula fitted beside accepted effects, whose parameters stay.
 
     What is no physics takes nothing from what is.
 
@@ -121,7 +121,7 @@ def beside(base: Judged, described: Empirical, joint_fit: Judged, data: Data) ->
 
 
 def _formula_of(model: Model, own: Sequence[str]) -> Formula:
-    """Terms and shapes as they stand in a model."""
+    """Terms and shapes of the empirical formula that a model holds."""
     terms: dict[str, tuple[str, ...]] = {}
     for dotted in own:
         joint, _, term = dotted.partition(".empirical.")
@@ -138,7 +138,7 @@ def _formula_of(model: Model, own: Sequence[str]) -> Formula:
 
 
 def _fit(formula: Formula, final: Judged, data: Data) -> Judged:
-    """Fit the coefficients, and the periods of harmonic terms, together with all that is free."""
+    """Fit of the empirical formula: coefficients, periods of harmonic terms, and free parameters."""
     model = formula.add_to(final.model)
     own = [f"{joint}.empirical.{term}" for joint, terms in formula.terms.items() for term in terms]
     # In a first step the sizes alone: a period has no meaning while they are zero.
@@ -154,7 +154,7 @@ def _fit(formula: Formula, final: Judged, data: Data) -> Judged:
 
 
 def _without_small(formula: Formula, fitted: Judged) -> Formula:
-    """Drop what hardly moves the residual once periods are right; the sines of one wave go together."""
+    """Empirical formula without its small terms; sine and cosine of one wave go together."""
     weight = {}
     for joint, terms in formula.terms.items():
         for term in terms:
@@ -192,7 +192,7 @@ def _terms(formula: Formula, fitted: Judged) -> tuple[EmpiricalTerm, ...]:
 
 
 def _text(formula: Formula, model: Model, joint: str) -> str:
-    """``tau = -(0.31 s + 0.12 s x) N at axis, with x = (q - 0.2 m)/0.5 m, s = tanh(v/0.01 m/s)``."""
+    """Text of an empirical formula: ``tau = -(0.31 s + 0.12 s x) N at axis, with x = (q - 0.2 m)/0.5 m``."""
     value = {name: model.parameters[f"{joint}.empirical.{name}"] for name in formula.shapes[joint]}
     terms = formula.terms[joint]
 
@@ -217,7 +217,7 @@ def _text(formula: Formula, model: Model, joint: str) -> str:
 
 
 def _in_time(states: dict[str, float], beat: Rhythm | None, formula_share: float) -> tuple[str, float]:
-    """What runs with the time and not with the machine, and its share; empty if the formula or a state says as much."""
+    """Sentence on a rhythm in time of the residual and its share; empty if formula or state explain it as well."""
     time = max((share for name, share in states.items() if name.startswith("time")), default=0.0)
     machine = max((formula_share, *(share for name, share in states.items() if not name.startswith("time"))))
     if beat is not None and beat.share > max(machine, time) + TIME_AHEAD:
@@ -234,7 +234,7 @@ def _in_time(states: dict[str, float], beat: Rhythm | None, formula_share: float
 
 
 def _depends(states: Shares) -> str:
-    """The state that predicts most, states not discriminated from it, and states that predict clearly less."""
+    """States for the empirical description: the best one, those not discriminated from it, and clearly worse ones."""
     named = [name for name, share in states.of.items() if share >= NAMED][:MOST_NAMED]
     if not named or not states.alike:
         return "no single state of the machine predicts it"

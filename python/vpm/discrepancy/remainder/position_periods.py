@@ -1,4 +1,4 @@
-"""Ways after which a residual repeats: by itself, with the direction of the motion, or with the load."""
+"""Periods in position at which a residual repeats: by itself, with direction or with load."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST_SAMPLES = 4000
 def harmonic_periods(
     base: Judged, data: InverseDynamicsProblem, joint: str, ranges: Mapping[str, float]
 ) -> tuple[float, ...]:
-    """Periods in position (m or rad) at which a residual is strongest, itself or as a factor of direction or load.
+    """Periods in position (m or rad) at which a residual is strongest, itself or multiplied by direction or load.
 
     Least squares with a cosine and a sine at evenly spaced wave numbers, beside a constant and the direction (N. Lomb,
     *Astrophysics and Space Science* 39, 1976).
@@ -51,7 +51,7 @@ def harmonic_periods(
 
 
 def _taken(residual: Array, factor: Array, direction: Array, phase: Array) -> float:
-    """Sum of squares that one wave takes."""
+    """Sum of squares that a wave of one period in position explains."""
     columns = np.column_stack([np.ones_like(phase), direction, factor * np.cos(phase), factor * np.sin(phase)])
     normal = columns.T @ columns + 1e-9 * phase.size * np.eye(4)
     right = columns.T @ residual

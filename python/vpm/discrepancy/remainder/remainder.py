@@ -1,4 +1,4 @@
-"""The residual after all effects: whether it repeats on validation records, and the share that effects explain.
+"""Remainder of the residual after all effects: whether it repeats, and the share that effects explain.
 
 The noise floor is an estimate, and a residual close to it may still not be noise. So an empirical fit is compared with
 the effects: what it predicts of validation records, the right physics would predict too. Effects that leave much of
@@ -35,7 +35,7 @@ DESCRIBED = 2
 
 @dataclass(frozen=True)
 class Described:
-    """A model, what is said of its residual, and the model with the formula for it."""
+    """Description of a remainder: a model, a remark on its residual, and the model with a formula for it."""
 
     base: Judged
     empirical: Empirical
@@ -44,7 +44,7 @@ class Described:
 
 @dataclass(frozen=True)
 class Remainder:
-    """What the model with all accepted effects leaves of the validation records.
+    """Remainder of validation records under the model with all accepted effects.
 
     Attributes
     ----------
@@ -70,13 +70,13 @@ class Remainder:
 
     @property
     def best(self) -> Described:
-        """The description that leaves least, the one with fewer effects if it is hardly worse."""
+        """Best description of the remainder, with fewer effects if that is hardly worse."""
         *first, last = self.choices
         return first[0] if first and last.empirical.after >= CLEARLY * first[0].empirical.after else last
 
 
 def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float, workers: int = 1) -> Remainder:
-    """Describe what is left of a model, and of the one that it began with.
+    """Describe the remainder of the final model, and that of the model before effects.
 
     Parameters
     ----------
@@ -111,7 +111,7 @@ def _described(base: Judged, data: Data) -> Described:
 
 
 def _before(recalibrated: Judged, final: Judged, data: Data) -> Array:
-    """What the recalibrated model leaves, less a shift within the sampling interval unless that is what was named."""
+    """Residual of the recalibrated model, to which the remainder is compared; less a shift of commands."""
     known = {effect.key for effect in recalibrated.model.effects}
     late = any(effect.type.shifts and effect.key not in known for effect in final.model.effects)
     return recalibrated.validation if late else in_time(recalibrated, data).validation
@@ -123,25 +123,25 @@ def _power(values: Array) -> float:
 
 @dataclass(frozen=True)
 class _View:
-    """Validation residuals in the band of the motion, with what the times of samples leave open."""
+    """Validation residuals in the motion band, with uncertain sample times removed, for the remainder."""
 
     data: Data
     frequency: float
     thresholds: Thresholds
 
     def __call__(self, judged: Judged) -> Array:
-        """Residual of a model."""
+        """Validation residual of a model as the remainder sees it."""
         return below(self.data.validation, in_time(judged, self.data).validation, self.frequency)
 
     def clearly_better(self, choice: Described, left: Array) -> bool:
-        """Whether a description predicts more than the effects do, as surely as an effect has to."""
+        """Whether a description of the remainder predicts surely more than the effects do."""
         if choice.empirical.remark:
             own = self(choice.base)
             return _power(own) - self._said(choice, own) < (1.0 - WORTH_A_NAME) * _power(left)
         return self.thresholds.met(gain(left, self(choice.judged), segments(self.data.validation)))
 
     def pressed(self, recalibrated: Judged, left: Array) -> Seals | None:
-        """Friction of seals that predicts more in the place of the effects than they do, as surely as one has to."""
+        """Friction of seals that predicts surely more than the effects, in their place."""
         found = seals(recalibrated, self.data)
         if found is None:
             return None
@@ -149,11 +149,11 @@ class _View:
         return found if self.thresholds.met(gain(left, alone, segments(self.data.validation))) else None
 
     def leaves(self, choice: Described) -> float:
-        """Sum of squares over all frequencies that a description leaves."""
+        """Sum of squares that a description of the remainder leaves at all frequencies."""
         own = in_time(choice.judged, self.data).validation
         return _power(own) - self._said(choice, own) if choice.empirical.remark else _power(own)
 
     def _said(self, choice: Described, own: Array) -> float:
-        """What a remark predicts of a residual: of the effort that it speaks of, and of nothing else."""
+        """Sum of squares that a remark on the remainder predicts, at the effort that it names."""
         blocks = (block for block in self.data.validation.blocks if block.channel == choice.empirical.channel)
         return choice.empirical.predicted * sum(_power(own[block.samples]) for block in blocks)

@@ -1,4 +1,4 @@
-"""Joints whose residual no effect explains, apart from joints whose residual effects explain."""
+"""Residual by joint: joints at which effects explain it, and open joints at which they do not."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ MOSTLY_OPEN = 0.15
 
 @dataclass(frozen=True)
 class Joints:
-    """What effects make of the gap at each joint that has one.
+    """Joints with a clear residual: open ones, and closed ones that effects explain.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Joints:
 
     @classmethod
     def of(cls, gap: Mapping[str, ChannelGap], left: Structure | None, tracked: Mapping[str, float]) -> Joints:
-        """From the residual, what is left of it, and what a tracker leaves of each joint, see `Search.left`."""
+        """Open and closed joints, from the residual by joint and what a tracker leaves, see `Search.left`."""
         efforts = {channel.rpartition(".")[0]: g for channel, g in gap.items() if _is_effort(channel, g)}
         efforts = {joint: g for joint, g in efforts.items() if _is_clear(g.recalibrated, g)}
         shares = {
@@ -65,11 +65,11 @@ class Joints:
 
     @property
     def differ(self) -> bool:
-        """Whether there are both."""
+        """Whether there are both open and closed joints."""
         return bool(self.open and self.closed)
 
     def has(self, entry: Accepted, model: Model) -> bool:
-        """Whether an effect acts at an open joint; what acts on all of them has to explain the worst."""
+        """Whether an effect acts at an open joint; one that acts on all joints counts at the worst."""
         return (joint_at(model, entry.key[1]) or self.worst) in self.open
 
 
@@ -78,12 +78,12 @@ def _is_effort(channel: str, gap: ChannelGap) -> bool:
 
 
 def _is_clear(value: float, gap: ChannelGap) -> bool:
-    """Whether a gap stands clear of the noise, and is something beside the effort."""
+    """Whether the residual of a joint is clear of noise and not negligible beside the effort."""
     return value > FLOOR_FACTOR * gap.noise_floor and value > NEGLIGIBLE * gap.signal
 
 
 def only_where_closed(found: Search, data: Data, gap: Mapping[str, ChannelGap], left: Structure) -> Search:
-    """Without the effects at joints that stay open, where there are others that do not.
+    """Search without effects at joints whose residual stays open, if other joints are closed.
 
     What happens at one joint says nothing of effects at another one. All is fitted again without them.
     """

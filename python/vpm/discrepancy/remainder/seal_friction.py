@@ -1,4 +1,4 @@
-"""Seals that the chambers press upon: friction that grows with the pressures, which the catalogue does not have.
+"""Friction of seals that the chambers press: it grows with the pressures, and the catalogue does not have it.
 
 An asymmetric cylinder has other pressures on its way out than on its way back, so that such friction looks like a dry
 one and a constant force beside it. The sum of the logged pressures tells more than the direction: it changes with the
@@ -31,7 +31,7 @@ UNIT_PRESSURE = 1e5
 
 @dataclass(frozen=True)
 class Seals:
-    """Friction of one cylinder's seals in the place of all effects that were accepted.
+    """Friction of one cylinder's seals in the place of all accepted effects.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Seals:
 
     @property
     def sentence(self) -> str:
-        """What it says of the machine."""
+        """Sentence on the friction of the seals for the result."""
         return (
             f"Friction of the seals of {self.drive} that grows with the pressures in its chambers, by "
             f"{self.share:.3g} ± {self.std:.2g} of the piston's area times their sum, predicts the validation data "
@@ -59,7 +59,7 @@ class Seals:
 
 
 def seals(base: Judged, data: Data) -> Seals | None:
-    """The friction of seals that leaves least of the training residual; None where none dissipates beyond doubt.
+    """Friction of seals with the least training residual; None where none surely dissipates.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def seals(base: Judged, data: Data) -> Seals | None:
 
 @dataclass(frozen=True)
 class _Stroke:
-    """A cylinder along one record: sum of pressures (N,), effort at each joint per pressure (N, joints), flow (N,)."""
+    """Stroke along one record for seal friction: pressure sum (N,), effort per pressure (N, joints), flow (N,)."""
 
     pressed: Array
     levers: Array
@@ -92,7 +92,7 @@ class _Stroke:
 
 
 def _pressed(model: Model, problem: InverseDynamicsProblem) -> list[str]:
-    """Cylinders both of whose pressures all logs hold."""
+    """Cylinders whose seals may have friction: all logs hold both pressures."""
     if any(has_hidden(model, m.joints) for m in problem.motions):
         return []
     return [name for name in model.actuators if all(channel in problem.shown for channel in _pressures(name))]
@@ -112,7 +112,7 @@ def _strokes(problem: InverseDynamicsProblem, drive: str) -> list[_Stroke]:
 
 
 def _per_pressure(problem: InverseDynamicsProblem, record: int, drive: str) -> Array:
-    """Effort at each joint per pressure in the first chamber (N, joints): area times lever arm, along the motion."""
+    """Effort at each joint per chamber pressure (N, joints), to which the seals' friction is proportional."""
     model, m, experiment = problem.nominal, problem.motions[record], problem.experiments[record]
     for name in model.actuators:
         for channel, value in zip(_pressures(name), (UNIT_PRESSURE * (name == drive), 0.0), strict=True):
@@ -125,7 +125,7 @@ def _per_pressure(problem: InverseDynamicsProblem, record: int, drive: str) -> A
 
 
 def _bends(model: Model, training: InverseDynamicsProblem, drive: str, strokes: Sequence[_Stroke]) -> list[float]:
-    """Flows below which friction bends to its other sign, as that of the joint does if it has any."""
+    """Transition flows of the seals' friction, from the joint's transition velocity if it has one."""
     fastest = _fastest([stroke.flow for stroke in strokes])
     moved, joints = model.joints_of_actuator(drive), training.motions[0].joints
     joint = moved[0] if len(moved) == 1 else ""
@@ -141,13 +141,13 @@ def _fastest(rates: Sequence[Array]) -> float:
 
 
 def _column(problem: InverseDynamicsProblem, strokes: Sequence[_Stroke], bend: float) -> Array:
-    """What seals of the whole piston's area add to a residual."""
+    """Residual column of the friction of seals on the whole piston area."""
     efforts = [-(one.pressed * np.tanh(one.flow / bend))[:, None] * one.levers for one in strokes]
     return np.asarray(problem.added([effort[:, :, None] for effort in efforts])[:, 0])
 
 
 def _fitted(base: Judged, data: Data, drive: str, columns: tuple[Array, Array], slopes: Array) -> Seals:
-    """One step of everything that is free, beside the size of the friction, in which the effort is linear.
+    """Fit of the friction of seals: one linear step with everything that is free.
 
     ``slopes`` are those of the validation residual by what is free.
     """

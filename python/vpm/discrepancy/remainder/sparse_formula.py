@@ -1,4 +1,4 @@
-"""A sparse formula for what is left: which few terms of the library of empirical forces describe a residual.
+"""Sparse formula for a residual: forward selection of a few terms of empirical forces by cross-validation.
 
 Forward selection: of all terms at all joints the one that explains most of the training residual per number comes next.
 It is fitted together with the parameters that are free already, so that it gains nothing that a better mass would
@@ -39,7 +39,7 @@ _HARMONIC = (("cosine", "sine"), ("dry_cosine", "dry_sine"), ("load_cosine", "lo
 
 @dataclass(frozen=True)
 class Atom:
-    """Terms that come in together, at one joint; harmonic ones with their period."""
+    """Atom of a sparse formula: terms at one joint that are selected together; harmonic ones with their period."""
 
     joint: str
     terms: tuple[str, ...]
@@ -47,27 +47,27 @@ class Atom:
     columns: Array
 
     def fits(self, chosen: Sequence[Atom]) -> bool:
-        """Whether it may stand beside the chosen ones: a joint has one period."""
+        """Whether an atom fits beside the chosen terms of a formula: a joint has one period."""
         periods = {a.period for a in chosen if a.joint == self.joint and a.period is not None}
         return self.period is None or not periods or self.period in periods
 
 
 @dataclass(frozen=True)
 class Formula:
-    """Chosen terms of each joint, and the shapes that they are meant with."""
+    """Sparse formula: chosen terms of each joint, and their shape parameters."""
 
     terms: Mapping[str, tuple[str, ...]]
     shapes: Mapping[str, Mapping[str, float]]
 
     def add_to(self, model: Model) -> Model:
-        """The model with these terms at zero size."""
+        """Model with the terms of a sparse formula added at zero size."""
         for joint, terms in self.terms.items():
             model = model.with_effect(without_law().name, at=joint, **self.shapes[joint], **dict.fromkeys(terms, 0.0))
         return model
 
 
 def select(base: Judged, records: Data) -> Formula | None:
-    """Choose terms for the training residual of ``base``; None if none predicts what was left out.
+    """Select the terms of a sparse formula for the training residual of ``base``; None if none predicts.
 
     Of the validation records only the range of the motion is used: within it, and no farther, the formula may be
     followed.
@@ -104,7 +104,7 @@ def select(base: Judged, records: Data) -> Formula | None:
 
 
 def _without_needless(chosen: list[Atom], error: float, scorer: _Folds) -> tuple[list[Atom], float]:
-    """Drop what a later term has made needless."""
+    """Sparse formula without terms that a later one replaced."""
     for atom in chosen[:-1]:
         rest = [a for a in chosen if a is not atom]
         without = scorer.error(rest)
@@ -114,7 +114,7 @@ def _without_needless(chosen: list[Atom], error: float, scorer: _Folds) -> tuple
 
 
 def _most_promising(base: Judged, chosen: Sequence[Atom], atoms: Sequence[Atom], count: int = 4) -> list[Atom]:
-    """Atoms that take most from the training residual for each number they bring."""
+    """Atoms that lower the training residual most for each number they add to a formula."""
     known = np.column_stack([base.fit.jacobian, *(a.columns for a in chosen)])
     basis = _basis(known)
     rest = base.fit.residual - basis @ (basis.T @ base.fit.residual)
@@ -130,7 +130,7 @@ def _most_promising(base: Judged, chosen: Sequence[Atom], atoms: Sequence[Atom],
 
 
 def _basis(columns: Array) -> Array:
-    """Orthonormal basis of what columns span."""
+    """Orthonormal basis of the columns of formula terms."""
     if not columns.shape[1]:
         return np.zeros((len(columns), 0))
     lengths = np.linalg.norm(columns, axis=0)
@@ -139,7 +139,7 @@ def _basis(columns: Array) -> Array:
 
 
 class _Folds:
-    """Mean square with which terms predict the parts of the training records that they were not fitted to."""
+    """Cross-validation of formula terms: mean square on parts of training records that were left out."""
 
     def __init__(self, data: InverseDynamicsProblem, residual: Array, jacobian: Array) -> None:
         self._residual, self._known = residual, jacobian
@@ -149,7 +149,7 @@ class _Folds:
             self._fold[block.samples] = np.arange(count) * FOLDS // count
 
     def error(self, atoms: Sequence[Atom]) -> float:
-        """Sum over all parts."""
+        """Cross-validation error of formula terms, summed over all parts."""
         columns = np.column_stack([self._known, *(atom.columns for atom in atoms)])
         lengths = np.linalg.norm(columns, axis=0)
         columns = columns / np.where(lengths > 0.0, lengths, 1.0)
@@ -164,7 +164,7 @@ class _Folds:
 def _ranges(
     base: Judged, data: InverseDynamicsProblem, validation: InverseDynamicsProblem, joint: str
 ) -> dict[str, float]:
-    """Middle and reach of the way, largest speed, and the transition velocity that suits the residual best."""
+    """Scales of formula terms at a joint: middle and reach of position, largest speed, transition velocity."""
     column = data.joints.index(joint)
     states = [data.state(record) for record in range(len(data.motions))]
     position = np.concatenate([q[:, column] for q, _, _ in states])
@@ -194,7 +194,7 @@ def _taken(residual: Array, sign: Array, x: Array) -> float:
 
 
 def _atoms(base: Judged, data: InverseDynamicsProblem, joint: str, ranges: Mapping[str, float]) -> list[Atom]:
-    """Every term of a joint with its exact regressor; the load is not that of a joint that lines pull."""
+    """All atoms of a joint with exact regressors; no load terms where two-point elements pull."""
     skipped = ("load",) if base.model.lines else ()
     smooth = [t for t in TERMS if "cosine" not in t and "sine" not in t and not t.startswith(skipped or ("-",))]
     atoms = [
@@ -213,7 +213,7 @@ def _atoms(base: Judged, data: InverseDynamicsProblem, joint: str, ranges: Mappi
 def _columns(
     base: Judged, data: InverseDynamicsProblem, joint: str, shapes: Mapping[str, float], terms: Sequence[str]
 ) -> Array:
-    """Derivatives of the residual by coefficients, at zero size."""
+    """Columns of formula terms: derivatives of the residual by their coefficients at zero size."""
     model = base.model.with_effect(without_law().name, at=joint, **shapes, **dict.fromkeys(terms, 0.0))
     _, columns = data.evaluate(model, model.theta, [model.index(f"{joint}.empirical.{term}") for term in terms])
     return columns

@@ -1,4 +1,4 @@
-"""What a residual depends on: the share of it that each state predicts on records that were not looked at."""
+"""Dependence of a residual on states: the share that each state predicts on validation records."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ MOST_SAMPLES = 3000
 
 @dataclass(frozen=True)
 class Shares:
-    """What each state predicts of a residual.
+    """Shares of a validation residual that each state predicts.
 
     Attributes
     ----------
@@ -50,14 +50,14 @@ class Shares:
 
 @dataclass(frozen=True)
 class Rhythm:
-    """A disturbance periodic in time: its period in s, and the share of the validation residual that it predicts."""
+    """Dependence of a residual on time: a period in s, and the share of the validation residual that it predicts."""
 
     period: float
     share: float
 
 
 def busiest_joint(data: Data, final: Judged) -> int:
-    """The joint whose residual on validation data is the largest part of its effort."""
+    """Joint whose validation residual is the largest part of its effort; its dependence on states is examined."""
     sums = np.zeros(len(data.validation.joints))
     for record in range(len(data.validation.motions)):
         for column, block in enumerate(data.validation.efforts(record)):
@@ -67,7 +67,7 @@ def busiest_joint(data: Data, final: Judged) -> int:
 
 
 def shares(data: Data, final: Judged, joint: int) -> Shares:
-    """Share of one joint's validation residual that a map of each state, drawn from the training residual, predicts.
+    """Share of one joint's validation residual that a binned map of each state predicts.
 
     A map is a table of means over bins of equal count, for both directions of the motion or for each on its own. Two
     states are alike where the mean difference of the squares that they leave is within its 95 % interval, which allows
@@ -100,7 +100,7 @@ def shares(data: Data, final: Judged, joint: int) -> Shares:
 
 
 def _as_good(best: Array, other: Array, records: Sequence[slice]) -> bool:
-    """Whether what ``other`` leaves is larger than what ``best`` leaves by no more than chance."""
+    """Whether two states predict a residual equally well within chance."""
     difference = other**2 - best**2
     mean = float(difference.mean())
     variance = robust_covariance(np.ones((difference.size, 1)), difference - mean, records)[0, 0]
@@ -113,7 +113,7 @@ def _share(rest: Array, target: Array) -> float:
 
 
 def rhythm(data: Data, final: Judged, joint: int) -> Rhythm | None:
-    """The frequency in time that stands out of the training residual, with what it predicts of the validation one.
+    """Dominant frequency in time of the training residual, with the share it predicts of the validation residual.
 
     The phase is free on the validation records: nobody knows when they began in the beat of the disturbance. But a
     disturbance keeps it: each half of a record has to predict the other one. Links that ring with noise have a line of
@@ -141,7 +141,7 @@ def _series(problem: InverseDynamicsProblem, residual: Array, joint: int) -> lis
 
 
 def _other_half(time: Array, values: Array, frequency: float) -> float:
-    """Sum of squares that a line leaves of each half of a record when it was fitted to the other half."""
+    """Sum of squares of a rhythm in each half of a record when it was fitted to the other half."""
     columns, middle = _waves(time, frequency), time.size // 2
     halves = slice(None, middle), slice(middle, None)
     left = 0.0
@@ -167,7 +167,7 @@ def _residual(problem: InverseDynamicsProblem, residual: Array, joint: int) -> A
 
 
 def _states(problem: InverseDynamicsProblem, final: Judged, joint: int) -> Mapping[str, Array]:
-    """Every state by name: of all joints, the load of this one, logged pressures, and the time in the record."""
+    """States that a residual may depend on, by name: of all joints, the load, pressures and the time."""
     found: dict[str, list[Array]] = {}
     for record, m in enumerate(problem.motions):
         for column, name in enumerate(problem.joints):
@@ -187,7 +187,7 @@ def _states(problem: InverseDynamicsProblem, final: Judged, joint: int) -> Mappi
 
 
 def _left(seen: Cells, met: Cells, edges: Array) -> Array:
-    """What the means of the first target in its bins leave of the second."""
+    """Sum of squares of a validation residual that means in bins of a state do not predict."""
     cells = [np.digitize(state, edges) * 2 + direction for state, direction, _ in (seen, met)]
     count = np.bincount(cells[0], minlength=2 * BINS)
     means = np.bincount(cells[0], seen[2], minlength=2 * BINS) / (count + PULL * seen[2].size / BINS)

@@ -1,4 +1,4 @@
-"""What else the data would let stand in the place of an effect that was accepted."""
+"""Ambiguity: rival effects that predict the validation records as well as an accepted effect."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ AS_GOOD = 0.05
 
 @dataclass(frozen=True)
 class Rivals:
-    """An accepted effect, and the models in which something else does its work.
+    """Rivals of an accepted effect: trials in its place that predict the validation records as well.
 
     Attributes
     ----------
@@ -50,12 +50,12 @@ class Rivals:
 
     @property
     def label(self) -> str:
-        """``effect at site``."""
+        """Label of the accepted effect that rivals compete with: ``effect at site``."""
         return f"{self.effect} at {self.site}"
 
 
 def listed(known: Sequence[Ambiguity], found: Sequence[Rivals]) -> tuple[Ambiguity, ...]:
-    """What the search saw already, and what else does as well, each named once."""
+    """Ambiguities for the result: those that the search saw, and rivals found afterwards, each named once."""
     said = {(a.name, a.site, other) for a in known for other in a.others}
     more = []
     for entry in found:
@@ -75,7 +75,7 @@ def rivals(
     each: SideBySide | None = None,
     last: Tried | None = None,
 ) -> tuple[Rivals, ...]:
-    """Replace each accepted effect in turn by every other that could do its work, and keep those that do it as well.
+    """Rivals of each accepted effect: every other effect in its place, kept if it predicts the validation data as well.
 
     All rivals are screened on the model without the effect; the few with nearly the same share of the training residual
     are refitted. They have to predict the validation records as well as the effect. What the ``last`` effect competed
@@ -128,7 +128,7 @@ def rivals(
 
 @dataclass(frozen=True)
 class _Job:
-    """A candidate for the place of an accepted effect, and the model without that."""
+    """Screening job for rivals: a candidate for the place of an accepted effect, and the model without that effect."""
 
     entry: Accepted
     base: Judged
@@ -136,7 +136,7 @@ class _Job:
 
     @property
     def label(self) -> str:
-        """Label in progress reports."""
+        """Label of a rival's screening in progress reports."""
         return f"{self.candidate.label} for {_label(self.entry)}"
 
 
@@ -145,12 +145,12 @@ def _label(entry: Accepted) -> str:
 
 
 def _beside(last: Tried, entry: Accepted) -> list[Probe]:
-    """What was screened when an effect came in, of that which could do its work."""
+    """Probes of possible rivals that were screened in the round in which an effect came in."""
     return [p for p in last.probes if _could_do(last.without.model, entry, p.candidate)]
 
 
 def _without(final: Judged, data: Data, known: Mapping[Key, Tried], entry: Accepted) -> Judged:
-    """The model without an effect, all that is left fitted again."""
+    """Model without one accepted effect, all other free parameters fitted again; rivals are judged on it."""
     if entry.key in known:
         return known[entry.key].without
     model = final.model.without_effect(*entry.key)
@@ -159,19 +159,19 @@ def _without(final: Judged, data: Data, known: Mapping[Key, Tried], entry: Accep
 
 
 def _others(without: Judged, data: Data, entry: Accepted, effects: Sequence[str] | None) -> list[Candidate]:
-    """Candidates that could do the work of an effect."""
+    """Possible rivals of an accepted effect among all candidates."""
     offered = candidates(without.model, data.training, without.fit.residual, effects)
     return [c for c in offered if _could_do(without.model, entry, c)]
 
 
 def _could_do(model: Model, entry: Accepted, candidate: Candidate) -> bool:
-    """Whether a candidate acts near an effect; where links bend, a spring more would not have been tried beside it."""
+    """Whether a candidate acts near enough to an accepted effect to be its rival."""
     heavier = bool(candidate.effect.motion) and not entry.effect.motion
     return _near(candidate, entry) and not (heavier and bends(model))
 
 
 def _short_list(final: Judged, without: Judged | None, entry: Accepted, probes: Sequence[Probe]) -> list[Probe]:
-    """Rivals worth a refit: the largest predicted gains per number, and what might refine the effect most."""
+    """Short list of rivals to refit: the largest predicted gains per number, and nested laws of the effect."""
     if without is None:
         return []
     taken = _power(without) - _power(final)
@@ -185,7 +185,7 @@ def _short_list(final: Judged, without: Judged | None, entry: Accepted, probes: 
 
 
 def _near(candidate: Candidate, entry: Accepted) -> bool:
-    """Another effect that acts on the same joint, or that the catalogue knows to be taken for this one."""
+    """Whether a rival acts on the joint of an accepted effect, or the catalogue calls both confusable."""
     name, site = entry.key
     if candidate.key == (name, site):
         return False
@@ -194,7 +194,7 @@ def _near(candidate: Candidate, entry: Accepted) -> bool:
 
 
 def as_good(final: Judged, trial: Trial, data: Data) -> bool:
-    """Whether something in the place of an effect predicts the validation data as the effect does."""
+    """Whether a rival predicts the validation data as well as the accepted effect in whose place it stands."""
     if not trial.clear:
         return False
     change = gain(final.validation, trial.judged.validation, segments(data.validation)).relative

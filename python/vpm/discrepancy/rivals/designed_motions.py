@@ -1,4 +1,4 @@
-"""Motions that an experiment may make, by the design tool, within limits: fast and slow ways, a chirp, a multisine."""
+"""Designed motions for a discriminating experiment within limits: slow and fast ways, a chirp, a multisine."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ DURATION = 20.0
 
 @dataclass(frozen=True)
 class Motion:
-    """A designed excitation, and the motion of all joints (n, joints) that it means."""
+    """Designed motion: an excitation, and the motion of all joints (n, joints) that it means."""
 
     excitation: Excitation
     parameters: Mapping[str, float | str]
@@ -38,19 +38,19 @@ class Motion:
 
     @property
     def time_step(self) -> float:
-        """S."""
+        """Time step of a designed motion, s."""
         return self.excitation.time_step
 
 
 def designs(seen: ExcitationRange) -> list[Callable[[], Motion]]:
-    """Designs to choose from; each raises `ExcitationError` if it does not fit into the limits."""
+    """Designed motions to choose from; each raises `ExcitationError` if it does not fit into the limits."""
     ways = [partial(_way, seen, share) for share in SPEEDS]
     waves = [partial(design, seen, share) for share in AMPLITUDES for design in (_chirp, _multisine)]
     return [*ways, *waves]
 
 
 def _way(seen: ExcitationRange, share: float) -> Motion:
-    """Back and forth with constant speeds and rests; a slow one over as much of the way as the time allows."""
+    """Designed motion back and forth at constant speed with rests; a slow one uses the time available."""
     speed = share * seen.speed
     middle, half = 0.5 * (seen.low + seen.high), 0.5 * WITHIN * (seen.high - seen.low)
     half = min(half, 0.05 * LONGEST * speed)
@@ -100,12 +100,12 @@ def _multisine(seen: ExcitationRange, share: float) -> Motion:
 
 
 def _fastest(seen: ExcitationRange, amplitude: float) -> float:
-    """Frequency in Hz at which a sine of this amplitude reaches the speed or the acceleration that was seen."""
+    """Highest frequency in Hz of a designed sine within the speed and acceleration of the records."""
     return min(seen.speed / amplitude, float(np.sqrt(seen.acceleration / amplitude))) / (2.0 * np.pi)
 
 
 def _step(seen: ExcitationRange, duration: float) -> float:
-    """Time step of the records, or a whole multiple of it that keeps the samples few; a whole part of a second."""
+    """Time step of a designed motion: a multiple of that of the records, and a whole part of a second."""
     step = max(seen.time_step, duration / MOST_SAMPLES)
     return 1.0 / max(1, int(1.0 / step))
 
@@ -124,7 +124,7 @@ def _motion(
     velocity: Array,
     acceleration: Array,
 ) -> Motion:
-    """All joints, of which the others stand still."""
+    """Designed motion of all joints; those that are not excited stand still."""
     joints = list(seen.hold)
     place = joints.index(seen.joint)
     table = np.tile([seen.hold[name] for name in joints], (position.size, 1))

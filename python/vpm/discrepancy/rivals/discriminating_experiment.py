@@ -1,4 +1,4 @@
-"""The discriminating experiment for two repaired models: of the designed signals the one on which they differ most.
+"""Discriminating experiment for two rival models: the designed motion on which their torque residuals differ most.
 
 Both models follow the same designed motion with the same commands, and their torque residuals are compared. A
 difference that other parameters of the second model could imitate does not count. So the second model is fitted to the
@@ -33,7 +33,7 @@ TELLING = 1.0
 
 @dataclass(frozen=True)
 class _Residual:
-    """What shows of a model along a motion: effort applied less effort required (n, joints), and its derivative."""
+    """Torque residual of a model along a motion of the experiment (n, joints), and its derivative."""
 
     residual: Array
     slopes: Array
@@ -42,7 +42,7 @@ class _Residual:
 def experiments(
     final: Judged, ambiguous: Sequence[Rivals], data: InverseDynamicsProblem, noise: Mapping[str, float]
 ) -> tuple[ProposedExperiment, ...]:
-    """For each pair of an effect and a rival, the motion that discriminates them best.
+    """Discriminating experiment for each pair of an effect and its rival.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def experiments(
 def propose(
     first: Judged, second: Judged, labels: tuple[str, str], seen: ExcitationRange, noise: Mapping[str, float]
 ) -> ProposedExperiment | None:
-    """The best motion for one pair of models, or None if no motion can be made."""
+    """Propose the motion that discriminates two models best, or None if no motion is possible."""
     best: ProposedExperiment | None = None
     for motion in _possible(seen):
         difference, joint = _difference(first, second, motion, seen)
@@ -106,7 +106,7 @@ def _possible(seen: ExcitationRange) -> Iterator[Motion]:
 
 
 def _difference(first: Judged, second: Judged, motion: Motion, seen: ExcitationRange) -> tuple[float, str]:
-    """Root mean square difference that the second model cannot imitate, and the joint where it is largest."""
+    """Root mean square difference of two models in an experiment that the second cannot imitate, and its joint."""
     model = first.model
     inputs = _commands(model, motion, seen)
     one = _residual(model, (), motion, inputs)
@@ -121,7 +121,7 @@ def _difference(first: Judged, second: Judged, motion: Motion, seen: ExcitationR
 
 
 def _imitation(change: Array, slopes: Array, second: Judged, spread: float) -> Array:
-    """Change of the parameters that brings the second model nearest to the first, held back by the records.
+    """Parameter change of the second model that imitates the first in the experiment, with the fit as prior.
 
     Nothing holds back what the records do not see: its variance is infinite.
     """
@@ -145,7 +145,7 @@ def _residual(model: Model, free: Sequence[str], motion: Motion, inputs: Array) 
 
 
 def _commands(model: Model, motion: Motion, seen: ExcitationRange) -> Array:
-    """Commands that a controller would have to give: their effort is the required one, at the drives' mean gain."""
+    """Commands for an experiment: the required effort divided by the mean gain of the drives."""
     count = len(model.inputs)
     rest = np.zeros((len(motion.position), count))
     required = model.core.inverse_dynamics(
@@ -164,7 +164,7 @@ def _commands(model: Model, motion: Motion, seen: ExcitationRange) -> Array:
 
 
 def _joint_of(model: Model, site: str, joints: Sequence[str]) -> str:
-    """The joint to be moved for an effect at a site."""
+    """Joint that the experiment moves for an effect at a site."""
     if site in joints:
         return site
     if site in model.actuators and (driven := [j for j in model.joints_of_actuator(site) if j in joints]):

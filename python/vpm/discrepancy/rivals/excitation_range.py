@@ -1,4 +1,4 @@
-"""The excitation range of records: how far they moved a joint, which limits the next experiment."""
+"""Excitation range of records: how far they moved a joint, which limits the next experiment."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vpm.identify import InverseDynamicsProblem
 
 @dataclass(frozen=True)
 class ExcitationRange:
-    """Range of the motion of one joint; the others stay at ``hold``.
+    """Excitation range of one joint: way, speed and acceleration; other joints stay at ``hold``.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class ExcitationRange:
 
 
 def excitation_range(data: InverseDynamicsProblem, joint: str) -> ExcitationRange:
-    """Range in which records moved ``joint``."""
+    """Excitation range of ``joint`` in the records."""
     motions = data.motions
     column = motions[0].joints.index(joint)
     position, velocity, acceleration = (

@@ -1,4 +1,4 @@
-"""A nested model: a law that contains an accepted one is judged beside the other accepted effects.
+"""Nested model: a rival law that contains an accepted one is judged beside the other accepted effects.
 
 A spring is a constant force that changes with position. On a joint in gravity, a shifted centre of mass does nearly the
 same. While the constant force is missing, its residual hides the small difference, so the spring looks identical to the
@@ -22,7 +22,7 @@ from vpm.numbers import NORMAL_95
 
 
 def probe_beside(final: Judged, without: Judged, data: InverseDynamicsProblem, entry: Accepted, probe: Probe) -> Probe:
-    """A rival that looked like known parameters, with what the data show of it beside the effect that was accepted.
+    """Probe of a nested rival beside the accepted effect whose law it contains.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def probe_beside(final: Judged, without: Judged, data: InverseDynamicsProblem, e
 
 
 def contains(rival: Judged, parameters: tuple[str, ...], final: Judged, own: tuple[str, ...]) -> bool:
-    """Whether a rival can do all that an accepted effect does, and something more.
+    """Whether a rival is a richer law in which the accepted effect is nested.
 
     Then the effect is the rival with one number at zero. The distance of that number from zero on the training records
     counts as evidence, so validation records, which are fewer, only have to improve. Of laws that are different, and of

@@ -1,4 +1,4 @@
-"""Rivals of an accepted effect, discriminated by closed-loop predictions of the model.
+"""Discrimination of rivals of an accepted effect by closed-loop predictions of the model.
 
 Examples are a constant force and a tilted world, or a delay and direction-dependent friction. Beside other missing
 effects, or in a record of few reversals, the inverse-dynamics residual hardly separates them.
@@ -27,7 +27,7 @@ from vpm.discrepancy.search.search import Search
 def discriminated(
     found: Search, known: Sequence[Rivals], data: Data, each: SideBySide
 ) -> tuple[Search, tuple[Rivals, ...]]:
-    """Exchange an effect for the rival that predictions support most, if training and validation records are clear.
+    """Exchange an effect for the rival that predictions discriminate clearly, on training and validation records.
 
     Returns
     -------

@@ -25,7 +25,7 @@ from vpm.identify import Gain, gain, segments
 
 
 def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search, tuple[Rivals, ...]]:
-    """Let the rival that the validation data prefer most take the place of the effect it was put for, if there is one.
+    """Exchange one effect for the rival that the validation data prefer most, if there is one.
 
     A rival counts that acts at the same site and is confused with the effect. A rival changes a name and adds none, so
     it need not halve the residual: it only has to predict the validation data better than the effect.
@@ -55,7 +55,7 @@ def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search
 
 
 def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresholds: Thresholds) -> float:
-    """Standard deviations by which the validation data prefer a rival, 0 if not beyond chance or not in every view."""
+    """Standard deviations by which validation data prefer a rival for an exchange; 0 if not in every view."""
     if trial.probe.candidate.effect.late and entry.effect.late:
         return 0.0  # their runs along the reference said which, and the residual knows less of it
     if not alike(trial.probe.candidate, entry.trial.probe.candidate) or refuse_trial(trial, thresholds):
@@ -80,7 +80,7 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
 
 
 def timed_again(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search, tuple[Rivals, ...]]:
-    """Choose each delay or lag again among all of these, now that the other effects are known.
+    """Exchange each delay or lag for another one if that is better beside all other effects.
 
     When it came in, another effect was missing. The error of that one was attributed to the drive rather than to an
     instrument, and disturbed the predictions that discriminate a delay from a lag. One that came in last was chosen
@@ -110,12 +110,12 @@ def timed_again(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Sea
 
 
 def _thresholds(known: Sequence[Rivals], data: Data) -> Thresholds:
-    """Thresholds for rivals when so many were tried."""
+    """Thresholds for the exchange of rivals when so many were tried."""
     return Thresholds(max(1, sum(len(r.tried) for r in known)), min(m.dt for m in data.training.motions))
 
 
 def earned(fitted: Gain, more: int) -> bool:
-    """Whether a rival lowers the training error by what its additional numbers cost.
+    """Whether a rival lowers the training error by the cost of its additional numbers, so that an exchange pays.
 
     By the information criterion on training records: parameters that these do not show would only fit the errors of
     friction laws at a few reversals of other records.
@@ -133,7 +133,7 @@ def earned(fitted: Gain, more: int) -> bool:
 def exchanged(
     found: Search, known: Sequence[Rivals], data: Data, place: int, trial: Trial, why: str
 ) -> tuple[Search, tuple[Rivals, ...]]:
-    """The search with another effect at one place, and the rivals of that one; ``why`` it is there, in words."""
+    """Search after the exchange of an effect for a rival, with the rivals of that one and ``why`` in words."""
     entry, mine = found.accepted[place], known[place]
     new, old = trial.probe.candidate, entry.trial.probe.candidate
     incoming = Accepted(trial, ())
@@ -163,7 +163,7 @@ def exchanged(
 
 
 def in_order(found: Search, known: Sequence[Rivals]) -> tuple[Search, tuple[Rivals, ...]]:
-    """Accepted effects by what each adds to the prediction of validation data given all the others, the most first.
+    """Accepted effects after the exchange, ordered by what each adds to validation beside all others.
 
     An effect with a held number, which the data show only together with another effect, comes after that one: with
     either removed, the held number would decide how they share the residual.
@@ -180,5 +180,5 @@ def in_order(found: Search, known: Sequence[Rivals]) -> tuple[Search, tuple[Riva
 
 
 def _refines(entry: Accepted, other: Accepted) -> bool:
-    """Whether a number of one effect was held for the sake of another."""
+    """Whether a parameter of one effect was held for another one, so that their order is given."""
     return bool({alias.partner for alias in entry.trial.held} & set(other.trial.parameters))

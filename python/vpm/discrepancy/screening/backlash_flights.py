@@ -1,4 +1,4 @@
-"""Flights of a link through a backlash along the measured motion, from one soft contact to the other.
+"""Backlash flights: a link crosses its backlash along the measured motion, between soft contacts.
 
 Along a noisy motion within a band, single bounces between hard contacts are not predictable: each enlarges the error of
 the one before. Soft, well damped contacts forget the flight before and pass on low frequencies as hard ones do. They
@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class _Course:
-    """What lets a link fly along one record.
+    """Data along one record from which backlash flights are simulated.
 
     Attributes
     ----------
@@ -43,7 +43,7 @@ class _Course:
 def flights(
     model: Model, site: str, data: InverseDynamicsProblem, gaps: Array, frequencies: Array, dampings: Array
 ) -> Array:
-    """What backlashes would add to the residual, shape (n, backlashes).
+    """Change of the residual by backlash flights, shape (n, backlashes).
 
     Law: within the gap no effort is transmitted to the link. Beyond it a spring and a damper hold it, ``y'' = pull -
     w^2 (y -+ gap/2) - 2 z w y'``, with ``w = 2 pi frequency`` and the damping ratio z. Steps take the damping at the
@@ -69,7 +69,7 @@ def flights(
 
 
 def _course(model: Model, site: str, m: Motion) -> _Course:
-    """The measured motion with the link at rest in the backlash, and once more with one unit of acceleration there."""
+    """Measured motion for backlash flights: with the link at rest, and once more with a unit acceleration."""
     behind = model.joints.index(name_behind(site))
     before = [model.joints.index(joint) for joint in m.joints]
     motion = np.zeros((3, len(m.time), len(model.joints)))

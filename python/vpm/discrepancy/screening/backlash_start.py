@@ -1,4 +1,4 @@
-"""Width of a backlash, estimated by simulating the free flight of the link along the measured motion.
+"""Start value of a backlash: its width, from simulated free flights of the link along the measured motion.
 
 Whenever the transmitted effort changes its sign, the link flies freely and comes to rest on the other side. The
 duration of the flight, and so the width, shows in the residual: until the link arrives, the drive accelerates only
@@ -53,7 +53,7 @@ HOPELESS = 0.95
 
 @dataclass(frozen=True)
 class _Look:
-    """A backlash and what it leaves, beside the best values of what else is free."""
+    """Start values of a backlash, the best values of the free parameters beside it, and the residual."""
 
     gap: float
     frequency: float
@@ -62,13 +62,13 @@ class _Look:
 
 
 def is_read_off(model: Model, data: InverseDynamicsProblem, candidate: Candidate) -> bool:
-    """Whether a candidate is a backlash that the measured motion shows: between ideal drives and rigid links."""
+    """Whether the width of a backlash can be searched as a start value: between ideal drives and rigid links."""
     measured = candidate.site in data.motions[0].joints
     return candidate.effect.has_play and measured and not (bends(model) or has_own_drives(model))
 
 
 def near_prior(model: Model, nominal: Model, free: Sequence[str]) -> Model:
-    """The model with the parameters of the nominal one, if the recalibration moved any of these beyond its prior.
+    """Model for the search of a backlash width: nominal parameters if the recalibration moved any beyond its prior.
 
     A backlash looks like a load that comes and goes; a fit without it may make a body weightless, along which nothing
     flies.
@@ -83,7 +83,7 @@ def near_prior(model: Model, nominal: Model, free: Sequence[str]) -> Model:
 
 
 def only_compliant(model: Model, site: str, data: InverseDynamicsProblem) -> str:
-    """Why a fitted play is none, or "": under the effort its contacts give way further than the link flies."""
+    """Why a fitted backlash is none, or "": its contacts give way further than its width."""
     names = next(effect.parameter_names for effect in model.effects if effect.type.has_play and effect.at == site)
     gap, stiffness = (model.parameters[names[name]] for name in ("gap", "stiffness"))
     if site not in data.joints:
@@ -101,7 +101,7 @@ def only_compliant(model: Model, site: str, data: InverseDynamicsProblem) -> str
 def read_off(
     model: Model, free: Sequence[str], data: InverseDynamicsProblem, candidate: Candidate, *, hard: bool = False
 ) -> Candidate:
-    """The candidate with the one start that leaves least.
+    """Candidate backlash with the one start value of least residual.
 
     Parameters
     ----------
@@ -126,7 +126,7 @@ def read_off(
 
 
 class _Search:
-    """Judges backlashes by the residual along the measured motion."""
+    """Search for the start values of a backlash by the residual along the measured motion."""
 
     def __init__(self, model: Model, free: Sequence[str], data: InverseDynamicsProblem, candidate: Candidate) -> None:
         self.model, self.data, self.candidate = model, data, candidate
@@ -152,18 +152,18 @@ class _Search:
         return self.model.with_effect(self.candidate.effect.name, at=self.candidate.site, **values)
 
     def best(self, so_far: _Look, tried: Sequence[_Look]) -> _Look:
-        """What leaves least of those and the one before."""
+        """Backlash of least residual among those tried and the one before."""
         looks = [self(one.gap, one.frequency, one.damping) for one in tried]
         return min((so_far, *looks), key=lambda look: look.left)
 
     def hard(self, found: _Look) -> _Look:
-        """The best of hard contacts around a width."""
+        """Best backlash with hard contacts around a width."""
         contacts = sorted({self.slowed(frequency) for frequency in CONTACTS if frequency >= HARD})
         first = replace(found, left=math.inf)
         return self.best(first, [replace(first, frequency=f, damping=d) for f in contacts for d in HARD_DAMPINGS])
 
     def soft(self, found: _Look) -> _Look:
-        """The best of all contacts around a width: one number after the other."""
+        """Best backlash with soft or hard contacts around a width: one number after the other."""
         contacts = sorted({self.slowed(frequency) for frequency in CONTACTS})
         found = self.best(found, [replace(found, frequency=f) for f in contacts])
         found = self.best(found, [replace(found, damping=d) for d in DAMPINGS])
@@ -171,17 +171,17 @@ class _Search:
         return self.best(found, [replace(found, frequency=self.slowed(factor * found.frequency)) for factor in BESIDE])
 
     def slowed(self, frequency: float) -> float:
-        """A frequency of contacts, or the fastest that samples show."""
+        """Contact frequency of a backlash, no faster than samples can show."""
         return min(frequency, FASTEST / (2.0 * math.pi * self.interval))
 
     def values(self, gap: float, frequency: float, damping: float) -> Mapping[str, float]:
-        """Values of the effect by short name."""
+        """Start values of the backlash by short name."""
         stiffness = self.inertia * (2.0 * math.pi * frequency) ** 2
         resistance = 2.0 * damping * math.sqrt(stiffness * self.inertia)
         return {"gap": gap, "stiffness": stiffness, "contact_damping": resistance, "width": ROUNDING * gap}
 
     def survey(self) -> list[_Look]:
-        """The backlashes between soft contacts that leave least, the least first."""
+        """Backlashes between soft contacts by their residual, the least first."""
         contacts = sorted({self.slowed(frequency) for frequency in SURVEYED})
         widths, frequencies = (each.ravel() for each in np.meshgrid(SHARES * self.travel, contacts))
         start = self.values(float(widths[0]), contacts[0], SURVEYED_DAMPING)
@@ -194,6 +194,6 @@ class _Search:
         return [_Look(float(widths[k]), float(frequencies[k]), SURVEYED_DAMPING, float(left[k])) for k in order]
 
     def _left(self, residual: Array) -> Array:
-        """Sum of squares, of each column, beside the best change of what is free."""
+        """Sum of squares that each backlash column leaves beside the best change of the free parameters."""
         rest = residual - self.known @ (self.known.T @ residual)
         return np.asarray(np.sum(rest**2, axis=0))

@@ -1,4 +1,4 @@
-"""Every effect of the catalogue that is screened, at every place it can sit, with start values read off the data."""
+"""Candidates: every effect of the catalogue at every possible site, with start values from the data."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ PERIODS = 3
 
 @dataclass(frozen=True)
 class Candidate:
-    """One effect at one site, to be tried.
+    """Candidate of the screening: one effect at one site, with its start values and bounds.
 
     Attributes
     ----------
@@ -64,18 +64,18 @@ class Candidate:
 
     @property
     def key(self) -> Key:
-        """Effect and site."""
+        """Effect and site of a candidate."""
         return self.effect.name, self.site
 
     @property
     def label(self) -> str:
-        """``effect at site``."""
+        """Label of a candidate: ``effect at site``."""
         return f"{self.effect.name} at {self.site}"
 
 
 @dataclass(frozen=True)
 class Excitation:
-    """How far the data move one joint or actuator, the number of that among the inputs, and the longest record."""
+    """Excitation of one joint or actuator by the records, from which candidates take their start values."""
 
     speed: float
     middle: float
@@ -86,7 +86,7 @@ class Excitation:
     record: float
 
     def multiple(self, of: Seen, share: float) -> float:
-        """A share of what the data show."""
+        """Start value of a candidate as a multiple of the excitation's speed, way or time."""
         if of == "way":
             return self.middle + share * self.travel
         scales: dict[Seen, float] = {
@@ -101,7 +101,7 @@ class Excitation:
 
 
 def asked_for(effects: Sequence[str] | None) -> tuple[str, ...]:
-    """Names of effects that are to be tried; those of all that have a law if not given.
+    """Names of effects that may become candidates: the given ones, or all with a law.
 
     Raises
     ------
@@ -128,7 +128,7 @@ def candidates(
     *,
     simulated: bool = False,
 ) -> tuple[Candidate, ...]:
-    """List what could be missing from ``model``.
+    """List the candidates: all effects that could be missing from ``model``, at each site.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def candidates(
 
 
 def left_out(model: Model, data: InverseDynamicsProblem, effects: Sequence[str] | None = None) -> dict[Key, str]:
-    """Why effects are not among the `candidates` that ``model`` could have but for what it has already."""
+    """Reasons why some effects are not among the `candidates` of ``model``."""
     reasons = {
         (effect.name, site): beyond(effect, site, model, data.joints) for effect, site in _absent(model, effects)
     }
@@ -159,7 +159,7 @@ def left_out(model: Model, data: InverseDynamicsProblem, effects: Sequence[str] 
 
 
 def _absent(model: Model, effects: Sequence[str] | None) -> list[tuple[EffectType, str]]:
-    """Effects of the catalogue that ``model`` does not have, with each of their sites."""
+    """Effects of the catalogue that ``model`` does not have, with each possible site, before they become candidates."""
     present, by_key = {(effect.name, effect.at) for effect in model.effects}, {effect.key for effect in model.effects}
     tried = {effect.name for effect in EFFECTS.values() if effect.screened} if effects is None else set(effects)
     found = []
@@ -191,7 +191,7 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
 def _tried(
     effect: EffectType, site: str, model: Model, seen: Excitation, limit: Callable[[str, int], float | None]
 ) -> Candidate:
-    """With the start values and bounds that the catalogue gives; a ``limit`` of commands is guessed from data too."""
+    """Candidate with start values and bounds of the catalogue; a ``limit`` of commands starts from data."""
     # A way that is passed between two samples is like dry friction.
     least = min(seen.speed * seen.interval, 0.5 * seen.travel)
     grids, bounds = list[list[tuple[str, float]]](), dict[str, tuple[float, float]]()
@@ -218,7 +218,7 @@ def _tried(
 
 
 def _periodic(effect: EffectType, site: str, data: InverseDynamicsProblem, model: Model, residual: Array) -> Candidate:
-    """Waves over the way of a joint; what rubs turns round with the motion, a share of the effort with that."""
+    """Candidate that is periodic in position, such as a ripple, with the periods that the residual shows."""
     where, rate, values = _over_way(data, model, site, residual)
     if effect.rubs or effect.takes_effort:
         values = values * (np.sign(rate) if effect.rubs else _applied(data, site))
@@ -228,7 +228,7 @@ def _periodic(effect: EffectType, site: str, data: InverseDynamicsProblem, model
 
 
 def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
-    """At the origin of the body, at its centre of mass, and twice as far out."""
+    """Start positions of a candidate payload: origin of the body, its centre of mass, and twice as far out."""
     if body in model.beams:  # in the frame of its tip
         return ({},)
     centre = {axis: model.parameters[f"{body}.center_of_mass.{axis}"].value for axis in "xyz"}
@@ -237,18 +237,18 @@ def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
 
 
 def slow_speeds(fastest: float) -> tuple[float, float]:
-    """Bounds of a transition velocity, a detail of small speeds: between 1/5000 and 1/10 of the largest."""
+    """Bounds of a candidate's transition velocity: between 1/5000 and 1/10 of the largest speed."""
     return SLOW[0] * fastest, SLOW[1] * fastest
 
 
 def _known_transition(model: Model, site: str, seen: Excitation) -> float:
-    """Transition velocity of the Coulomb friction that is already there, else one hundredth of the speed."""
+    """Transition velocity for a candidate: that of the model's Coulomb friction, else a hundredth of the speed."""
     name = f"{site}.friction.transition_velocity"
     return model.parameters[name].value if name in model.parameters else 0.01 * seen.speed
 
 
 def joint_at(model: Model, site: str) -> str:
-    """The joint at which an effect acts, its drive or its sensor; "" if it acts on a body or on several."""
+    """Joint on which a candidate acts, through its drive or sensor too; "" for bodies and for several joints."""
     if site in model.joints:
         return site
     if site in model.actuators:
@@ -258,7 +258,7 @@ def joint_at(model: Model, site: str) -> str:
 
 
 def shares_at(model: Model, site: str, joints: Sequence[str]) -> Array:
-    """Share of each of these joints in the coordinate at a site, shape (n,).
+    """Share of each joint in the coordinate at a candidate's site, shape (n,).
 
     At a transmission these are its ratios, elsewhere 1 of the joint there, or of the first one.
     """
@@ -272,7 +272,7 @@ def shares_at(model: Model, site: str, joints: Sequence[str]) -> Array:
 
 
 def _excitation(data: InverseDynamicsProblem, model: Model, site: str, actuator: str | None) -> Excitation:
-    """Largest speed (99.9 % quantile), middle and half range of the travel, interval and largest command."""
+    """Excitation of one joint: its largest speed (99.9 % quantile), middle and half range, sampling time, command."""
     shares = shares_at(model, site, data.motions[0].joints)
     position = np.concatenate([m.position @ shares for m in data.motions])
     velocity = np.concatenate([m.velocity @ shares for m in data.motions])
@@ -291,7 +291,7 @@ def _excitation(data: InverseDynamicsProblem, model: Model, site: str, actuator:
 
 
 def _ripple_periods(position: Array, values: Array, fewest: float) -> list[float]:
-    """Periods in position at which a residual is strongest: peaks of its least-squares periodogram.
+    """Start periods of candidates in position: peaks of the residual's least-squares periodogram.
 
     Evenly spaced frequencies up to what the decimated samples resolve, from ``fewest`` periods per travel; friction
     changes its sign with the motion, and half a period suffices for it; N. Lomb, *Astrophysics and Space Science* 39,
@@ -312,7 +312,7 @@ def _ripple_periods(position: Array, values: Array, fewest: float) -> list[float
 
 
 def _over_way(data: InverseDynamicsProblem, model: Model, site: str, residual: Array) -> tuple[Array, Array, Array]:
-    """Position, velocity and residual of one joint, or of the first one that is measured, at all samples.
+    """Position, velocity and residual of one joint at all samples, for start values of candidates.
 
     At a transmission it is the effort on the shaft that leaves least of the residual of its joints.
     """
@@ -323,7 +323,7 @@ def _over_way(data: InverseDynamicsProblem, model: Model, site: str, residual: A
 
 
 def _applied(data: InverseDynamicsProblem, joint: str) -> Array:
-    """What drives deliver there by the model as it was given, at all samples."""
+    """Effort that the model's drives apply at a candidate's site, at all samples."""
     model, column = data.nominal, _column(data, joint)
     return np.concatenate([data.effort(model, model.theta, r)[1][:, column] for r in range(len(data.motions))])
 

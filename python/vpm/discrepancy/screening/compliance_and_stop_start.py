@@ -1,4 +1,4 @@
-"""Start values of effects that add compliance or stops to what is described as rigid and free.
+"""Start values of effects that add compliance, backlash or end stops to rigid and free parts.
 
 A spring between two masses shows by its resonance, so stiffnesses are tried at a grid of frequencies.
 """
@@ -45,7 +45,7 @@ Bounds = Mapping[str, tuple[float, float]]
 
 
 def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
-    """Sites of an effect but those where it cannot show: links that bend already, damping of rigid beams.
+    """Sites where compliance, stops or other effects can show: no links that bend already, no damping if rigid.
 
     A backlash is tried where an actuator drives the joint; elsewhere it needs a joint of its own. Effects of joints may
     be on the motor side of a transmission too, but for those of links.
@@ -74,7 +74,7 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
 
 
 def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str], *, simulated: bool = False) -> str:
-    """Why a model with one effect more could not be built, or balanced along the ``measured`` joints, or "".
+    """Why a model with one more compliance or effect cannot be built or computed along the ``measured`` joints.
 
     A motion with joints that no channel measures is integrated, and there effects with a memory are refused. They work
     on the motor side of a split joint where that is measured, see `vpm.identify.parts.bending`, and where all is
@@ -102,22 +102,22 @@ def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str],
 
 
 def in_series(effect: EffectType) -> tuple[str, ...]:
-    """Short names of the parameters of an effect that do less the larger they are."""
+    """Short names of compliance parameters in series: the larger they are, the less they do."""
     return (SERIES,) if effect.motion else ()
 
 
 def coupled(model: Model) -> bool:
-    """Whether it has several joints beside those that effects have split off, whose errors can cancel each other."""
+    """Whether a model has several joints without those that added compliance split off, so that errors cancel."""
     return len(set(model.joints) - set(model.added_joints)) > 1
 
 
 def _joint(model: Model, site: str) -> str:
-    """A joint itself, or the one before a body or beam."""
+    """Joint of a compliance or stop: the site itself, or the joint before a body or beam."""
     return site if site in model.joints else model.joint_before(site)
 
 
 def logged_swing(data: InverseDynamicsProblem, model: Model, site: str) -> tuple[float, float] | None:
-    """Stiffness and damping per inertia, 1/s^2 and 1/s, of the deflection behind a joint, where the logs hold it.
+    """Stiffness and damping of a compliance per inertia, 1/s^2 and 1/s, where logs hold its deflection.
 
     What hangs on the spring obeys ``a + d'' = -(k/J) d - (c/J) d'``, ``a`` the acceleration of the joint before it.
     Two numbers by linear least squares, without gravity and the motion of other joints, so good for a start only.
@@ -141,7 +141,7 @@ def logged_swing(data: InverseDynamicsProblem, model: Model, site: str) -> tuple
 def structural_starts(
     effect: EffectType, site: str, model: Model, travel: float, swing: tuple[float, float] | None = None
 ) -> tuple[Starts, Bounds]:
-    """Start values and bounds by short name.
+    """Start values and bounds of a compliance, backlash or stop by short name.
 
     Parameters
     ----------
@@ -183,12 +183,12 @@ def structural_starts(
 
 
 def softest(model: Model, site: str) -> float:
-    """Least stiffness that holds what a joint moves, N/m or N m/rad."""
+    """Least start stiffness of a compliance that holds what the joint moves, N/m or N m/rad."""
     return moved(model, site) * (2.0 * math.pi * SLOWEST) ** 2
 
 
 def stop_starts(position: Array, residual: Array, middle: float, travel: float, least: float) -> tuple[Starts, Bounds]:
-    """The same for the ends of a way: one end, or both where either side looks like one.
+    """Start values and bounds of end stops: one end, or both where either side looks like one.
 
     A stop pushes back over the last part of the travel, so the residual (applied - required) grows outwards from its
     position. The positions on either side are those at which such a ramp explains most of it.
@@ -217,7 +217,7 @@ def stop_starts(position: Array, residual: Array, middle: float, travel: float, 
 
 
 def _ramp(outwards: Array, push: Array) -> tuple[float, ...]:
-    """Place from which a ramp outwards takes most of the push; none where nothing pushes back."""
+    """Start position of an end stop: a ramp outwards from there explains the residual best; None without one."""
     order = np.sort(outwards)
     most = int(BEYOND_MOST * order.size)
     if most <= BEYOND_LEAST:
@@ -234,7 +234,7 @@ def _ramp(outwards: Array, push: Array) -> tuple[float, ...]:
 
 
 def moved(model: Model, site: str) -> float:
-    """Inertia that hangs on a joint, a body or a beam when all joints stand at zero."""
+    """Inertia behind a compliance at a joint, body or beam when all joints are at zero."""
     joint = model.joint_before(site)
     place = model.joints.index(joint)
     whole = float(model.masses_at_zero[place])
@@ -255,7 +255,7 @@ def moved(model: Model, site: str) -> float:
 def ends_apart(
     model: Model, free: Sequence[str], bounds: Mapping[str, tuple[float, float]]
 ) -> dict[str, tuple[float, float]]:
-    """Bounds that keep both ends of a stop, where both are free, on their sides of its middle."""
+    """Bounds that keep both ends of a stop on their sides of its middle."""
     apart = dict(bounds)
     for stop in (effect.parameter_names for effect in model.effects if effect.type.stops):
         low, high = stop["low"], stop["high"]

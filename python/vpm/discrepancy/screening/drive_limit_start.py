@@ -14,7 +14,7 @@ LIMITS, BEYOND_MOST, BEYOND_LEAST = 30, 0.5, 3
 
 
 def limit_start(data: InverseDynamicsProblem, joint: str, actuator: int, residual: Array) -> float | None:
-    """Limit beyond which the command itself, cut off there, takes most of a residual.
+    """Start value of a drive limit: the cut-off of the command that explains most of a residual.
 
     A limited drive leaves what the command has too much, which is a ramp in the command with the slope of the gain.
     Commands of a loop whose drive gives no more run far beyond it, so that shares of the largest one say little.

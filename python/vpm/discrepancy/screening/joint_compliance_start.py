@@ -29,7 +29,7 @@ DAMPINGS = (0.1, 0.3)
 
 
 def is_searched(model: Model, data: InverseDynamicsProblem, candidate: Candidate) -> bool:
-    """Whether a candidate is a joint compliance between an ideal drive and rigid links, where a search is cheap."""
+    """Whether the stiffness of a joint compliance is searched: between an ideal drive and rigid links."""
     measured = candidate.site in data.motions[0].joints
     return candidate.effect.winds_up and measured and not (bends(model) or has_own_drives(model))
 
@@ -37,7 +37,7 @@ def is_searched(model: Model, data: InverseDynamicsProblem, candidate: Candidate
 def best_start(
     model: Model, jacobian: Array, data: InverseDynamicsProblem, candidate: Candidate
 ) -> Mapping[str, float] | None:
-    """The spring that leaves least beside the best change of what is free, or None if none leaves less than before.
+    """Start stiffness of a joint compliance with the least residual, or None if none improves it.
 
     Parameters
     ----------

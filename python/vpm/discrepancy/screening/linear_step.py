@@ -1,4 +1,4 @@
-"""The step of a linearised least-squares problem by which a candidate is judged before it is refitted."""
+"""Linear step of least squares, by which a candidate is judged before it is refitted."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 
 
 def linear_step(data: InverseDynamicsProblem, jacobian: Array, residual: Array) -> tuple[Array, Array, float]:
-    """Unbounded least-squares step, its standard deviations and the remaining sum of squares."""
+    """Linear least-squares step, its standard deviations and the remaining sum of squares."""
     if jacobian.shape[1] == 0:
         return np.zeros(0), np.zeros(0), float(residual @ residual)
     lengths = column_lengths(jacobian)
@@ -29,7 +29,7 @@ def linear_step(data: InverseDynamicsProblem, jacobian: Array, residual: Array) 
 def step_without(
     data: InverseDynamicsProblem, jacobian: Array, residual: Array, staying: Sequence[int]
 ) -> tuple[Array, Array, float]:
-    """The same with some parameters that stay where they are, without any deviation."""
+    """Linear step in which some parameters stay where they are, without deviation."""
     moves = [i for i in range(jacobian.shape[1]) if i not in staying]
     values, std = np.zeros(jacobian.shape[1]), np.zeros(jacobian.shape[1])
     values[moves], std[moves], left = linear_step(data, jacobian[:, moves], residual)
@@ -37,12 +37,12 @@ def step_without(
 
 
 def is_outside(parameter: Parameter, value: float, std: float) -> bool:
-    """Whether an estimate lies outside the physical range by more than one standard deviation."""
+    """Whether an estimate of a linear step lies outside the physical range by more than one standard deviation."""
     return value + std < parameter.minimum or value - std > parameter.maximum
 
 
 def softened(start: float, estimate: float, std: float) -> tuple[float, float]:
-    """Stiffness of a spring in series after the same step, taken in its compliance, with its standard deviation.
+    """Stiffness after a linear step in the compliance of a series spring, with its standard deviation.
 
     Under an effort F it gives way by F/k, which is linear in 1/k: from a start that is k0, a step dk is one of -dk/k0^2
     in the compliance. Taken in k, a spring half as stiff as its start, or less, would come out below zero. What comes

@@ -1,4 +1,4 @@
-"""Effects with a location parameter, such as the rest position of a spring: estimated together with its size.
+"""Location parameter of an effect, such as the rest position of a spring: estimated together with its size.
 
 At size zero the location has no influence. A spring that is assumed to rest in the middle of the motion then comes out
 wrong where most of its effort is constant. An effort ``size (c + location d)`` is linear in ``size`` and in
@@ -27,7 +27,7 @@ EVEN = 1e-6
 
 @dataclass(frozen=True)
 class Place:
-    """Numbers of the size and the place among those of an effect, and the column of the product of both."""
+    """Indices of size and location parameter of an effect, and the column of their product."""
 
     size: int
     where: int
@@ -37,7 +37,7 @@ class Place:
 def free_location(
     data: InverseDynamicsProblem, model: Model, candidate: Candidate, added: Sequence[str], fresh: Array
 ) -> Place | None:
-    """The place of a candidate that has a size and a place, or None.
+    """Location parameter of a candidate that has a size and a location, or None.
 
     Parameters
     ----------

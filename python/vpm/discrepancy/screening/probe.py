@@ -1,4 +1,4 @@
-"""Screening of candidates: the share of the training residual that the regressor of each explains.
+"""Probe of a candidate: the share of the training residual that its regressor explains in one linear step.
 
 For each candidate one linearised step moves the free parameters and the new ones together. So a candidate gains nothing
 that a better value of a known parameter would explain.
@@ -33,7 +33,7 @@ SIZE_LEVEL = 0.05
 
 @dataclass(frozen=True)
 class Alias:
-    """A parameter held at its start because the data show it only together with another one."""
+    """Alias in a probe: a parameter held at its start because data show it only together with another one."""
 
     parameter: str
     partner: str
@@ -41,7 +41,7 @@ class Alias:
 
 @dataclass(frozen=True)
 class Probe:
-    """What one linearised step says about one candidate.
+    """Probe of a candidate: estimates and gain of one linearised step.
 
     Attributes
     ----------
@@ -71,13 +71,13 @@ class Probe:
 
     @property
     def score(self) -> float:
-        """Drop per root of the fitted numbers: richer effects have to earn the numbers they bring."""
+        """Score of a probe: predicted gain per root of the fitted numbers, so that richer effects pay for them."""
         return self.drop / float(np.sqrt(max(1, len(self.free))))
 
 
 @dataclass(frozen=True)
 class Baseline:
-    """The model that candidates are added to, with its training residual and regressor.
+    """Baseline of probes: the model to which candidates are added, with its training residual and regressor.
 
     ``pushed`` says of parameters that a bound holds on which side: 1 at the upper one, -1 at the lower one.
     """
@@ -90,7 +90,7 @@ class Baseline:
 
 
 def prepare(base: Baseline, data: InverseDynamicsProblem, listed: Sequence[Candidate]) -> Baseline:
-    """Work out together what links do under all candidates that move them and do nothing at their start.
+    """Prepare probes: simulate together all candidates that move links and do nothing at their start values.
 
     They all share one motion there, and its derivatives by many parameters take little longer than by one. Shapes of
     what has no size have no influence. The baseline comes back with its regressor at its own values.
@@ -115,13 +115,13 @@ def prepare(base: Baseline, data: InverseDynamicsProblem, listed: Sequence[Candi
 
 
 def _short(model: Model, candidate: Candidate, name: str) -> str:
-    """Short name of a parameter of a candidate."""
+    """Short name of a candidate's parameter in a probe."""
     effect = model.effect(*candidate.key)
     return next(short for short, dotted in effect.parameter_names.items() if dotted == name)
 
 
 def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *, hard: bool = False) -> Probe:
-    """Try all start values of a candidate and keep the best, a possible one before an impossible one.
+    """Probe a candidate from all its start values; the best step counts, possible estimates before impossible ones.
 
     A backlash that is read off the motion has one start, with the contacts that suit it or ``hard`` ones.
     """
@@ -142,7 +142,7 @@ def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *,
 
 
 def _searched(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe | None:
-    """A drive with joint compliance, as it stands at the best of its starts; None where none of them leaves less."""
+    """Probe of a joint compliance at its best start value; None where none lowers the residual."""
     if not is_searched(base.model, data, candidate):
         return None
     start = best_start(base.model, base.jacobian, data, candidate)
@@ -151,25 +151,25 @@ def _searched(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate
 
 
 def screening_effort(candidate: Candidate) -> float:
-    """Guess of the time that `probe` takes, in starts that do nothing: a backlash is searched by its flights."""
+    """Time estimate of a `probe`, in starts that do nothing: a backlash is searched by its flights."""
     searched = 50.0 if candidate.effect.has_play else 0.0
     return searched + len(candidate.starts) * (1.0 if candidate.neutral else 2.0)
 
 
 def refit_effort(probe: Probe) -> float:
-    """Guess of the time that a refit takes: linear parameters are found in one step, shapes are not."""
+    """Time estimate of a refit after its probe: shapes take longer than linear parameters."""
     own = (*probe.free, *probe.invisible)
     return float(sum(probe.model.parameters[name].kind != "linear" for name in own))
 
 
 def impossible_values(probe: Probe) -> list[str]:
-    """Parameters whose estimate lies outside the physical range by more than one standard deviation."""
+    """Parameters whose estimate in a probe is outside the physical range by more than one standard deviation."""
     known = probe.model.parameters
     return [name for name in probe.free if is_outside(known[name], probe.values[name], probe.std[name])]
 
 
 def size_is_clear(names: Sequence[str], values: Array, covariance: Array) -> bool:
-    """Wald test that not all of ``names`` are zero at the level ``SIZE_LEVEL``."""
+    """Wald test of a probe that the parameters ``names`` are not all zero, at the level ``SIZE_LEVEL``."""
     if not names:
         return False
     if not np.all(np.isfinite(covariance)):
@@ -186,7 +186,7 @@ def _probe_start(
     *,
     still: bool = False,
 ) -> Probe:
-    """One start; where it is ``still``, the effect stays there, as its only one, and what is known moves alone."""
+    """Probe from one start value; a ``still`` start moves the known parameters alone."""
     start = candidate.starts[0] if start is None else start
     model = base.model.with_effect(candidate.effect.name, at=candidate.site, **start)
     added = _added(model, candidate)
@@ -240,7 +240,7 @@ def _probe_start(
 def _stepped(
     base: Baseline, data: InverseDynamicsProblem, jacobian: Array, residual: Array, start: Array, losses: Sequence[int]
 ) -> tuple[Array, Array, float]:
-    """Step of the known parameters and those of a candidate, see `linear_step`; some of them stay where they are.
+    """Linear step of a probe in known and new parameters, see `linear_step`; some of them stay.
 
     What a bound holds stays there: beyond it, it would seem to explain what no fit can. A negative loss of a spring in
     series stays at its ``start``. It depends on the square of the compliance, so a step from a clearly stiffer or
@@ -259,13 +259,13 @@ def _stepped(
 
 
 def _losses(model: Model, candidate: Candidate, names: Sequence[str]) -> list[int]:
-    """Places of the losses of a spring in series among parameters."""
+    """Indices of the loss parameters of a spring in series in a probe."""
     own = set(_added(model, candidate)) if in_series(candidate.effect) else set()
     return [i for i, name in enumerate(names) if name in own and _short(model, candidate, name) in LOSSES]
 
 
 def _sizes(model: Model, candidate: Candidate, known: Sequence[str], added: Sequence[str]) -> tuple[Array, Array]:
-    """Orders of magnitude of the known parameters and of those that the candidate adds."""
+    """Orders of magnitude of known and new parameters in a probe."""
     values = np.array([abs(model.parameters[name].value) or 1.0 for name in known])
     own = [candidate.effect.parameter(_short(model, candidate, name)) for name in added]
     return values, np.array([parameter.typical for parameter in own])
@@ -286,7 +286,7 @@ def sort_columns(
     residual: Array,
     sizes: tuple[Array, Array],
 ) -> tuple[list[int], tuple[Alias, ...], tuple[str, ...]]:
-    """Split the new columns into those the data see, those they confuse with others, and those without influence.
+    """Sort the new columns of a probe: identifiable, confused with others, and without influence.
 
     The first come by their places, the others by name. ``sizes`` are those of known and fresh parameters, without which
     SI units would decide what is small.

@@ -1,4 +1,4 @@
-"""Candidates of a round to be refitted, and candidates that are one model under two names."""
+"""Short list of a round: candidates to be refitted, and candidates that are one model under two names."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ TWIN = 1e-6
 
 
 def same_models(short_list: Sequence[Probe]) -> dict[Key, Key]:
-    """Candidates with a motion of their own that are an earlier one by another name, with that one.
+    """Candidates for the short list with a motion of their own that are the same model as an earlier one.
 
     A rigid link that bends at its root is a drive with joint compliance: no digit of what screening says parts the two.
     Refits of such machines take long, so that one of each pair has to be enough where it is refused.
@@ -33,6 +33,6 @@ def same_models(short_list: Sequence[Probe]) -> dict[Key, Key]:
 
 
 def most_promising(promising: Sequence[Probe]) -> list[Probe]:
-    """What is refitted, of probes by falling score."""
+    """Short list of probes to refit, by falling score."""
     richest = {p.candidate.key for p in sorted(promising, key=lambda p: -p.drop)[:RICHEST]}
     return [p for rank, p in enumerate(promising) if rank < SHORT_LIST or p.candidate.key in richest]

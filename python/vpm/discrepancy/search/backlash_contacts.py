@@ -1,4 +1,4 @@
-"""Stiffness and damping of the contacts of a backlash, from closed-loop predictions of the model.
+"""Contacts of a backlash: their stiffness and damping, from closed-loop predictions of the model.
 
 Along a measured motion the errors of simulated flights accumulate. The inverse-dynamics residual therefore prefers
 contacts that absorb impacts, and confuses their damping with softness and with a smaller inertia before them. In closed
@@ -48,7 +48,7 @@ TOLD = ("stiffness", "inertia")
 
 
 def with_predicted_contacts(found: Search, data: Data, each: SideBySide) -> Search:
-    """The search with contacts of its backlashes as hard as runs of the model along the training records say.
+    """Search whose backlashes have contacts as stiff as closed-loop predictions of training records support.
 
     The numbers of the runs stand if with them the training records are simulated better, beyond chance, and the
     validation ones are neither simulated nor balanced worse.
@@ -63,7 +63,7 @@ def with_predicted_contacts(found: Search, data: Data, each: SideBySide) -> Sear
 
 
 def _harder(final: Judged, entry: Accepted, data: Data, each: SideBySide) -> Judged:
-    """The model with the contacts of one backlash as runs say, or as it is."""
+    """Model with harder contacts of one backlash where predictions support them, or unchanged."""
     if data.simulation is None or data.simulation.mode != "closed_loop":
         return final
     records, setup = beginnings(data.training.experiments), data.simulation.setup
@@ -92,7 +92,7 @@ def _harder(final: Judged, entry: Accepted, data: Data, each: SideBySide) -> Jud
 
 
 def beginnings(records: Sequence[Experiment]) -> list[Experiment]:
-    """The first part of each record."""
+    """First part of each record, long enough to predict the contacts of a backlash."""
     most = LASTING / len(records)
     whole = [float(record.time[-1] - record.time[0]) for record in records]
     shares = [most / length if length > most else 1.0 for length in whole]
@@ -100,13 +100,13 @@ def beginnings(records: Sequence[Experiment]) -> list[Experiment]:
 
 
 def _predicted_values(model: Model, key: Key) -> tuple[str, ...]:
-    """Parameters of a backlash that a run tells, by dotted name."""
+    """Parameters of a backlash's contacts that a closed-loop prediction estimates, by dotted name."""
     effect = model.effect(*key)
     return tuple(effect.parameter_names[short] for short in TOLD)
 
 
 def with_contact(model: Model, key: Key, frequency: float, ratio: float) -> Model:
-    """The model with contacts on which the link swings at a frequency, Hz, while the motor stands."""
+    """Model with backlash contacts on which the link swings at a frequency, Hz, while the motor stands."""
     effect = model.effect(*key)
     stiffness = moved(model, key[1]) * (2.0 * math.pi * frequency) ** 2
     values = {effect.parameter_names["stiffness"]: stiffness}
@@ -114,7 +114,7 @@ def with_contact(model: Model, key: Key, frequency: float, ratio: float) -> Mode
 
 
 def _damped(model: Model, key: Key, ratio: float) -> Model:
-    """The model with another damping ratio of its contacts."""
+    """Model with another damping ratio of its backlash contacts."""
     names = model.effect(*key).parameter_names
     stiffness = model.parameters[names["stiffness"]].value
     resistance = 2.0 * ratio * math.sqrt(stiffness * moved(model, key[1]))
@@ -124,7 +124,7 @@ def _damped(model: Model, key: Key, ratio: float) -> Model:
 def _balanced(
     final: Judged, run: ClosedLoopPrediction, names: Sequence[str], key: Key, ratio: float, data: Data
 ) -> Judged | None:
-    """The residual fitted with what the run tells; None where that cannot be computed."""
+    """Refit to the residual with predicted contacts of a backlash held; None where that cannot be computed."""
     rest = tuple(name for name in final.free if name not in names)
     bounds = {name: pair for name, pair in final.bounds.items() if name in rest}
     try:
@@ -144,7 +144,7 @@ def _balanced(
 
 
 def _predicts_better(before: Array, one: Judged, runs: OutputErrorProblem) -> bool:
-    """Whether a model simulates the training records better than what was left ``before``, beyond chance."""
+    """Whether harder contacts simulate the training records better than ``before``, beyond chance."""
     try:
         after, _ = runs.evaluate(one.model, one.model.theta)
     except VpmError:
@@ -154,7 +154,7 @@ def _predicts_better(before: Array, one: Judged, runs: OutputErrorProblem) -> bo
 
 
 def _better(final: Judged, one: Judged, data: Data) -> bool:
-    """Whether a model predicts the validation records at least as well, in both views."""
+    """Whether a model with other contacts predicts the validation records at least as well, in both views."""
     if data.simulation is None or final.simulated is None or one.simulated is None:
         return False
     views = ((final.validation, one.validation, data.validation), (final.simulated, one.simulated, data.simulation))

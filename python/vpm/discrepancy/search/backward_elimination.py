@@ -19,7 +19,7 @@ MORE_ROOM = 3.0
 
 @dataclass(frozen=True)
 class Stage:
-    """The model at one point of the search; ``change`` is "recalibrated", "added" or "removed"."""
+    """Stage of the search, with its model; ``change`` is "recalibrated", "added" or "removed"."""
 
     change: str
     effect: str
@@ -28,7 +28,7 @@ class Stage:
 
 
 def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
-    """Backward elimination: drop every earlier effect without which the model predicts the validation data as well.
+    """Backward elimination of each earlier effect without which the model predicts validation data as well.
 
     A parameter of a later effect may have been held because the data show it only together with the earlier effect. It
     is set free for the trial: a spring that may rest elsewhere needs no constant force beside it. One name for what two
@@ -59,7 +59,7 @@ def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dro
 
 
 def _renamed(current: Judged, reduced: Judged, model: Model, free: tuple[str, ...], data: Data) -> bool:
-    """Whether the numbers that were set free do the work of the effect that went, and there is such work.
+    """Whether released parameters only take over the work of an effect that elimination dropped.
 
     Without them, and without the effect, the validation data are predicted worse, in ``model`` with ``free`` fitted;
     with them the validation records are simulated as well. Where there is none, as many numbers as before would tell
@@ -76,7 +76,7 @@ def _renamed(current: Judged, reduced: Judged, model: Model, free: tuple[str, ..
 
 
 def without_tight_bounds(final: Judged, data: Data) -> Judged:
-    """The same model fitted with more room where a transition velocity stands at its upper bound.
+    """Refit with wider bounds where a transition velocity stands at its upper bound.
 
     The bound keeps dry friction apart from viscous friction while candidates compete; once the names stand, it need not
     cut the fit short. The training records decide, and the validation ones may not be predicted worse for it.
@@ -98,7 +98,7 @@ def without_tight_bounds(final: Judged, data: Data) -> Judged:
 
 
 def _released(entry: Accepted, freed: set[str]) -> Accepted:
-    """An accepted effect of which parameters that were held are fitted now."""
+    """Accepted effect whose held parameters are released during elimination."""
     trial = entry.trial
     mine = tuple(alias.parameter for alias in trial.held if alias.parameter in freed)
     if not mine:
@@ -108,7 +108,7 @@ def _released(entry: Accepted, freed: set[str]) -> Accepted:
 
 
 def refitted(best: Accepted, data: Data) -> Accepted:
-    """What was fitted on a tangent, fitted to the end: the next round starts from it."""
+    """Refit to the end of a model that was fitted on a tangent, before the next round."""
     judged = best.trial.judged
     try:
         exact = judge(judged.model, judged.free, data, dict(judged.bounds))
@@ -118,7 +118,7 @@ def refitted(best: Accepted, data: Data) -> Accepted:
 
 
 def drop_springs(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
-    """Drop backlashes of which a later effect has left no more than a spring."""
+    """Elimination of backlashes that a later effect has reduced to a spring."""
     for entry in accepted[:]:
         current = stages[-1].judged
         name, site = entry.key

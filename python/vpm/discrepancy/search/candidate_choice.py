@@ -1,4 +1,4 @@
-"""Choice among supported candidates: small residual, few parameters, the machine before its instruments."""
+"""Choice among candidates that validation data support: least residual, fewest numbers, the machine before sensors."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ REFINED = 0.5
 
 @dataclass(frozen=True)
 class Accepted:
-    """An effect that came in, the trial that let it in, and those that would have done as well.
+    """Accepted effect: the trial that was chosen, and rivals that would do as well.
 
     Where a ranking named it, with its evidence in nats, its probability and its side of a joint that is split.
     """
@@ -46,27 +46,27 @@ class Accepted:
 
     @property
     def key(self) -> Key:
-        """Effect and site."""
+        """Effect and site of an accepted candidate."""
         return self.trial.probe.candidate.key
 
     @property
     def effect(self) -> EffectType:
-        """Entry of the catalogue."""
+        """Catalogue entry of an accepted candidate."""
         return self.trial.probe.candidate.effect
 
     @property
     def label(self) -> str:
-        """``effect at site``."""
+        """Label of an accepted candidate: ``effect at site``."""
         return self.trial.probe.candidate.label
 
     @property
     def ranked(self) -> bool:
-        """Whether a ranking named it."""
+        """Whether a ranking named the accepted effect."""
         return bool(np.isfinite(self.evidence))
 
 
 def choose(supported: Sequence[Trial], data: Data) -> Accepted:
-    """The candidate that leaves least for its numbers; of those that are as good, the best simulation.
+    """Choose the candidate with the least criterion; of equally good ones the one whose simulation is best.
 
     One that refines another only takes its place if it leaves less than ``REFINED`` of what that leaves.
     """
@@ -79,7 +79,7 @@ def choose(supported: Sequence[Trial], data: Data) -> Accepted:
 
 
 def _delay_or_lag(chosen: Trial, supported: Sequence[Trial], data: Data) -> Trial:
-    """Of delay, lag and slow spool, where several would do: the one that the response to the reference discriminates.
+    """Choice among delay, lag and valve dynamics by the response to the reference.
 
     A delay shifts in time; a lag also weakens high frequencies, which has to show. Without a result it is the delay.
     """
@@ -103,7 +103,7 @@ def _kind_of_delay(trial: Trial) -> Late:
 
 
 def _first_named(equals: Sequence[Trial]) -> Trial:
-    """The trial with the best evidence; of several identical models, the first in the catalogue.
+    """Choice by evidence; of several identical models, the first in the catalogue.
 
     On a single link a drive with joint compliance and a link that bends at its root are one and the same model, and
     rounding would decide.
@@ -114,7 +114,7 @@ def _first_named(equals: Sequence[Trial]) -> Trial:
 
 
 def _left(trial: Trial) -> float:
-    """Share of the validation mean square that a trial leaves."""
+    """Share of the validation mean square that a candidate leaves."""
     return _share(trial.validation)
 
 
@@ -123,12 +123,12 @@ def _share(gained: Gain) -> float:
 
 
 def cost(trial: Trial) -> float:
-    """Information criterion of the validation data, see `schwarz`."""
+    """Cost of a candidate in the choice: information criterion of the validation data, see `schwarz`."""
     return schwarz(trial.validation, len(trial.parameters))
 
 
 def schwarz(gained: Gain, numbers: int) -> float:
-    """Information criterion of G. Schwarz (*Annals of Statistics* 6, 1978) per independent piece; 0 says no change.
+    """Information criterion of G. Schwarz (*Annals of Statistics* 6, 1978) per independent piece; 0 for no change.
 
     Parameters
     ----------
@@ -142,25 +142,25 @@ def schwarz(gained: Gain, numbers: int) -> float:
 
 
 def _plainer(trial: Trial, first: Trial) -> bool:
-    """Whether a trial says in fewer numbers nearly what ``first`` says, at the same site and confusable with it."""
+    """Whether a candidate explains nearly as much as ``first`` with fewer numbers, at the same site and confusable."""
     fewer = len(trial.parameters) < len(first.parameters)
     return alike(trial.probe.candidate, first.probe.candidate) and fewer and REFINED * _left(trial) <= _left(first)
 
 
 def alike(one: Candidate, other: Candidate) -> bool:
-    """Whether two candidates act at the same site and the catalogue knows that one is taken for the other."""
+    """Whether two candidates act at the same site and the catalogue calls them confusable."""
     confused = other.effect.name in one.effect.confused_with or one.effect.name in other.effect.confused_with
     return one.site == other.site and confused
 
 
 def _as_good(trial: Trial, first: Trial) -> bool:
-    """Whether a trial explains the validation data as the first one does, with no more numbers."""
+    """Whether a candidate explains the validation data as well as the first one, with no more numbers."""
     close = trial.validation.relative >= first.validation.relative - LEAST_GAIN and _left(trial) <= SAME * _left(first)
     return close and len(trial.parameters) <= len(first.parameters)
 
 
 def _evidence(trial: Trial) -> float:
-    """Logarithm of what is left of the gap in both views; the machine is blamed before its instruments."""
+    """Evidence for the choice: logarithm of the error left in both views, with a preference for the machine."""
     left = np.log(max(trial.validation.after, 1e-300) / trial.validation.before)
     if trial.probe.candidate.effect.site == "sensor":
         left -= np.log(SENSOR_SHARE)

@@ -1,4 +1,4 @@
-"""A pair of effects that predicts validation records only together.
+"""Pair of effects: each is refused alone, and both together predict the validation records.
 
 With two effects missing, the fit of one alone lets its parameters imitate the other on the training records. It then
 predicts the validation records worse than no effect, so the right effect is refused and a wrong one comes in. So the
@@ -26,7 +26,7 @@ CLEARLY_LESS = 0.5
 
 @dataclass(frozen=True)
 class Pair:
-    """Two effects that come in together.
+    """Pair of effects that the search accepts together.
 
     Attributes
     ----------
@@ -45,7 +45,7 @@ class Pair:
 def together(
     outcome: Round, best: Accepted | None, data: Data, effects: Sequence[str] | None, without: set[Key]
 ) -> Pair | None:
-    """Two effects for the one that would come in alone, or for none.
+    """Search for a pair of effects, in place of the one that would come in alone or of none.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def together(
 
 
 def _lead(outcome: Round, best: Accepted | None) -> Trial | None:
-    """What was refused and takes most of the training residual, clearly more than what would come in."""
+    """Leading effect of a pair: refused alone, with clearly the largest gain on the training residual."""
     if best is not None and best.trial.validation.relative >= CLEAR_GAIN:
         return None
     least = 1.0 - CLEARLY_LESS * (1.0 if best is None else 1.0 - best.trial.training.relative)
@@ -90,7 +90,7 @@ def _lead(outcome: Round, best: Accepted | None) -> Trial | None:
 
 
 def _do_more(outcome: Round, best: Accepted | None, first: Trial, second: Trial, data: Data) -> bool:
-    """Whether two effects are accepted as one would have to be, and leave less for their numbers than the best one."""
+    """Whether a pair of effects is accepted, and leaves less for its numbers than the best single effect."""
     current, judged = outcome.current, second.judged
     simulated = None
     if data.simulation is not None and current.simulated is not None and judged.simulated is not None:
@@ -112,7 +112,7 @@ def _do_more(outcome: Round, best: Accepted | None, first: Trial, second: Trial,
 
 
 def _without(judged: Judged, key: Key, data: Data) -> Judged:
-    """The model without one of its effects, fitted again; judged by the residual alone where it cannot simulate."""
+    """Model without one effect of a pair, fitted again; judged by the residual alone where it cannot simulate."""
     model = judged.model.without_effect(*key)
     free = tuple(name for name in judged.free if name in model.parameters)
     bounds = {name: pair for name, pair in judged.bounds.items() if name in free}

@@ -1,4 +1,4 @@
-"""A forward step: one effect more, of which the inverse-dynamics residual shows too little.
+"""Forward step after the search: one more effect, accepted by closed-loop predictions.
 
 Candidates are those that the last round of the search refused: they explain a modest part of the residual, or help
 everywhere except at one dominant reversal. Each gets a closed-loop prediction beside that of the model found so far.
@@ -41,7 +41,7 @@ FITTED = 2
 
 @dataclass(frozen=True)
 class _Predicted:
-    """An effect with its run, and its trial where it was fitted to the residual."""
+    """Effect of a forward step with its closed-loop prediction, and its trial on the residual if any."""
 
     probe: Probe
     trial: Trial | None
@@ -49,7 +49,7 @@ class _Predicted:
 
 
 def forward_step(found: Search, data: Data, each: SideBySide) -> Search:
-    """The search with the one effect more that predictions support most, if both sets of records are clear."""
+    """Forward step of the search: the effect that closed-loop predictions of all records support most."""
     promising = _promising(found)
     before = predicted(found.final, data) if promising else None
     if before is None:
@@ -73,7 +73,7 @@ def forward_step(found: Search, data: Data, each: SideBySide) -> Search:
 
 
 def _best(more: Sequence[Accepted], data: Data) -> Accepted:
-    """The first; if it is a delay or a lag, the one that is chosen among these."""
+    """Best effect for a forward step; among delays and lags the chosen one."""
     late = [entry for entry in more if entry.effect.late]
     if len(late) < 2 or more[0] is not late[0]:
         return more[0]
@@ -81,7 +81,7 @@ def _best(more: Sequence[Accepted], data: Data) -> Accepted:
 
 
 def _promising(found: Search) -> list[Probe]:
-    """What takes most of the training residual of that which was refused in the last round, and springs in series.
+    """Candidates for a forward step: refused effects of the largest training gain, and springs in series.
 
     A spring swings above the band of the residual, which may hardly show it.
     """
@@ -102,7 +102,7 @@ def _possible(probe: Probe) -> bool:
 
 
 def _taken(probe: Probe, tried: Sequence[Trial]) -> float:
-    """Share of the training residual that an effect takes, as fitted or as screened."""
+    """Share of the training residual that a candidate for a forward step explains, fitted or screened."""
     mine = [
         1.0 - (t.training.after / t.training.before) ** 2
         for t in tried
@@ -112,7 +112,7 @@ def _taken(probe: Probe, tried: Sequence[Trial]) -> float:
 
 
 def _run(found: Search, data: Data, before: ClosedLoopPrediction, probe: Probe) -> _Predicted | str:
-    """The prediction of a model with one effect more, as fitted to the residual; or why there is none."""
+    """Closed-loop prediction of a model with one more effect for a forward step, or why there is none."""
     if probe.candidate.effect.elastic:
         run = _sprung(found, data, before, probe)
         return "no run with it does better" if run is None else _Predicted(probe, None, run)
@@ -125,7 +125,7 @@ def _run(found: Search, data: Data, before: ClosedLoopPrediction, probe: Probe) 
 
 
 def _sprung(found: Search, data: Data, before: ClosedLoopPrediction, probe: Probe) -> ClosedLoopPrediction | None:
-    """The run of a model with a spring in series from the start that suits the records best; None if none does."""
+    """Closed-loop prediction for a forward step by a spring in series, from its best start; None if none fits."""
     candidate, starts = probe.candidate, []
     for start in candidate.starts:
         model = before.model.with_effect(candidate.effect.name, at=candidate.site, **start)
@@ -143,7 +143,7 @@ def _sprung(found: Search, data: Data, before: ClosedLoopPrediction, probe: Prob
 
 
 def _accepted(found: Search, data: Data, tried: _Predicted, comparison: Comparison) -> Accepted | None:
-    """The effect with its refit near the values of the predictions, and with the gain of these."""
+    """Effect accepted by a forward step: refitted near its predicted values, with the gain of predictions."""
     final, run = found.final, comparison.run
     own = tuple(name for name in run.free if name not in final.free)
     bounds, values = dict(final.bounds if tried.trial is None else tried.trial.judged.bounds), {}
@@ -170,7 +170,7 @@ def _accepted(found: Search, data: Data, tried: _Predicted, comparison: Comparis
 
 
 def _added(found: Search, more: Accepted) -> Search:
-    """A search with one effect more."""
+    """Search with the effect of a forward step added."""
     name, site = more.key
     ranking = [*found.ranking]
     last = max((n for n, c in enumerate(ranking) if (c.name, c.site) == more.key), default=None)

@@ -1,4 +1,4 @@
-"""The search: each round accepts at most one effect and drops what is not needed any more."""
+"""Search for missing effects: each round accepts at most one and drops those that are no longer needed."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from vpm.model import Model
 
 @dataclass(frozen=True)
 class Tried:
-    """What was tried in the place of one effect before it came in: of the last one, all that may do its work.
+    """Candidates that the search tried in the round before an effect came in.
 
     Attributes
     ----------
@@ -46,7 +46,7 @@ class Tried:
 
 @dataclass(frozen=True)
 class Over:
-    """What the last round screened and refitted in vain."""
+    """Last round of the search: candidates that it screened and refitted in vain."""
 
     probes: tuple[Probe, ...] = ()
     trials: tuple[Trial, ...] = ()
@@ -54,7 +54,7 @@ class Over:
 
 @dataclass(frozen=True)
 class Search:
-    """Outcome of the whole search, or of what was done of it when Ctrl-C was pressed.
+    """Outcome of the search, also of one that Ctrl-C ended.
 
     ``last`` is given if nothing has changed since the last effect came in; ``over`` is the last round, if it accepted
     nothing. ``left`` comes from a ranking: by joint the share of the error power of validation records that effects
@@ -74,20 +74,20 @@ class Search:
 
     @property
     def gone(self) -> set[Key]:
-        """Effects that were taken out again, which do not come back."""
+        """Effects that the search removed again, which do not come back."""
         removed = {(stage.effect, stage.site) for stage in self.stages if stage.change == "removed"}
         return removed - {entry.key for entry in self.accepted}
 
     @property
     def final(self) -> Judged:
-        """The model that came out."""
+        """Final model of the search."""
         return self.stages[-1].judged
 
 
 def search(
     start: Judged, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: SideBySide
 ) -> Search:
-    """Add effects one at a time, and drop earlier ones that later ones replace, until none is accepted any more."""
+    """Search: add effects one at a time and drop replaced ones, until none is accepted any more."""
     found = Search((Stage("recalibrated", "", "", start),), (), (), (), start.fit.interrupted)
     return found if found.interrupted else further(found, data, effects, limit, tell, each)
 
@@ -95,7 +95,7 @@ def search(
 def further(
     found: Search, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: SideBySide
 ) -> Search:
-    """A search that goes on from where another one ended; what went out again does not come back.
+    """Continue a search from the end of another one; removed effects do not come back.
 
     An effect that took the place of another one leaves what the other one had covered, in which a second effect stands
     clear that was refused before.
@@ -152,7 +152,7 @@ def further(
 
 
 def _dropped(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> bool:
-    """Drop what the last effect has made needless; whether that was done before Ctrl-C."""
+    """Search after backward elimination; also whether that ended before Ctrl-C."""
     try:
         drop_replaced(stages, accepted, data, dropped)
         drop_springs(stages, accepted, data, dropped)
@@ -164,7 +164,7 @@ def _dropped(stages: list[Stage], accepted: list[Accepted], data: Data, dropped:
 def _whole(
     outcome: Round, effects: Sequence[str] | None, without: set[Key], *, several: bool
 ) -> tuple[Accepted | None, Pair | None]:
-    """The best of all candidates, and the pair that comes in for it where ``several`` may and only two together do."""
+    """Best candidate of a search round, or the pair of effects where ``several`` may come in."""
     best = outcome.light(effects, without)
     if best is None or outcome.weak(best):
         best = outcome.heavy(effects, without) or best
@@ -173,7 +173,7 @@ def _whole(
 
 
 def _loosened(stage: Stage, data: Data) -> tuple[Stage, bool]:
-    """The last stage without bounds that cut its fit short, and whether it is the same."""
+    """Last stage of the search without tight bounds, and whether it is unchanged."""
     loosened = replace(stage, judged=without_tight_bounds(stage.judged, data))
     return loosened, loosened.judged is stage.judged
 
@@ -183,7 +183,7 @@ def _listed(refused: dict[Key, str]) -> tuple[RefusedEffect, ...]:
 
 
 def ambiguities(accepted: Sequence[Accepted]) -> tuple[Ambiguity, ...]:
-    """What is not discriminated from each accepted effect: rivals in its round, and parameters held beside it."""
+    """Ambiguities that the search saw: rivals of an accepted effect in its round, and parameters held beside it."""
     found = []
     for entry in accepted:
         candidate = entry.trial.probe.candidate

@@ -1,4 +1,4 @@
-"""One round of the search: screen every candidate, refit with the most promising, accept or refuse each."""
+"""Round of the search: screen every candidate, refit with the most promising, accept or refuse each."""
 
 from __future__ import annotations
 
@@ -65,11 +65,11 @@ class Round:
         self.trials: list[Trial] = []
 
     def done(self) -> bool:
-        """Whether what is left is noise alone, as far as links that bend make it ring."""
+        """Whether a round has nothing to explain: the residual is noise, as far as links ring by it."""
         return noise_alone(self.current.model, self.data, self.timed.validation)
 
     def light(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
-        """The best of the candidates whose regressor follows from the measured motion alone."""
+        """Best candidate of the round among those whose regressor needs the measured motion alone."""
         self.screen(effects, without, heavy=False)
         if self._promising and self._promising[0].candidate.effect.has_play:
             # What is compliant passes for backlash, and has to compete with it.
@@ -80,7 +80,7 @@ class Round:
         return self.best()
 
     def heavy(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
-        """The best of those with a motion of their own, tried where more than noise is left to explain.
+        """Best candidate of the round among those with a motion of their own, if more than noise is left.
 
         A spring that swings within the whole band leaves a residual as white as noise. On rigid machines, one with a
         large predicted gain is refitted all the same.
@@ -97,7 +97,7 @@ class Round:
         return self.best()
 
     def by_prediction(self, without: set[Key]) -> Accepted | None:
-        """The best of the effects close to rest that closed-loop predictions show and the residual does not."""
+        """Best friction near rest of the round, which only closed-loop predictions show."""
         tried = [
             p for p in self.probes if p.candidate.key not in without and needs_prediction(self.current, self.data, p)
         ]
@@ -120,18 +120,18 @@ class Round:
         return best
 
     def again(self, several: set[Key]) -> Accepted | None:
-        """The best of a few that were accepted before another one came in, if any still is."""
+        """Best of the round's earlier accepted candidates, judged again after another effect came in."""
         self.screen([name for name, _ in several], set(), heavy=False, only=several)
         self.confirm()
         return self.best()
 
     @property
     def tried(self) -> int:
-        """Candidates from which those were chosen that were refitted."""
+        """Candidates of the round from which those to refit were chosen."""
         return max(len(self._ranking), self._chosen_from)
 
     def elsewhere(self, best: Accepted) -> set[Key]:
-        """What is accepted, too, at other joints than what comes in, and has no motion of its own."""
+        """Candidates of the round that are accepted at other joints too and have no motion of their own."""
         model = self.current.model
         here = joint_at(model, best.key[1])
         supported = [trial.probe.candidate for trial in self._supported]
@@ -139,7 +139,7 @@ class Round:
         return {one.key for one in light if here and joint_at(model, one.site) != here}
 
     def weak(self, best: Accepted) -> bool:
-        """Whether the best candidate leaves most of the validation error, so that it may only imitate a hidden motion.
+        """Whether the best candidate of the round leaves most of the error, so that a hidden motion is tried too.
 
         A motion that nobody measures shows in the efforts of all joints, in part as any of several lighter effects
         would: what explains little has to compete with it. Where links bend already, or drives have states, its probes
@@ -149,13 +149,13 @@ class Round:
         return best.trial.there.relative < CLEAR_GAIN and not tried and not self._takes_long()
 
     def _takes_long(self) -> bool:
-        """Whether the probes of a motion of its own take long on this machine."""
+        """Whether probes of candidates with a motion of their own take long in this round."""
         return bends(self.current.model) or has_own_drives(self.current.model)
 
     def screen(
         self, effects: Sequence[str] | None, without: set[Key], *, heavy: bool, only: set[Key] | None = None
     ) -> None:
-        """Probe every candidate, or only some, and set aside those that cannot be."""
+        """Screen all or some candidates of the round, and set aside impossible ones."""
         current, data = self.current, self.data
         self._promising = []
         found = candidates(current.model, data.training, current.fit.residual, effects)
@@ -188,7 +188,7 @@ class Round:
             self._promising = [one for one in self._promising if one.drop >= RINGING][:FEW]
 
     def _is_heavy(self, candidate: Candidate) -> bool:
-        """Whether it adds a motion that nobody measures, which has to be simulated for every probe.
+        """Whether a candidate of the round adds an unmeasured motion, simulated for every probe.
 
         Where the log holds that motion, it is evidence like any. The same holds for bending of a rigid beam beside
         flexible ones, and for a backlash between rigid links, which its flights show: light effects would only imitate
@@ -203,7 +203,7 @@ class Round:
         return bool(motion) and not logged & set(self.data.training.shown)
 
     def confirm(self) -> None:
-        """Refit with the most promising ones and judge them on validation data."""
+        """Refit with the most promising candidates of the round and judge them on validation data."""
         short_list = most_promising(self._promising)
         if short_list:
             self.tell(f"round {self.number}: refitting with {', '.join(p.candidate.label for p in short_list)}")
@@ -230,7 +230,7 @@ class Round:
             )
 
     def _refit(self, short_list: Sequence[Probe]) -> None:
-        """Refit with each of some candidates, and accept or refuse it."""
+        """Refit with each of some candidates of the round, and accept or refuse it."""
         if drives_on_tangent(self.current.model, self.data.training) and len(short_list) > 1:
             # What one of them explains tells which of the others are worth a refit.
             first = max(short_list, key=lambda p: p.drop)
@@ -243,7 +243,7 @@ class Round:
             self._tried(short_list, np.inf)
 
     def _tried(self, short_list: Sequence[Probe], rival: float) -> None:
-        """Refit with some candidates beside each other; ``rival`` is what another one leaves, see `confirm`."""
+        """Trials of some candidates of the round side by side; ``rival`` is the residual of another, see `confirm`."""
         thresholds = self.thresholds()
         what = f"round {self.number}: refitting"
         confirmed = partial(self._confirmed, rival=rival)
@@ -261,7 +261,7 @@ class Round:
                 self._supported.append(trial)
 
     def _confirmed(self, one: Probe, rival: float) -> Trial:
-        """A trial; a backlash with soft contacts that does not simulate gives way to hard ones if these do better.
+        """Trial of the round; a backlash with soft contacts that cannot simulate gets hard ones if they are better.
 
         The residual hardly tells how hard the contacts are, for errors of the flights add up between lively ones.
         """
@@ -273,16 +273,16 @@ class Round:
         return trial if worse_in_simulation(harder) else harder
 
     def thresholds(self) -> Thresholds:
-        """Thresholds for an effect when so many have been tried."""
+        """Thresholds of the round for an effect when so many have been tried."""
         return Thresholds(self.tried * self.number, min(m.dt for m in self.data.training.motions))
 
     @cached_property
     def timed(self) -> InTime:
-        """Residuals of the model at hand with what the times of samples leave open."""
+        """Residuals of the round's model without the effect of uncertain sample times."""
         return in_time(self.current, self.data)
 
     def _refused(self, trial: Trial, thresholds: Thresholds) -> str:
-        """Why a trial is not accepted, or ""."""
+        """Reason why a trial of the round is refused, or ""."""
         candidate = trial.probe.candidate
         reason = refuse_trial(trial, thresholds) or self._only_timing(trial, thresholds)
         if reason and self._is_predicted(trial, thresholds):
@@ -292,7 +292,7 @@ class Round:
         return reason or only_ringing(self.current, self.data, trial)
 
     def _is_predicted(self, trial: Trial, thresholds: Thresholds) -> bool:
-        """Whether a delay gains little and surely, and closed-loop predictions of validation records support it.
+        """Whether closed-loop predictions support a delay of the round that gains little and surely.
 
         Stiction imitates a delay in an inverse-dynamics residual, but not in a prediction. A prediction also does not
         depend on the sample to which a command was logged.
@@ -304,11 +304,11 @@ class Round:
 
     @cached_property
     def prediction(self) -> ClosedLoopPrediction | None:
-        """The model at hand, run along the training records by itself."""
+        """Closed-loop prediction of the training records by the round's model."""
         return prediction_without(self.current, self.data)
 
     def _only_timing(self, trial: Trial, thresholds: Thresholds) -> str:
-        """Why a trial that would be accepted does no more than a shift of the commands does, or ""."""
+        """Why an otherwise accepted trial of the round does no more than shifted commands do, or ""."""
         if self.timed.shift == 0.0 or explains_most(trial):
             return ""
         shifted = in_time(trial.judged, self.data)
@@ -322,7 +322,7 @@ class Round:
         return refuse_timing(timed, self.timed.shift, thresholds, beside=shifted.shift)
 
     def best(self) -> Accepted | None:
-        """The one that comes in, if any is accepted; fitted to the end it has to stand as it did before."""
+        """Candidate that the round accepts, if any; it has to stand when fitted to the end."""
         while self._supported:
             best = choose(self._supported, self.data)
             whole = finished(self.current, self.data, best.trial)
@@ -338,21 +338,21 @@ class Round:
         return None
 
     def mark(self, accepted: Key) -> None:
-        """Note in the ranking what comes in."""
+        """Mark the accepted candidates in the ranking of the round."""
         for key, entry in self._ranking.items():
             self._ranking[key] = replace(entry, accepted=key == accepted)
 
     def after(self, judged: Judged) -> Round:
-        """The round that follows if ``judged`` is the model at hand."""
+        """Next round with ``judged`` as its model."""
         return Round(judged, self.data, self.number + 1, self.tell, self.each)
 
     def ranked(self) -> list[RankedCandidate]:
-        """Candidates of this round: what was accepted, what helped on validation data, then by predicted gain."""
+        """Ranked candidates of the round: accepted ones, then by validation gain, then by predicted gain."""
         return sorted(self._ranking.values(), key=_by_gain)
 
 
 def _by_gain(candidate: RankedCandidate) -> tuple[int, float]:
-    """Sorts a ranking."""
+    """Sort key of the round's ranking: predicted gain."""
     if candidate.accepted:
         return 0, 0.0
     if candidate.unseen > 0.0:
