@@ -330,8 +330,8 @@ class Diagnosis(Result):
     summary : str
         The verdict in a sentence or two.
     effects : tuple of AcceptedEffect
-        By what each adds to the prediction of validation data given all the others, the most first; in the order in
-        which they were found where a ranking named them.
+        By what each adds to the prediction of validation data beside all others, the most first. Effects that a ranking
+        named stand in the order in which it found them.
     gap : dict of str to ChannelGap
         On validation data.
     refused : tuple of RefusedEffect

@@ -116,8 +116,8 @@ def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[
 def _within_reach(model: Model, free: Sequence[str]) -> dict[str, tuple[float, float]]:
     """Bounds for the recalibration of positive nonlinear parameters, from their stated uncertainties.
 
-    With something large missing, a fit may flee to where nothing shows any more, such as oil as soft as air, from where
-    no effect leads back. What is linear comes back by itself.
+    With something large missing, a fit may end where nothing shows any more, such as oil as soft as air. No effect
+    leads back from there. What is linear comes back by itself.
     """
     found = {}
     for name in free:

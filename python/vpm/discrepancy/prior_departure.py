@@ -1,8 +1,8 @@
 """Departure of parameters from their prior: a fit moves them far from the model file's stated uncertainty.
 
 A stated uncertainty is a measurement. A correct effect brings the known parameters back to it. An effect that imitates
-another force together with a shifted centre of mass moves them away: a linear spring with an inverted pendulum imitates
-a hardening spring.
+another force together with a shifted centre of mass moves them away. For example, a linear spring with an inverted
+pendulum imitates a hardening spring.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ def driven_away(nominal: Model, recalibrated: Judged, final: Judged, ranked: Mod
     Returns
     -------
     dict of str to float
-        Stated uncertainties by which the parameter stands away, the farthest first. Those are left out that were as far
-        before, for then the file is wrong whatever is missing, and those that the data hardly show beside the effects.
+        Stated uncertainties by which the parameter stands away, the farthest first. Parameters that were as far before
+        are left out: the file is wrong whatever is missing. So are those that the data hardly show beside the effects.
     """
     found = {}
     for name, std in zip(final.free, final.fit.std, strict=True):

@@ -92,8 +92,8 @@ class Round:
 def calibrated(rounds: Sequence[Round], seeds: str, cases: int) -> Calibration:
     """Calibration under which the true effects are most probable.
 
-    Law: the logarithm of the probability that was given to the truth is a proper score: it is largest in the mean for
-    probabilities that are true (I. Good, *J. Royal Statistical Society B* 14, 1952).
+    Law: the logarithm of the probability given to the truth is a proper score. Its mean is largest for true
+    probabilities (I. Good, *J. Royal Statistical Society B* 14, 1952).
 
     Raises
     ------

@@ -20,9 +20,9 @@ from vpm.ranking.tried_effect import Trial
 def weighed(counting: Sequence[Trial], fitter: Fitter) -> list[Trial]:
     """Chosen effect, then its rivals, with the evidence that each adds under one noise model.
 
-    What nobody can tell from each other is probable together. The best is the plainest one of the most probable class;
-    a part of the machine comes before an instrument, and what a law contains before the law, if that may be enough or
-    is a curve of the same shape: it will be judged again beside what comes after it.
+    What nobody can tell from each other is probable together. The best is the plainest one of the most probable class.
+    A part of the machine comes before an instrument. A law that a richer one contains comes before it, if it may be
+    enough or has a curve of the same shape: it will be judged again beside later effects.
     """
     several, richer = _rivals(counting, fitter.settings)
     noise = fitted_noise(several[0].fitted.residual, fitter.tracked.parts, fitter.settings.order)

@@ -13,8 +13,8 @@ Array = NDArray[np.float64]
 def probabilities(gains: Sequence[float], tempering: float) -> Array:
     """Posterior probabilities of each of several effects, and last that none is missing (k + 1,).
 
-    Law: the posterior of models in proportion to their prior odds and a power of their evidence, which is below one
-    where no model is exact (P. Grunwald, *Algorithmic Learning Theory*, 2012).
+    Law: the posterior of models is proportional to their prior odds and a power of their evidence. The power is below
+    one where no model is exact (P. Grunwald, *Algorithmic Learning Theory*, 2012).
 
     Parameters
     ----------

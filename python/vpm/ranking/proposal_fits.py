@@ -16,8 +16,8 @@ def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: SideBySi
 
     Each has to gain what makes it worth while. The most promising one is fitted first, and another one has to save a
     share of the cost that this one saved (O. Maron and A. Moore, *Advances in Neural Information Processing Systems* 6,
-    1994: those that cannot win leave a race early), unless it is a part of another one: a rotor may seem to gain little
-    where a spring takes it along. The outcome does not depend on how many are fitted at a time.
+    1994: those that cannot win leave a race early). A part of another one is fitted all the same: a rotor may seem to
+    gain little where a spring takes it along. The outcome does not depend on how many are fitted at a time.
 
     Parameters
     ----------

@@ -33,10 +33,10 @@ def rank(
 ) -> Ranking:
     """Rank what ``model`` could be missing by the error that it removes; add the best effect as long as it counts.
 
-    Every structure, the model with some effects, is kept on the records by a slow tracker, and fitted to what that
-    leaves of two thirds of each record. What decides is the error power that an effect removes, there and from the
-    third that is held back. Nothing is inverted or differentiated, and neither the controller nor a start at rest is
-    asked for.
+    A slow tracker keeps every structure, the model with some effects, on the records. The structure is fitted to the
+    error that this leaves of two thirds of each record. What decides is the error power that an effect removes, there
+    and from the third that is held back. Nothing is inverted or differentiated, and neither the controller nor a start
+    at rest is asked for.
 
     Parameters
     ----------
@@ -51,9 +51,8 @@ def rank(
     settings : Settings, optional
         The numbers that decide.
     setup : Setup, optional
-        Integrator and hold. Where the hold is ``auto``, commands run on from sample to sample, straight or as a cubic,
-        as readings of a drive do, where that counts as an effect would; else they are held, as those of a digital
-        controller are.
+        Integrator and hold. Where the hold is ``auto``, commands are held, as those of a digital controller are. They
+        run on between samples, straight or as a cubic, if that counts as an effect would.
     workers : int, optional
         Structures that are fitted at a time; one per core if not given. The result does not depend on it.
     tell, progress : callable, optional

@@ -117,7 +117,8 @@ class Search:
         """Search again with commands that change between samples, where no effect does as well; else none.
 
         Commands that are held for a sample come half a sample late. A spring takes nearly all of that back, with three
-        numbers more, and may leave less because it answers to noise otherwise: samples have to be more probable by it.
+        numbers more. It may leave less because it answers to noise otherwise, so samples have to be more probable by
+        it.
         """
         if self.fitter.tracked.setup.hold != AUTOMATIC:
             return []
@@ -255,8 +256,8 @@ class Search:
     def _detours(self, fitted: Fitted, view: View) -> list[Fitted]:
         """Fits of a splitting effect in the search, continued from where a faster tracker leads.
 
-        A slow tracker lets what hangs behind a play go its own way, so that few of its impacts are in step with those
-        of the record, and fits end in many places. A fast one holds it in step (H. Abarbanel, *Predicting the Future*,
+        A slow tracker lets a load behind a backlash go its own way. Few of its impacts are in step with those of the
+        record, and fits end in many places. A fast one holds it in step (H. Abarbanel, *Predicting the Future*,
         Springer 2013).
         """
         detour = Tracker(max(self.settings.bands))

@@ -72,15 +72,15 @@ class Gap(Storable):
         Of the model as it was, with fitted parameters, and with what was found, in ``unit``; NaN where it runs away.
     unit : str
     left : float
-        Share of the error power above the noise that is still there with what was found, of what the recalibrated model
-        leaves or, if that is less, masses on which nothing acts; NaN if not known.
+        Share of the error power above the noise that effects leave; NaN if not known. It refers to the error of the
+        recalibrated model or, if that is less, of masses on which nothing acts.
     noise : float
         What noise alone leaves, as far as it is white; NaN if not known.
     signal : float
         Root mean square of the channel about its mean.
     explained : float
-        What is left without the effects of the model whose laws are not exact, those that were found among them; no
-        more than the motion itself, and as much as with them where there are none.
+        Error without the effects of the model whose laws are not exact, found ones included. It is no more than the
+        motion itself, and the same as with them where there are none.
     """
 
     before: float

@@ -17,8 +17,8 @@ from vpm.ranking.tried_effect import Trial
 def alike(tried: Sequence[Trial], most: int, fitter: Fitter, each: SideBySide) -> list[Trial]:
     """Fits of one effect at several places together, ``most`` effects at a time, by the error that they leave.
 
-    Joints that move each other hide such an effect from each other: a command that is late at one drive alone asks the
-    next drive for a force that nobody logged.
+    Joints that move each other hide such an effect from each other. A command that is delayed at one drive alone would
+    need a force at the next drive that no log holds.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
 def _placed(candidate: Candidate, sizes: Sizes) -> Candidate:
     """Candidate with several start values of a location parameter, such as where a spring rests.
 
-    An effect without size does not feel its place, so that a first step gives it a size and leaves the place: a spring
+    Without size an effect does not depend on its place, so a first step gives it a size and leaves the place. A spring
     that rests far away pulls nearly the same everywhere.
     """
     anywhere = [one.name for one in candidate.effect.parameters if one.shape and tuple(one.physical) == ANYWHERE]

@@ -68,12 +68,12 @@ class Tracker:
 class TrackedRecords:
     """Tracked records, and the error that a model leaves of them under a tracker.
 
-    The tracker knows no noise: each measured joint is drawn to its encoder with the bandwidth, as by a soft spring
-    with a damper between the machine and its log. All structures are compared under the same one. Where a joint is
-    split, what hangs behind its spring or backlash is drawn along with the motor: else both would answer to noise, and
-    to what is missing elsewhere, otherwise than a rigid joint does. A deflection that the logs hold is compared and not
-    drawn: a structure without the joint behind predicts zero. Of joints that closed loops tie, as many are drawn as
-    there are degrees of freedom: more of them would have to be weighed against each other.
+    The tracker knows no noise. It draws each measured joint to its encoder with the bandwidth, as by a soft spring with
+    a damper between the machine and its log. All structures are compared under the same one. Where a joint is split,
+    the load behind its spring or backlash is drawn along with the motor. Else both would answer to noise, and to
+    missing effects elsewhere, otherwise than a rigid joint does. A deflection that the logs hold is compared and not
+    drawn: a structure without the joint behind predicts zero. Of joints in closed loops, as many are drawn as there are
+    degrees of freedom. More of them would have to be weighed against each other.
 
     Parameters
     ----------
@@ -192,8 +192,8 @@ class TrackedRecords:
     ) -> tuple[Array, Array]:
         """Readings minus outputs (N, m) of the tracked model on all records, with derivatives (N, m, len(columns)).
 
-        ``theta`` are the parameters, then, if they are not those of balance, by how much the first states are others:
-        all of the first record, all of the second, and so on. Derivatives are exact, or approximate where ``moves``
+        ``theta`` are the parameters. Differences of the first states from equilibrium follow, if there are any: all of
+        the first record, all of the second, and so on. Derivatives are exact, or approximate where ``moves``
         (len(columns),) tell by how much each of these numbers may be moved for a difference.
         """
         own = len(model.theta)

@@ -203,8 +203,8 @@ def unmoved(
 def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) -> Trial:
     """Confirm a candidate: refit with it, release parameters that became visible, measure the validation gain.
 
-    ``rival`` is the sum of squares that another one leaves of the training records: the refit of a candidate above
-    ``HOPELESS`` times that may end early.
+    ``rival`` is the sum of squares that another candidate leaves of the training records. A refit above ``HOPELESS``
+    times that may end early.
     """
     bounds = {**current.bounds, **_bounds(probe)}
     start = probe.model.with_parameters(_inside(probe, bounds))
@@ -482,8 +482,8 @@ def is_clear(judged: Judged, own: tuple[str, ...]) -> bool:
     """Whether the size of a confirmed effect differs from zero: a Wald test of its linear parameters together.
 
     Size and shape of a law often compensate each other, such as a higher friction close to rest that fades sooner. A
-    law without size has no uncertain shape. The size of a backlash is its width, however hard its contacts are: what is
-    as hard as rigid has a stiffness that no data bound from above.
+    law without size has no uncertain shape. The size of a backlash is its width, however hard its contacts are. Of
+    nearly rigid contacts no data bound the stiffness from above.
     """
     widths = {effect.parameter_names["gap"] for effect in judged.model.effects if effect.type.has_play}
     size = [n for n in own if n in widths]

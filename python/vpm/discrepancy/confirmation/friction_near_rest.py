@@ -1,10 +1,10 @@
 """Friction near rest, judged by closed-loop predictions of the model.
 
-Such friction acts for milliseconds while a joint breaks away. The filter of a measured motion smears that instant, so
-the inverse-dynamics residual hardly shows it and takes part of it for friction at small speeds. In closed loop a
-machine sticks when its model sticks. So the model predicts the training records without and with the effect
-(`vpm.discrepancy.confirmation.whittle_likelihood`). The validation records then give the share of the change between
-both predictions that they support: zero for an effect that is absent, one for an effect that is there.
+Such friction acts for milliseconds while a joint breaks away. The filter of a measured motion smears that instant. The
+inverse-dynamics residual hardly shows it, and takes part of it for friction at small speeds. In closed loop a machine
+sticks when its model sticks. So the model predicts the training records without and with the effect
+(`vpm.discrepancy.confirmation.whittle_likelihood`). The validation records then give the share of the change that they
+support: zero for an absent effect, one for a present effect.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class Support:
     Attributes
     ----------
     training, validation : Gain
-        Of what the run without the effect leaves, relative to the noise at each frequency; the weight is the supported
-        share of the change, beside all parameters without it.
+        Gain on the error of the run without the effect, relative to the noise at each frequency. The weight is the
+        supported share of the change, beside all other parameters.
     run : ClosedLoopPrediction
         With the effect, fitted to the training records.
     """

@@ -42,8 +42,8 @@ class Verdict:
         By how many standard deviations of the noise they differ along it, the smaller of both views; 0 where it cannot
         be said.
     first, second : float
-        Estimated part of the rival in the error of each model, in standard deviations: zero for the right model, and
-        the whole difference of both for the wrong one, with an error of one.
+        Estimated part of the rival in the error of each model, in standard deviations, with an error of one. It is zero
+        for the right model, and the whole difference for the wrong one.
     """
 
     apart: float
@@ -97,9 +97,9 @@ class Runs:
 def compare_driven(first: Judged, second: Judged, data: Data, runs: Runs | None = None) -> Verdict | None:
     """Compare two models by their reference responses, each with its best parameters.
 
-    The part of the difference to the rival in the error of one model is estimated together with changes of its fitted
-    parameters: 0 for a right model, 1 if its rival is right. None where one of them cannot follow its references. With
-    ``runs``, what was worked out for another comparison is known.
+    The part of the rival's difference in a model's error is estimated together with the fitted parameters. It is 0 for
+    a right model, and 1 if its rival is right. None where one of them cannot follow its references. With ``runs``, what
+    was worked out for another comparison is known.
     """
     runs = runs or Runs(data)
     one = runs(first)

@@ -1,8 +1,8 @@
 """Start values for the refit with a candidate: the recalibrated parameters, or those of the model file.
 
 A drive with states integrates its command. Without an effect of that command, a recalibration can only weaken the
-drive: it softens the oil and closes the valve, up to the bounds of the prior. From there the true values lie behind a
-ridge once the effect is present, while the values of the file are near.
+drive. It softens the oil and closes the valve, up to the prior's bounds. From there the true values lie behind a ridge
+once the effect is present, while the values of the file are near.
 """
 
 from __future__ import annotations

@@ -172,9 +172,9 @@ def _impossible(probe: Probe, name: str) -> str:
 def _too_short(trial: Trial, interval: float) -> str:
     """Refusal of a delay or lag below one sampling interval: how commands are logged may explain it.
 
-    The hold is that of all commands. Where one of several drives or instruments has a delay and the others have none,
-    `refuse_timing` judges it beside a shift of them all, if it explains more than an imitation would. The time of a
-    lossy link is no delay: it is a share of its stiffness.
+    The hold is that of all commands. One of several drives or instruments may have a delay and the others none.
+    `refuse_timing` then judges it beside a shift of them all, if it explains more than an imitation would. The time of
+    a lossy link is no delay: it is a share of its stiffness.
     """
     model = trial.judged.model
     site = trial.probe.candidate.effect.site
@@ -201,9 +201,9 @@ def has_peers(model: Model, site: str) -> bool:
 def _no_way(trial: Trial) -> str:
     """Refusal of a hysteresis that turns round within the way of one sample: it is dry friction.
 
-    So is one within the way of two, unless its way is clearly longer than that of one. If the joint's dry friction is
-    fitted beside it and it explains most of the remaining error, the data discriminate the two: joints reverse slowly,
-    over many samples.
+    So is one within the way of two, unless its way is clearly longer than that of one. It may explain most of the
+    remaining error beside fitted dry friction. Then the data discriminate the two: joints reverse slowly, over many
+    samples.
     """
     candidate, bounds = trial.probe.candidate, trial.judged.bounds
     way = next((tried.parameter for tried in candidate.effect.tried if tried.sampled), None)

@@ -22,8 +22,8 @@ Array = NDArray[np.float64]
 def preferred_sensor(chosen: Trial, equals: Sequence[Trial], data: Data) -> Trial:
     """Sensor error whose predicted reading supports it, of trials as good as ``chosen``; else ``chosen``.
 
-    On training and on validation records it has to predict its channel clearly better than ``chosen`` does, by as much
-    as is worth a name, and to leave no more of all channels together.
+    On training and validation records it has to predict its channel clearly better than ``chosen`` does, by as much as
+    is worth a name. It may not leave more of all channels together.
     """
     if chosen.probe.candidate.effect.site == "sensor":
         return chosen

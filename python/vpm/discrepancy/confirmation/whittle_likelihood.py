@@ -146,8 +146,8 @@ def weighted(
 
     What no model is exact to, ``inexact``, adds to it where it is given, at the very frequency and to each reading.
 
-    The noise of a drive shows in its pressures and in the motion at once: taken separately, one noise would count as
-    often as it is read. So the readings of one drive are weighed by the whole matrix of their spectra.
+    The noise of a drive shows in its pressures and in the motion at once. Taken separately, one noise would count once
+    for each reading. So the readings of one drive are weighed by the whole matrix of their spectra.
     """
     scale, triangle = _noise(left, inexact)
     apart = np.linalg.solve(triangle, spectrum / scale[:, :, None]) * np.sqrt(2.0)

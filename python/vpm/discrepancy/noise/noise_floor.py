@@ -34,7 +34,7 @@ def noise_floor(
     possible, and noise of the measured size is added. The residual of that log is noise and the error of filters and
     steps. Where the model cannot run them so, noise is added to the measured motion once more, and what that changes is
     taken. The second comes from the residual: its white part, such as the ripple of a drive that no channel shows (see
-    `white_level`), or noise that was white before a drive with states integrated it (see `noise_shapes`).
+    `white_level`). Noise that a drive with states integrated counts too (see `noise_shapes`).
 
     Parameters
     ----------
@@ -69,9 +69,9 @@ def noise_floor(
 def white_level(residual: Array, moving: Array, shape: Array | None = None) -> float:
     """Root mean square of the white noise in one channel of a residual.
 
-    Power of white noise is the same at every frequency of the retained band and is distributed exponentially from one
-    to the next, so its mean follows from any quantile of the periodogram. A low one is taken, which what follows the
-    motion or stands out as a line does not reach.
+    White noise has the same mean power at every frequency of the retained band, with an exponential distribution. So
+    the mean follows from any quantile of the periodogram. A low one is taken, which what follows the motion or stands
+    out as a line does not reach.
 
     Parameters
     ----------

@@ -34,7 +34,7 @@ PERIOD_RANGE = 1.15
 def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
     """Describe a residual: the states that it depends on, and an empirical formula if one predicts validation data.
 
-    A drift or a rhythm depends on the time of the record and is described in words: as a force of the machine's state
+    A drift or a rhythm depends on the time of the record and is described in words. As a force of the machine's state
     it would be wrong in the next record.
 
     Returns

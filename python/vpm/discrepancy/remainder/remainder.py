@@ -56,8 +56,8 @@ class Remainder:
         Share that the effects leave of the mean square that a fit finds in the recalibrated residual; 0 where nothing
         repeats.
     instead : bool
-        Whether a fit in the place of the effects, with no more numbers, leaves less than ``HALF`` of their error; or
-        whether friction of seals, a single number, clearly leaves less.
+        Whether a fit in the place of the effects, with no more numbers, leaves less than ``HALF`` of their error. Also
+        true if friction of seals, a single number, clearly leaves less.
     seals : Seals or None
         That friction, if it does.
     """

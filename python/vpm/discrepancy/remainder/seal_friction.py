@@ -1,9 +1,9 @@
 """Friction of seals that the chambers press: it grows with the pressures, and the catalogue does not have it.
 
-An asymmetric cylinder has other pressures on its way out than on its way back, so that such friction looks like a dry
-one and a constant force beside it. The sum of the logged pressures tells more than the direction: it changes with the
-load and at each reversal. One number, the share of the piston's area that presses the seals, is fitted together with
-the free parameters of the model without any effect. Its residual is compared with that of the effects.
+An asymmetric cylinder has other pressures on its way out than on its way back. Such friction therefore looks like dry
+friction and a constant force. The sum of the logged pressures tells more than the direction: it changes with the load
+and at each reversal. One number, the share of the piston's area that presses the seals, is fitted together with the
+free parameters of the model without any effect. Its residual is compared with that of the effects.
 """
 
 from __future__ import annotations

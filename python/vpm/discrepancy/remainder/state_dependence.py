@@ -70,8 +70,9 @@ def shares(data: Data, final: Judged, joint: int) -> Shares:
     """Share of one joint's validation residual that a binned map of each state predicts.
 
     A map is a table of means over bins of equal count, for both directions of the motion or for each on its own. Two
-    states are alike where the mean difference of the squares that they leave is within its 95 % interval, which allows
-    for samples that resemble their neighbours (F. Diebold and R. Mariano, *J. Business & Econ. Statistics* 13, 1995).
+    states are alike where the mean difference of the squares that they leave is within its 95 % interval. The interval
+    allows for samples that resemble their neighbours (F. Diebold and R. Mariano, *J. Business & Econ. Statistics* 13,
+    1995).
     """
     sides = []
     for problem, residual in ((data.training, final.fit.residual), (data.validation, final.validation)):

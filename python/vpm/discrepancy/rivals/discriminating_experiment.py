@@ -2,8 +2,8 @@
 
 Both models follow the same designed motion with the same commands, and their torque residuals are compared. A
 difference that other parameters of the second model could imitate does not count. So the second model is fitted to the
-first by weighted least squares, with the covariance of its own fit as prior; the remainder is the difference. This is
-the T-optimality of A. Atkinson and V. Fedorov, "The design of experiments for discriminating between two rival models",
+first by weighted least squares, with its own covariance as prior. The remainder is the difference. This is the
+T-optimality of A. Atkinson and V. Fedorov, "The design of experiments for discriminating between two rival models",
 *Biometrika* 62, 1975.
 """
 

@@ -28,7 +28,7 @@ def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search
     """Exchange one effect for the rival that the validation data prefer most, if there is one.
 
     A rival counts that acts at the same site and is confused with the effect. A rival changes a name and adds none, so
-    it need not halve the residual: it only has to predict the validation data better than the effect.
+    it need not halve the residual. It only has to predict the validation data better than the effect.
 
     Returns
     -------
@@ -82,9 +82,9 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
 def timed_again(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search, tuple[Rivals, ...]]:
     """Exchange each delay or lag for another one if that is better beside all other effects.
 
-    When it came in, another effect was missing. The error of that one was attributed to the drive rather than to an
-    instrument, and disturbed the predictions that discriminate a delay from a lag. One that came in last was chosen
-    beside all the others already.
+    When it came in, another effect was missing. Its error was attributed to the drive rather than to an instrument.
+    That disturbed the predictions that discriminate a delay from a lag. One that came in last was chosen beside all the
+    others already.
     """
     thresholds = _thresholds(known, data)
     for place, entry in enumerate(found.accepted):
@@ -117,7 +117,7 @@ def _thresholds(known: Sequence[Rivals], data: Data) -> Thresholds:
 def earned(fitted: Gain, more: int) -> bool:
     """Whether a rival lowers the training error by the cost of its additional numbers, so that an exchange pays.
 
-    By the information criterion on training records: parameters that these do not show would only fit the errors of
+    By the information criterion on training records. Parameters that these do not show would only fit the errors of
     friction laws at a few reversals of other records.
 
     Parameters
@@ -165,7 +165,7 @@ def exchanged(
 def in_order(found: Search, known: Sequence[Rivals]) -> tuple[Search, tuple[Rivals, ...]]:
     """Accepted effects after the exchange, ordered by what each adds to validation beside all others.
 
-    An effect with a held number, which the data show only together with another effect, comes after that one: with
+    An effect may have a held number that the data show only together with another effect. It comes after that one: with
     either removed, the held number would decide how they share the residual.
     """
     power = float(found.final.validation @ found.final.validation)

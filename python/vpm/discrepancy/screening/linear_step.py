@@ -44,9 +44,9 @@ def is_outside(parameter: Parameter, value: float, std: float) -> bool:
 def softened(start: float, estimate: float, std: float) -> tuple[float, float]:
     """Stiffness after a linear step in the compliance of a series spring, with its standard deviation.
 
-    Under an effort F it gives way by F/k, which is linear in 1/k: from a start that is k0, a step dk is one of -dk/k0^2
-    in the compliance. Taken in k, a spring half as stiff as its start, or less, would come out below zero. What comes
-    out stiffer than rigid stays as it is.
+    Under an effort F it gives way by F/k, which is linear in 1/k. From a start k0, a step dk is one of -dk/k0^2 in the
+    compliance. Taken in k, a spring half as stiff as its start, or less, would come out below zero. What comes out
+    stiffer than rigid stays as it is.
     """
     ratio = 2.0 - estimate / start if start > 0.0 else 0.0
     if ratio <= 0.0:

@@ -50,8 +50,8 @@ TOLD = ("stiffness", "inertia")
 def with_predicted_contacts(found: Search, data: Data, each: SideBySide) -> Search:
     """Search whose backlashes have contacts as stiff as closed-loop predictions of training records support.
 
-    The numbers of the runs stand if with them the training records are simulated better, beyond chance, and the
-    validation ones are neither simulated nor balanced worse.
+    The predicted values stand if they simulate the training records better, beyond chance. The validation records may
+    not be simulated worse, nor have a larger residual.
     """
     final = found.final
     for entry in found.accepted:

@@ -61,9 +61,8 @@ def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dro
 def _renamed(current: Judged, reduced: Judged, model: Model, free: tuple[str, ...], data: Data) -> bool:
     """Whether released parameters only take over the work of an effect that elimination dropped.
 
-    Without them, and without the effect, the validation data are predicted worse, in ``model`` with ``free`` fitted;
-    with them the validation records are simulated as well. Where there is none, as many numbers as before would tell
-    nothing.
+    Without them, and without the effect, ``model`` with ``free`` fitted predicts the validation data worse. With them
+    it simulates the validation records as well. Where there is none, as many numbers as before would tell nothing.
     """
     if current.simulated is not None and reduced.simulated is not None and data.simulation is not None:
         simulated = gain(current.simulated, reduced.simulated, segments(data.simulation))

@@ -105,8 +105,8 @@ def _kind_of_delay(trial: Trial) -> Late:
 def _first_named(equals: Sequence[Trial]) -> Trial:
     """Choice by evidence; of several identical models, the first in the catalogue.
 
-    On a single link a drive with joint compliance and a link that bends at its root are one and the same model, and
-    rounding would decide.
+    On a single link, joint compliance of the drive and a link that bends at its root are the same model. Rounding would
+    decide between them.
     """
     best = min(map(_evidence, equals))
     tied = [t for t in equals if _evidence(t) <= best + TIE]

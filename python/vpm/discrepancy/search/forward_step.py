@@ -1,6 +1,6 @@
 """Forward step after the search: one more effect, accepted by closed-loop predictions.
 
-Candidates are those that the last round of the search refused: they explain a modest part of the residual, or help
+Candidates are those that the last round of the search refused. They explain a modest part of the residual, or help
 everywhere except at one dominant reversal. Each gets a closed-loop prediction beside that of the model found so far.
 """
 

@@ -57,8 +57,8 @@ class Search:
     """Outcome of the search, also of one that Ctrl-C ended.
 
     ``last`` is given if nothing has changed since the last effect came in; ``over`` is the last round, if it accepted
-    nothing. ``left`` comes from a ranking: by joint the share of the error power of validation records that effects
-    leave; ``ranked`` is its model, and ``within_laws`` whether it leaves less than laws are wrong by.
+    nothing. ``left`` comes from a ranking: by joint the share of validation error power that effects leave. ``ranked``
+    is its model, and ``within_laws`` says whether it leaves less than the errors of laws.
     """
 
     stages: tuple[Stage, ...]
@@ -97,8 +97,8 @@ def further(
 ) -> Search:
     """Continue a search from the end of another one; removed effects do not come back.
 
-    An effect that took the place of another one leaves what the other one had covered, in which a second effect stands
-    clear that was refused before.
+    A new effect in the place of another one leaves what the other one had covered. A second effect that was refused
+    before may be clear in that.
     """
     stages, accepted, ranking = list(found.stages), list(found.accepted), list(found.ranking)
     dropped = {(r.name, r.site): r.reason for r in found.refused if (r.name, r.site) in found.gone}

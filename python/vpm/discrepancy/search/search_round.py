@@ -141,9 +141,9 @@ class Round:
     def weak(self, best: Accepted) -> bool:
         """Whether the best candidate of the round leaves most of the error, so that a hidden motion is tried too.
 
-        A motion that nobody measures shows in the efforts of all joints, in part as any of several lighter effects
-        would: what explains little has to compete with it. Where links bend already, or drives have states, its probes
-        take long, and come after all others.
+        An unmeasured motion shows in the efforts of all joints, in part as several lighter effects would. So an effect
+        that explains little has to compete with it. Where links bend already, or drives have states, its probes take
+        long, and come after all others.
         """
         tried = any(EFFECTS[name].winds_up for name, _ in self._ranking)
         return best.trial.there.relative < CLEAR_GAIN and not tried and not self._takes_long()
@@ -191,8 +191,7 @@ class Round:
         """Whether a candidate of the round adds an unmeasured motion, simulated for every probe.
 
         Where the log holds that motion, it is evidence like any. The same holds for bending of a rigid beam beside
-        flexible ones, and for a backlash between rigid links, which its flights show: light effects would only imitate
-        them.
+        flexible ones, and for a backlash between rigid links. Light effects would only imitate them.
         """
         model, motion = self.current.model, candidate.effect.motion
         if bends(model) and motion == "bending" and candidate.site in model.beams:
