@@ -91,7 +91,7 @@ class Evaluations(Motions):
 
     @property
     def beam_summary(self) -> tuple[str, ...]:
-        """Flexible links in sentences: levels and coordinates, frequencies and sag with all joints held at zero."""
+        """Flexible links in sentences: levels, coordinates, frequencies and sag, evaluated with joints at zero."""
         sentences = []
         for beam in self.beams:
             own = [name for name in self.coordinates if name.startswith(f"{beam}.")]
@@ -160,7 +160,7 @@ class Evaluations(Motions):
         return filled
 
     def _keep_named(self, state: Array, internal: Array, named: Mapping[str, float]) -> None:
-        """Put in what drives and supplies hold, but for what is named."""
+        """Put in what drives and supplies hold for an evaluation, but for what is named."""
         for place, name in enumerate(self.internal_names):
             if name not in named:
                 state[2 * len(self.coordinates) + place] = internal[place]
@@ -250,7 +250,7 @@ class Evaluations(Motions):
         )
 
     def _settled(self, values: Mapping[str, float] | ArrayLike | None, command: Array) -> Array:
-        """State in which flexible links that are not named rest and drives that are not named follow their command."""
+        """State for an evaluation in which unnamed flexible links rest and unnamed drives follow their command."""
         place = self.state(values)
         if values is None or isinstance(values, Mapping):
             named = values or {}

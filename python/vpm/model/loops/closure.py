@@ -70,7 +70,7 @@ class Loops:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the joints that close loops."""
+        """Names of the closures: joints that close loops."""
         return tuple(self._model.loop_entries)
 
     def __len__(self) -> int:
@@ -85,7 +85,7 @@ class Loops:
     # ---- kinematics --------------------------------------------------------------------------------------------------
 
     def at(self, q: ArrayLike, v: ArrayLike | None = None) -> LoopState:
-        """Gap of the loops, its derivatives, and which equations are independent.
+        """Closure gap of the loops, its derivatives, and which equations are independent.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class Loops:
         return LoopState(gap, jacobian, drift, chosen > 0.5)
 
     def assembled(self, held: Mapping[str, float] | None = None, guess: Mapping[str, float] | None = None) -> Array:
-        """Coordinates at which all loops are closed.
+        """Coordinates at which all loop closures hold.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class Loops:
         return closed
 
     def velocities(self, q: ArrayLike, held: Mapping[str, float]) -> Array:
-        """Rates that keep the loops closed, the smallest ones with those of some coordinates given.
+        """Rates that keep the loop closures, the smallest ones with those of some coordinates given.
 
         Raises
         ------
@@ -209,13 +209,13 @@ class Loops:
         return a
 
     def turns(self, coordinate: str) -> bool:
-        """Whether a coordinate is the angle of a joint, so that a whole turn of it changes nothing."""
+        """Whether a closure's coordinate is an angle, so that a whole turn of it changes nothing."""
         return coordinate in self._model.joints and self._model.joint_kind(coordinate) == "revolute"
 
     # ---- what is said of them ----------------------------------------------------------------------------------------
 
     def summary(self, q: ArrayLike | None = None) -> str:
-        """One sentence: equations, those that are redundant, and degrees of freedom."""
+        """Sentence on the closure equations, redundant ones, and degrees of freedom."""
         state = self.at(self.assembled() if q is None else q)
         m, n = state.jacobian.shape
         redundant = m - state.rank
@@ -337,7 +337,7 @@ class Loops:
         return tuple(dict.fromkeys(joint for name in direct for joint in model.joints_of_actuator(name)))
 
     def place(self, name: str) -> int:
-        """Number of a coordinate.
+        """Number of a coordinate in the closure equations.
 
         Raises
         ------
