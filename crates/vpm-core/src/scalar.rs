@@ -175,7 +175,7 @@ pub trait Scalar:
     fn if_positive<T: Choice<Self>>(self, yes: impl FnOnce() -> T, no: impl FnOnce() -> T) -> T {
         Self::zero().if_less(self, yes, no)
     }
-    /// |x|; at zero the derivative is that of +x.
+    /// Absolute value of a scalar, |x|; at zero the derivative is that of +x.
     #[inline]
     fn abs(self) -> Self {
         self.if_negative(|| -self, || self)

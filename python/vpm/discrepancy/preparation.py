@@ -98,7 +98,7 @@ def recalibrated_of(model: Model, data: Data, notes: list[str], each: SideBySide
 
 
 def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[float, float]]:
-    """Transition velocities of the nominal model's dry friction to recalibrate, with bounds from data.
+    """Prepared transition velocities of dry friction to recalibrate, with bounds from data.
 
     Nobody knows them beforehand, and a wrong one leaves an error at every reversal, where small effects show.
     """
@@ -114,7 +114,7 @@ def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[
 
 
 def _within_reach(model: Model, free: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Bounds for the recalibration of positive nonlinear parameters, from their stated uncertainties.
+    """Prepared bounds for positive nonlinear parameters, from their stated uncertainties.
 
     With something large missing, a fit may end where nothing shows any more, such as oil as soft as air. No effect
     leads back from there. What is linear comes back by itself.

@@ -183,7 +183,7 @@ def _laws(motion: Sequence[Array], efforts: Sequence[Array], checks: Checks) -> 
 
 
 def missing_effects(judged: Sequence[Whiteness], checks: Checks) -> list[str]:
-    """Sentences about channels whose residual repeats with the motion."""
+    """Sentences on missing effects: channels whose residual repeats with the motion."""
     level = checks.level / max(1, len(judged))
     return [
         f"the residual of {one.channel} in {one.experiment} repeats with the motion, which explains "

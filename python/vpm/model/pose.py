@@ -27,7 +27,7 @@ class Pose:
     rotation: tuple[float, ...] = _IDENTITY
 
     def __matmul__(self, other: Pose) -> Pose:
-        """Composition ``X_AC = X_AB X_BC``; exact where one of the two is the identity."""
+        """Composition of poses ``X_AC = X_AB X_BC``; exact where one of the two is the identity."""
         if self == Pose():
             return other
         if other == Pose():

@@ -52,7 +52,7 @@ def importer_of(path: str | PathLike[str]) -> Plugin | None:
 
 
 def _imported(plugin: Plugin, path: str | PathLike[str]) -> dict[str, Any]:
-    """Content by an importer of another package: what it names is called with the path."""
+    """Content read by an importer of another package: what it names is called with the path."""
     importer = plugin.load()
     try:
         found = importer(path)  # type: ignore[operator]  # an error says so

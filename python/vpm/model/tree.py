@@ -35,7 +35,7 @@ def name_problems(document: Document) -> Iterator[Problem]:
 
 
 def tree_problems(document: Document) -> Iterator[Problem]:
-    """Unknown parents, bodies with no joint or several, places outside of a beam, loops."""
+    """Problems of the tree: unknown parents, bodies with no joint or several, wrong places, loops."""
     for keys, parent, at in _attachments(document):
         yield from _attachment_problems(keys, parent, at, document)
     yield from _child_problems(document)

@@ -172,7 +172,7 @@ class Look:
         return replace(judgement, score=max(score, self._score_of_all(fitted, left[1])))
 
     def _score_of_all(self, fitted: Fitted, left: Array) -> float:
-        """Score of a judgement by cross-validation over all parts of the record.
+        """Score in a look by cross-validation over all parts of the record.
 
         Law: cross-validation (M. Stone, *J. Royal Statistical Society B* 36, 1974): what is held back for a judgement
         can be fitted for another one, so that no part of a record goes unheard.
@@ -254,7 +254,7 @@ class Look:
 
 
 def same_curve(one: Key, other: Key) -> bool:
-    """Whether two effects depend on the same states at the same place."""
+    """Whether two effects look alike: they depend on the same states at the same place."""
     states = (set(EFFECTS[name].signature.lives_in) for name, _ in (one, other))
     return one[1] == other[1] and bool(set.intersection(*states))
 

@@ -55,7 +55,7 @@ def log_volume(slopes: Array) -> float:
 
 
 def apart(one: Array, other: Array) -> float:
-    """Mean difference of two log-densities in nats: by how much records discriminate two models.
+    """Discrimination beside posteriors: mean difference of two log-densities in nats.
 
     Law: where one of two models is exact, the logarithm of the ratio of their densities has half of its variance as
     mean (Q. Vuong, *Econometrica* 57, 1989, for the variance). Below a nat or so nobody can choose.

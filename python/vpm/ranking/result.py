@@ -53,12 +53,12 @@ class Ranked(Storable):
 
     @property
     def key(self) -> tuple[str, str]:
-        """Effect and site of a ranked effect."""
+        """Effect and site of a ranked effect in the result."""
         return self.effect, self.site
 
     @property
     def place(self) -> str:
-        """Site and side of a ranked effect in words."""
+        """Site and side of a ranked effect in words, for the result."""
         return in_words(self.site, self.side)
 
 
@@ -129,7 +129,7 @@ class Ranking(Result):
 
     @property
     def left(self) -> dict[str, float]:
-        """Share of validation error power that ranked effects leave, by joint or other owner of a channel.
+        """Result by joint or other channel owner: share of validation error power that effects leave.
 
         Of its channel that they explain best.
         """

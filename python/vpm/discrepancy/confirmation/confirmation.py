@@ -81,7 +81,7 @@ class Judged:
 
     @property
     def baseline(self) -> Baseline:
-        """Baseline for the next screening round, from a fitted model."""
+        """Baseline for the next screening round, from a judged model of the confirmation."""
         pushed = {}
         for name in self.fit.at_bounds:
             parameter = self.model.parameters[name]
@@ -143,12 +143,12 @@ class Trial:
 
     @property
     def there(self) -> Gain:
-        """Validation gain of a trial on the joint where the effect acts most; other joints may miss other effects."""
+        """Validation gain of a confirmation trial on the joint where the effect acts most."""
         return self.validation if self.here is None else max(self.validation, self.here, key=lambda one: one.relative)
 
     @property
     def score(self) -> float:
-        """Validation gain of a trial per fitted number."""
+        """Validation gain of a confirmation trial per fitted number."""
         return self.validation.relative / max(1, len(self.parameters))
 
 
@@ -160,9 +160,9 @@ def judge(
     origin: Array | None = None,
     worth: Worth | None = None,
 ) -> Judged:
-    """Fit ``free`` on training records and predict validation records; see `vpm.identify.tangent` for ``origin``.
+    """Confirmation's judgement: fit ``free`` on training records, predict validation records.
 
-    Where links bend and nothing else is worked out, the tangent at the start is taken if none is given. A fit that is
+    For ``origin`` see `vpm.identify.tangent`. Where links bend and nothing else is worked out, the tangent at the start is taken if none is given. A fit that is
     not on a tangent of links ends early if it is not ``worth`` its time.
 
     Raises
@@ -189,7 +189,7 @@ def judge(
 def unmoved(
     model: Model, free: tuple[str, ...], data: Data, bounds: dict[str, tuple[float, float]]
 ) -> tuple[Judged, str]:
-    """Judge a model without a fit: its parameter uncertainty, and why it cannot simulate, or ""."""
+    """Confirmation's judgement without a fit: parameter uncertainty, and why it cannot simulate, or ""."""
     fit = standing(model, data.training, free)
     validation, _ = data.validation.evaluate(model, model.theta)
     simulated, stopped = None, ""
@@ -237,7 +237,7 @@ def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) ->
 
 
 def finished(current: Judged, data: Data, trial: Trial) -> Trial:
-    """Trial whose refit ended early, fitted to the end; any other trial unchanged."""
+    """Confirmation trial whose refit ended early, fitted to the end; any other trial unchanged."""
     if not trial.judged.fit.early:
         return trial
     known = trial.judged
@@ -255,7 +255,7 @@ def measured(
     timed: Timed | None,
     diverged: str,
 ) -> Trial:
-    """Gain of a refit on training and validation data; a delay fitted in motion counts by its gain in motion."""
+    """Confirmed gain of a refit on all data; a delay fitted in motion counts by its gain in motion."""
     fitted = judged.fit.residual * shrinkage(data.training, current, judged)
     validation = judged.validation * shrinkage(data.validation, current, judged)
     return Trial(
@@ -283,7 +283,7 @@ def judged_anyhow(
     origin: Array | None = None,
     worth: Worth | None = None,
 ) -> tuple[Judged, str]:
-    """Judge a fit by the residual alone where it cannot simulate the validation records, with the reason.
+    """Confirmation's judgement by the residual alone where a fit cannot simulate, with the reason.
 
     One that Ctrl-C ended says nothing of a candidate.
     """
@@ -298,7 +298,7 @@ def judged_anyhow(
 
 
 def _visible_now(judged: Judged, data: Data, probe: Probe) -> tuple[str, ...]:
-    """Held parameters of a trial that were not identifiable at the start of the refit and are at its end.
+    """Held parameters of a confirmation trial that became identifiable during the refit.
 
     A stiffness looks like the inertia behind it as long as neither is near its value. A doubtful parameter of an effect
     that does nothing at its start may stay there. Any other start is a guess, so it moves if the data show it at all.
@@ -321,12 +321,12 @@ def _visible_now(judged: Judged, data: Data, probe: Probe) -> tuple[str, ...]:
 
 
 def _still(data: InverseDynamicsProblem, probe: Probe) -> frozenset[str]:
-    """Kinds of sites where a candidate moves nothing that a refit on a tangent uses."""
+    """Kinds of sites where a candidate to confirm moves nothing that a refit on a tangent uses."""
     return frozenset({"joint"} if drives_on_tangent(probe.model, data) else {"joint", "actuator"})
 
 
 def _origin(data: InverseDynamicsProblem, probe: Probe, start: Model) -> Array | None:
-    """Origin for a refit on a tangent: link deflections of the model without the candidate, where that is valid.
+    """Origin for a confirmation refit on a tangent: link deflections without the candidate, where valid.
 
     Drives are taken as without it where it is none of theirs, and else as where the fit starts.
     """
@@ -339,7 +339,7 @@ def _origin(data: InverseDynamicsProblem, probe: Probe, start: Model) -> Array |
 
 
 def weaker(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> Array:
-    """Factors, at least 1, by which a refit weakened the actuators of each joint (joints,).
+    """Factors, at least 1, by which a confirmation refit weakened the actuators of each joint (joints,).
 
     An effect that suppresses the command, or a gain that shrinks, leaves a small difference of two small efforts. So
     errors are compared relative to the effort. One drive may do so where others are stronger.
@@ -349,7 +349,7 @@ def weaker(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> 
 
 
 def shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> Array:
-    """Factor by which a refit weakened the actuators behind each residual, see `weaker` (n,)."""
+    """Factor by which a confirmation refit weakened the actuators behind each residual, see `weaker` (n,)."""
     factors_of_joints = weaker(problem, current, judged)
     # What else is logged is shown by the machine as a whole.
     factors = np.full(max(block.samples.stop for block in problem.blocks), np.max(factors_of_joints))
@@ -360,7 +360,7 @@ def shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) 
 
 
 def _where_it_acts(current: Judged, validation: Array, problem: InverseDynamicsProblem, site: str) -> Gain | None:
-    """Validation gain of a refit in the effort at the joint where the effect acts; None without one."""
+    """Confirmed gain in the effort at the joint where the effect acts; None without one."""
     joint, lost = (
         joint_at(current.model, site),
         float(validation @ validation) > float(current.validation @ current.validation),
@@ -388,7 +388,7 @@ def _low_frequency_gain(current: Judged, validation: Array, data: InverseDynamic
 def _timed(
     current: Judged, judged: Judged, data: Data, probe: Probe
 ) -> tuple[Timed | None, ClosedLoopPrediction | None]:
-    """Refit of a delay on a machine with dry friction: fitted in motion, with its closed-loop prediction if any."""
+    """Confirmation of a delay beside dry friction: fitted in motion, with its closed-loop prediction if any."""
     if not is_late(probe.candidate.effect, current.model) or has_tangent(probe.model, data.training):
         return None, None
     before, late = (current.model, current.free), (judged.model, judged.free)
@@ -396,7 +396,7 @@ def _timed(
 
 
 def _checked_by_prediction(trial: Trial, current: Judged, prediction: ClosedLoopPrediction | None, data: Data) -> Trial:
-    """Trial of a delay that worsens simulations, judged by closed-loop predictions of refitted models."""
+    """Confirmation trial of a delay that worsens simulations, judged by closed-loop predictions."""
     if prediction is None or data.simulation is None or trial.simulated is None or trial.simulated.relative >= 0.0:
         return trial
     gained = gain_in_closed_loop(current.model, current.free, prediction, data.simulation)
@@ -404,7 +404,7 @@ def _checked_by_prediction(trial: Trial, current: Judged, prediction: ClosedLoop
 
 
 def _away_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem, probe: Probe) -> Gain | None:
-    """Validation gain of a trial on samples at which every joint is clearly in motion.
+    """Confirmed gain on samples at which every joint is clearly in motion.
 
     At a reversal a joint with dry friction sticks for a while, which no smooth law follows. A delay or a joint
     compliance imitates that there, and nowhere else.
@@ -424,14 +424,14 @@ def _away_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem, pr
 
 
 def _bounds(probe: Probe) -> dict[str, tuple[float, float]]:
-    """Bounds of a candidate's shape from the data, by dotted name, for its refit."""
+    """Bounds of a candidate's shape from the data, by dotted name, for its confirmation."""
     given, short = probe.candidate.bounds, _short_names(probe)
     away = _out_of_reach(probe)
     return {dotted: given[s] for s, dotted in short.items() if s in given and dotted not in away}
 
 
 def _out_of_reach(probe: Probe) -> set[str]:
-    """Start positions of a candidate that no joint reaches in the records, such as another end stop.
+    """Start positions in a confirmation that no joint reaches in the records, such as another end stop.
 
     Moved to the rim of what was seen they would stand where no sample of the training contradicts them.
     """
@@ -446,7 +446,7 @@ def _short_names(probe: Probe) -> dict[str, str]:
 
 
 def _inside(probe: Probe, bounds: dict[str, tuple[float, float]]) -> dict[str, float]:
-    """Linearised estimates of a probe, moved into the bounds as start values of a refit."""
+    """Linearised estimates of a probe, moved into the bounds as start values of the confirmation."""
     values = {}
     for name in probe.free:
         parameter = probe.model.parameters[name]
@@ -458,7 +458,7 @@ def _inside(probe: Probe, bounds: dict[str, tuple[float, float]]) -> dict[str, f
 def _release(
     model: Model, data: Problem, free: tuple[str, ...], fit: Estimate, probe: Probe
 ) -> tuple[tuple[str, ...], tuple[Alias, ...]]:
-    """Parameters to release in a second refit: a period or transition velocity matters once the size is not zero."""
+    """Parameters to release in a second confirmation refit: they matter once the size is not zero."""
     fixed = {dotted for short, dotted in _short_names(probe).items() if short in probe.candidate.fixed}
     asleep = [name for name in probe.invisible if name not in fixed | _out_of_reach(probe)]
     theta = model.theta.copy()

@@ -74,7 +74,7 @@ class ClosedLoopPrediction:
     slopes: Array
 
     def spectra(self) -> Spectra:
-        """Spectra of the prediction error and of its derivatives."""
+        """Spectra of the prediction error and of its derivatives, for the Whittle likelihood."""
         return spectra(self.model, self.problem, np.column_stack([self.left, self.slopes]))
 
     def estimated(self, name: str) -> tuple[float, float]:
@@ -116,7 +116,7 @@ def fit_prediction(
 
 
 def spectra(model: Model, problem: OutputErrorProblem, columns: Array) -> Spectra:
-    """Spectra of prediction-error columns over all samples, for each joint and its drives (frequencies, k, columns).
+    """Spectra for the Whittle likelihood over all samples, by joint with its drives (frequencies, k, columns).
 
     A command is what the controller made of readings, and is left out.
     """
@@ -132,7 +132,7 @@ def spectra(model: Model, problem: OutputErrorProblem, columns: Array) -> Spectr
 
 
 def _read_with(model: Model, channel: str) -> str:
-    """Joint with whose readings another reading shares its noise spectrum: that which its drive moves."""
+    """Joint with whose readings another reading shares its noise in the Whittle likelihood."""
     owner = channel.rpartition(".")[0]
     if owner in model.actuators:
         return model.joints_of_actuator(owner)[0]
@@ -191,7 +191,7 @@ def _noise(
 
 
 def least(transforms: Spectra, inexact: Spectra | None = None) -> tuple[Array, Spectra, Array]:
-    """Least-squares change of the parameters, remaining noise spectrum and weighted rows.
+    """Whittle step: least-squares change of parameters, remaining noise spectrum and weighted rows.
 
     ``inexact`` is what no model is exact to, see `weighted`.
     """
@@ -206,7 +206,7 @@ def least(transforms: Spectra, inexact: Spectra | None = None) -> tuple[Array, S
 
 
 def _like(model: Model, free: Sequence[str], beside: ClosedLoopPrediction) -> Model:
-    """Model with the parameters of another closed-loop prediction; a delay that only one has stays."""
+    """Model with the parameters of another Whittle prediction; a delay that only one has stays."""
     theirs = beside.model.parameters
     values = {name: theirs[name].value for name in free if name in beside.free}
     mine = [name for name in free if name not in beside.free]
@@ -223,7 +223,7 @@ def predict(
     setup: Setup,
     beside: ClosedLoopPrediction | None = None,
 ) -> ClosedLoopPrediction:
-    """Closed-loop prediction with a model's own parameters; see `fit_prediction` for ``beside``.
+    """Closed-loop prediction with own parameters for the Whittle likelihood; ``beside`` as in `fit_prediction`.
 
     Raises
     ------
@@ -243,7 +243,7 @@ def _with_slopes(
     setup: Setup,
     beside: ClosedLoopPrediction | None = None,
 ) -> ClosedLoopPrediction:
-    """Closed-loop prediction with derivatives by coarse steps; those known ``beside`` it are reused.
+    """Whittle prediction with derivatives by coarse steps; those known ``beside`` it are reused.
 
     Each takes as long as the run itself, and models of which one is a little later or slower share all but their own.
     """
@@ -259,7 +259,7 @@ def _with_slopes(
 
 
 def _fine(model: Model, free: Sequence[str], records: Sequence[Experiment], setup: Setup) -> Setup:
-    """Integration steps of a prediction, as short as the model's time constants need."""
+    """Integration steps of a Whittle prediction, as short as the model's time constants need."""
     times = [model.parameters[name] for name in free]
     shortest = min((time.value for time in times if time.unit == "s" and time.value > 0.0), default=np.inf)
     interval, steps = max(record.dt for record in records), DRY_STEPS if is_dry(model) else STEPS

@@ -114,7 +114,7 @@ def _share(rest: Array, target: Array) -> float:
 
 
 def rhythm(data: Data, final: Judged, joint: int) -> Rhythm | None:
-    """Dominant frequency in time of the training residual, with the share it predicts of the validation residual.
+    """Dependence on time as a rhythm: dominant frequency of the training residual, and its validation share.
 
     The phase is free on the validation records: nobody knows when they began in the beat of the disturbance. But a
     disturbance keeps it: each half of a record has to predict the other one. Links that ring with noise have a line of
@@ -142,7 +142,7 @@ def _series(problem: InverseDynamicsProblem, residual: Array, joint: int) -> lis
 
 
 def _other_half(time: Array, values: Array, frequency: float) -> float:
-    """Sum of squares of a rhythm in each half of a record when it was fitted to the other half."""
+    """Sum of squares of a time dependence in each half of a record, fitted to the other half."""
     columns, middle = _waves(time, frequency), time.size // 2
     halves = slice(None, middle), slice(middle, None)
     left = 0.0

@@ -50,7 +50,7 @@ class Rivals:
 
     @property
     def label(self) -> str:
-        """Label of the accepted effect that rivals compete with: ``effect at site``."""
+        """Label of the ambiguous effect that rivals compete with: ``effect at site``."""
         return f"{self.effect} at {self.site}"
 
 
@@ -75,7 +75,7 @@ def rivals(
     each: SideBySide | None = None,
     last: Tried | None = None,
 ) -> tuple[Rivals, ...]:
-    """Rivals of each accepted effect: every other effect in its place, kept if it predicts the validation data as well.
+    """Ambiguity of each accepted effect: rivals in its place that predict the validation data as well.
 
     All rivals are screened on the model without the effect; the few with nearly the same share of the training residual
     are refitted. They have to predict the validation records as well as the effect. What the ``last`` effect competed
@@ -136,7 +136,7 @@ class _Job:
 
     @property
     def label(self) -> str:
-        """Label of a rival's screening in progress reports."""
+        """Label of a rival's screening for ambiguity in progress reports."""
         return f"{self.candidate.label} for {_label(self.entry)}"
 
 
@@ -145,12 +145,12 @@ def _label(entry: Accepted) -> str:
 
 
 def _beside(last: Tried, entry: Accepted) -> list[Probe]:
-    """Probes of possible rivals that were screened in the round in which an effect came in."""
+    """Probes for ambiguity from the round in which an effect came in."""
     return [p for p in last.probes if _could_do(last.without.model, entry, p.candidate)]
 
 
 def _without(final: Judged, data: Data, known: Mapping[Key, Tried], entry: Accepted) -> Judged:
-    """Model without one accepted effect, all other free parameters fitted again; rivals are judged on it."""
+    """Model without one accepted effect, all else fitted again; ambiguity is judged on it."""
     if entry.key in known:
         return known[entry.key].without
     model = final.model.without_effect(*entry.key)
@@ -159,19 +159,19 @@ def _without(final: Judged, data: Data, known: Mapping[Key, Tried], entry: Accep
 
 
 def _others(without: Judged, data: Data, entry: Accepted, effects: Sequence[str] | None) -> list[Candidate]:
-    """Possible rivals of an accepted effect among all candidates."""
+    """Possible rivals of an accepted effect among all candidates, for its ambiguity."""
     offered = candidates(without.model, data.training, without.fit.residual, effects)
     return [c for c in offered if _could_do(without.model, entry, c)]
 
 
 def _could_do(model: Model, entry: Accepted, candidate: Candidate) -> bool:
-    """Whether a candidate acts near enough to an accepted effect to be its rival."""
+    """Whether a candidate acts near enough to an accepted effect to make it ambiguous."""
     heavier = bool(candidate.effect.motion) and not entry.effect.motion
     return _near(candidate, entry) and not (heavier and bends(model))
 
 
 def _short_list(final: Judged, without: Judged | None, entry: Accepted, probes: Sequence[Probe]) -> list[Probe]:
-    """Short list of rivals to refit: the largest predicted gains per number, and nested laws of the effect."""
+    """Short list of ambiguous rivals to refit: the largest predicted gains per number, and nested laws."""
     if without is None:
         return []
     taken = _power(without) - _power(final)
@@ -185,7 +185,7 @@ def _short_list(final: Judged, without: Judged | None, entry: Accepted, probes: 
 
 
 def _near(candidate: Candidate, entry: Accepted) -> bool:
-    """Whether a rival acts on the joint of an accepted effect, or the catalogue calls both confusable."""
+    """Whether a rival acts on the joint of an effect, or is confusable with it, so that it is ambiguous."""
     name, site = entry.key
     if candidate.key == (name, site):
         return False
@@ -194,7 +194,7 @@ def _near(candidate: Candidate, entry: Accepted) -> bool:
 
 
 def as_good(final: Judged, trial: Trial, data: Data) -> bool:
-    """Whether a rival predicts the validation data as well as the accepted effect in whose place it stands."""
+    """Whether an effect is ambiguous: a rival in its place predicts the validation data as well."""
     if not trial.clear:
         return False
     change = gain(final.validation, trial.judged.validation, segments(data.validation)).relative

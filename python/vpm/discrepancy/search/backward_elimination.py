@@ -75,7 +75,7 @@ def _renamed(current: Judged, reduced: Judged, model: Model, free: tuple[str, ..
 
 
 def without_tight_bounds(final: Judged, data: Data) -> Judged:
-    """Refit with wider bounds where a transition velocity stands at its upper bound.
+    """Refit after elimination with wider bounds where a transition velocity stands at its upper bound.
 
     The bound keeps dry friction apart from viscous friction while candidates compete; once the names stand, it need not
     cut the fit short. The training records decide, and the validation ones may not be predicted worse for it.
@@ -107,7 +107,7 @@ def _released(entry: Accepted, freed: set[str]) -> Accepted:
 
 
 def refitted(best: Accepted, data: Data) -> Accepted:
-    """Refit to the end of a model that was fitted on a tangent, before the next round."""
+    """Refit before elimination, to the end, of a model that was fitted on a tangent."""
     judged = best.trial.judged
     try:
         exact = judge(judged.model, judged.free, data, dict(judged.bounds))

@@ -61,7 +61,7 @@ class Accepted:
 
     @property
     def ranked(self) -> bool:
-        """Whether a ranking named the accepted effect."""
+        """Whether a ranking named the chosen candidate."""
         return bool(np.isfinite(self.evidence))
 
 
@@ -128,7 +128,9 @@ def cost(trial: Trial) -> float:
 
 
 def schwarz(gained: Gain, numbers: int) -> float:
-    """Information criterion of G. Schwarz (*Annals of Statistics* 6, 1978) per independent piece; 0 for no change.
+    """Criterion to choose a candidate by G. Schwarz (*Annals of Statistics* 6, 1978) per independent piece.
+
+    It is 0 for no change.
 
     Parameters
     ----------

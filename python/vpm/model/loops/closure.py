@@ -158,7 +158,7 @@ class Loops:
         return v
 
     def independent(self, q: ArrayLike, prefer: Iterable[str] = ()) -> tuple[str, ...]:
-        """Coordinates that decide all others near ``q``: as many as there are degrees of freedom.
+        """Independent coordinates near ``q`` under the closures: as many as degrees of freedom.
 
         The dependent ones are the pivots of an elimination of the loops' derivative, sought among joints without an
         actuator first, then among the others, then among those to ``prefer`` and the coordinates of flexible links.
@@ -176,7 +176,7 @@ class Loops:
         return tuple(name for place, name in enumerate(names) if place not in dependent)
 
     def transmission(self, q: ArrayLike, inputs: Sequence[str]) -> Array:
-        """Rates of all coordinates per unit rate of some that are independent, shape (n, len(inputs)).
+        """Rates of all coordinates that closures demand per unit rate of inputs, shape (n, len(inputs)).
 
         Its rows are ratios and levers: rad/m of a joint by a stroke, and the effort on a stroke by one on the joint.
 
@@ -201,7 +201,7 @@ class Loops:
         return whole
 
     def accelerations(self, q: ArrayLike, v: ArrayLike, given: Mapping[str, float]) -> Array:
-        """Accelerations of all coordinates that follow from those of the independent ones, shape (n,)."""
+        """Accelerations of all coordinates that closures demand for independent ones, shape (n,)."""
         state, names = self.at(q, v), tuple(given)
         a: Array = self.transmission(q, names) @ np.array([given[name] for name in names])
         free = [place for place, name in enumerate(self._model.coordinates) if name not in names]
@@ -230,7 +230,7 @@ class Loops:
     def efforts(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, joints: Sequence[str] | None = None
     ) -> dict[str, float]:
-        """Efforts (N, N m) of the driven joints that a motion needs: inverse dynamics with closed loops.
+        """Efforts (N, N m) of the driven joints under loop closures: inverse dynamics.
 
         Parameters
         ----------
@@ -272,7 +272,7 @@ class Loops:
         return dict(zip(driven, np.linalg.solve(levers, moves.T @ needed).tolist(), strict=True))
 
     def rest(self, held: Mapping[str, float]) -> tuple[Array, dict[str, float]]:
-        """Rest under gravity with some joints held: the others and flexible links where the loops' forces balance.
+        """Rest of closures under gravity with some joints held, where the loops' forces balance.
 
         Parameters
         ----------
@@ -297,7 +297,7 @@ class Loops:
     def singularities(
         self, coordinate: str, held: Mapping[str, float] | None = None, guess: Mapping[str, float] | None = None
     ) -> tuple[Singularity, ...]:
-        """Singular configurations on the way of one degree of freedom, all others held.
+        """Singular configurations of closures on the way of one degree of freedom, all others held.
 
         Parameters
         ----------
