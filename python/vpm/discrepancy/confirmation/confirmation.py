@@ -162,8 +162,8 @@ def judge(
 ) -> Judged:
     """Confirmation's judgement: fit ``free`` on training records, predict validation records.
 
-    For ``origin`` see `vpm.identify.tangent`. Where links bend and nothing else is worked out, the tangent at the start is taken if none is given. A fit that is
-    not on a tangent of links ends early if it is not ``worth`` its time.
+    For ``origin`` see `vpm.identify.tangent`. Where links bend and nothing else is worked out, the tangent at the start
+    is taken if none is given. A fit that is not on a tangent of links ends early if it is not ``worth`` its time.
 
     Raises
     ------
