@@ -37,9 +37,11 @@ impl<S: Scalar> MemoryLaw<S> for Hysteresis<S> {
         MemoryChords { push, resistance: zero, gain, source: zero, fading }
     }
 
-    /// Memory of a hysteresis after a way. Law: with `u = |way| / displacement` and y = z along the motion, `y+ = (y +
-    /// (1 - e^(-b u))/b) - y (1 - e^(-b u))` for y < 0, b the shape, until y = 0 at `u = ln(1 - b y)/b`; from there `1
-    /// - y` falls by `e^(-u)`.
+    /// Memory of a hysteresis after a way.
+    ///
+    /// Law: with `u = |way| / displacement` and y = z along the motion,
+    /// `y+ = (y + (1 - e^(-b u))/b) - y (1 - e^(-b u))` for y < 0, b the shape, until y = 0 at `u = ln(1 - b y)/b`;
+    /// from there `1 - y` falls by `e^(-u)`.
     #[inline]
     fn advance(&self, z: S, way: S, _: S) -> S {
         let along = way.if_negative(|| -z, || z);

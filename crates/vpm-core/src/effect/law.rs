@@ -28,8 +28,10 @@ pub trait Law<S: Scalar> {
         S::zero()
     }
 
-    /// Resistance r of a law in N s/m or N m s/rad: its velocity-dependent part is `-r v`. So `effort(q, v) = effort(q,
-    /// 0) - r v`. It is the slope of the chord from rest to `v`, not of the tangent, and finite at rest.
+    /// Resistance r of a law in N s/m or N m s/rad: its velocity-dependent part is `-r v`.
+    ///
+    /// So `effort(q, v) = effort(q, 0) - r v`. It is the slope of the chord from rest to `v`, not of the tangent, and
+    /// finite at rest.
     #[inline]
     fn resistance(&self, _q: S, _v: S) -> S {
         self.damping().unwrap_or_else(S::zero)
