@@ -18,7 +18,7 @@ from functools import partial
 from pathlib import Path
 
 import vpm
-from vpm.many import Case, diagnose_many
+from vpm.many_diagnoses import Case, diagnose_many
 from vpm.sending import packed
 from vpm.tasks import processes
 

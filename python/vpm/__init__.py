@@ -45,7 +45,7 @@ if TYPE_CHECKING:
     )
     from vpm.linear import LinearModel
     from vpm.log_check import LogCheck, check_log
-    from vpm.many import Case, diagnose_many
+    from vpm.many_diagnoses import Case, diagnose_many
     from vpm.model import Dynamics, Model
     from vpm.observer import Noise, Observation, Observer, observe
     from vpm.optimise import Optimum, optimise
@@ -172,8 +172,8 @@ _HOMES = {
     "LinearModel": "vpm.linear",
     "LogCheck": "vpm.log_check",
     "check_log": "vpm.log_check",
-    "Case": "vpm.many",
-    "diagnose_many": "vpm.many",
+    "Case": "vpm.many_diagnoses",
+    "diagnose_many": "vpm.many_diagnoses",
     "Dynamics": "vpm.model",
     "Model": "vpm.model",
     "Noise": "vpm.observer",

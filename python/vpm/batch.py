@@ -56,7 +56,7 @@ def simulate_batch(
     cutoff: float | None = None,
     executor: Executor | Callable[[], Executor] | None = None,
 ) -> list[Run | VpmError]:
-    """Simulate a machine many times, on threads: the core computes without the interpreter's lock.
+    """Simulate a batch of one machine on threads: the core computes without the interpreter's lock.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def _run_all(
     where: Where,
     told: Callable[[int, int], object] | None,
 ) -> list[Run | VpmError]:
-    """Runs of all chunks; one that dies with its worker is an error for each of its trials."""
+    """Runs of all chunks of a batch; one that dies with its worker is an error for each trial."""
     done = 0
 
     def heard(ended: list[Done[int]]) -> None:
@@ -172,7 +172,7 @@ def _outcomes_of(done: Done[int] | None, size: int) -> list[Run | VpmError | Non
 
 
 def _chunk(one: Callable[[Item], Run], items: Sequence[Item]) -> list[Run | VpmError]:
-    """Runs of several trials, one after the other, with an error as a value in the place of a run."""
+    """Runs of a batch's chunk, one after the other, with an error as a value in the place of a run."""
     found: list[Run | VpmError] = []
     for item in items:
         try:
@@ -204,7 +204,7 @@ def _one(model: Model, mode: str, setup: Setup, cutoff: float | None, trial: Tri
 
 @contextmanager
 def _shown(progress: Callable[[int, int], object] | bool, total: int) -> Iterator[Callable[[int, int], object] | None]:
-    """Function that shows how many simulations are done: the caller's, a progress bar on the error stream, or none."""
+    """Function that shows the progress of a batch: the caller's, a progress bar on stderr, or none."""
     if progress is not True:
         yield progress or None
         return

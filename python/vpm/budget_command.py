@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from vpm.command import Integrator, ModelPath, Plot, Share, console, load_model, load_pair, progress, save_plot
-from vpm.manner import give
+from vpm.command_output import give
 
 EXAMPLES = "Example:  vpm budget examples/emps/model.toml --rate 1000"
 

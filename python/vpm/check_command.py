@@ -20,9 +20,9 @@ from vpm.command import (
     load_all,
     searching,
 )
+from vpm.command_output import give, wrote
 from vpm.errors import ModelError
 from vpm.files import probe_file, write_text
-from vpm.manner import give, wrote
 
 if TYPE_CHECKING:
     from vpm.log_check import LogCheck

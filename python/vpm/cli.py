@@ -41,10 +41,10 @@ from vpm import (
     view_command,
 )
 from vpm.command import BESIDE, PICTURES, console, errors
+from vpm.command_output import STOPPED, add_flags, asked, give, notes, speak, unexpected
 from vpm.errors import INTERRUPTED, VpmError
 from vpm.excite_command import app as excite_app
 from vpm.files import exists
-from vpm.manner import STOPPED, add_flags, asked, give, notes, speak, unexpected
 
 
 class _Commands(TyperGroup):

@@ -13,11 +13,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
+from vpm.command_output import console as console  # noqa: PLC0414  # commands say their results by these two
+from vpm.command_output import detail, in_lines, notes, progressed, wrote
+from vpm.command_output import errors as errors  # noqa: PLC0414
 from vpm.errors import VpmError
 from vpm.files import probe_file, probe_folder, replacing
-from vpm.manner import console as console  # noqa: PLC0414  # commands say their results by these two
-from vpm.manner import detail, in_lines, notes, progressed, wrote
-from vpm.manner import errors as errors  # noqa: PLC0414
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -20,7 +20,7 @@ from vpm.command import (
     save_plot,
     writable,
 )
-from vpm.manner import give, wrote
+from vpm.command_output import give, wrote
 
 EXAMPLES = "Example:  vpm compare examples/emps/model.toml log.csv --mode inverse_dynamics"
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vpm.command import Integrator, ModelPath, console, fillable, load_model, writable
+from vpm.command_output import give, note, wrote
 from vpm.errors import VpmError
-from vpm.manner import give, note, wrote
 
 if TYPE_CHECKING:
     from vpm.realtime import Fmu

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from vpm.command import console, fillable, progress
-from vpm.manner import give, wrote
+from vpm.command_output import give, wrote
 
 EXAMPLES = "Example:  vpm demo --out demo-report\n\nExample:  vpm demo --hide torque_ripple"
 

@@ -26,7 +26,7 @@ from vpm.command import (
     load_record,
     searching,
 )
-from vpm.manner import give, wrote
+from vpm.command_output import give, wrote
 
 EXAMPLES = (
     "Example:  vpm diagnose model.toml train.csv --validate test.csv --out report/\n\n"
@@ -116,7 +116,7 @@ def _tried(only: list[str] | None, without: list[str] | None) -> list[str] | Non
     DiagnosisError
         Nothing is left to try, or what is to be left out was never in.
     """
-    from vpm.discrepancy.candidates import asked_for
+    from vpm.discrepancy.screening.candidates import asked_for
     from vpm.errors import DiagnosisError, near_match
 
     if not without:

@@ -1,4 +1,4 @@
-"""Find what a model is missing: recalibrate, look, rank or search the catalogue, and say what the data support."""
+"""Diagnosing what a model is missing: recalibrate it, name effects, judge them, and describe the rest."""
 
 from __future__ import annotations
 
@@ -10,24 +10,24 @@ from functools import partial
 from itertools import chain
 from typing import TypedDict, get_args
 
-from vpm.discrepancy.ambiguity import Rivals, listed
-from vpm.discrepancy.assembled import accepted_effect, classes, examined, gaps_of, of_search, step
-from vpm.discrepancy.by_ranking import tracker_gaps
-from vpm.discrepancy.candidates import asked_for
-from vpm.discrepancy.choice import Accepted
-from vpm.discrepancy.confirmation import Data, Judged
+from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis, Empirical
-from vpm.discrepancy.discriminating_experiment import experiments as experiments_for
-from vpm.discrepancy.empirical import beside
+from vpm.discrepancy.diagnosis_fields import accepted_effect, classes, examined, gaps_of, of_search, step
 from vpm.discrepancy.evidence import gather
+from vpm.discrepancy.parallel_candidates import Progress, SideBySide
 from vpm.discrepancy.plot_samples import pictures, traces, where
 from vpm.discrepancy.preparation import Records, data_of, nominal_of, recalibrated_of, records_of
 from vpm.discrepancy.provenance import own_settings, provenance
+from vpm.discrepancy.ranked_effects import tracker_gaps
 from vpm.discrepancy.recorded_calls import recorded
-from vpm.discrepancy.remainder import Remainder, remainder
-from vpm.discrepancy.residual_by_joint import only_where_closed
-from vpm.discrepancy.search import Search, ambiguities
-from vpm.discrepancy.side_by_side import Progress, SideBySide
+from vpm.discrepancy.remainder.empirical_formula import beside
+from vpm.discrepancy.remainder.remainder import Remainder, remainder
+from vpm.discrepancy.remainder.residual_by_joint import only_where_closed
+from vpm.discrepancy.rivals.ambiguity import Rivals, listed
+from vpm.discrepancy.rivals.discriminating_experiment import experiments as experiments_for
+from vpm.discrepancy.screening.candidates import asked_for
+from vpm.discrepancy.search.candidate_choice import Accepted
+from vpm.discrepancy.search.search import Search, ambiguities
 from vpm.discrepancy.verdict import is_negligible, verdict
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records
@@ -40,7 +40,7 @@ from vpm.naming import BROKEN, FAILED, RANKING, Names, Tell, named, ranked_notes
 from vpm.one_thread import in_one_thread
 from vpm.ranking import Ranking
 from vpm.ranking.by_tracker import diagnosed_by_tracker
-from vpm.ranking.stand_in import why_unbalanced
+from vpm.ranking.substitute_records import why_unbalanced
 from vpm.simulate import Setup, judging_mode
 from vpm.tasks import done_by
 
@@ -155,7 +155,7 @@ def diagnose(
 
 
 def check_asked(asked: Asked, workers: int | None) -> None:
-    """Refuse what no diagnosis can be asked.
+    """Refuse arguments of `diagnose` that no diagnosis can take.
 
     Raises
     ------
@@ -176,7 +176,7 @@ def with_provenance(
     asked: Asked,
     workers: int | None,
 ) -> Diagnosis:
-    """The diagnosis with what it was made of, as this process knows it: where it was done, paths may be others.
+    """Diagnosis with its provenance, as this process knows it; paths may differ where it was computed.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def diagnosed(
     tell: Tell | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
-    """What `diagnose` finds, without where it comes from; a task for an executor.
+    """Diagnosis of `diagnose` without its provenance; a task for an executor.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ def _diagnosis(
     each: SideBySide,
     tell: Tell | None,
 ) -> Diagnosis:
-    """The diagnosis of `diagnose` on checked records: names the effects, judges them, and tells what is left."""
+    """Diagnosis on checked records: it names effects, judges them, and describes the rest."""
     began = time.perf_counter()
     say = tell or (lambda _: None)
     training, validation, notes = records
@@ -274,7 +274,7 @@ def _diagnosis(
 
 @dataclass(frozen=True)
 class _Known:
-    """What a diagnosis knows once effects are named: models, records, ranking and rivals.
+    """Intermediate results of `diagnose` once effects are named: models, records, ranking and rivals.
 
     Attributes
     ----------
@@ -297,7 +297,7 @@ class _Known:
 
 @dataclass(frozen=True)
 class _Concluded:
-    """The verdict in words, and on which model with which effects it stands."""
+    """Verdict of `diagnose`, and the model with effects on which it stands."""
 
     word: str
     summary: str
@@ -308,7 +308,7 @@ class _Concluded:
 
 
 def _told(known: _Known, found: Search, mode: str, setup: Setup, each: SideBySide, say: Tell) -> Diagnosis:
-    """The diagnosis after its search: noise floor, what is left of the residual, and the verdict."""
+    """Diagnosis after naming: noise floor, remaining residual, and verdict."""
     data, (_, _, notes) = known.data, known.records
     say("measuring the noise floor")
     measure = partial(examined, known.nominal, known.recalibrated, data, mode, setup)
@@ -337,7 +337,7 @@ def _concluded(
     floor: dict[str, float],
     rest: Remainder | None,
 ) -> _Concluded:
-    """A verdict on the model that was found or, where what is left is ``said`` to be described, with that beside it."""
+    """Verdict of `diagnose` on the final model, or on that with a formula for the rest."""
     word, summary, described = said
     if not described or rest is None:
         return _Concluded(word, summary, gap, found.final, None, found.accepted)
@@ -354,7 +354,7 @@ def _concluded(
 def _whole(
     known: _Known, found: Search, concluded: _Concluded, floor: dict[str, float], *, interrupted: bool
 ) -> Diagnosis:
-    """The diagnosis as a result, with its evidence and pictures."""
+    """Result of `diagnose` with its evidence and pictures."""
     data, nominal, (training, validation, notes) = known.data, known.nominal, known.records
     final, accepted, summary = concluded.final, concluded.accepted, concluded.summary
     ambiguous = known.ambiguous if accepted else ()
@@ -386,6 +386,6 @@ def _whole(
 
 
 def _rest(recalibrated: Judged, found: Search, data: Data, each: SideBySide) -> Remainder:
-    """Remainder of the residual under the effects found; those of an interrupted search stand."""
+    """Remainder of the residual in `diagnose`, under the effects found."""
     start = found.final if found.interrupted or not found.accepted else recalibrated
     return remainder(start, found.final, data, min(m.dt for m in data.training.motions), worker_count(each.workers))

@@ -269,7 +269,7 @@ class MissingExtraError(VpmError, ImportError):
 
 @contextmanager
 def needs(package: str, extra: str) -> Iterator[None]:
-    """Where an optional package is imported inside and is not there, one sentence names the extra that brings it."""
+    """Error where an optional package is missing: one sentence names the extra that brings it."""
     try:
         yield
     except ImportError as error:
@@ -277,7 +277,7 @@ def needs(package: str, extra: str) -> Iterator[None]:
 
 
 def near_match(name: str, candidates: Iterable[str], *, what: str = "the choices are") -> str:
-    """Repair for an unknown name: the nearest candidate, or the list of them.
+    """Repair in an error for an unknown name: the nearest candidate, or the list of them.
 
     Parameters
     ----------

@@ -16,8 +16,8 @@ from vpm.command import (
     save_plot,
     writable,
 )
+from vpm.command_output import give, wrote
 from vpm.errors import ExcitationError
-from vpm.manner import give, wrote
 
 if TYPE_CHECKING:
     from vpm.excitation import Excitation, JointLimits

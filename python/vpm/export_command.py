@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from vpm.command import ModelPath, console, load_model, writable
-from vpm.manner import give, note, wrote
+from vpm.command_output import give, note, wrote
 
 EXAMPLES = "Example:  vpm export fit/model.toml --urdf robot.urdf -o fitted.urdf"
 

@@ -40,7 +40,7 @@ class Quantity(NamedTuple):
 
 
 def unwrap(angle: Array, period: Array) -> Array:
-    """Angle or count without the jumps that it makes at the ends of its range.
+    """Expression's angle or count without jumps at the ends of its range.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def unwrap(angle: Array, period: Array) -> Array:
 
 
 def zeroed(count: Array, index: Array) -> Array:
-    """Count of an encoder from its index pulse on: less what it was at the first sample of the first pulse.
+    """Expression's encoder count from its index pulse on, less the first one.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ class Expression:
     _tree: ast.expr
 
     def __call__(self, parts: Mapping[str, Quantity]) -> Quantity:
-        """Value over columns.
+        """Value of an expression over columns.
 
         Parameters
         ----------
@@ -180,7 +180,7 @@ def read_expression(text: str) -> Expression:
 
 
 def _check(node: ast.expr, names: dict[str, None], text: str) -> None:
-    """Refuse whatever is not known, and collect names."""
+    """Refuse whatever is not known in an expression, and collect names."""
     match node:
         case ast.Constant(value=int() | float() as number) if not isinstance(number, bool) and _is_finite(number):
             return None
@@ -227,7 +227,7 @@ def _is_finite(number: float) -> bool:
 
 
 def _exponent(node: ast.expr) -> float | None:
-    """The number that a power is, or None."""
+    """Exponent number of an expression's power, or None."""
     match node:
         case ast.UnaryOp(op=ast.USub(), operand=ast.Constant() as inner):
             number = _exponent(inner)
@@ -303,7 +303,7 @@ def _unwrapped(given: Sequence[Quantity], words: str) -> Quantity:
 
 
 def _same(quantities: Sequence[Quantity], words: str) -> None:
-    """Refuse what is of different kinds."""
+    """Refuse an expression of different kinds."""
     first = quantities[0].dimension
     for other in quantities[1:]:
         if other.dimension != first:

@@ -31,7 +31,7 @@ def misfit(value: object) -> str:
 
 
 def fits(value: object, hint: object) -> bool:
-    """Whether a value is of a type; a whole number is a number.
+    """Whether a field's value is of a type; a whole number is a number.
 
     Parameters
     ----------
@@ -60,7 +60,7 @@ def fits(value: object, hint: object) -> bool:
 
 
 def _all_fit(value: tuple[object, ...], inner: tuple[Any, ...]) -> bool:
-    """Entries of a tuple; three dots stand for any number of the type before them."""
+    """Whether all entries of a tuple field fit; three dots stand for any number of a type."""
     if inner[1:] == (...,):
         return all(fits(item, inner[0]) for item in value)
     return len(value) == len(inner) and all(map(fits, value, inner))

@@ -72,7 +72,7 @@ def replacing(path: str | PathLike[str]) -> Iterator[Path]:
 
 
 def write_text(path: str | PathLike[str], text: str) -> Path:
-    """Write a text in UTF-8, or leave what is there; lines end as they do in the text.
+    """Write a text file in UTF-8, or leave what is there; lines end as they do in the text.
 
     Returns
     -------
@@ -90,7 +90,7 @@ def write_text(path: str | PathLike[str], text: str) -> Path:
 
 
 def make_folder(path: str | PathLike[str]) -> Path:
-    """Make a folder, and those above it, where they are not there.
+    """Make a folder for files, and those above it, where they are not there.
 
     Raises
     ------
@@ -125,7 +125,7 @@ def probe_file(path: str | PathLike[str]) -> None:
 
 
 def probe_folder(path: str | PathLike[str]) -> None:
-    """Complain, before work begins, about a folder that could not be made or filled after it; makes none.
+    """Refuse, before work begins, a folder for files that could not be made or filled after it.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def unreadable(path: str | PathLike[str]) -> str:
 
 
 def _linked(path: str | PathLike[str]) -> Path:
-    """Where links lead to, which need not be there."""
+    """File where links lead to, which need not be there."""
     target = Path(os.path.realpath(path))
     if target.is_symlink():
         raise OSError(0, "its links lead round in a circle")
@@ -190,7 +190,7 @@ def _probe(folder: Path) -> None:
 
 
 def _settle(beside: Path, target: Path) -> None:
-    """Move what was written into its place, once the disk has all of it."""
+    """Move a written file into its place, once the disk has all of it."""
     with beside.open("rb+") as file:
         os.fsync(file.fileno())
     if target.exists():

@@ -119,7 +119,7 @@ class VectorEnvironment(VectorEnv[Array, Array, Any]):
     def reset(
         self, *, seed: int | Sequence[int | None] | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Array, dict[str, Any]]:
-        """Begin anew; copy k takes the seed ``seed + k``, or its own of a list."""
+        """Reset the gymnasium environments; copy k takes the seed ``seed + k``, or its own of a list."""
         del options
         if seed is not None:
             seeds = [seed + k for k in range(self.num_envs)] if isinstance(seed, int) else seed
@@ -129,7 +129,7 @@ class VectorEnvironment(VectorEnv[Array, Array, Any]):
         return self._seen.copy(), {}
 
     def step(self, actions: Array) -> tuple[Array, Array, NDArray[np.bool_], NDArray[np.bool_], dict[str, Any]]:
-        """Hold actions (E, nu), clipped to their ranges, over the samples of a step."""
+        """Step the gymnasium environments: hold actions (E, nu), clipped to their ranges."""
         from vpm._core import step_all
 
         low, high = self._ranges.T
@@ -177,13 +177,13 @@ class Environment(gymnasium.Env[Array, Array]):
         self.action_space = self._one.single_action_space
 
     def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Array, dict[str, Any]]:
-        """Begin anew, from this seed on where one is given."""
+        """Reset the gymnasium environment, from this seed on where one is given."""
         super().reset(seed=seed)
         seen, told = self._one.reset(seed=seed, options=options)
         return seen[0], told
 
     def step(self, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
-        """Hold an action (nu,) over the samples of a step."""
+        """Step the gymnasium environment: hold an action (nu,) over the samples of a step."""
         seen, rewards, terminated, truncated, told = self._one.step(np.asarray(action)[None])
         return seen[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), told
 

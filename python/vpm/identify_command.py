@@ -26,8 +26,8 @@ from vpm.command import (
     save_plot,
     writable,
 )
+from vpm.command_output import give, wrote
 from vpm.errors import IdentificationError, near_match
-from vpm.manner import give, wrote
 
 if TYPE_CHECKING:
     from vpm.experiment import Experiment
@@ -138,7 +138,7 @@ def identify(
 
 def _refuse(machine: Model, records: list[Experiment], setup: Setup, workers: int) -> None:
     """Refuse logs with a mistake, or in which nothing moves."""
-    from vpm.discrepancy.moving import check_stuck
+    from vpm.discrepancy.stuck_channels import check_stuck
     from vpm.log_check import refuse_mistakes
 
     check_stuck(machine, records)

@@ -8,8 +8,8 @@ from typing import Annotated
 import typer
 
 from vpm.command import console, writable
+from vpm.command_output import give, note, wrote
 from vpm.errors import ModelError
-from vpm.manner import give, note, wrote
 
 EXAMPLES = (
     "Example:  vpm import robot.urdf -o model.toml --uncertain 0.1\n\n"

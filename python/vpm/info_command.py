@@ -10,7 +10,7 @@ import typer
 
 from vpm import __version__
 from vpm.command import console, load_model
-from vpm.manner import give
+from vpm.command_output import give
 from vpm.plugins import KINDS, plugins
 
 if TYPE_CHECKING:

@@ -30,7 +30,7 @@ def measured_states(
     cutoff: float | None,
     given: Motion | None = None,
 ) -> Array:
-    """States (len(rows), nx) at some samples of the measured motion.
+    """Initial or other states (len(rows), nx) at some samples of the measured motion.
 
     Sensor errors are undone; flexible links bend as the measured motion of the joints has made them; lags and spools
     have followed the commands from the beginning of the log, currents have settled on the held one, and chambers are
@@ -62,7 +62,7 @@ def measured_states(
 
 
 def _bent(model: Model, theta: Array, motion: tuple[Array, Array, Array], dt: float) -> Array:
-    """Coordinates and their rates (N, 2 coordinates) of a machine with flexible links along a motion of its joints."""
+    """Coordinates and rates (N, 2 coordinates) of flexible links along a motion, for initial states."""
     position, velocity, acceleration = motion
     joints, coordinates = len(model.joints), len(model.coordinates)
     _, states, _ = model.core.simulate_prescribed(
@@ -75,7 +75,7 @@ def _bent(model: Model, theta: Array, motion: tuple[Array, Array, Array], dt: fl
 
 
 def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
-    """State at the first sample, lags settled at the command, flexible links deflected as in equilibrium.
+    """Initial state at the first sample: lags settled, flexible links deflected as in equilibrium.
 
     The machine is at rest at zero where the log holds no position, and shafts tell none. Drives have stood without
     commands, but for what the log holds of them: pressures of chambers, current, place of the spool. One pressure and
@@ -113,7 +113,7 @@ def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
 
 
 def whole_motion(model: Model, experiment: Experiment, theta: Array, cutoff: float | None) -> Motion:
-    """Measured motion of all joints; that of joints which effects have split off is worked out along the others'."""
+    """Motion of all joints for an initial state; joints that effects split off are computed."""
     experiment = joints_from_shafts(experiment, model, theta)
     if not model.added_joints:
         return motion(experiment, model, cutoff=cutoff)
@@ -124,7 +124,7 @@ def whole_motion(model: Model, experiment: Experiment, theta: Array, cutoff: flo
 
 
 def _worked_out(model: Model, theta: Array, m: Motion) -> tuple[Array, Array, Array]:
-    """Positions, velocities and accelerations (N, joints) of all joints along a motion that lacks those split off."""
+    """Motion (N, joints) of all joints, computed where it lacks those split off, for an initial state."""
     quantities = ("position", "velocity", "acceleration")
     outputs = np.asarray(_along(model, theta, (m.position, m.velocity, m.acceleration), m.joints, m.dt))
     columns = [[model.output_channels.index(f"{name}.{what}") for name in model.joints] for what in quantities]
@@ -137,7 +137,7 @@ def _worked_out(model: Model, theta: Array, m: Motion) -> tuple[Array, Array, Ar
 
 
 def _along(model: Model, theta: Array, given: tuple[Array, Array, Array], joints: tuple[str, ...], dt: float) -> Array:
-    """Outputs (N, channels) along a motion of some joints, the others passive.
+    """Outputs (N, channels) along a motion of some joints, the others passive, for an initial state.
 
     What a followed joint remembers of its way changes the effort that it takes, not how the others move.
     """
@@ -155,7 +155,7 @@ def _along(model: Model, theta: Array, given: tuple[Array, Array, Array], joints
 
 
 def _forgetful(model: Model, joints: tuple[str, ...]) -> tuple[Model, NDArray[np.int64]]:
-    """Machine without effects that remember at some joints, and its parameters among those of the whole one.
+    """Machine for an initial state without effects that remember at some joints, and its parameters.
 
     One behind a spring moves what nobody measures, and stays.
     """
@@ -164,7 +164,7 @@ def _forgetful(model: Model, joints: tuple[str, ...]) -> tuple[Model, NDArray[np
 
 @lru_cache(maxsize=128)
 def _without_memories(model: Model, kept: tuple[str, ...] = ()) -> tuple[Model, NDArray[np.int64]]:
-    """A machine without what remembers, but for what moves the joints to keep; its parameters among those it had."""
+    """Machine for an initial state without memories, but for joints to keep; and its parameters."""
     bare = model
     for effect in model.effects:
         behind = model.joint_behind(effect.at) if effect.side == "link" else None
@@ -174,7 +174,7 @@ def _without_memories(model: Model, kept: tuple[str, ...] = ()) -> tuple[Model, 
 
 
 def invertible(model: Model, measured: Sequence[str]) -> Model:
-    """A machine whose inverse dynamics is known: without what remembers, where joints move that nobody measures.
+    """Machine with known inverse dynamics, for initial states: without memories at unmeasured joints.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def invertible(model: Model, measured: Sequence[str]) -> Model:
 
 
 def _settled(model: Model, theta: Array, positions: Array, dt: float) -> Array:
-    """Positions with those of joints that effects have split off as they rest under gravity, remembering nothing."""
+    """Initial positions with split-off joints at rest under gravity, remembering nothing."""
     model, places = _without_memories(model)
     theta = theta[places]
     own = [place for place, name in enumerate(model.joints) if name not in model.added_joints]
@@ -200,7 +200,7 @@ def _settled(model: Model, theta: Array, positions: Array, dt: float) -> Array:
 
 
 def _internal(model: Model, experiment: Experiment, theta: Array, coordinates: Array, row: int) -> Array:
-    """States of drives and supplies after a rest at the pressures that the log holds of supplies."""
+    """Initial states of drives and supplies after a rest at the logged supply pressures."""
     known = [name for name in model.supplies if f"{name}.pressure" in experiment]
     if known:
         theta = theta.copy()
@@ -210,7 +210,7 @@ def _internal(model: Model, experiment: Experiment, theta: Array, coordinates: A
 
 
 def _seen(model: Model, experiment: Experiment, theta: Array, state: Array, internal: Array, row: int) -> Array:
-    """Internal states of drives where the log holds them; see `_chambers` for pressures."""
+    """Initial states of drives where the log holds them; see `_chambers` for pressures."""
     for place, name in enumerate(model.internal_names):
         owner, _, quantity = name.partition(".")
         if quantity in {"spool", "current"} and name in experiment:
@@ -227,7 +227,7 @@ def _seen(model: Model, experiment: Experiment, theta: Array, state: Array, inte
 def _chambers(
     model: Model, experiment: Experiment, theta: Array, name: str, coordinates: Array, rest: Array, row: int
 ) -> Array:
-    """Pressures (2,) of both chambers of a cylinder: as logged, or as after a ``rest`` where the log holds none.
+    """Initial pressures (2,) of a cylinder's chambers: as logged, or as after a ``rest``.
 
     Where the log holds one of them, and the cylinder moves a joint by itself, the other is that which holds the machine
     at rest, between the pressures of tank and supply.
@@ -254,7 +254,7 @@ def _chambers(
 
 
 def _reading(model: Model, experiment: Experiment, theta: Array, channel: str, row: int) -> float:
-    """True value behind a reading, without its sensor's offset and gain."""
+    """True initial value behind a reading, without its sensor's offset and gain."""
     sensor = model.sensor_of(channel)
 
     def error(suffix: str, none: float) -> float:
@@ -265,7 +265,7 @@ def _reading(model: Model, experiment: Experiment, theta: Array, channel: str, r
 
 
 def _areas(model: Model, theta: Array, name: str) -> tuple[float, float]:
-    """Areas (m^2) of a cylinder on which the pressures of chambers a and b act."""
+    """Areas (m^2) of a cylinder's chambers a and b, for initial pressures."""
     size = {
         key: float(theta[model.index(f"{name}.cylinder.{key}")])
         for key in _SIZES
@@ -287,7 +287,7 @@ class _Joints:
 
 
 def passive_joints(experiment: Experiment, model: Model) -> tuple[str, ...]:
-    """Joints that nobody drives and nobody measures: without an actuator and without a position in the log.
+    """Passive joints, which need initial states: neither driven nor measured.
 
     In prescribed motion they move freely with their effects. A joint with an actuator is never one of them; that its
     position is missing is a mistake of the log. One that an effect has split off is always one of them: where the log
@@ -308,7 +308,7 @@ def joint_motion(
     commanded: bool = False,
     band: float | None = None,
 ) -> Motion:
-    """Filtered motion of the joints, as `vpm.experiment.motion` gives it.
+    """Filtered motion of the joints for initial states, as `vpm.experiment.motion` gives it.
 
     Of joints that are passive there (see `passive_joints`) it has no columns, as long as any joint is measured. The
     log need not hold commands, unless the motion is to be ``commanded``.
@@ -321,7 +321,7 @@ def joint_motion(
 
 
 def _fit_start(experiment: Experiment, channel: str, samples: int = 15) -> tuple[float, float]:
-    """Position and velocity at the first sample from a parabola through the first few."""
+    """Initial position and velocity from a parabola through the first few samples."""
     count = min(samples, len(experiment))
     time = experiment.time[:count] - experiment.time[0]
     curve = np.polynomial.Polynomial.fit(time, experiment[channel][:count], min(2, count - 1)).convert()
@@ -330,7 +330,7 @@ def _fit_start(experiment: Experiment, channel: str, samples: int = 15) -> tuple
 
 
 def sensor_errors(model: Model, theta: Array) -> tuple[Array, Array]:
-    """Gain and offset of the position sensor of each joint (1 and 0 where none is modelled)."""
+    """Gain and offset of each joint's position sensor (1 and 0 by default), for initial states."""
     gain, offset = np.ones(len(model.joints)), np.zeros(len(model.joints))
     for joint, name in enumerate(model.joints):
         sensor = model.sensor_of(f"{name}.position")

@@ -58,16 +58,16 @@ class LinearModel(Result):
     delays: dict[str, float] = field(default_factory=dict)
 
     def poles(self) -> Complex:
-        """Eigenvalues of A, shape (nx,), in 1/s, slowest first; of a pair the one with the positive frequency first."""
+        """Poles of a linear model: eigenvalues of A, shape (nx,), in 1/s, slowest first."""
         values = np.linalg.eigvals(self.A).astype(np.complex128)
         return values[np.lexsort((-values.imag, np.round(np.abs(values), 9)))]
 
     def frequencies(self) -> Array:
-        """Natural frequencies ``|p| / 2 pi`` of the oscillating poles, Hz, ascending; one per pair."""
+        """Natural frequencies ``|p| / 2 pi`` of a linear model's oscillating poles, Hz, ascending."""
         return np.asarray(np.abs(self._oscillating()) / (2.0 * np.pi), dtype=np.float64)
 
     def damping_ratios(self) -> Array:
-        """Damping ratios ``-Re p / |p|`` of the oscillating poles, in the order of `frequencies`."""
+        """Damping ratios ``-Re p / |p|`` of a linear model's oscillating poles, as `frequencies`."""
         poles = self._oscillating()
         return np.asarray(-poles.real / np.abs(poles), dtype=np.float64)
 
@@ -78,11 +78,11 @@ class LinearModel(Result):
 
     @property
     def stable(self) -> bool:
-        """Whether every deviation dies out; a joint that stays where it is put has a pole at zero and does not."""
+        """Whether every deviation of a linear model dies out; a pole at zero does not."""
         return bool(np.all(np.linalg.eigvals(self.A).real < 0.0))
 
     def response(self, frequencies: ArrayLike) -> Complex:
-        """Frequency response ``C (i w - A)^-1 B + D``, without the delays.
+        """Frequency response of a linear model, ``C (i w - A)^-1 B + D``, without the delays.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class LinearModel(Result):
         )
 
     def sampled(self, time_step: float) -> tuple[Array, Array]:
-        """Matrices of ``x[k+1] = Ad x[k] + Bd u[k]`` for commands that are held over a sample, exact.
+        """Linear model in sampled time, ``x[k+1] = Ad x[k] + Bd u[k]``, for held commands, exact.
 
         Source: C. Van Loan, "Computing integrals involving the matrix exponential", IEEE TAC 23(3), 1978.
 
@@ -151,7 +151,7 @@ class LinearModel(Result):
         )
 
     def to_control(self, time_step: float | None = None) -> object:
-        """The same as ``control.StateSpace`` of python-control, with the names, dots being underscores.
+        """Linear model as ``control.StateSpace`` of python-control, dots in names as underscores.
 
         Elastic coordinates and what drives hold are states like others. Needs the extra ``control``.
 
@@ -187,7 +187,7 @@ class LinearModel(Result):
     def plot(
         self, kind: str = "poles", *, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None
     ) -> Figure:
-        """Map of the poles, or Bode diagram. Needs the extra ``plot``.
+        """Plot a linear model's poles, or Bode diagram. Needs the extra ``plot``.
 
         Parameters
         ----------
@@ -236,7 +236,7 @@ class LinearModel(Result):
 
 
 def _grid(poles: Complex, points: int = 600) -> Array:
-    """Frequencies (Hz) from a decade below the slowest to a decade above the fastest pole that is not zero."""
+    """Frequencies (Hz) for a linear model from a decade below the slowest to one above the fastest pole."""
     size = np.abs(poles) / (2.0 * np.pi)
     size = size[size > 1e-6]
     low, high = (size.min(), size.max()) if size.size else (0.1, 10.0)

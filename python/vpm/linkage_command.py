@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from vpm.command import Plot, console, save_plot
-from vpm.manner import give
+from vpm.command_output import give
 
 EXAMPLES = "Example:  vpm linkage examples/karl/karl.toml --plot karl.png"
 

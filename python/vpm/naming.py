@@ -1,4 +1,4 @@
-"""Names of missing effects: from a ranking of the training records, or from a search on inverse-dynamics residuals."""
+"""Naming of missing effects: by a ranking of the training records, or by a search on inverse-dynamics residuals."""
 
 from __future__ import annotations
 
@@ -7,22 +7,22 @@ from functools import partial
 from typing import Literal, TypeVar
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.ambiguity import Rivals, rivals
-from vpm.discrepancy.by_ranking import free_joints, searched, why_not_ranked
-from vpm.discrepancy.by_ranking import notes as notes_of
-from vpm.discrepancy.confirmation import Data, Judged
-from vpm.discrepancy.contacts import with_predicted_contacts
+from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import RefusedEffect
-from vpm.discrepancy.forward_step import forward_step
-from vpm.discrepancy.rival_discrimination import discriminated
-from vpm.discrepancy.rival_exchange import in_order, replaced, timed_again
-from vpm.discrepancy.search import Search, further, search
-from vpm.discrepancy.side_by_side import SideBySide
+from vpm.discrepancy.parallel_candidates import SideBySide
+from vpm.discrepancy.ranked_effects import free_joints, searched, why_not_ranked
+from vpm.discrepancy.ranked_effects import notes as notes_of
+from vpm.discrepancy.rivals.ambiguity import Rivals, rivals
+from vpm.discrepancy.rivals.rival_discrimination import discriminated
+from vpm.discrepancy.rivals.rival_exchange import in_order, replaced, timed_again
+from vpm.discrepancy.search.backlash_contacts import with_predicted_contacts
+from vpm.discrepancy.search.forward_step import forward_step
+from vpm.discrepancy.search.search import Search, further, search
 from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.ranking import Ranking, Settings, rank
-from vpm.ranking.stand_in import why_unbalanced
+from vpm.ranking.substitute_records import why_unbalanced
 from vpm.simulate import Setup
 
 #: What an interrupted diagnosis says of itself.
@@ -54,7 +54,7 @@ def ranking_of(
     each: SideBySide,
     notes: list[str],
 ) -> Ranking | None:
-    """A ranking of the training records where names are to come from one and it covers the machine.
+    """Ranking of the training records if the naming uses one and it covers the machine.
 
     Validation records only say, at the end, how much of their error what was found leaves.
 
@@ -109,7 +109,7 @@ def named(
     each: SideBySide,
     notes: list[str],
 ) -> tuple[Search, tuple[Rivals, ...], bool]:
-    """What is missing by a ranking or else by a search, what else would do, and whether Ctrl-C left that open."""
+    """Naming of missing effects by a ranking or a search, with rivals, and whether Ctrl-C ended it."""
     _, effects, limit = by
     screened = _searchable(effects)
     if ranking is not None:
@@ -132,7 +132,7 @@ def named(
 
 
 def ranked_notes(ranking: Ranking, refused: Sequence[RefusedEffect], interrupted: bool) -> list[str]:
-    """Where names come from, whether there may be more, and names of the ranking that had to be refused."""
+    """Notes on the naming: where names come from, and names of the ranking that were refused."""
     named = {one.key for one in ranking.effects}
     lost = [one for one in refused if (one.name, one.site) in named]
     told = [f"the ranking names {one.name} at {one.site}: {one.reason}" for one in lost]
@@ -142,7 +142,7 @@ def ranked_notes(ranking: Ranking, refused: Sequence[RefusedEffect], interrupted
 def _settled(
     found: Search, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: SideBySide
 ) -> tuple[Search, tuple[Rivals, ...]]:
-    """Names and their order when each effect has been taken out again, with what would do in its place.
+    """Names and their order, with the rivals of each, after it was removed again.
 
     Where something takes the place of an effect, or comes in beside it as runs of the model support it, the search goes
     on beside that.
@@ -166,7 +166,7 @@ def _settled(
 
 
 def until_stopped(work: Callable[[], Found], nothing: Found) -> tuple[Found, bool]:
-    """What some work gives, or ``nothing`` if Ctrl-C ended it, and whether it did."""
+    """Result of some naming work, or ``nothing`` if Ctrl-C ended it, and whether it did."""
     try:
         return work(), False
     except KeyboardInterrupt:
@@ -174,12 +174,12 @@ def until_stopped(work: Callable[[], Found], nothing: Found) -> tuple[Found, boo
 
 
 def _searchable(effects: Sequence[str] | None) -> Sequence[str] | None:
-    """Those of the effects asked for that a search tries; all of these if not given."""
+    """Effects asked for that naming by search tries; all of them if none were given."""
     return None if effects is None else [name for name in effects if EFFECTS[name].screened]
 
 
 def _not_searched(effects: Sequence[str] | None, reason: str) -> list[str]:
-    """What is to be said of effects that were asked for and that a search does not try.
+    """Note on effects asked for that naming by search does not try.
 
     Raises
     ------

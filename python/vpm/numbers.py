@@ -62,7 +62,7 @@ def short(value: float) -> str:
 
 
 def percent(share: float) -> str:
-    """A share with two decimals, as texts, tables and pictures show it; two digits where that would hide it.
+    """Number in percent with two decimals for texts and pictures; two digits where that would hide it.
 
     Less than a millionth is nothing. A share of nothing is not known.
     """
@@ -74,6 +74,6 @@ def percent(share: float) -> str:
 
 
 def stretches(counts: NDArray[np.bool_]) -> list[slice]:
-    """Contiguous stretches of samples that count."""
+    """Contiguous stretches of numbers that count."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], counts, [False]]).astype(np.int8)))
     return [slice(int(first), int(last)) for first, last in zip(edges[::2], edges[1::2], strict=True)]

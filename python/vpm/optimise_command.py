@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vpm.command import ModelPath, Plot, console, load_model, progress, save_plot, writable
-from vpm.manner import give, wrote
+from vpm.command_output import give, wrote
 
 if TYPE_CHECKING:
     from vpm.optimise import Optimum

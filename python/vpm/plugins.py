@@ -57,7 +57,7 @@ class Plugin:
         return f"the {KINDS[self.kind]} {self.name} of the package {self.package}"
 
     def load(self) -> object:
-        """What the entry point names.
+        """Load what a plugin's entry point names.
 
         Raises
         ------
@@ -77,7 +77,7 @@ class Plugin:
 
 
 def told(error: BaseException) -> str:
-    """An error of another package in a few words."""
+    """Error of a plugin's package in a few words."""
     words = str(error).strip().splitlines()
     return f"{type(error).__name__}: {words[0][:200]}" if words else type(error).__name__
 
@@ -126,7 +126,7 @@ _complaints: set[str] = set()
 
 @cache
 def _offers(kind: str) -> Mapping[str, list[tuple[str, EntryPoint]]]:
-    """Packages and entry points by name; looking for them takes some milliseconds."""
+    """Plugins by name: packages and entry points; looking for them takes some milliseconds."""
     found: dict[str, list[tuple[str, EntryPoint]]] = {}
     for point in entry_points(group=f"vpm.{kind}"):
         package = f"{point.dist.name} {point.dist.version}" if point.dist is not None else "an unknown package"

@@ -13,9 +13,9 @@ from typing import Annotated, Any
 import typer
 
 from vpm.command import console, writable
+from vpm.command_output import give, note, progressed, wrote
 from vpm.errors import DiagnosisError
 from vpm.files import exists, write_text
-from vpm.manner import give, note, progressed, wrote
 
 EXAMPLES = (
     "Example:  vpm prove --machine axis_linear --effect coulomb_friction --seeds 0-4 --each 5\n\n"

@@ -22,7 +22,7 @@ from vpm.command import (
     searching,
     writable,
 )
-from vpm.manner import give, wrote
+from vpm.command_output import give, wrote
 
 if TYPE_CHECKING:
     from vpm.model import Model

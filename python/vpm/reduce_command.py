@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from vpm.command import console, writable
-from vpm.manner import give, wrote
+from vpm.command_output import give, wrote
 
 EXAMPLES = (
     "Example:  vpm reduce bracket.toml --modes 8 --out bracket.npz\n\n"

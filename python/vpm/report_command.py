@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from vpm.command import ReportFolder, console
-from vpm.manner import give, wrote
+from vpm.command_output import give, wrote
 
 EXAMPLES = "Example:  vpm report report/diagnosis.npz --out report/"
 

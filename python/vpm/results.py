@@ -45,7 +45,7 @@ import numpy as np
 from vpm.errors import VpmError, needs
 from vpm.fields import misfit
 from vpm.files import replacing, unreadable
-from vpm.plain import plain
+from vpm.json_values import plain
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -165,21 +165,21 @@ class Storable:
         _STORED_CLASSES[_class_name(cls)] = cls
 
     def to_stored(self) -> Mapping[str, object]:
-        """Content as a mapping of names to storable values."""
+        """Content of a result as a mapping of names to storable values."""
         return {name: getattr(self, name) for name in _field_names(self)}
 
     def to_dict(self) -> dict[str, Any]:
-        """Attributes by name as JSON has them, but for samples of signals: SI; what is not known is None."""
+        """Attributes of a result by name as JSON has them, without samples: SI; unknown is None."""
         shown = self.to_stored().items()
         return {name: plain(value) for name, value in shown if not name.startswith("_") and name not in self._samples}
 
     @classmethod
     def from_stored(cls, content: Mapping[str, Any]) -> Self:
-        """Build the object from what `to_stored` gave."""
+        """Build a result from what `to_stored` gave."""
         return cls(**content)
 
     def _headline(self) -> Mapping[str, object]:
-        """Names and values that the one-line repr shows."""
+        """Names and values that a result's one-line repr shows."""
         return {name: getattr(self, name) for name in _field_names(self) if not name.startswith("_")}
 
     def __repr__(self) -> str:
@@ -199,11 +199,11 @@ class Result(Storable):
     """A frozen outcome of one step of the program."""
 
     def _frame_columns(self) -> Mapping[str, object]:
-        """Columns of `to_frame`: names to equally long sequences."""
+        """Columns of a result's `to_frame`: names to equally long sequences."""
         raise VpmError(f"{type(self).__name__} has no table form")
 
     def _html_rows(self) -> Mapping[str, object]:
-        """Rows of the HTML table."""
+        """Rows of a result's HTML table."""
         return self._headline()
 
     def _repr_html_(self) -> str:
@@ -288,7 +288,7 @@ class Result(Storable):
 
 
 def html_table(caption: str, head: tuple[str, ...], rows: list[tuple[object, ...]]) -> str:
-    """HTML table with escaped text; numbers are shortened.
+    """HTML table of a result with escaped text; numbers are shortened.
 
     Parameters
     ----------
@@ -308,7 +308,7 @@ def html_table(caption: str, head: tuple[str, ...], rows: list[tuple[object, ...
 
 
 def _read_arrays(path: Path) -> dict[str, np.ndarray[Any, Any]]:
-    """Arrays of an .npz file; pickled objects are refused."""
+    """Arrays of a stored result's .npz file; pickled objects are refused."""
     try:
         if reason := unreadable(path):
             raise VpmError(reason)
@@ -334,7 +334,7 @@ def _field_names(value: object) -> tuple[str, ...]:
 
 
 def _encode(value: object, where: str, arrays: dict[str, np.ndarray[Any, Any]]) -> object:
-    """JSON form of a value; arrays go to `arrays` under the name of their place."""
+    """JSON form of a result's value; arrays go to `arrays` under the name of their place."""
     if isinstance(value, np.generic):
         value = value.item()
     if isinstance(value, float) and not math.isfinite(value):  # JSON has no name for these
@@ -348,7 +348,7 @@ def _encode(value: object, where: str, arrays: dict[str, np.ndarray[Any, Any]]) 
 
 
 def _encode_container(value: object, where: str, arrays: dict[str, np.ndarray[Any, Any]]) -> tuple[str, object]:
-    """Tag and JSON content of an array, a tuple, a mapping or a storable object."""
+    """Tag and JSON content of a result's array, tuple, mapping or storable object."""
     match value:
         case np.ndarray():
             if value.dtype.kind not in "biufcU":
@@ -370,7 +370,7 @@ def _encode_container(value: object, where: str, arrays: dict[str, np.ndarray[An
 
 
 def _decode(value: object, arrays: Mapping[str, np.ndarray[Any, Any]], path: object) -> object:
-    """Undo `_encode`."""
+    """Decode a result's value: undo `_encode`."""
     if isinstance(value, list):
         return [_decode(item, arrays, path) for item in value]
     if not isinstance(value, dict):
@@ -388,7 +388,7 @@ def _decode(value: object, arrays: Mapping[str, np.ndarray[Any, Any]], path: obj
 
 
 def _built(kind: type[Storable], items: Mapping[str, Any], path: object) -> Storable:
-    """Object of a stored class, whose fields are of their types."""
+    """Result object of a stored class, whose fields are of their types."""
     built = kind.from_stored(items)
     if field := misfit(built):
         value = _short(getattr(built, field))
@@ -425,7 +425,7 @@ def _same(left: object, right: object) -> bool:
 
 
 def _short(value: object) -> str:
-    """One value inside a one-line repr."""
+    """One value inside a result's one-line repr."""
     if isinstance(value, float):
         return f"{value:.6g}"
     if isinstance(value, str):

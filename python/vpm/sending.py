@@ -35,7 +35,7 @@ Ending = Literal["value", "error", "refused", "interrupted"]
 
 
 def packed(work: Callable[[], object]) -> bytes:
-    """Work as bytes for `run_packed`, with the effects that this program has added to the catalogue.
+    """Work to send as bytes for `run_packed`, with effects that this program added to the catalogue.
 
     Parameters
     ----------
@@ -51,7 +51,7 @@ def packed(work: Callable[[], object]) -> bytes:
 
 
 def run_packed(their_version: str, folders: Sequence[str], content: bytes, attempt: int) -> tuple[Ending, bytes | str]:
-    """Do packed work; what a worker runs.
+    """Do sent work; what a worker runs.
 
     Linear algebra has one thread here: cores are for tasks side by side.
 
@@ -102,7 +102,7 @@ class Parcel:
 
     @classmethod
     def of(cls, thing: object) -> Parcel:
-        """Pickle something; records go by the path of their file.
+        """Parcel to send: something pickled; records go by the path of their file.
 
         Raises
         ------
@@ -112,12 +112,12 @@ class Parcel:
         return cls(_sendable(thing))
 
     def open(self) -> Any:  # noqa: ANN401  whatever was put into it
-        """The object that was packed into a parcel."""
+        """Object in a sent parcel."""
         return pickle.loads(self.content)  # noqa: S301  see above
 
 
 def unpacked(answer: bytes) -> Any:  # noqa: ANN401  whatever the task gives
-    """What `run_packed` gave as bytes.
+    """Result that `run_packed` sent as bytes.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def unpacked(answer: bytes) -> Any:  # noqa: ANN401  whatever the task gives
 
 @cache
 def vpm_version() -> str:
-    """Version of vpm here; "unknown" where it is not installed as a package."""
+    """Version of vpm for sent work; "unknown" where it is not installed as a package."""
     try:
         return version("vpm-dynamics")
     except PackageNotFoundError:
@@ -136,12 +136,12 @@ def vpm_version() -> str:
 
 
 def worker() -> str:
-    """Host and process where this runs."""
+    """Host and process that does the sent work."""
     return f"{socket.gethostname()} (process {os.getpid()})"
 
 
 def _refusal(their_version: str, folders: Sequence[str]) -> str | None:
-    """Why no work is done here; None where nothing speaks against it."""
+    """Why no sent work is done here; None where nothing speaks against it."""
     if their_version != vpm_version():
         return (
             f"the worker {worker()} has vpm {vpm_version()}, and the program that gives it work has vpm "
@@ -188,7 +188,7 @@ def _pickled(thing: object, *, by_path: bool = False) -> bytes:
 
 
 def _error(error: Exception) -> bytes:
-    """An error as bytes, with all that it carries where that can be sent."""
+    """Error to send as bytes, with all that it carries where possible."""
     try:
         content = _pickled(error)
         pickle.loads(content)  # noqa: S301  an error may be written and not read: its class wants more than a sentence
@@ -198,7 +198,7 @@ def _error(error: Exception) -> bytes:
 
 
 def _read(kind: type[Experiment], called: str, place: str, how: Mapping[str, Any], digest: str) -> Experiment:
-    """The record in a file, if it is the one that was sent; it knows its path as it was ``called``."""
+    """Record in a file, if it is the one that was sent; it knows its path as it was ``called``."""
     repair = "or send its numbers, with record.renamed(record.name)"
     if not exists(place):
         raise ExecutorError(
@@ -219,7 +219,7 @@ def _read(kind: type[Experiment], called: str, place: str, how: Mapping[str, Any
 
 
 def _digest(record: Experiment) -> str:
-    """Checksum of all that a record says."""
+    """Checksum of a record to be sent."""
     content = hashlib.sha256(repr((record.name, record.channels, record.units, record.data.shape)).encode())
     content.update(record.time.tobytes())
     content.update(record.data.tobytes())

@@ -38,7 +38,7 @@ class Shaper:
     damping_ratios: Array
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check the numbers of a shaper."""
         if self.kind not in KINDS:
             raise SimulationError(f"there is no shaper '{self.kind}'; choose {' or '.join(KINDS)}")
         for name, values, possible in (
@@ -54,7 +54,7 @@ class Shaper:
 
     @property
     def impulses(self) -> tuple[Array, Array]:
-        """Times (s) and amplitudes of the impulses; the amplitudes add up to 1."""
+        """Times (s) and amplitudes of a shaper's impulses; the amplitudes add up to 1."""
         times, amplitudes = np.zeros(1), np.ones(1)
         for frequency, damping in zip(self.frequencies, self.damping_ratios, strict=True):
             root = np.sqrt(1.0 - damping**2)
@@ -166,7 +166,7 @@ def shaper(
 
 
 def vibrations(model: Model, q: ArrayLike | None = None, held: Sequence[str] | None = None) -> tuple[Array, Array]:
-    """Undamped frequencies (Hz), ascending, and damping ratios of vibrations about rest, with joints held.
+    """Vibrations about rest for shaping, with joints held: undamped frequencies (Hz), damping ratios.
 
     Law: ``M x'' + D x' + K x = 0`` of the coordinates that are free, from exact derivatives of the inverse dynamics.
     """
@@ -193,7 +193,7 @@ def vibrations(model: Model, q: ArrayLike | None = None, held: Sequence[str] | N
 
 
 def _cancelling(frequency: float, damping: float, time_step: float) -> Array:
-    """Weights at samples 0, k and k + 1, half a period being between the last two, that cancel one mode."""
+    """Weights of a shaper at samples 0, k and k + 1 that cancel one mode."""
     omega = 2.0 * np.pi * frequency
     turn = omega * np.sqrt(1.0 - damping**2) * time_step
     half = int(np.pi / turn)

@@ -20,7 +20,7 @@ from vpm.command import (
     save_plot,
     writable,
 )
-from vpm.manner import give, wrote
+from vpm.command_output import give, wrote
 
 EXAMPLES = "Example:  vpm simplify model.toml log.csv --rate 1000 --tolerance 0.05"
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vpm.command import FORMATS, Channels, Interpolate, console, drawable, load_pair, progress, save_plot, writable
+from vpm.command_output import give, wrote
 from vpm.errors import ValidityWarning, VpmError
-from vpm.manner import give, wrote
 
 if TYPE_CHECKING:
     from vpm.experiment import Experiment

@@ -90,32 +90,32 @@ class Simulation:
 
     @property
     def model(self) -> Model:
-        """The machine that is simulated step by step."""
+        """Machine of the stepping simulation."""
         return self._model
 
     @property
     def time_step(self) -> float:
-        """Time between samples of a simulation step by step, s."""
+        """Time between samples of a stepping simulation, s."""
         return self._time_step
 
     @property
     def not_compiled(self) -> str | None:
-        """Why machine code was asked for and there is none; ``None`` otherwise."""
+        """Why a stepping simulation has no machine code; ``None`` if it has or none was asked for."""
         return self._not_compiled
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Names of the inputs, in the order of `step`: commands of actuators, then pressures of logged supplies."""
+        """Input names of a stepping simulation: commands of actuators, then logged supply pressures."""
         return self._model.inputs
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
-        """Names of the outputs of a simulation step by step."""
+        """Output names of a stepping simulation."""
         return self._model.output_channels
 
     @cached_property
     def units(self) -> tuple[str, ...]:
-        """SI units of the outputs."""
+        """SI units of a stepping simulation's outputs."""
         return tuple(self._model.channel_unit(name) for name in self.channels)
 
     @cached_property
@@ -124,7 +124,7 @@ class Simulation:
 
     @property
     def resolution(self) -> Resolution:
-        """What the steps do not resolve about the state where it is, over one second.
+        """What the stepping simulation does not resolve about its state, over one second.
 
         `Run.resolution` says it of a run, over its own time.
         """
@@ -133,28 +133,28 @@ class Simulation:
 
     @property
     def core(self) -> Core:
-        """The core's simulation, for those who step many in one call."""
+        """Core of a stepping simulation, for those who step many in one call."""
         return self._core
 
     # ---- where it is -------------------------------------------------------------------------------------------------
 
     @property
     def time(self) -> float:
-        """Time since the beginning, s."""
+        """Time of a stepping simulation since the beginning, s."""
         return self._core.time
 
     @property
     def state(self) -> Array:
-        """State, shape (nx,), named by ``model.state_names``; a copy."""
+        """State of a stepping simulation, shape (nx,), named by ``model.state_names``; a copy."""
         return self._core.state
 
     @property
     def outputs(self) -> Array:
-        """What the sensors show, shape (ny,), in the order of `channels`."""
+        """Sensor outputs of a stepping simulation, shape (ny,), in the order of `channels`."""
         return self._outputs
 
     def __getitem__(self, channel: str) -> float:
-        """What the sensors show of one channel."""
+        """Sensor output of one channel of a stepping simulation."""
         try:
             return float(self._outputs[self._columns[channel]])
         except KeyError:
@@ -164,7 +164,7 @@ class Simulation:
     # ---- how it goes on ----------------------------------------------------------------------------------------------
 
     def step(self, inputs: ArrayLike | Mapping[str, float] = ()) -> Array:
-        """Hold commands for one sample.
+        """Step the simulation: hold commands for one sample.
 
         Parameters
         ----------
@@ -196,7 +196,7 @@ class Simulation:
         return self._outputs
 
     def run(self, inputs: ArrayLike | Controller, duration: float | None = None) -> Run:
-        """Many steps: through a table of commands, or with a controller that is asked before every step.
+        """Step many times: through a table of commands, or with a controller asked before every step.
 
         Parameters
         ----------
@@ -247,7 +247,7 @@ class Simulation:
         return judged(self._model, run, states)
 
     def reset(self, state: Mapping[str, float] | ArrayLike | None = None) -> None:
-        """Begin again at time zero, with nothing remembered.
+        """Reset the stepping simulation to time zero, with nothing remembered.
 
         Parameters
         ----------
@@ -262,7 +262,7 @@ class Simulation:
         self._outputs = self._core.outputs
 
     def snapshot(self) -> Snapshot:
-        """Take note of all that the simulation is now, with what delays and sampled actuators remember.
+        """Snapshot of a stepping simulation with what delays and sampled actuators remember.
 
         Returns
         -------
@@ -272,7 +272,7 @@ class Simulation:
         return self._core.snapshot()
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to where the simulation was when the snapshot was taken: what follows is the same to the last bit.
+        """Restore a stepping simulation from a snapshot: what follows is the same to the last bit.
 
         Parameters
         ----------
@@ -340,11 +340,11 @@ class Simulation:
 
     @cached_property
     def _commanded(self) -> list[int]:
-        """Columns of the outputs that show what is held."""
+        """Output columns of a stepping simulation that show what is held."""
         return [self._columns[name] for name in self._model.input_channels]
 
     def _unresolved(self, about: Array, rows: Array) -> Resolution:
-        """What the steps of a run did not resolve that began in the state ``about``.
+        """What a stepping run that began in the state ``about`` did not resolve.
 
         Of the states that followed, its rows show some; the others are taken for those of the beginning.
         """

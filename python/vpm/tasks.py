@@ -173,7 +173,7 @@ class Tasks(Generic[K]):
         return ended
 
     def stopped(self) -> list[Done[K]]:
-        """Call back what was not begun, and tell what is known of the others: threads stop, and say what they have."""
+        """Stop tasks: call back what was not begun; threads say what they have."""
         self._stop.set()
         for future in self._flying:
             future.cancel()
@@ -189,7 +189,7 @@ class Tasks(Generic[K]):
         return known
 
     def _give(self) -> None:
-        """Give away as much as the executor is to hold; what has died with a worker twice runs alone at the end."""
+        """Give tasks to the executor as far as it holds them; twice-failed ones run alone at the end."""
         while self._ready and len(self._flying) < self.width:
             self._launch(self._ready.popleft())
         if self._alone and not self._flying and not self._ready:
@@ -272,7 +272,7 @@ class Tasks(Generic[K]):
         return None
 
     def _renew(self, why: str) -> None:
-        """Another executor in the place of one that broke."""
+        """Another executor for the tasks in the place of one that broke."""
         self._broken += 1
         if self._broken > ATTEMPTS * (len(self._flying) + len(self._ready) + len(self._alone) + 1):
             raise ExecutorError(f"executors break one after the other ({why}); give one whose workers can begin")
@@ -289,7 +289,7 @@ def outcomes(
     heard: Callable[[list[Done[int]]], object] | None = None,
     names: Sequence[str] = (),
 ) -> tuple[list[Done[int] | None], bool]:
-    """How each job ended, in the order of the jobs wherever they ran, and whether Ctrl-C was pressed.
+    """Outcomes of tasks in their order wherever they ran, and whether Ctrl-C was pressed.
 
     Of jobs that Ctrl-C kept from an end there is None. Those that run on threads see ``KeyboardInterrupt`` in the core
     and may still give what they have.
@@ -324,7 +324,7 @@ def outcomes(
 
 
 def until_interrupted(jobs: Sequence[Callable[[], T]], where: Where) -> tuple[list[T | None], bool]:
-    """What each job gives, None for those that Ctrl-C kept from an end, and whether it was pressed.
+    """Results of tasks, None for those that Ctrl-C ended, and whether it was pressed.
 
     The first job in their order that fails raises its error, after the others have ended.
 
@@ -339,7 +339,7 @@ def until_interrupted(jobs: Sequence[Callable[[], T]], where: Where) -> tuple[li
 
 
 def done_by(executor: Executor | Callable[[], Executor], job: Callable[[], T], say: Say | None = None) -> T:
-    """What one job gives that an executor does; its error is raised.
+    """Result of one task that an executor does; its error is raised.
 
     Parameters
     ----------
@@ -357,7 +357,7 @@ def done_by(executor: Executor | Callable[[], Executor], job: Callable[[], T], s
 
 
 def processes(count: int) -> ProcessPoolExecutor:
-    """New processes that work for this one, and leave Ctrl-C to it.
+    """New processes for tasks that leave Ctrl-C to this one.
 
     Parameters
     ----------
@@ -367,7 +367,7 @@ def processes(count: int) -> ProcessPoolExecutor:
 
 
 def _maker(where: Where) -> Callable[[], Executor]:
-    """Function that makes an executor, also in the place of one that was given and broke."""
+    """Function that makes an executor for tasks, also in the place of a broken one."""
     if isinstance(where, int):
         return partial(ThreadPoolExecutor, where, "vpm")
     if isinstance(where, Executor):
@@ -376,7 +376,7 @@ def _maker(where: Where) -> Callable[[], Executor]:
 
 
 def _end(executor: Executor) -> None:
-    """End an executor that nobody else uses, with its processes."""
+    """End an executor of tasks that nobody else uses, with its processes."""
     if isinstance(executor, ProcessPoolExecutor):
         running = list((executor._processes or {}).values())  # noqa: SLF001  a shutdown would wait for their tasks
         executor.shutdown(wait=False, cancel_futures=True)
@@ -395,7 +395,7 @@ def _deaf() -> None:
 
 
 def _watching(asked: Callable[[], bool], job: Callable[[], object]) -> tuple[object, BaseException | None]:
-    """What a job gives, and its error, on a thread that stops when it is asked to."""
+    """Result of a task, and its error, on a thread that stops when it is asked to."""
     from vpm._core import stop_when
 
     stop_when(asked)

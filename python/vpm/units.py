@@ -111,7 +111,7 @@ class _Symbol:
 
 
 def _symbol(factor: float, dimension: tuple[int, ...], si: str, prefixes: str = "") -> _Symbol:
-    """Table entry; `si` is like ``"m^3 s^-1"``."""
+    """Table entry of a unit's symbol; `si` is like ``"m^3 s^-1"``."""
     terms = tuple((name, int(power or 1)) for name, _, power in (term.partition("^") for term in si.split()))
     return _Symbol(factor, dimension, terms, prefixes)
 
@@ -382,7 +382,7 @@ class _Reader:
 
 
 def _whole(power: Power) -> Power:
-    """The power, as an int if it is one."""
+    """Power of a unit, as an int if it is one."""
     return int(power) if power.denominator == 1 else power
 
 
@@ -405,7 +405,7 @@ def _tokens(text: str, usual: str) -> list[str]:
 
 
 def _look_up(name: str, text: str) -> _Parsed:
-    """Find a symbol, or raise with the repair."""
+    """Look up a unit's symbol, or raise with the repair."""
     found = _find(name) or _find(_WORDS.get(name.lower(), name))
     if found is not None:
         return found
@@ -420,7 +420,7 @@ def _look_up(name: str, text: str) -> _Parsed:
 
 
 def _find(name: str) -> _Parsed | None:
-    """Find a symbol in the table, else a prefix before one that takes it: exact names win, so "min" is a minute."""
+    """Find a unit's symbol in the table, else a prefix before one; exact names win."""
     symbol, scale = _SYMBOLS.get(name), 1.0
     if symbol is None and name[0] in _PREFIXES:
         symbol, scale = _SYMBOLS.get(name[1:]), _PREFIXES[name[0]]
@@ -449,5 +449,5 @@ def _write(terms: tuple[tuple[str, Power], ...]) -> str:
 
 
 def _digits(power: Fraction) -> str:
-    """A positive power as decimal digits; powers are sums and products of decimal numbers, so they have an end."""
+    """Positive power of a unit as decimal digits, which have an end."""
     return format(Decimal(power.numerator) / Decimal(power.denominator), "f")

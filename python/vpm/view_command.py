@@ -18,8 +18,8 @@ from vpm.command import (
     progress,
     writable,
 )
+from vpm.command_output import give, note, wrote
 from vpm.errors import VpmError
-from vpm.manner import give, note, wrote
 
 if TYPE_CHECKING:
     from vpm.experiment import Experiment

@@ -43,7 +43,7 @@ def test_laws_beside_the_bending_are_what_a_whole_simulation_gives(
     problem = InverseDynamicsProblem(model, [record], cutoff=40.0)
     assert has_tangent(model, problem)
     residual, jacobian = problem.evaluate(model, model.theta, columns)
-    monkeypatch.setattr(sys.modules["vpm.identify.along"], "bending_of", lambda *_, **__: None)
+    monkeypatch.setattr(sys.modules["vpm.identify.response_along_motion"], "bending_of", lambda *_, **__: None)
     whole = InverseDynamicsProblem(model, [record], cutoff=40.0).evaluate(model, model.theta, columns)
     assert np.abs(residual - whole[0]).max() < 1e-10 * np.abs(whole[0]).max()
     for mine, other, name in zip(jacobian.T, whole[1].T, model.parameter_names, strict=True):

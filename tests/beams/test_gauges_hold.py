@@ -59,7 +59,7 @@ def test_derivatives_on_fewer_samples_are_nearly_those_on_all(
     columns = [machine.index(name) for name in ("link.young", "link.density")]
     answers = []
     for samples in (8.0, np.inf):
-        monkeypatch.setattr(sys.modules["vpm.identify.along"], "SLOPE_SAMPLES", samples)
+        monkeypatch.setattr(sys.modules["vpm.identify.response_along_motion"], "SLOPE_SAMPLES", samples)
         problem = InverseDynamicsProblem(machine, [log], cutoff=30.0)
         answers.append(problem.evaluate(machine, machine.theta, columns))
     (few, slopes), (residual, exact) = answers

@@ -12,14 +12,14 @@ import pytest
 from numpy.typing import NDArray
 
 from shared_cases import shared_case
-from vpm.discrepancy.floor import noise_floor
-from vpm.discrepancy.noise_spectrum import noise_shapes, noise_spectrum
-from vpm.discrepancy.structure import structure
+from vpm.discrepancy.noise.noise_floor import noise_floor
+from vpm.discrepancy.noise.noise_spectrum import noise_shapes, noise_spectrum
+from vpm.discrepancy.noise.residual_structure import structure
 from vpm.identify import InverseDynamicsProblem, gaps
-from vpm.identify.along import Response
 from vpm.identify.drives import SLOPE_STEP
 from vpm.identify.following import Memo
 from vpm.identify.parts import carried, drives_of
+from vpm.identify.response_along_motion import Response
 from vpm.model import Model
 
 Array = NDArray[np.float64]

@@ -18,9 +18,9 @@ from sledge import MASS, SLEDGE, swung
 from synthetic import Truth, nominal, simulate_axis
 from vpm import naming
 from vpm.diagnosing import diagnose
-from vpm.discrepancy import by_ranking
-from vpm.discrepancy.by_ranking import why_not_ranked
-from vpm.discrepancy.confirmation import unmoved
+from vpm.discrepancy import ranked_effects
+from vpm.discrepancy.confirmation.confirmation import unmoved
+from vpm.discrepancy.ranked_effects import why_not_ranked
 from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -116,7 +116,7 @@ def test_what_was_tried_in_vain_is_refused_with_its_numbers(named: vpm.Diagnosis
 def test_each_reason_is_one_sentence(name: str, value: float, said: str) -> None:
     one = tried("spring", {}, 0.5)
     object.__setattr__(one.judgement, name, value)
-    assert said in by_ranking._reason(by_ranking._Last(one, None, came_in=False), Asked())
+    assert said in ranked_effects._reason(ranked_effects._Last(one, None, came_in=False), Asked())
 
 
 def test_what_is_not_told_apart_is_one_class(named: vpm.Diagnosis, tmp_path: Path) -> None:
@@ -180,7 +180,7 @@ def test_names_that_leave_more_of_an_effort_than_it_is_explain_nothing(
         heavy = ranking(tried("rotor_inertia", {"axis.rotor.inertia": mass}, 0.9, evidence=900.0, probability=0.99))
         seen = replace(heavy, gaps={"axis.position": seen_by_tracker(1.0, 0.1)})
         monkeypatch.setattr(naming, "rank", lambda *_, seen=seen, **__: seen)
-        monkeypatch.setattr(by_ranking, "judged_anyhow", unmoved)
+        monkeypatch.setattr(ranked_effects, "judged_anyhow", unmoved)
         words.append(diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict)
     assert words == ["effect_found", "unexplained"]
 
@@ -236,8 +236,8 @@ def test_machines_that_a_ranking_does_not_cover_say_why() -> None:
 
 def test_a_refit_that_simulates_worse_is_not_kept(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
     monkeypatch.setattr(naming, "rank", lambda *_, **__: two())
-    never = replace(by_ranking.SETTINGS, worse=-np.inf, sure=-np.inf)
-    monkeypatch.setattr(by_ranking, "SETTINGS", never)
+    never = replace(ranked_effects.SETTINGS, worse=-np.inf, sure=-np.inf)
+    monkeypatch.setattr(ranked_effects, "SETTINGS", never)
     why = diagnose(nominal(), records[0], records[1], names="ranking", workers=1)
     step = why.steps[1]
     assert step.values["axis.friction.coulomb"] == pytest.approx(8.8)
@@ -284,7 +284,7 @@ def test_names_come_from_one_of_two_places(records: list[Experiment]) -> None:
 def test_a_parameter_without_a_derivative_along_the_motion_is_not_told_by_a_balance() -> None:
     """Behind a play two motions part ever faster, and squares of derivatives overflow."""
     columns = np.array([[1.0, 1e200, np.inf], [0.0, 1e200, 0.0]])
-    assert by_ranking._has_derivatives(columns).tolist() == [True, False, False]
+    assert ranked_effects._has_derivatives(columns).tolist() == [True, False, False]
 
 
 def test_what_commands_do_between_samples_is_found_and_holds_for_balances_and_runs() -> None:

@@ -22,9 +22,9 @@ from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.ranking import Ranking
-from vpm.ranking.residual import TrackerResidual
 from vpm.ranking.settings import Settings
 from vpm.ranking.tracked_records import TrackedRecords
+from vpm.ranking.tracker_residual import TrackerResidual
 from vpm.report import write_report
 from vpm.report.messages import estimate
 

@@ -7,7 +7,7 @@ import pytest
 
 import vpm
 from shared_cases import shared_case
-from vpm.discrepancy.whittle_likelihood import misfit, predict
+from vpm.discrepancy.confirmation.whittle_likelihood import misfit, predict
 from vpm.simulate import Setup
 
 CLOSE_TO_REST = "stribeck_friction"

@@ -10,10 +10,11 @@ import pytest
 import vpm
 from shared_cases import shared_case
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy import forward_step, rival_discrimination
-from vpm.discrepancy.choice import Accepted
-from vpm.discrepancy.confirmation import Data, Trial
-from vpm.discrepancy.round import Round
+from vpm.discrepancy.confirmation.confirmation import Data, Trial
+from vpm.discrepancy.rivals import rival_discrimination
+from vpm.discrepancy.search import forward_step
+from vpm.discrepancy.search.candidate_choice import Accepted
+from vpm.discrepancy.search.search_round import Round
 
 
 @pytest.mark.nightly

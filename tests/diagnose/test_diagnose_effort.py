@@ -8,7 +8,7 @@ from threading import Barrier
 import numpy as np
 import pytest
 
-from vpm.discrepancy.side_by_side import Failure, SideBySide
+from vpm.discrepancy.parallel_candidates import Failure, SideBySide
 from vpm.errors import DiagnosisError
 from vpm.identify import Worth
 

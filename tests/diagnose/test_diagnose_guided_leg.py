@@ -10,8 +10,8 @@ import pytest
 from numpy.typing import NDArray
 
 import vpm
-from vpm.discrepancy import by_ranking
-from vpm.discrepancy.by_ranking import free_joints, why_not_ranked
+from vpm.discrepancy import ranked_effects
+from vpm.discrepancy.ranked_effects import free_joints, why_not_ranked
 from vpm.experiment import Experiment
 from vpm.model import Model
 
@@ -58,7 +58,7 @@ def test_a_ranking_covers_oil_where_a_joint_has_no_drive() -> None:
 
 def test_what_no_balance_sees_is_told_where_a_search_names(monkeypatch: pytest.MonkeyPatch) -> None:
     """A payload on the trunk loads the guide's joint alone; that nothing is said of it has to be said."""
-    monkeypatch.setattr(by_ranking, "SETTINGS", replace(by_ranking.SETTINGS, joints=2))
+    monkeypatch.setattr(ranked_effects, "SETTINGS", replace(ranked_effects.SETTINGS, joints=2))
     *train, test = logged(leg().with_effect("payload", at="carriage", mass=0.8))
     why = vpm.diagnose(leg(), train, test, effects=["bias_force"])
     assert any(note.startswith("the joint slider has no drive") for note in why.notes)

@@ -9,9 +9,9 @@ import pytest
 
 from vpm import Experiment, Model
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.candidates import Candidate, candidates
-from vpm.discrepancy.low_frequency import AVERAGED, has_impacts, low_frequency
-from vpm.discrepancy.screening import Baseline, probe
+from vpm.discrepancy.confirmation.low_frequency import AVERAGED, has_impacts, low_frequency
+from vpm.discrepancy.screening.candidates import Candidate, candidates
+from vpm.discrepancy.screening.probe import Baseline, probe
 from vpm.identify import InverseDynamicsProblem
 
 TEXT = """name = "slide"

@@ -10,12 +10,12 @@ import pytest
 
 import vpm
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.candidates import Candidate
-from vpm.discrepancy.confirmation import is_clear
-from vpm.discrepancy.first_step import softened
-from vpm.discrepancy.round import Round
-from vpm.discrepancy.screening import Probe, _stepped
-from vpm.discrepancy.short_list import same_models
+from vpm.discrepancy.confirmation.confirmation import is_clear
+from vpm.discrepancy.screening.candidates import Candidate
+from vpm.discrepancy.screening.linear_step import softened
+from vpm.discrepancy.screening.probe import Probe, _stepped
+from vpm.discrepancy.screening.short_list import same_models
+from vpm.discrepancy.search.search_round import Round
 from vpm.identify import Estimate, InverseDynamicsProblem, Worth, estimate
 
 DT = 1e-3

@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 
 from vpm.catalogue import EFFECTS
 from vpm.demo import MODEL
-from vpm.discrepancy.candidates import Candidate
-from vpm.discrepancy.confirmation import Trial
-from vpm.discrepancy.refusal import (
+from vpm.discrepancy.confirmation.confirmation import Trial
+from vpm.discrepancy.confirmation.refusal import (
     NEGLIGIBLE,
     Thresholds,
     impossible_trial,
@@ -23,8 +22,9 @@ from vpm.discrepancy.refusal import (
     refuse_trial,
     worse_in_simulation,
 )
-from vpm.discrepancy.screening import Probe
-from vpm.discrepancy.structural import moved
+from vpm.discrepancy.screening.candidates import Candidate
+from vpm.discrepancy.screening.compliance_and_stop_start import moved
+from vpm.discrepancy.screening.probe import Probe
 from vpm.identify import Gain
 from vpm.model import Model
 

@@ -14,16 +14,16 @@ import vpm
 from inverse_dynamics import inverse_dynamics_data
 from shared_cases import shared_case
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy import rival_exchange
-from vpm.discrepancy.ambiguity import Rivals
-from vpm.discrepancy.candidates import candidates
-from vpm.discrepancy.confirmation import Data, judge
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge
 from vpm.discrepancy.diagnosis import RefusedEffect
-from vpm.discrepancy.elimination import Stage
-from vpm.discrepancy.rival_exchange import earned, in_order
-from vpm.discrepancy.screening import Baseline, probe
-from vpm.discrepancy.search import Search, search
-from vpm.discrepancy.side_by_side import SideBySide
+from vpm.discrepancy.parallel_candidates import SideBySide
+from vpm.discrepancy.rivals import rival_exchange
+from vpm.discrepancy.rivals.ambiguity import Rivals
+from vpm.discrepancy.rivals.rival_exchange import earned, in_order
+from vpm.discrepancy.screening.candidates import candidates
+from vpm.discrepancy.screening.probe import Baseline, probe
+from vpm.discrepancy.search.backward_elimination import Stage
+from vpm.discrepancy.search.search import Search, search
 from vpm.identify import Gain, InverseDynamicsProblem, estimate
 
 
@@ -197,7 +197,7 @@ class _Found:
 
 def _known(power: float | None) -> Rivals:
     without = None if power is None else _Judged(np.full(4, power))
-    return Rivals("effect", "site", (), (), cast("vpm.discrepancy.confirmation.Judged | None", without))
+    return Rivals("effect", "site", (), (), cast("Judged | None", without))
 
 
 def _ordered(entries: dict[str, tuple[_Entry, float | None]]) -> list[str]:

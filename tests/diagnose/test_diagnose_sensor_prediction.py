@@ -7,10 +7,10 @@ import pytest
 from inverse_dynamics import inverse_dynamics_data
 from shared_cases import shared_case
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.candidates import Candidate
-from vpm.discrepancy.choice import choose
-from vpm.discrepancy.confirmation import confirm, judge
-from vpm.discrepancy.screening import probe
+from vpm.discrepancy.confirmation.confirmation import confirm, judge
+from vpm.discrepancy.screening.candidates import Candidate
+from vpm.discrepancy.screening.probe import probe
+from vpm.discrepancy.search.candidate_choice import choose
 
 RIVALS = (("bias_force", "axis"), ("sensor_offset", "gauge_a"), ("sensor_offset", "gauge_b"))
 

@@ -8,7 +8,7 @@ import pytest
 import vpm
 from shared_cases import shared_case
 from vpm.demo import MODEL
-from vpm.discrepancy.structural import ends_apart, stop_starts
+from vpm.discrepancy.screening.compliance_and_stop_start import ends_apart, stop_starts
 
 
 @pytest.mark.parametrize(("side", "end"), [(1.0, "high"), (-1.0, "low")])

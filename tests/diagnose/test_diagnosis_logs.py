@@ -16,7 +16,7 @@ import pytest
 
 from vpm.diagnosing import diagnose
 from vpm.discrepancy import Diagnosis
-from vpm.discrepancy.candidates import candidates, left_out
+from vpm.discrepancy.screening.candidates import candidates, left_out
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 import vpm
 from model_texts import DAMPED_AXIS
 from vpm.discrepancy import ProposedExperiment
-from vpm.discrepancy.discriminating_experiment import _imitation
+from vpm.discrepancy.rivals.discriminating_experiment import _imitation
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ import pytest
 
 import vpm
 from shared_cases import shared_case
-from vpm.discrepancy.candidates import candidates
-from vpm.discrepancy.joint_compliance import best_start, is_searched
-from vpm.discrepancy.structural import moved
+from vpm.discrepancy.screening.candidates import candidates
+from vpm.discrepancy.screening.compliance_and_stop_start import moved
+from vpm.discrepancy.screening.joint_compliance_start import best_start, is_searched
 from vpm.identify import InverseDynamicsProblem, estimate
 
 PAIR = ("joint_compliance", "viscous_friction")

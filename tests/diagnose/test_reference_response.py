@@ -13,10 +13,10 @@ from scipy.stats import t as student_t
 import vpm
 from blind import Case
 from shared_cases import shared_case
-from vpm.discrepancy.confirmation import Data, judge
-from vpm.discrepancy.reference_response import Runs, Verdict, compare_driven, inexact, part
-from vpm.discrepancy.refusal import NEGLIGIBLE
-from vpm.discrepancy.whittle_likelihood import fit_prediction, predict, spectra, weighted
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge
+from vpm.discrepancy.confirmation.reference_response import Runs, Verdict, compare_driven, inexact, part
+from vpm.discrepancy.confirmation.refusal import NEGLIGIBLE
+from vpm.discrepancy.confirmation.whittle_likelihood import fit_prediction, predict, spectra, weighted
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
 from vpm.model import Model
 from vpm.simulate import Setup
@@ -27,7 +27,7 @@ Array = NDArray[np.float64]
 LATE = ("actuator_lag", "input_delay", "sensor_delay")
 
 
-def fitted_late(case: Case) -> tuple[Data, list[vpm.discrepancy.confirmation.Judged]]:
+def fitted_late(case: Case) -> tuple[Data, list[Judged]]:
     """A lag and a delay, each fitted beside the parameters that may be calibrated."""
     model = case.model()
     training = InverseDynamicsProblem(model, case.train)

@@ -12,7 +12,7 @@ import pytest
 from command_line import vpm
 from shared_cases import shared_case
 from vpm import diagnose, identify, rank
-from vpm.discrepancy.moving import check_moving
+from vpm.discrepancy.stuck_channels import check_moving
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment
 from vpm.model import Model

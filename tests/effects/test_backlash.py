@@ -9,10 +9,10 @@ from numpy.typing import NDArray
 from vpm import Experiment, Model, diagnose
 from vpm._core import soft_flights
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.backlash import only_compliant, read_off
-from vpm.discrepancy.candidates import Candidate
-from vpm.discrepancy.contacts import beginnings, with_contact
-from vpm.discrepancy.flights import flights
+from vpm.discrepancy.screening.backlash_flights import flights
+from vpm.discrepancy.screening.backlash_start import only_compliant, read_off
+from vpm.discrepancy.screening.candidates import Candidate
+from vpm.discrepancy.search.backlash_contacts import beginnings, with_contact
 from vpm.identify import InverseDynamicsProblem
 
 Array = NDArray[np.float64]

@@ -11,13 +11,13 @@ from scipy.integrate import solve_ivp
 import vpm
 from hydraulic_reference import AREA, RATIO, SUPPLY, TANK, VALUES
 from nightly import at_night
-from vpm.discrepancy.candidates import Candidate
+from vpm.discrepancy.screening.candidates import Candidate
 from vpm.errors import IdentificationError, ModelError
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.identify.sample_mask import SETTLING, at_stops
 from vpm.initial import joint_motion, measured_states
 from vpm.model.drives.states import commanded_states
-from vpm.ranking.sizes import Sizes
+from vpm.ranking.parameter_priors import Sizes
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import pytest
 
 import vpm
 from vpm import Experiment, Model
-from vpm.discrepancy.candidates import candidates
+from vpm.discrepancy.screening.candidates import candidates
 from vpm.errors import ModelError, SimulationError
 from vpm.identify import InverseDynamicsProblem
 

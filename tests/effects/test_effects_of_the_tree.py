@@ -6,7 +6,7 @@ import pytest
 from test_split_joints import ARM, commanded, slide
 from vpm import EFFECTS, Experiment, Model, simulate
 from vpm.catalogue import effects_for_site, register, unregister
-from vpm.discrepancy.candidates import candidates
+from vpm.discrepancy.screening.candidates import candidates
 from vpm.errors import ModelError
 from vpm.identify import InverseDynamicsProblem
 

@@ -15,7 +15,7 @@ from model_texts import DAMPED_AXIS
 from nightly import at_night
 from vpm.catalogue import effect_type
 from vpm.catalogue.empirical import TERMS
-from vpm.discrepancy.dependence import _other_half
+from vpm.discrepancy.remainder.state_dependence import _other_half
 from vpm.errors import ModelError
 
 Array = NDArray[np.float64]

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from test_sides import TIMES, elastic, force
 from test_split_joints import commanded, slide
 from vpm import EFFECTS, Experiment, Model, simulate
-from vpm.discrepancy.candidates import candidates
+from vpm.discrepancy.screening.candidates import candidates
 from vpm.errors import ModelError, SimulationError
 from vpm.identify import InverseDynamicsProblem, identify
 

@@ -7,7 +7,7 @@ import pytest
 
 from vpm import Experiment, Model, simulate
 from vpm.diagnosing import diagnose
-from vpm.discrepancy.structural import logged_swing
+from vpm.discrepancy.screening.compliance_and_stop_start import logged_swing
 from vpm.errors import ModelError
 from vpm.identify import InverseDynamicsProblem, identify
 

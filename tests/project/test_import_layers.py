@@ -40,7 +40,8 @@ class Import(NamedTuple):
 def layers() -> dict[str, int]:
     """Height of each part of the package; the lowest is 0."""
     with (ROOT / "pyproject.toml").open("rb") as file:
-        (contract,) = tomllib.load(file)["tool"]["importlinter"]["contracts"]
+        contracts = tomllib.load(file)["tool"]["importlinter"]["contracts"]
+    (contract,) = (contract for contract in contracts if contract["id"] == "layers")
     rows = reversed(contract["layers"])
     return {part.strip(" ()"): height for height, row in enumerate(rows) for part in row.split("|")}
 

@@ -16,22 +16,22 @@ from second_suite import arm
 from sledge import GAIN, MASS, OIL, SLEDGE, pushed
 from vpm.catalogue import EFFECTS
 from vpm.catalogue.kinds import in_words
-from vpm.discrepancy.candidates import candidates
-from vpm.discrepancy.side_by_side import SideBySide
+from vpm.discrepancy.parallel_candidates import SideBySide
+from vpm.discrepancy.screening.candidates import candidates
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
 from vpm.initial import invertible
 from vpm.model import Model
-from vpm.ranking.extensions import Extensions
 from vpm.ranking.fit import Fitter, View, by_secant
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
+from vpm.ranking.model_structure import Structure
+from vpm.ranking.parameter_priors import Sizes
 from vpm.ranking.proposals import Proposal, _seated, proposals
-from vpm.ranking.search import _is_worse
+from vpm.ranking.ranking_search import _is_worse
 from vpm.ranking.settings import PLACES, Settings
-from vpm.ranking.sizes import Sizes
-from vpm.ranking.starts import started
-from vpm.ranking.structure import Structure
+from vpm.ranking.start_values import started
+from vpm.ranking.structure_extensions import Extensions
 from vpm.ranking.tracked_records import TrackedRecords, Tracker, tracker_gain
 from vpm.weighing import Prior
 

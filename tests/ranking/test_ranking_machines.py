@@ -12,7 +12,7 @@ from sledge import POLE, SAMPLED, SLEDGE, STIFFNESS, pushed, wound
 from slider_crank import OIL, SLIDER, SLIDER_CRANK, turned
 from vpm.model import Model
 from vpm.ranking.settings import Settings
-from vpm.ranking.stand_in import opened, shown
+from vpm.ranking.substitute_records import opened, shown
 from vpm.ranking.tracked_records import TrackedRecords, Tracker
 
 

@@ -12,10 +12,10 @@ from scipy.stats import norm
 from sledge import SLEDGE, pushed
 from vpm.model import Model
 from vpm.ranking.fit import Fitted, Fitter, View
+from vpm.ranking.model_structure import Structure
 from vpm.ranking.noise_model import fitted_noise
 from vpm.ranking.posterior import apart, log_volume, probabilities
 from vpm.ranking.settings import Settings
-from vpm.ranking.structure import Structure
 from vpm.ranking.tracked_records import TrackedRecords, Tracker
 from vpm.weighing import Prior
 

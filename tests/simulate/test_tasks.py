@@ -23,7 +23,7 @@ from two_link_arm import Arm, record
 from two_link_arm import nominal as arm
 from vpm import demo, sending, tasks
 from vpm.errors import DiagnosisError, ExecutorError
-from vpm.many import Case, diagnose_many
+from vpm.many_diagnoses import Case, diagnose_many
 from vpm.one_thread import ONE_THREAD
 from vpm.simplify.judge import Judge
 from vpm.simplify.reductions import reductions

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from blind import Case
-from vpm.discrepancy.confirmation import Data
+from vpm.discrepancy.confirmation.confirmation import Data
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 

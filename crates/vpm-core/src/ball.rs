@@ -35,13 +35,13 @@ pub struct Ball {
 }
 
 impl Ball {
-    /// The angles, or their rates, among those of all coordinates.
+    /// Angles of a ball joint, or their rates, among those of all coordinates.
     pub(crate) fn of<S: Scalar>(&self, numbers: &[S]) -> [S; 3] {
         self.angles.each_ref().map(|places| places.iter().map(|&place| numbers[place]).sum())
     }
 
-    /// The second angle (rad) at coordinates `q` and rates `v`, and whether it is too near to 90 degrees for a coordinate, in steps (s) of
-    /// fixed length or of controlled error.
+    /// Nearness of a ball joint's second angle (rad) to 90 degrees, where it is no coordinate. At coordinates `q` and
+    /// rates `v`, in steps (s) of fixed length or of controlled error.
     pub(crate) fn nearness<S: Scalar>(&self, q: &[S], v: &[S], step: Option<f64>) -> (f64, bool) {
         let [angles, rates] = [self.of(q), self.of(v)].map(|numbers| numbers.map(|number| number.re()));
         let cosine = angles[1].cos();
@@ -49,7 +49,7 @@ impl Ball {
         (angles[1], cosine.abs() < LEAST.max(step.map_or(0.0, |step| STEPS_AWAY * step * turning)))
     }
 
-    /// The coordinates of the angles, if nothing divides them.
+    /// Places of a ball joint's angles among the coordinates, if nothing divides them.
     pub(crate) fn places(&self) -> Option<[usize; 3]> {
         match self.angles.each_ref().map(Vec::as_slice) {
             [&[first], &[second], &[third]] => Some([first, second, third]),
@@ -69,8 +69,8 @@ pub(crate) fn check_angles(balls: &[Ball], q: &[f64]) -> Result<()> {
     Ok(())
 }
 
-/// The angles next to those `near` (rad) of an orientation. Of the two triples that every orientation has, it takes the one whose first
-/// angle is nearer.
+/// Angles of a ball joint's orientation next to those `near` (rad). Of the two triples that every orientation has, it
+/// takes the one whose first angle is nearer.
 pub(crate) fn angles<S: Scalar>(orientation: Matrix3<S>, near: [f64; 3]) -> [S; 3] {
     let [x, y, z] = orientation.columns;
     let (sine, cosine) = near[0].sin_cos();
@@ -87,20 +87,22 @@ pub(crate) fn angles<S: Scalar>(orientation: Matrix3<S>, near: [f64; 3]) -> [S; 
     [a, b, c]
 }
 
-/// The angular velocity in axes of the child (rad/s) at these angles and their rates.
+/// Angular velocity of a ball joint in axes of the child (rad/s) at these angles and their rates.
 pub(crate) fn angular_velocity<S: Scalar>([_, b, c]: [S; 3], [u, v, w]: [S; 3]) -> Vector3<S> {
     let ((sb, cb), (sc, cc)) = (b.sin_cos(), c.sin_cos());
     Vector3::new(u * cb * cc + v * sc, v * cc - u * cb * sc, u * sb + w)
 }
 
-/// The rates of the angles (rad/s) at an angular velocity in axes of the child, the inverse of [`angular_velocity`].
+/// Rates of a ball joint's angles (rad/s) at an angular velocity, the inverse of [`angular_velocity`]. The velocity is
+/// in axes of the child.
 pub(crate) fn rates<S: Scalar>([_, b, c]: [S; 3], omega: Vector3<S>) -> [S; 3] {
     let ((sb, cb), (sc, cc)) = (b.sin_cos(), c.sin_cos());
     let u = (cc * omega.x - sc * omega.y) / regular(cb);
     [u, sc * omega.x + cc * omega.y, omega.z - u * sb]
 }
 
-/// The second derivatives of the angles (rad/s^2) at their rates and the derivative of the angular velocity in axes of the child.
+/// Second derivatives of a ball joint's angles (rad/s^2). They hold at their rates and the derivative of the angular
+/// velocity in axes of the child.
 pub(crate) fn accelerations<S: Scalar>(angles: [S; 3], [u, v, w]: [S; 3], alpha: Vector3<S>) -> [S; 3] {
     let ((sb, cb), (sc, cc)) = (angles[1].sin_cos(), angles[2].sin_cos());
     // The derivative of the angular velocity at constant rates.
@@ -112,14 +114,14 @@ pub(crate) fn accelerations<S: Scalar>(angles: [S; 3], [u, v, w]: [S; 3], alpha:
     rates(angles, alpha - drift)
 }
 
-/// A cosine that is not too near to zero to be divided by.
+/// Cosine of a ball joint's angle that is not too near to zero to be divided by.
 fn regular<S: Scalar>(cosine: S) -> S {
     let least = S::from_f64(SHOWN);
     let away = || cosine.if_negative(|| -least, || least);
     cosine.abs().if_less(least, away, || cosine)
 }
 
-/// The angle (rad) next to `near` that has this sine and cosine, up to a positive factor of both.
+/// Angle (rad) of a ball joint next to `near` with this sine and cosine. They count up to a positive factor of both.
 fn angle<S: Scalar>(sine: S, cosine: S, near: f64) -> S {
     let turns = (sine.re().atan2(cosine.re()) - near) / TAU;
     let value = near + (turns - turns.round()) * TAU;

@@ -65,7 +65,7 @@ pub struct Answers {
 }
 
 impl Question {
-    /// The function, and what it is called.
+    /// Kind of function in a batch, and what it is called.
     fn kind(self, description: &Description) -> Result<(Kind, &'static str)> {
         let marker = |number: usize| {
             let count = description.layout().markers;
@@ -113,7 +113,7 @@ impl Motions<'_> {
         Ok(())
     }
 
-    /// Puts motion `row` where it stands among the inputs of a function.
+    /// Puts motion `row` of a batch among the inputs of a function.
     fn put(&self, places: Places, row: usize, inputs: &mut [f64]) {
         let parts =
             [(0, Some(self.position)), (places.coordinates, self.velocity), (places.accelerations(), self.third)];
@@ -125,7 +125,7 @@ impl Motions<'_> {
     }
 }
 
-/// The answers to `question` at all `motions`, with derivatives.
+/// Batch of answers to `question` at all `motions`, with derivatives.
 ///
 /// Checked: against single evaluations, other programs, difference quotients and dual numbers.
 ///
@@ -160,7 +160,7 @@ pub fn answer(
     job.run(&Engine::of_derivatives(&function, theta, rows))
 }
 
-/// Numbers of the inputs by which a function is differentiated.
+/// Inputs by which the function of a batch is differentiated.
 fn variables(places: Places, by: By<'_>) -> Vec<u32> {
     let n = places.coordinates;
     let motion = [0, n, places.accelerations()].into_iter().flat_map(|first| first..first + n);
@@ -203,7 +203,7 @@ impl Job<'_> {
         })
     }
 
-    /// Lets threads fill pieces of the answers with memory of their own.
+    /// Fills pieces of a batch by threads with memory of their own.
     fn fill<W>(
         &self,
         work: impl Fn() -> W + Sync + Send,
@@ -235,7 +235,7 @@ impl Job<'_> {
         Ok(Answers { values, derivatives, width: self.width })
     }
 
-    /// Complains where a number is not finite.
+    /// Refuses a batch in which a number is not finite.
     fn sound(&self, numbers: &[f64], width: usize, what: &str) -> Result<()> {
         let Some(place) = numbers.iter().position(|number| !number.is_finite()) else { return Ok(()) };
         let path = format!("{what}{}[{}, {}] at this state", self.name, place / width, place % width);

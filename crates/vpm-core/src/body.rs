@@ -31,7 +31,7 @@ pub struct Body<P> {
     pub rotor_inertia: Option<P>,
 }
 
-/// A missing rotor (the derive would ask for `P: Default`).
+/// Missing rotor of a body (the derive would ask for `P: Default`).
 fn none<T>() -> Option<T> {
     None
 }
@@ -87,7 +87,7 @@ pub struct PointMass<S> {
 }
 
 impl<P> Inertia<P> {
-    /// The same inertia over another parameter type.
+    /// Inertia of a body over another parameter type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Inertia<T> {
         Inertia {
             mass: f(&self.mass),
@@ -155,7 +155,7 @@ impl<S: Scalar> Body<S> {
         self.inertia.map_or(Ok(SpatialInertia::zero()), |inertia| inertia.checked(&self.name))
     }
 
-    /// The inertia of the rotor of its joint, zero without one. Checked: finite and not negative.
+    /// Rotor inertia of a body's joint, zero without one. Checked: finite and not negative.
     pub fn rotor(&self) -> Result<S> {
         let rotor = self.rotor_inertia.unwrap_or(S::zero());
         let path = || format!("{}.rotor_inertia", self.joint.name);
@@ -169,7 +169,7 @@ impl<S: Scalar> Body<S> {
     }
 }
 
-/// Checks a mass (kg) and an inertia about the centre of mass (kg m^2), with `slack` (kg m^2) for its own rounding.
+/// Checks a body's mass (kg) and inertia about the centre of mass (kg m^2). `slack` (kg m^2) is for its own rounding.
 pub(crate) fn check_physical(body: &str, mass: f64, central: Symmetric3<f64>, slack: f64) -> Result<()> {
     if mass.is_nan() || mass <= 0.0 {
         return Err(Error::Mass { body: body.to_owned(), mass });

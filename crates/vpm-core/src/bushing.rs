@@ -43,7 +43,7 @@ pub struct BushingWrenches<S> {
 }
 
 impl<P> Bushing<P> {
-    /// The same law over another number type.
+    /// Bushing over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Bushing<T> {
         Bushing {
             stiffness: self.stiffness.each_ref().map(|row| row.each_ref().map(&mut *f)),
@@ -52,7 +52,7 @@ impl<P> Bushing<P> {
         }
     }
 
-    /// The parameters and where each is defined: entries on the diagonals are not negative.
+    /// Parameters of a bushing and where each is defined: entries on the diagonals are not negative.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let entry = |(k, entry)| (entry, if k % 7 == 0 { Domain::NonNegative } else { Domain::Any });
         let matrices = [&self.stiffness, &self.damping];
@@ -62,7 +62,7 @@ impl<P> Bushing<P> {
 }
 
 impl<S: Scalar> Bushing<S> {
-    /// Without coupling and preload: the six entries of each diagonal, `[angular; linear]`.
+    /// Bushing without coupling and preload: the six entries of each diagonal, `[angular; linear]`.
     pub fn diagonal(stiffness: [S; 6], damping: [S; 6]) -> Self {
         let matrix = |entries: [S; 6]| {
             std::array::from_fn(|i| std::array::from_fn(|j| if i == j { entries[i] } else { S::zero() }))
@@ -70,12 +70,13 @@ impl<S: Scalar> Bushing<S> {
         Self { stiffness: matrix(stiffness), damping: matrix(damping), preload: [S::zero(); 6] }
     }
 
-    /// Displacement d of the pose `X_BA`: rotation vector in rad and place in m.
+    /// Displacement d of a bushing at the pose `X_BA`: rotation vector in rad and place in m.
     pub fn displacement(pose: &Pose<S>) -> [S; 6] {
         stacked(pose.rotation.rotation_vector(), pose.translation)
     }
 
-    /// Rate of d for the motion of A against B, a twist at A's origin in A's axes: `V_A - X_BA^-1 V_B`.
+    /// Rate of a bushing's displacement for a twist of A against B: `V_A - X_BA^-1 V_B`. The twist is at A's origin in
+    /// A's axes.
     pub fn displacement_rate(pose: &Pose<S>, motion: Twist<S>) -> [S; 6] {
         let phi = pose.rotation.rotation_vector();
         stacked(inverse_tangent(phi, 0.5, motion.angular), pose.rotation * motion.linear)
@@ -93,14 +94,14 @@ impl<S: Scalar> Bushing<S> {
         BushingWrenches { on_a, on_b: -pose.wrench(on_a) }
     }
 
-    /// Potential energy in J at the pose `X_BA`, for symmetric K; zero without displacement.
+    /// Potential energy of a bushing in J at the pose `X_BA`, for symmetric K; zero without displacement.
     pub fn potential(&self, pose: &Pose<S>) -> S {
         let d = Self::displacement(pose);
         let spring = self.stiffness.iter().zip(&d).map(|(row, &entry)| product(row, &d) * entry).sum::<S>();
         spring * 0.5 - product(&self.preload, &d)
     }
 
-    /// Power in W that is lost, `(dd/dt)^T C dd/dt`.
+    /// Power in W that a bushing loses, `(dd/dt)^T C dd/dt`.
     pub fn dissipation(&self, pose: &Pose<S>, motion: Twist<S>) -> S {
         let rate = Self::displacement_rate(pose, motion);
         self.damping.iter().zip(&rate).map(|(row, &entry)| product(row, &rate) * entry).sum()
@@ -118,8 +119,9 @@ fn product<S: Scalar>(row: &[S; 6], column: &[S; 6]) -> S {
     row.iter().zip(column).map(|(&left, &right)| left * right).sum()
 }
 
-/// `J w = w + half phi x w + g phi x (phi x w)` with `g = (1 - (a/2) cot(a/2)) / a^2` and a = |phi|: for an angular velocity in the
-/// axes of A with `half = 1/2`, its transpose with `half = -1/2`.
+/// Inverse tangent of a bushing's rotation, `J w = w + half phi x w + g phi x (phi x w)`. With `g = (1 - (a/2)
+/// cot(a/2)) / a^2` and a = |phi|: for an angular velocity in the axes of A with `half = 1/2`, its transpose with `half
+/// = -1/2`.
 #[inline]
 fn inverse_tangent<S: Scalar>(phi: Vector3<S>, half: f64, w: Vector3<S>) -> Vector3<S> {
     let square = phi.dot(phi);
@@ -129,13 +131,14 @@ fn inverse_tangent<S: Scalar>(phi: Vector3<S>, half: f64, w: Vector3<S>) -> Vect
     w + once * S::from_f64(half) + skew * once * factor
 }
 
-/// g from its series in a^2 (Bernoulli numbers), so that derivatives hold at zero; what is left out is below rounding.
+/// Series in a^2 for g of a bushing (Bernoulli numbers), so that derivatives hold at zero. What is left out is below
+/// rounding.
 fn series<S: Scalar>(square: S) -> S {
     let terms = [12.0, 720.0, 30240.0, 1_209_600.0, 47_900_160.0, 1_307_674_368_000.0 / 691.0, 74_724_249_600.0];
     terms.into_iter().rev().fold(S::zero(), |sum, term: f64| sum * square + term.recip())
 }
 
-/// g from its closed form.
+/// Closed form for g of a bushing.
 fn closed<S: Scalar>(square: S) -> S {
     let half = square.sqrt() * 0.5;
     let (sine, cosine) = half.sin_cos();

@@ -42,7 +42,7 @@ fn upright() -> [f64; 9] {
 }
 
 impl Closure {
-    /// Axes, one of A and one of B, that stay perpendicular.
+    /// Axes in a closure, one of A and one of B, that stay perpendicular.
     pub fn perpendicular(self) -> &'static [(usize, usize)] {
         match self {
             Self::Spherical => &[],
@@ -51,14 +51,14 @@ impl Closure {
         }
     }
 
-    /// Number of its equations.
+    /// Number of a closure's equations.
     pub fn equations(self) -> usize {
         3 + self.perpendicular().len()
     }
 }
 
 impl LoopEntry {
-    /// Both frames, A first, as frames to keep track of.
+    /// Frames of a closure, A first, as frames to keep track of.
     pub fn markers(&self) -> [Marker; 2] {
         [("a", self.a), ("b", self.b)].map(|(end, frame)| {
             let BushingEnd { on, translation, rotation } = frame;

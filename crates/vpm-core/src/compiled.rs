@@ -118,7 +118,7 @@ impl Compiled {
         &self.description
     }
 
-    /// The machine at its start, with its own parameters.
+    /// Live machine of a compiled model at its start, with its own parameters.
     pub fn live(&self) -> Result<Live> {
         Live::new(self.description.clone(), &self.description.parameters, &self.start, self.stepping)
     }

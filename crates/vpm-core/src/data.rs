@@ -136,7 +136,7 @@ pub(crate) struct AbaSlot<S> {
 }
 
 impl<S: Scalar> Data<S> {
-    /// Allocates all buffers for `model`.
+    /// Allocates all data buffers for `model`.
     pub fn new(model: &Model<S>) -> Self {
         let (n, count) = (model.n_joints(), model.n_coordinates());
         let world = KinematicsSlot { pose: Pose::identity(), twist: Twist::zero() };
@@ -154,17 +154,19 @@ impl<S: Scalar> Data<S> {
         }
     }
 
-    /// The pose `X_WB` of body `k` after [`crate::dynamics::kinematics()`].
+    /// Pose `X_WB` of body `k` in the data after [`crate::dynamics::kinematics()`].
     pub fn pose(&self, k: usize) -> Option<Pose<S>> {
         self.kinematics.get(k + 1).map(|slot| slot.pose)
     }
 
-    /// The twist `V_WB` of body `k` at its own origin, in its own axes, after [`crate::dynamics::kinematics()`].
+    /// Twist `V_WB` of body `k` in the data, after [`crate::dynamics::kinematics()`]. At its own origin, in its own
+    /// axes.
     pub fn twist(&self, k: usize) -> Option<Twist<S>> {
         self.kinematics.get(k + 1).map(|slot| slot.twist)
     }
 
-    /// Makes coordinates `times` as heavy in the mass matrix of the last [`crate::dynamics::flexible::terms()`].
+    /// Makes coordinates `times` as heavy in the mass matrix of the data. It is that of the last
+    /// [`crate::dynamics::flexible::terms()`].
     pub(crate) fn weigh(&mut self, coordinates: &[u32], times: f64) {
         let n = self.acceleration.len();
         for &place in coordinates {
@@ -172,7 +174,7 @@ impl<S: Scalar> Data<S> {
         }
     }
 
-    /// Factorises the mass matrix of the last [`crate::dynamics::flexible::terms()`].
+    /// Factorises the mass matrix in the data of the last [`crate::dynamics::flexible::terms()`].
     pub(crate) fn factorise(&mut self) {
         self.composite.factors.factorise(&self.mass_matrix);
     }
@@ -182,7 +184,7 @@ impl<S: Scalar> Data<S> {
         self.composite.factors.solve(load);
     }
 
-    /// Adds to `loads` what `force` (N) on a line does to the coordinates: `J^T F`.
+    /// Adds to `loads` the `force` (N) on a line of the data: `J^T F`.
     pub(crate) fn line_load(&self, line: usize, force: S, loads: &mut [S]) {
         let LineSlot { direction, from, to, .. } = &self.composite.lines[line];
         for (load, (&to, &from)) in loads.iter_mut().zip(to.columns.iter().zip(&from.columns)) {
@@ -190,24 +192,26 @@ impl<S: Scalar> Data<S> {
         }
     }
 
-    /// Joint efforts (N or N m) of the last [`crate::dynamics::rnea()`].
+    /// Joint efforts (N or N m) in the data of the last [`crate::dynamics::rnea()`].
     pub fn effort(&self) -> &[S] {
         &self.effort
     }
 
-    /// Accelerations (m/s^2 or rad/s^2) of the last [`crate::dynamics::aba()`] or [`crate::dynamics::flexible::solve()`].
+    /// Accelerations (m/s^2 or rad/s^2) in the data. They are those of the last [`crate::dynamics::aba()`] or
+    /// [`crate::dynamics::flexible::solve()`].
     pub fn acceleration(&self) -> &[S] {
         &self.acceleration
     }
 
-    /// Mass matrix of the last [`crate::dynamics::crba()`] or [`crate::dynamics::flexible::terms()`], n x n, column by column.
+    /// Mass matrix in the data, n x n, column by column. It is that of the last [`crate::dynamics::crba()`] or
+    /// [`crate::dynamics::flexible::terms()`].
     pub fn mass_matrix(&self) -> &[S] {
         &self.mass_matrix
     }
 }
 
 impl<S: Scalar> LineSlot<S> {
-    /// How fast it grows, m/s.
+    /// Growth of a line in the data, m/s.
     #[inline]
     pub(crate) fn rate(&self) -> S {
         self.direction.dot(self.to.velocity - self.from.velocity)

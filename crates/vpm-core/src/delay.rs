@@ -34,7 +34,7 @@ impl<S: Scalar> SampleDelay<S> {
         at(newer) * (S::one() - self.fraction) + at(newer.saturating_sub(1)) * self.fraction
     }
 
-    /// Samples up to `k` of which something arrives after it.
+    /// Samples up to `k` of which a delay lets something arrive after it.
     #[inline]
     pub fn arriving(&self, k: usize) -> RangeInclusive<usize> {
         k.saturating_sub(self.whole)..=k

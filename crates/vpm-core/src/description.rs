@@ -137,55 +137,55 @@ impl Description {
         Ok(description)
     }
 
-    /// Number of joints.
+    /// Number of joints in a description.
     pub fn n_joints(&self) -> usize {
         self.bodies.len()
     }
 
-    /// Number of generalised coordinates: those of the joints lead, then the elastic ones, beam by beam.
+    /// Number of coordinates in a description: joints lead, then the elastic ones, beam by beam.
     pub fn n_coordinates(&self) -> usize {
         self.n_joints() + self.n_elastic()
     }
 
-    /// Number of elastic coordinates.
+    /// Number of elastic coordinates in a description.
     pub fn n_elastic(&self) -> usize {
         self.elastic.iter().sum()
     }
 
-    /// Number of elastic coordinates of each beam.
+    /// Number of elastic coordinates of each beam in a description.
     pub fn elastic(&self) -> &[usize] {
         &self.elastic
     }
 
-    /// Number of beams.
+    /// Number of beams in a description.
     pub fn n_beams(&self) -> usize {
         self.beams.len()
     }
 
-    /// Number of lines and transmissions.
+    /// Number of lines and transmissions in a description.
     pub fn n_wires(&self) -> usize {
         self.lines.len() + self.transmissions.len()
     }
 
-    /// Number of actuators.
+    /// Number of actuators in a description.
     pub fn n_actuators(&self) -> usize {
         self.actuators.len()
     }
 
-    /// Number of inputs: a command for each actuator, then a pressure for each logged supply.
+    /// Number of inputs in a description: a command for each actuator, a pressure for each logged supply.
     pub fn n_inputs(&self) -> usize {
         self.actuators.len() + self.supplies.iter().filter(|supply| supply.is_logged()).count()
     }
 
-    /// Length of the state: coordinates, rates, the states of each actuator (lag, then drive), states of each supply,
-    /// memories of hystereses.
+    /// Length of the state in a description. It has coordinates, rates, the states of each actuator (lag, then drive),
+    /// states of each supply, and memories of hystereses.
     pub fn n_states(&self) -> usize {
         let of_supplies: usize = self.supplies.iter().map(|supply| supply.states().count()).sum();
         let drives = self.actuators.iter().map(Actuator::n_states).sum::<usize>();
         2 * self.n_coordinates() + drives + of_supplies + self.remembering().count()
     }
 
-    /// Seats of the effects that remember, one for each.
+    /// Seats of the described effects that remember, one for each.
     pub(crate) fn remembering(&self) -> impl Iterator<Item = &Seat<usize>> {
         self.effects.iter().filter_map(|entry| match entry {
             EffectEntry::Memory { seat, .. } => Some(seat),
@@ -193,12 +193,12 @@ impl Description {
         })
     }
 
-    /// Number of output channels.
+    /// Number of output channels in a description.
     pub fn n_outputs(&self) -> usize {
         self.layout().count()
     }
 
-    /// Where the outputs are.
+    /// Layout of a description's outputs.
     pub fn layout(&self) -> Layout {
         let count =
             |kind: fn(&Drive<usize>) -> bool| self.actuators.iter().filter(|actuator| kind(&actuator.drive)).count();
@@ -219,13 +219,13 @@ impl Description {
         }
     }
 
-    /// Number of parameters.
+    /// Number of parameters of a description.
     pub fn n_parameters(&self) -> usize {
         self.parameters.len()
     }
 
-    /// Whether the machine exists with these parameters: right length, finite, every law defined, inertia physical, no joint without
-    /// inertia.
+    /// Checks whether the described machine exists with these parameters. They have the right length and are finite,
+    /// every law is defined, inertia physical, and no joint without inertia.
     pub fn check_values(&self, theta: &[f64]) -> Result<()> {
         check::parameters(self, theta)?;
         let model = self.model(theta)?;
@@ -240,7 +240,7 @@ impl Description {
         Ok(System::new(self.machine(theta, &values)?)?.with_balls(self.balls.iter().map(|ball| (ball, false))))
     }
 
-    /// All that a [`System`] is made from, with the checked parameters `theta`, whose plain numbers are `values`.
+    /// Described machine for a [`System`], with the checked parameters `theta`, whose values are `values`.
     pub(crate) fn machine<'a, S: Scalar>(&self, theta: &'a [S], values: &[f64]) -> Result<Machine<'a, S>> {
         let supplies = self.supplies.iter().filter(|supply| supply.is_logged());
         let commands = self.actuators.iter().map(|_| S::zero());
@@ -254,12 +254,12 @@ impl Description {
         })
     }
 
-    /// The functions of the machine, recorded as they are asked for.
+    /// Functions of the described machine, recorded as they are asked for.
     pub(crate) fn functions(&self) -> Arc<Functions> {
         self.recorded.functions(|| Box::new(self.clone()))
     }
 
-    /// The engine that evaluates the function `kind` for so many motions, with the parameters `theta`.
+    /// Engine of the described machine for the function `kind` of many motions, with the parameters `theta`.
     ///
     /// # Errors
     /// The parts cannot be built, or a law decides by the value of a state.
@@ -268,7 +268,7 @@ impl Description {
         Engine::of_values((kind, theta, motions), function, || Build::dynamics(&self, theta))
     }
 
-    /// A function of the machine as a program of operations, its parts built for the checked parameters `theta`.
+    /// Program of a described machine's function, built for the checked parameters `theta`.
     ///
     /// # Errors
     /// [`Error::Unrecorded`] where a law decides by the value of a state.
@@ -276,7 +276,7 @@ impl Description {
         Placed::new(self, self.places(), theta, kind)
     }
 
-    /// Where the inputs of its functions stand.
+    /// Places of the inputs of a described machine's functions.
     pub(crate) fn places(&self) -> Places {
         Places {
             coordinates: self.n_coordinates(),
@@ -286,17 +286,17 @@ impl Description {
         }
     }
 
-    /// The sensors over the number type of `theta`.
+    /// Sensors of a description over the number type of `theta`.
     pub(crate) fn sensors<S: Scalar>(&self, theta: &[S]) -> Vec<Sensor<S>> {
         self.sensors.iter().map(|sensor| sensor.map(&mut |&index| theta[index])).collect()
     }
 
-    /// The actuators over the number type of `theta`.
+    /// Actuators of a description over the number type of `theta`.
     pub(crate) fn actuators_of<S: Scalar>(&self, theta: &[S]) -> Vec<Actuator<S>> {
         self.actuators.iter().map(|actuator| actuator.map(&mut |&index| theta[index])).collect()
     }
 
-    /// Effects that remember, relaxed, over the number type of `theta`.
+    /// Memories of a description's effects, relaxed, over the number type of `theta`.
     pub(crate) fn memories_of<S: Scalar>(&self, theta: &[S]) -> Memories<S> {
         Memories::new(self.effects.iter().filter_map(|entry| entry.with_memory(theta)).collect())
     }
@@ -377,7 +377,7 @@ impl EffectEntry {
         }
     }
 
-    /// Where it puts an effort on joints; nowhere for what belongs to the tree.
+    /// Seat of a described effect's effort on joints; nowhere for what belongs to the tree.
     pub(crate) fn seat(&self) -> Option<&Seat<usize>> {
         match self {
             Self::Joint { seat, .. } | Self::Memory { seat, .. } => Some(seat),
@@ -385,7 +385,7 @@ impl EffectEntry {
         }
     }
 
-    /// The joint with which the rotor turns that it adds, if it is such an effect.
+    /// Joint with which the rotor of a described effect turns, if it adds one.
     fn rotor(&self) -> Option<usize> {
         match self {
             Self::Tree(TreeEffect::RotorInertia { joint, .. }) => Some(*joint),

@@ -7,7 +7,7 @@ use crate::statics::Statics;
 use crate::system::{Build, Dynamics, LoopState};
 use crate::table::Table;
 
-/// Accelerations of all coordinates under `effort` (N or N m) on the joints, with all effects.
+/// Evaluates accelerations of all coordinates under `effort` (N or N m) on the joints, with all effects.
 pub fn accelerations(
     description: &Description,
     theta: &[f64],
@@ -21,12 +21,13 @@ pub fn accelerations(
     Ok(dynamics.accelerations(position, velocity, effort).to_vec())
 }
 
-/// Mass matrix with payloads, n x n over all coordinates.
+/// Evaluates the mass matrix with payloads, n x n over all coordinates.
 pub fn mass_matrix(description: &Description, theta: &[f64], position: &[f64]) -> Result<Vec<f64>> {
     Ok(prepare(description, theta, [("position", position)])?.mass_matrix(position).to_vec())
 }
 
-/// Kinetic and potential energy in J. The potential is that of gravity, of the beams, and of the effects that have one.
+/// Evaluates kinetic and potential energy in J. The potential is that of gravity, of the beams, and of the effects that
+/// have one.
 ///
 /// Checked: with efforts of the actuators and frictions accounted for, the sum is conserved along a simulated run.
 pub fn energy(description: &Description, theta: &[f64], position: &[f64], velocity: &[f64]) -> Result<(f64, f64)> {
@@ -35,7 +36,8 @@ pub fn energy(description: &Description, theta: &[f64], position: &[f64], veloci
     Ok((total.kinetic, total.potential))
 }
 
-/// All coordinates at rest under gravity with the joints held at `position` (one per joint), and the efforts that hold them.
+/// Evaluates the equilibrium under gravity with the joints held at `position`, and the holding efforts. `position` has
+/// one per joint; the result has all coordinates.
 pub fn equilibrium(description: &Description, theta: &[f64], position: &[f64]) -> Result<(Vec<f64>, Vec<f64>)> {
     let mut statics = held(description, theta, position)?;
     let rest = statics.settle(position)?;
@@ -43,8 +45,8 @@ pub fn equilibrium(description: &Description, theta: &[f64], position: &[f64]) -
     Ok((rest.coordinates, efforts))
 }
 
-/// States of drives and supplies of a machine that has stood at `position` (all coordinates) without commands: what follows coordinates
-/// and rates in a state.
+/// Evaluates states of drives and supplies of a machine that has stood at `position` without commands. `position` has
+/// all coordinates. The result follows coordinates and rates in a state.
 ///
 /// Law: lags, currents and spools 0; visco-elastic elements settled at their length; chambers without net force, `A pa = alpha A pb` and
 /// `pa + pb = ps + pt`; sagging supplies at their pressure.
@@ -55,8 +57,8 @@ pub fn internal_state(description: &Description, theta: &[f64], position: &[f64]
     Ok(states)
 }
 
-/// Memories of effects at every sample, `time_step` (s) apart, of a path of the joints (`position`, N x joints, m or rad), row by row,
-/// relaxed at the first.
+/// Evaluates memories of effects at every sample of a path of the joints, relaxed at the first. Samples are `time_step`
+/// (s) apart; `position` is N x joints, m or rad, row by row.
 pub fn memories(description: &Description, theta: &[f64], position: Table<'_>, time_step: f64) -> Result<Vec<f64>> {
     position.expect("position", position.rows(), description.n_joints())?;
     description.check_values(theta)?;
@@ -72,8 +74,8 @@ pub fn memories(description: &Description, theta: &[f64], position: Table<'_>, t
     Ok(values)
 }
 
-/// Natural frequencies in Hz with the joints locked at `position` (one per joint), about rest under gravity, slowest first; negative
-/// for growth instead of vibration.
+/// Evaluates natural frequencies in Hz with the joints locked at `position` (one per joint). They are about rest under
+/// gravity, slowest first; negative for growth instead of vibration.
 ///
 /// Checked: against the closed form of a clamped beam.
 pub fn natural_frequencies(description: &Description, theta: &[f64], position: &[f64]) -> Result<Vec<f64>> {
@@ -82,8 +84,8 @@ pub fn natural_frequencies(description: &Description, theta: &[f64], position: &
     statics.natural_frequencies(&rest)
 }
 
-/// For each state (N x states) and each beam the largest slope of its axis in rad, where its kinematics are right for small slopes only;
-/// not a number where they are exact.
+/// Evaluates the largest slope of each beam's axis in rad for each state (N x states). It has a value where kinematics
+/// are right for small slopes only, and is not a number where they are exact.
 pub fn slopes(description: &Description, theta: &[f64], states: Table<'_>) -> Result<Vec<f64>> {
     states.expect("states", states.rows(), description.n_states())?;
     let dynamics = prepare(description, theta, [])?;

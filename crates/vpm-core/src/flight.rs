@@ -11,7 +11,7 @@ pub struct SoftPlay {
     pub damping: f64,
 }
 
-/// Acceleration of the link against the motor for each of the plays: N x plays, row by row.
+/// Flights through backlashes: acceleration of the link against the motor for each. N x backlashes, row by row.
 ///
 /// Law: `y'' = pull` within the gap and `y'' = pull - w^2 (y -+ gap/2) - 2 z w y'` beyond it, `pull` in m/s^2 or rad/s^2 against the
 /// motor, one per sample, `w` the rate and z the damping ratio. Steps of `interval` (s) take the damping at the new velocity and the
@@ -38,7 +38,7 @@ pub fn soft_flights(pull: &[f64], plays: &[SoftPlay], interval: f64) -> Vec<f64>
     swing
 }
 
-/// Way beyond the play; what is no number stays none.
+/// Way of a flight beyond the backlash; what is no number stays none.
 fn beyond(place: f64, half: f64) -> f64 {
     if place < -half {
         place + half

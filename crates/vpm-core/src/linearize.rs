@@ -32,7 +32,7 @@ pub struct Linearization {
     pub reading: Vec<f64>,
 }
 
-/// A, B, C and D at `state` under the commands `inputs`, exact to rounding.
+/// Linearizes at `state` under the commands `inputs`: A, B, C and D, exact to rounding.
 ///
 /// The inputs are commands that stand for long: delays of actuators and sensors, which a matrix cannot hold, pass them unchanged.
 /// Dead zones and saturations have the slope they have at the command, zero inside a dead zone and beyond a limit; a lag is a
@@ -78,7 +78,8 @@ impl Tangent {
         Ok(Self { readings: Routine::new(readings, &theta), state, commands })
     }
 
-    /// Rates and outputs with their derivatives along [`LANES`] directions, of which `first` is the first: states, then inputs.
+    /// Rates and outputs with derivatives along [`LANES`] directions from `first`, to linearize. Directions are states,
+    /// then inputs.
     fn evaluate(&mut self, state: &[f64], inputs: &[f64], first: usize) -> (&[Number], &[Number]) {
         // A direction that is not among these wraps around to a lane that does not exist, which gives a constant.
         let lift = |(place, &value): (usize, &f64)| Dual::variable(value, place.wrapping_sub(first));
@@ -94,7 +95,7 @@ impl Tangent {
 }
 
 impl Linearization {
-    /// Takes over the columns that begin at direction `first`.
+    /// Takes the columns from direction `first` into a linearized machine.
     fn take(&mut self, first: usize, (nx, nu): (usize, usize), (rate, reading): (&[Number], &[Number])) {
         fill(rate, first, [(&mut self.state, 0..nx), (&mut self.input, nx..nx + nu)]);
         fill(reading, first, [(&mut self.output, 0..nx), (&mut self.feedthrough, nx..nx + nu)]);
@@ -117,7 +118,8 @@ impl Linearization {
     }
 }
 
-/// Writes the derivatives of `numbers` along the directions from `first` into matrices that hold ranges of all directions.
+/// Fills matrices of a linearized machine with the derivatives of `numbers` from direction `first`. The matrices hold
+/// ranges of all directions.
 fn fill(numbers: &[Number], first: usize, matrices: [(&mut Vec<f64>, std::ops::Range<usize>); 2]) {
     for (matrix, range) in matrices {
         for (row, number) in matrix.chunks_exact_mut(range.len().max(1)).zip(numbers) {

@@ -56,7 +56,7 @@ pub struct Live {
 }
 
 impl Live {
-    /// The machine in `state`, no command given yet.
+    /// Live machine in `state`, no command given yet.
     pub fn new(description: Arc<Description>, theta: &[f64], state: &[f64], stepping: Stepping) -> Result<Self> {
         check_state("state", &description, state)?;
         check_step(&description, theta, stepping, state)?;
@@ -90,7 +90,8 @@ impl Live {
         Ok(live)
     }
 
-    /// Goes on by machine code, made here if the description has none yet: takes up to some tenths of a second now, and none later.
+    /// Compiles the live machine, if the description has no code yet. That takes up to some tenths of a second now, and
+    /// none later.
     ///
     /// # Errors
     /// Why there is no machine code, in one sentence; then the simulation goes on by direct evaluation.
@@ -100,44 +101,44 @@ impl Live {
         Ok(())
     }
 
-    /// Whether it goes on by machine code.
+    /// Whether the live machine goes on by machine code.
     pub fn is_compiled(&mut self) -> bool {
         self.system.has_code()
     }
 
-    /// The machine.
+    /// Description of the live machine.
     pub fn description(&self) -> &Description {
         &self.description
     }
 
-    /// Whether the other is a simulation of the same machine with the same parameters and steps, at whatever time.
+    /// Whether another live simulation has the same machine, parameters and steps, at whatever time.
     pub fn is_alike(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.description, &other.description)
             && self.stepping == other.stepping
             && self.theta == other.theta
     }
 
-    /// The parameters of the machine.
+    /// Parameters of the live machine.
     pub fn parameters(&self) -> &[f64] {
         &self.theta
     }
 
-    /// The state now.
+    /// State of the live machine now.
     pub fn state(&self) -> &[f64] {
         &self.state
     }
 
-    /// What the sensors show now.
+    /// Outputs of the live machine now, as sensors show them.
     pub fn outputs(&self) -> &[f64] {
         &self.outputs
     }
 
-    /// Time since the beginning, s.
+    /// Time of the live machine since the beginning, s.
     pub fn time(&self) -> f64 {
         self.sample as f64 * self.stepping.time_step
     }
 
-    /// Begins again in `state` at time zero, with no command and nothing remembered.
+    /// Resets the live machine to `state` at time zero, with no command and nothing remembered.
     pub fn reset(&mut self, state: &[f64]) -> Result<()> {
         check_state("state", &self.description, state)?;
         let mut start = state.to_vec();
@@ -159,7 +160,7 @@ impl Live {
         self.lost.clone().map_or(Ok(()), Err)
     }
 
-    /// Puts logged supplies at their own pressure, until one is given.
+    /// Puts logged supplies of the live machine at their own pressure, until one is given.
     fn feed(&mut self) {
         let (actuators, inputs) = (self.description.n_actuators(), self.description.n_inputs());
         for row in self.commands.chunks_exact_mut(inputs.max(1)) {
@@ -170,8 +171,8 @@ impl Live {
         }
     }
 
-    /// Holds the inputs (a command for each actuator, a pressure for each logged supply) for the time of one sample, and shows the outputs
-    /// at its end.
+    /// Steps the live machine: holds the inputs for the time of one sample, and shows the outputs at its end. There is
+    /// a command for each actuator, a pressure for each logged supply.
     pub fn step(&mut self, inputs: &[f64]) -> Result<&[f64]> {
         Table::vector("inputs", inputs, self.description.n_inputs(), INPUT)?;
         if let Some(error) = &self.lost {
@@ -196,7 +197,8 @@ impl Live {
         self.observe(sample + 1)
     }
 
-    /// Puts on actuators and supplies what the inputs until now amount to over the coming interval; sampled drives that are due act.
+    /// Holds on the live machine's actuators and supplies what inputs amount to over the coming interval. Sampled
+    /// drives that are due act.
     fn hold(&mut self) -> Result<()> {
         for number in 0..self.description.n_inputs() {
             let input = self.arrived(number);
@@ -224,7 +226,7 @@ impl Live {
         }
     }
 
-    /// What input `number` amounts to over the coming interval.
+    /// Input `number` of the live machine that arrives over the coming interval.
     fn arrived(&self, number: usize) -> f64 {
         let Self { system, commands, depth, sample, description, .. } = self;
         let inputs = description.n_inputs();
@@ -232,7 +234,7 @@ impl Live {
         system.input(number, *sample, self.stepping.time_step, command)
     }
 
-    /// Comes to the next state at `sample`, if it and what the sensors show there are what they can be.
+    /// Observes the live machine's next state at `sample`, if it and the readings are what they can be.
     fn observe(&mut self, sample: usize) -> Result<()> {
         if let Some(place) = self.bounds.outside(&self.local) {
             let (what, event) = self.bounds.complaint(&self.description, place, self.local[place]);
@@ -288,8 +290,8 @@ impl Live {
     }
 }
 
-/// Holds the inputs (row by row, one row each) in simulations of the same machine over so many samples, on several threads; what became of
-/// each. A simulation does the same as by [`Live::step`], whatever the others do.
+/// Steps many live simulations of the same machine, on several threads; what became of each. Inputs (row by row, one
+/// row each) are held over so many samples. A simulation does the same as by [`Live::step`], whatever the others do.
 pub fn step_all(lives: &mut [&mut Live], inputs: Table<'_>, samples: usize) -> Result<Vec<Result<()>>> {
     let width = lives.first().map_or(0, |live| live.description.n_inputs());
     inputs.expect("inputs", lives.len(), width)?;
@@ -299,7 +301,7 @@ pub fn step_all(lives: &mut [&mut Live], inputs: Table<'_>, samples: usize) -> R
     Ok(lives.par_iter_mut().with_min_len(least).enumerate().map(|(row, live)| one((row, live))).collect())
 }
 
-/// Samples to remember: the longest delay, the interpolation beyond it, and the sample itself.
+/// Samples that a live machine remembers: the longest delay, interpolation beyond it, and the sample itself.
 fn depth(description: &Description, theta: &[f64], time_step: f64) -> Result<usize> {
     let of_actuators = description.actuators.iter().filter_map(|actuator| actuator.delay.as_ref().map(|d| d.time));
     let of_sensors = description.sensors.iter().filter_map(|sensor| sensor.delay);

@@ -108,7 +108,7 @@ pub(crate) struct Strip {
 }
 
 impl Strip {
-    /// Strain per unit of each coordinate of its beam.
+    /// Strain in a model's gauge per unit of each coordinate of its beam.
     pub(crate) fn row(&self) -> Vec<f64> {
         let mut row = vec![0.0; self.len];
         let [x, y] = self.point;
@@ -156,82 +156,85 @@ pub(crate) struct Wire<S> {
 }
 
 impl<S: Scalar> Model<S> {
-    /// Builds a tree of rigid bodies with point masses (payloads) on them, under `gravity` in m/s^2 in the world frame.
+    /// Model of a tree of rigid bodies with point masses (payloads), under `gravity` in m/s^2. Gravity is in the world
+    /// frame.
     pub fn new(gravity: [f64; 3], bodies: &[Body<S>], point_masses: &[PointMass<S>]) -> Result<Self> {
         let (bodies, point_masses) = (bodies.to_vec(), point_masses.to_vec());
         let gravity = gravity.map(S::from_f64);
         Self::assemble(Parts { gravity, bodies, point_masses, ..Parts::default() })
     }
 
-    /// Number of joints and bodies.
+    /// Number of a model's joints and bodies.
     #[inline]
     pub fn n_joints(&self) -> usize {
         self.links.len()
     }
 
-    /// Number of coordinates: joints, then elastic coordinates beam by beam.
+    /// Number of a model's coordinates: joints, then elastic coordinates beam by beam.
     #[inline]
     pub fn n_coordinates(&self) -> usize {
         self.n_coordinates
     }
 
-    /// Number of elastic coordinates.
+    /// Number of a model's elastic coordinates.
     #[inline]
     pub fn n_elastic(&self) -> usize {
         self.n_coordinates - self.links.len()
     }
 
-    /// Whether the algorithms for rigid trees apply: no elastic beams, no lines with mass, no rotor that several joints turn, parents listed
-    /// before their children, a mass matrix in one piece.
+    /// Whether the algorithms for rigid trees apply to the model. That means no elastic beams, no lines with mass, no
+    /// rotor that several joints turn, parents listed before their children, and a mass matrix in one piece.
     #[inline]
     pub fn is_recursive(&self) -> bool {
         self.recursive
     }
 
-    /// Whether the recursion over bodies and segments of beams applies: no lines with mass, no rotor that several joints turn, a mass matrix
-    /// in one piece, products of rates counted everywhere or nowhere.
+    /// Whether the recursion over bodies and segments of beams applies to the model. That means no lines with mass, no
+    /// rotor that several joints turn, a mass matrix in one piece, and products of rates counted everywhere or nowhere.
     #[inline]
     pub fn is_segmented(&self) -> bool {
         self.segmented
     }
 
-    /// Whether that recursion is the fastest way to accelerations: it applies, and there are coordinates enough.
+    /// Whether the articulated recursion is a model's fastest way to accelerations. It applies, and there are
+    /// coordinates enough.
     #[inline]
     pub fn is_articulated(&self) -> bool {
         self.articulated
     }
 
-    /// Whether a frame is a slice of a beam that its beam's sums hold.
+    /// Whether a model's frame is a slice of a beam that its beam's sums hold.
     #[inline]
     pub(crate) fn is_summed(&self, frame: usize) -> bool {
         self.summed[frame]
     }
 
-    /// Whether anything with coordinates hangs on a frame.
+    /// Whether anything with coordinates hangs on a frame of the model.
     #[inline]
     pub(crate) fn is_carrier(&self, frame: usize) -> bool {
         self.carriers[frame]
     }
 
-    /// Whether products of rates count: Coriolis, centrifugal and gyroscopic terms. Without them `h(q, v) = h(q, 0)`.
+    /// Whether the model keeps products of rates: Coriolis, centrifugal and gyroscopic terms. Without them `h(q, v) =
+    /// h(q, 0)`.
     #[inline]
     pub fn keeps_velocity_terms(&self) -> bool {
         !self.drops_velocity_terms
     }
 
-    /// Whether the mass matrix is in one piece.
+    /// Whether the model's mass matrix is in one piece.
     #[inline]
     pub fn couples(&self) -> bool {
         self.couples
     }
 
-    /// Which products of rates count, frame by frame.
+    /// Products of rates that the model keeps, frame by frame.
     #[inline]
     pub(crate) fn products(&self) -> &[Products] {
         &self.products
     }
 
-    /// Whether the accelerations by products of rates of a beam's sections are asked for.
+    /// Whether the model needs accelerations by products of rates of a beam's sections.
     #[inline]
     pub(crate) fn accelerates(&self, beam: usize) -> bool {
         self.beams[beam].frame.is_none_or(|first| {
@@ -240,104 +243,106 @@ impl<S: Scalar> Model<S> {
         })
     }
 
-    /// The block of the mass matrix that each coordinate is in.
+    /// Block of the model's mass matrix that each coordinate is in.
     #[inline]
     pub(crate) fn blocks(&self) -> &[usize] {
         &self.blocks
     }
 
-    /// Gravity in m/s^2, in the world frame.
+    /// Gravity of the model in m/s^2, in the world frame.
     #[inline]
     pub fn gravity(&self) -> Vector3<S> {
         self.gravity
     }
 
-    /// Name of body `k`, if there is one.
+    /// Name of the model's body `k`, if there is one.
     pub fn body_name(&self, k: usize) -> Option<&str> {
         self.frames.get(k).map(|frame| frame.name.as_str())
     }
 
-    /// Joint `k` on the frame that it hangs on, if there is one.
+    /// Joint `k` of the model on the frame that it hangs on, if there is one.
     pub fn joint(&self, k: usize) -> Option<&Joint> {
         self.frames.get(k).map(|frame| &frame.joint)
     }
 
-    /// Spatial inertia of body `k` with all that is welded to it, in the body's frame, if there is one.
+    /// Spatial inertia of the model's body `k` with all that is welded to it, if there is one. It is in the body's
+    /// frame.
     pub fn inertia(&self, k: usize) -> Option<SpatialInertia<S>> {
         self.frames.get(k).map(|frame| frame.inertia)
     }
 
-    /// Number of beams, rigid ones included.
+    /// Number of the model's beams, rigid ones included.
     pub fn n_beams(&self) -> usize {
         self.beams.len()
     }
 
-    /// Beam `k` and its first coordinate, if there is one.
+    /// Beam `k` of the model and its first coordinate, if there is one.
     pub fn beam(&self, k: usize) -> Option<(&Beam<S>, usize)> {
         self.beams.get(k).map(|elastic| (&elastic.beam, elastic.coordinate))
     }
 
-    /// The links in the order of their coordinates.
+    /// Links of the model in the order of their coordinates.
     #[inline]
     pub(crate) fn links(&self) -> &[Link<S>] {
         &self.links
     }
 
-    /// The bodies in their own frames.
+    /// Bodies of the model in their own frames.
     #[inline]
     pub(crate) fn frames(&self) -> &[BodyFrame<S>] {
         &self.frames
     }
 
-    /// The beams.
+    /// Beams of the model.
     #[inline]
     pub(crate) fn beams(&self) -> &[Elastic<S>] {
         &self.beams
     }
 
-    /// Bodies and elastic beams, each after all that it hangs on.
+    /// Bodies and elastic beams of the model, each after all that it hangs on.
     #[inline]
     pub(crate) fn order(&self) -> &[Node] {
         &self.order
     }
 
-    /// The lines.
+    /// Lines of the model.
     #[inline]
     pub(crate) fn lines(&self) -> &[Wire<S>] {
         &self.lines
     }
 
-    /// The shafts of transmissions.
+    /// Shafts of the model's transmissions.
     #[inline]
     pub(crate) fn shafts(&self) -> &[Shaft<S>] {
         &self.shafts
     }
 
-    /// Number of lines and shafts. These are numbered after the lines wherever a force along something is meant.
+    /// Number of the model's lines and shafts. These are numbered after the lines wherever a force along something is
+    /// meant.
     #[inline]
     pub(crate) fn n_wires(&self) -> usize {
         self.lines.len() + self.shafts.len()
     }
 
-    /// The markers.
+    /// Markers of the model.
     #[inline]
     pub(crate) fn markers(&self) -> &[Place] {
         &self.markers
     }
 
-    /// The frames that contacts and bushings act on.
+    /// Frames of the model that contacts and bushings act on.
     #[inline]
     pub(crate) fn attachments(&self) -> &[Place] {
         &self.attachments
     }
 
-    /// The strain gauges.
+    /// Strain gauges of the model.
     #[inline]
     pub(crate) fn gauges(&self) -> &[Strip] {
         &self.gauges
     }
 
-    /// Beam and station of a frame that belongs to an elastic beam.
+    /// Beam and station of a model's frame that belongs to an elastic beam.
     pub(crate) fn station(&self, frame: usize) -> Option<(usize, usize)> {
         self.beams.iter().enumerate().find_map(|(number, elastic)| {
             let station = frame.checked_sub(elastic.frame?)?;
@@ -345,7 +350,7 @@ impl<S: Scalar> Model<S> {
         })
     }
 
-    /// Number of frames that something can sit on.
+    /// Number of the model's frames that something can sit on.
     #[inline]
     pub(crate) fn n_frames(&self) -> usize {
         self.n_frames
@@ -353,7 +358,8 @@ impl<S: Scalar> Model<S> {
 }
 
 impl<S: Scalar> Model<S> {
-    /// Lets the joint `k`, which turns, begin at an orientation that is held beside the coordinates; at first there is none.
+    /// Lets joint `k` of the model begin at an orientation that is held beside the coordinates. The joint turns; at
+    /// first there is none.
     ///
     /// It becomes a screw without pitch: the same motion, out of the way of the joints that are in almost every machine.
     pub(crate) fn turn_freely(&mut self, k: usize) {
@@ -362,7 +368,7 @@ impl<S: Scalar> Model<S> {
         self.orient(4 * self.turned.len() - 4, S::one());
     }
 
-    /// The orientation from which a joint begins.
+    /// Orientation from which a joint of the model begins.
     pub(crate) fn orientation(&self, k: usize) -> Quaternion<S> {
         let own = self.turned.iter().find(|(joint, _)| *joint == k);
         own.map_or(Quaternion::identity(), |(_, orientation)| *orientation)
@@ -374,7 +380,7 @@ impl<S: Scalar> Model<S> {
         4 * self.turned.len()
     }
 
-    /// Holds a number of an orientation from which a joint begins: w, x, y, z of each unit quaternion.
+    /// Holds a number of an orientation from which a model's joint begins: w, x, y, z of each unit quaternion.
     pub(crate) fn orient(&mut self, place: usize, number: S) {
         let (link, turn) = &mut self.turned[place / 4];
         let Quaternion { real, vector } = turn;
@@ -390,7 +396,7 @@ impl<S: Scalar> Model<S> {
 }
 
 impl<S: Scalar> Wire<S> {
-    /// Whether it weighs anything.
+    /// Whether a line or shaft of the model weighs anything.
     #[inline]
     pub(crate) fn is_massive(&self) -> bool {
         self.barrel.is_some() || self.rod.is_some()
@@ -398,7 +404,7 @@ impl<S: Scalar> Wire<S> {
 }
 
 impl<S: Scalar> Link<S> {
-    /// A body with its joint, on a frame with that alignment of its own.
+    /// Link of the model: a body with its joint, on a frame with that alignment of its own.
     fn new(
         (joint, rotor): (&Joint, S),
         parent: usize,
@@ -419,7 +425,7 @@ impl<S: Scalar> Link<S> {
         }
     }
 
-    /// The pose `X_PB` of the body in its parent at coordinate `q`, both in aligned frames.
+    /// Pose `X_PB` of a model's body in its parent at coordinate `q`, both in aligned frames.
     #[inline]
     pub(crate) fn pose(&self, q: S) -> Pose<S> {
         let [.., z] = self.rotation.columns;
@@ -431,7 +437,7 @@ impl<S: Scalar> Link<S> {
         }
     }
 
-    /// The pose of a screw; out of the way of the other two kinds, which are in almost every machine.
+    /// Pose of a model's screw joint; out of the way of the other two kinds, which are in almost every machine.
     #[cold]
     fn screwed(&self, q: S, pitch: f64) -> Pose<S> {
         if let Some(turn) = self.turn {
@@ -456,7 +462,7 @@ impl<S: Scalar> Link<S> {
     }
 }
 
-/// A constant vector times a number: cheaper than a product of two numbers that carry derivatives.
+/// Constant vector of the model times a number. That is cheaper than a product of two numbers that carry derivatives.
 #[inline]
 fn scaled<S: Scalar>(v: Vector3<f64>, factor: S) -> Vector3<S> {
     Vector3::new(factor * v.x, factor * v.y, factor * v.z)

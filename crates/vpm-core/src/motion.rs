@@ -27,21 +27,21 @@ pub struct StrainRates<'a> {
     pub gain: &'a [f64],
 }
 
-/// The sensor on each gauge, if there is one.
+/// Sensors on the gauges in a measured motion, where there are any.
 pub(crate) fn strain_sensors<S: Scalar>(description: &Description, theta: &[S]) -> Vec<Option<Sensor<S>>> {
     let sensors = description.sensors(theta);
     let on = |gauge| sensors.iter().find(|sensor| sensor.channel == Channel::Strain { gauge }).cloned();
     (0..description.gauges.len()).map(on).collect()
 }
 
-/// The sensor on the position of each joint, if there is one.
+/// Sensors on the joint positions of a measured motion, where there are any.
 pub(crate) fn position_sensors<S: Scalar>(description: &Description, theta: &[S]) -> Vec<Option<Sensor<S>>> {
     let sensors = description.sensors(theta);
     let on = |joint| sensors.iter().find(|sensor| sensor.channel == Channel::Position { joint }).cloned();
     (0..description.n_joints()).map(on).collect()
 }
 
-/// The sensor on each of the states of drives and supplies at `places`, if there is one.
+/// Sensors beside a measured motion on the states of drives and supplies at `places`, if any.
 pub(crate) fn state_sensors<S: Scalar>(
     description: &Description,
     theta: &[S],
@@ -55,7 +55,7 @@ pub(crate) fn state_sensors<S: Scalar>(
     places.iter().map(on).collect()
 }
 
-/// The channel that shows each state of the drives, if one does.
+/// Channels beside a measured motion that show each state of the drives, if one does.
 fn state_channels(description: &Description) -> Vec<Option<Channel>> {
     let (mut hydraulic, mut dc_motor, mut channels) = (0, 0, Vec::new());
     for actuator in &description.actuators {
@@ -86,14 +86,15 @@ fn state_channels(description: &Description) -> Vec<Option<Channel>> {
 }
 
 impl JointMotion<'_> {
-    /// Checks that all three tables are of the same rows and so many joints.
+    /// Checks that the three tables of a motion have the same rows and so many joints.
     pub(crate) fn expect(&self, joints: usize) -> Result<()> {
         let rows = self.position.rows();
         let tables = [("position", self.position), ("velocity", self.velocity), ("acceleration", self.acceleration)];
         tables.iter().try_for_each(|(name, table)| table.expect(name, rows, joints))
     }
 
-    /// Position, velocity and acceleration of a joint behind what was measured at sample `k`, `time_step` (s) after the one before.
+    /// True motion of a joint behind what was measured at sample `k`. Position, velocity and acceleration; `time_step`
+    /// (s) after the sample before.
     #[inline]
     pub(crate) fn behind<S: Scalar>(
         &self,

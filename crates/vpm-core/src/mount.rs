@@ -71,7 +71,7 @@ pub(crate) fn placed(name: &str, translation: [f64; 3], rotation: [f64; 9]) -> R
     Ok(Pose::new(matrix, Vector3::from_f64(translation)))
 }
 
-/// Checks that all numbers of a list are finite.
+/// Checks that all numbers of a mount are finite.
 pub(crate) fn check_finite(name: &str, group: &str, numbers: &[f64]) -> Result<()> {
     match numbers.iter().enumerate().find(|(_, value)| !value.is_finite()) {
         Some((index, &value)) => Err(Error::NonFinite { path: format!("{name}.{group}[{index}]"), value }),

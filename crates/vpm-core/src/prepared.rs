@@ -16,7 +16,7 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// The machine with the parameters `theta`.
+    /// Prepared machine with the parameters `theta`.
     pub fn new(description: &Description, theta: &[f64]) -> Result<Self> {
         description.check_values(theta)?;
         let n = description.n_coordinates();
@@ -24,13 +24,14 @@ impl Prepared {
         Ok(Self { dynamics, efforts: vec![0.0; n], jacobian: vec![0.0; 6 * n] })
     }
 
-    /// Number of coordinates.
+    /// Number of coordinates of a prepared machine.
     #[inline]
     pub fn coordinates(&self) -> usize {
         self.efforts.len()
     }
 
-    /// Efforts (N or N m) on all coordinates for accelerations `a` at coordinates `q` and rates `v`, those of the effects taken off.
+    /// Inverse dynamics of a prepared machine: efforts (N or N m) for accelerations `a` at `q` and `v`. They are on all
+    /// coordinates, those of the effects taken off.
     ///
     /// Law: `M(q) a + h(q, v) + K q + D v - effects(q, v)`; frictions, springs, loads and payloads are carried as well. Inverse of
     /// [`Prepared::forward_dynamics`].
@@ -41,7 +42,8 @@ impl Prepared {
         sound("effort", &self.efforts)
     }
 
-    /// Accelerations (m/s^2 or rad/s^2) that efforts `tau` (N or N m) on all coordinates give, with all effects.
+    /// Forward dynamics of a prepared machine: accelerations (m/s^2 or rad/s^2) by efforts `tau` (N or N m). On all
+    /// coordinates, with all effects.
     #[inline]
     pub fn forward_dynamics(&mut self, q: &[f64], v: &[f64], tau: &[f64]) -> Result<&[f64]> {
         self.expect([("position", q), ("velocity", v), ("effort", tau)])?;
@@ -49,14 +51,15 @@ impl Prepared {
         sound("acceleration", self.dynamics.forward_dynamics(q, v, tau))
     }
 
-    /// Mass matrix with payloads, n x n (kg, kg m or kg m^2), symmetric.
+    /// Mass matrix of a prepared machine with payloads, n x n (kg, kg m or kg m^2), symmetric.
     #[inline]
     pub fn mass_matrix(&mut self, q: &[f64]) -> Result<&[f64]> {
         self.expect([("position", q)])?;
         sound("mass_matrix", self.dynamics.mass_matrix(q))
     }
 
-    /// Kinetic and potential energy in J. The potential is that of gravity, of the beams, and of the effects that have one.
+    /// Kinetic and potential energy of a prepared machine in J. The potential is that of gravity, of the beams, and of
+    /// the effects that have one.
     #[inline]
     pub fn energy(&mut self, q: &[f64], v: &[f64]) -> Result<(f64, f64)> {
         self.expect([("position", q), ("velocity", v)])?;
@@ -65,8 +68,8 @@ impl Prepared {
         Ok((total.kinetic, total.potential))
     }
 
-    /// Jacobian of marker `number`, 6 x n row by row: angular velocity and velocity of its origin per unit rate of each coordinate, in
-    /// world axes.
+    /// Jacobian of marker `number` of a prepared machine, 6 x n row by row. Angular velocity and velocity of its origin
+    /// per unit rate of each coordinate, in world axes.
     #[inline]
     pub fn jacobian(&mut self, q: &[f64], number: usize) -> Result<&[f64]> {
         self.expect([("position", q)])?;
@@ -93,7 +96,7 @@ impl Prepared {
     }
 }
 
-/// A result, unless finite numbers far beyond any machine have made an infinite one of it.
+/// Result of a prepared machine, unless finite numbers far beyond any machine have made an infinite one.
 #[inline]
 fn sound<'a>(name: &str, result: &'a [f64]) -> Result<&'a [f64]> {
     match result.iter().position(|number| !number.is_finite()) {

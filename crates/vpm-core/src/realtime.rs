@@ -48,7 +48,7 @@ pub struct Loop {
 }
 
 impl Loop {
-    /// A loop with this period in s; its clock begins with the first [`Loop::wait`].
+    /// Real-time loop with this period in s; its clock begins with the first [`Loop::wait`].
     pub fn new(period: f64) -> Result<Self> {
         if !(SHORTEST_PERIOD..=LONGEST_PERIOD).contains(&period) {
             return Err(Error::Setting {
@@ -69,7 +69,8 @@ impl Loop {
         })
     }
 
-    /// Sleeps until the next deadline. None if `interrupted`, asked whenever a signal ends the sleep early, says so.
+    /// Sleeps until the real-time loop's next deadline. None if `interrupted`, asked whenever a signal ends the sleep
+    /// early, says so.
     ///
     /// The first call returns at once and begins the clock.
     pub fn wait(&mut self, mut interrupted: impl FnMut() -> bool) -> Option<Tick> {
@@ -97,7 +98,8 @@ impl Loop {
         Some(Tick { number: self.number, late, missed })
     }
 
-    /// Does `work` at each deadline, `count` times or until it returns false; true if nothing interrupted it.
+    /// Runs `work` at each deadline of a real-time loop, `count` times or until it returns false. True if nothing
+    /// interrupted it.
     pub fn run(
         &mut self,
         count: u64,
@@ -113,27 +115,27 @@ impl Loop {
         true
     }
 
-    /// The period, s.
+    /// Period of the real-time loop, s.
     pub fn period(&self) -> f64 {
         self.period as f64 * 1e-9
     }
 
-    /// Wake-ups recorded.
+    /// Wake-ups that the real-time loop recorded.
     pub fn wakes(&self) -> u64 {
         self.latencies.len()
     }
 
-    /// Deadlines missed.
+    /// Deadlines that the real-time loop missed.
     pub fn missed(&self) -> u64 {
         self.missed
     }
 
-    /// Time from a deadline to its wake-up below which the share `quantile` of all wake-ups lies, s; to three digits.
+    /// Latency of the real-time loop: wake-up after a deadline, at the share `quantile`, s; to three digits.
     pub fn latency(&self, quantile: f64) -> f64 {
         self.latencies.value_at_quantile(quantile) as f64 * 1e-9
     }
 
-    /// Time from a wake-up to the next wait below which the share `quantile` lies, s; to three digits.
+    /// Work of the real-time loop from a wake-up to the next wait, at the share `quantile`, s; to three digits.
     pub fn work(&self, quantile: f64) -> f64 {
         self.work.value_at_quantile(quantile) as f64 * 1e-9
     }

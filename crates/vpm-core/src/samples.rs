@@ -22,27 +22,27 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// The model over the number type `S`, all numbers constants.
+    /// Sample model over the number type `S`, all numbers constants.
     pub fn model<S: Scalar>(&self) -> Result<Model<S>> {
         let bodies: Vec<_> = self.bodies.iter().map(|body| body.map(&mut |&number| S::from_f64(number))).collect();
         Model::new(self.gravity, &bodies, &[])
     }
 }
 
-/// One mass (kg) on a horizontal rail along x, without gravity: M = mass.
+/// Sample of one mass (kg) on a horizontal rail along x, without gravity: M = mass.
 pub fn slider(mass: f64) -> Sample {
     let body = body("carriage", None, joint("axis", JointKind::Prismatic, [1.0, 0.0, 0.0], [0.0; 3]), mass);
     Sample { gravity: [0.0; 3], bodies: vec![body] }
 }
 
-/// A point mass (kg) on a massless rod (m) that turns about y and hangs along -z at zero.
+/// Sample of a point mass (kg) on a massless rod (m) that turns about y and hangs along -z at zero.
 ///
 /// Closed form: m l^2 a = tau - m g l sin q.
 pub fn pendulum(mass: f64, length: f64) -> Sample {
     Sample { gravity: GRAVITY, bodies: vec![bob("bob", "pivot", None, [0.0; 3], mass, length)] }
 }
 
-/// Two point masses on massless rods in series, both angles about y and the second relative to the first.
+/// Sample of two point masses on massless rods in series. Both angles are about y and the second relative to the first.
 ///
 /// Closed form: Goldstein, Poole & Safko 2002, chapter 1, problem 22.
 pub fn double_pendulum(masses: [f64; 2], lengths: [f64; 2]) -> Sample {
@@ -51,7 +51,7 @@ pub fn double_pendulum(masses: [f64; 2], lengths: [f64; 2]) -> Sample {
     Sample { gravity: GRAVITY, bodies: vec![upper, lower] }
 }
 
-/// A seven-joint arm of a lightweight robot's proportions: alternating roll and pitch axes, 16 kg, 1.2 m.
+/// Sample of a seven-joint arm of a lightweight robot's proportions. Roll and pitch axes alternate; 16 kg, 1.2 m.
 pub fn arm7() -> Sample {
     const MASSES: [f64; 7] = [4.0, 3.5, 3.0, 2.5, 1.5, 1.0, 0.5];
     let mut bodies = Vec::new();
@@ -67,7 +67,7 @@ pub fn arm7() -> Sample {
     Sample { gravity: GRAVITY, bodies }
 }
 
-/// A random tree of `n` bodies with random joints, frames and inertias; the same `seed` gives the same tree.
+/// Sample of a random tree of `n` bodies; the same `seed` gives the same tree. Joints, frames and inertias are random.
 ///
 /// Every body is a cloud of four random point masses, so its inertia is physical by construction.
 pub fn random_tree(seed: u64, n: usize) -> Sample {
@@ -89,7 +89,7 @@ fn random_body(random: &mut Random, k: usize) -> Body<f64> {
     link
 }
 
-/// The inertia of a few point masses.
+/// Inertia of a sample's few point masses.
 fn cloud<const N: usize>(points: [(f64, [f64; 3]); N]) -> Inertia<f64> {
     let mut cloud = Inertia { mass: points.iter().map(|point| point.0).sum(), ..Inertia::default() };
     for (mass, position) in points {
@@ -130,12 +130,12 @@ pub struct Random {
 }
 
 impl Random {
-    /// Starts the sequence that belongs to `seed`.
+    /// Random numbers for samples, from `seed`.
     pub fn new(seed: u64) -> Self {
         Self { state: seed }
     }
 
-    /// The next number, uniform in [0, 1).
+    /// Next random number of a sample, uniform in [0, 1).
     pub fn unit(&mut self) -> f64 {
         self.state = self.state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut bits = self.state;
@@ -144,22 +144,22 @@ impl Random {
         ((bits ^ (bits >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
     }
 
-    /// The next number, uniform in [-1, 1).
+    /// Next random number of a sample, uniform in [-1, 1).
     pub fn symmetric(&mut self) -> f64 {
         2.0 * self.unit() - 1.0
     }
 
-    /// Three numbers, each uniform in [-size, size).
+    /// Three random numbers of a sample, each uniform in [-size, size).
     pub fn vector(&mut self, size: f64) -> [f64; 3] {
         std::array::from_fn(|_| size * self.symmetric())
     }
 
-    /// `n` numbers, each uniform in [-size, size).
+    /// Random numbers of a sample, `n` of them, each uniform in [-size, size).
     pub fn numbers(&mut self, n: usize, size: f64) -> Vec<f64> {
         (0..n).map(|_| size * self.symmetric()).collect()
     }
 
-    /// A unit vector, uniform on the sphere (rejection from the cube).
+    /// Random unit vector of a sample, uniform on the sphere (rejection from the cube).
     pub fn direction(&mut self) -> [f64; 3] {
         loop {
             let candidate = self.vector(1.0);

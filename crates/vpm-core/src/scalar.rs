@@ -53,39 +53,39 @@ pub trait Scalar:
 {
     /// The value without any derivative. Where it decides what a law computes, ask by [`Scalar::if_less`] instead.
     fn re(&self) -> f64;
-    /// The value for a check that can only complain: nothing else may depend on it.
+    /// Value of a scalar for a check that can only complain: nothing else may depend on it.
     #[inline]
     fn inspect(&self) -> f64 {
         self.re()
     }
-    /// Whether the number is less than `other`, if that is known already.
+    /// Whether a scalar is less than `other`, if that is known already.
     #[inline]
     fn known_less(self, other: Self) -> Option<bool> {
         Some(self.re() < other.re())
     }
-    /// `yes` where the number is less than `other`, else `no`, with their derivatives. Both are worked out: prefer
-    /// [`Scalar::if_less`].
+    /// Scalar `yes` where the number is less than `other`, else `no`, with their derivatives. Both are worked out:
+    /// prefer [`Scalar::if_less`].
     #[inline]
     fn select_less(self, other: Self, yes: Self, no: Self) -> Self {
         if self.re() < other.re() { yes } else { no }
     }
-    /// Whether the value and all derivatives are finite.
+    /// Whether a scalar's value and all derivatives are finite.
     fn is_finite(self) -> bool;
-    /// Square root; its derivative is infinite at zero.
+    /// Square root of a scalar; its derivative is infinite at zero.
     fn sqrt(self) -> Self;
-    /// e^x.
+    /// Exponential e^x of a scalar.
     fn exp(self) -> Self;
-    /// e^x - 1, accurate near zero.
+    /// Exponential e^x - 1 of a scalar, accurate near zero.
     fn exp_m1(self) -> Self;
-    /// Natural logarithm.
+    /// Natural logarithm of a scalar.
     fn ln(self) -> Self;
-    /// Sine and cosine together (argument in rad).
+    /// Sine and cosine of a scalar together (argument in rad).
     fn sin_cos(self) -> (Self, Self);
-    /// Hyperbolic tangent, finite for every finite argument.
+    /// Hyperbolic tangent of a scalar, finite for every finite argument.
     fn tanh(self) -> Self;
-    /// Arc tangent in rad.
+    /// Arc tangent of a scalar in rad.
     fn atan(self) -> Self;
-    /// x^n for an integer exponent.
+    /// Power x^n of a scalar for an integer exponent.
     fn powi(self, exponent: i32) -> Self;
     /// What a search in plain numbers finds with the values of these arguments: a constant, whatever they carry.
     #[inline]
@@ -93,13 +93,13 @@ pub trait Scalar:
         Self::from_f64(search.value(arguments.map(|argument| argument.re())))
     }
 
-    /// The same number without the derivatives of the outermost kind: what a chord takes for a constant.
+    /// Scalar without the derivatives of the outermost kind: what a chord takes for a constant.
     #[inline]
     #[must_use]
     fn frozen(self) -> Self {
         self
     }
-    /// The numbers themselves, where they are plain values.
+    /// Scalars themselves, where they are plain values.
     #[inline]
     fn plain(_numbers: &[Self]) -> Option<&[f64]> {
         None
@@ -110,46 +110,47 @@ pub trait Scalar:
         None
     }
 
-    /// Whether numbers are plain values with their first derivatives along some directions.
+    /// Whether scalars are plain values with their first derivatives along some directions.
     #[inline]
     fn is_first_order() -> bool {
         false
     }
-    /// Whether it carries no derivative that is not zero.
+    /// Whether a scalar carries no derivative that is not zero.
     #[inline]
     fn is_constant(&self) -> bool {
         true
     }
-    /// Adds `slope` times the derivatives of `other` to its own; numbers that are not of first order stay as they are.
+    /// Adds `slope` times the derivatives of `other` to the scalar's own. Numbers that are not of first order stay as
+    /// they are.
     #[inline]
     fn add_derivatives(&mut self, _other: &Self, _slope: f64) {}
 
-    /// A constant: all derivatives zero.
+    /// Constant scalar: all derivatives zero.
     #[inline]
     fn from_f64(value: f64) -> Self {
         Self::from(value)
     }
-    /// 0.
+    /// Scalar 0.
     #[inline]
     fn zero() -> Self {
         Self::from(0.0)
     }
-    /// 1.
+    /// Scalar 1.
     #[inline]
     fn one() -> Self {
         Self::from(1.0)
     }
-    /// Sine (argument in rad).
+    /// Sine of a scalar (argument in rad).
     #[inline]
     fn sin(self) -> Self {
         self.sin_cos().0
     }
-    /// Cosine (argument in rad).
+    /// Cosine of a scalar (argument in rad).
     #[inline]
     fn cos(self) -> Self {
         self.sin_cos().1
     }
-    /// 1/x.
+    /// Reciprocal 1/x of a scalar.
     #[inline]
     fn recip(self) -> Self {
         Self::one() / self
@@ -174,17 +175,17 @@ pub trait Scalar:
     fn if_positive<T: Choice<Self>>(self, yes: impl FnOnce() -> T, no: impl FnOnce() -> T) -> T {
         Self::zero().if_less(self, yes, no)
     }
-    /// |x|; at zero the derivative is that of +x.
+    /// Absolute value of a scalar, |x|; at zero the derivative is that of +x.
     #[inline]
     fn abs(self) -> Self {
         self.if_negative(|| -self, || self)
     }
-    /// The larger of two numbers, with its derivatives; the first if they are equal.
+    /// Larger of two scalars, with its derivatives; the first if they are equal.
     #[inline]
     fn max(self, other: Self) -> Self {
         self.if_less(other, || other, || self)
     }
-    /// The smaller of two numbers, with its derivatives; the first if they are equal.
+    /// Smaller of two scalars, with its derivatives; the first if they are equal.
     #[inline]
     fn min(self, other: Self) -> Self {
         other.if_less(self, || other, || self)

@@ -25,18 +25,18 @@ pub struct Pair<S> {
 
 /// A computation that can run over any number type.
 pub(crate) trait Job: Sync {
-    /// Runs with the parameters `theta`.
+    /// Runs a job of sensitivities with the parameters `theta`.
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>>;
 }
 
-/// Values of a job and, for each parameter index in `variables`, the derivative of the first array: place by place, derivative number k at
-/// `place * variables.len() + k`.
+/// Sensitivity of a job's first array to each parameter index in `variables`, with its values. Place by place,
+/// derivative number k stands at `place * variables.len() + k`.
 pub(crate) fn differentiate<J: Job>(job: &J, theta: &[f64], variables: &[usize]) -> Result<(Pair<f64>, Vec<f64>)> {
     differentiate_by::<J, LANES>(job, theta, variables, None)
 }
 
-/// As [`differentiate`], of the numbers at some `places` of the first array alone, with `N` parameters per pass: where a pass is long, one
-/// that takes few parameters wants no more lanes.
+/// Sensitivity at some `places` of the first array alone, with `N` parameters per pass. Where a pass is long, one that
+/// takes few parameters wants no more lanes. Else as [`differentiate`].
 pub(crate) fn differentiate_by<J: Job, const N: usize>(
     job: &J,
     theta: &[f64],
@@ -66,7 +66,7 @@ pub(crate) fn differentiate_by<J: Job, const N: usize>(
     Ok((Pair { first, second: one.second.clone() }, jacobian))
 }
 
-/// As [`differentiate_by`], by differences of runs of which one parameter each is moved by its step.
+/// Sensitivity by differences of runs of which one parameter each is moved by its step. Else as [`differentiate_by`].
 ///
 /// Law: `(f(x + h) - f(x)) / h` errs by `h/2 f''`, and by what a run is rounded to, divided by h (Griewank & Walther 2008, chapter 1).
 /// Checked: against exact derivatives.
@@ -95,7 +95,7 @@ pub(crate) fn difference<J: Job>(
     Ok((pair, jacobian))
 }
 
-/// Whether all that is asked for are parameters.
+/// Checks whether all sensitivities asked for are by parameters.
 pub(crate) fn check_variables(theta: &[f64], variables: &[usize]) -> Result<()> {
     for &index in variables {
         if index >= theta.len() {

@@ -324,7 +324,8 @@ impl Layout {
         self.balls() + 7 * self.balls
     }
 
-    /// Whether the state alone decides an output, see [`crate::system::Dynamics::observe_motion`]; not said of contacts and bushings.
+    /// Whether the state alone decides an output, so that its sensor needs no rates. See
+    /// [`crate::system::Dynamics::observe_motion`]; not said of contacts and bushings.
     pub(crate) fn is_of_motion(self, column: usize) -> bool {
         match column {
             _ if column < self.actuators() => column % 4 < 2,
@@ -334,14 +335,14 @@ impl Layout {
         }
     }
 
-    /// Number of all outputs.
+    /// Number of all outputs that sensors may show.
     pub fn count(self) -> usize {
         self.loops() + 6 * self.loops
     }
 }
 
 impl Channel {
-    /// The column of this channel among the outputs of a model.
+    /// Column of a sensor's channel among the outputs of a model.
     pub fn column(self, layout: Layout) -> usize {
         match self {
             Self::Position { joint } => 4 * joint,
@@ -411,7 +412,7 @@ impl<P> Sensor<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of a sensor and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let mut domains = Vec::new();
         domains.extend(self.gain.as_ref().map(|gain| (gain, Domain::NonZero)));
@@ -422,7 +423,8 @@ impl<P> Sensor<P> {
 }
 
 impl<S: Scalar> Sensor<S> {
-    /// The reading at sample `k` of a true signal given sample by sample; before the record starts the signal is at its first value.
+    /// Sensor reading at sample `k` of a true signal given sample by sample. Before the record starts the signal is at
+    /// its first value.
     #[inline]
     pub fn read(&self, k: usize, time_step: f64, truth: impl Fn(usize) -> S) -> S {
         let arrived = match self.delay {
@@ -432,14 +434,15 @@ impl<S: Scalar> Sensor<S> {
         self.show(arrived)
     }
 
-    /// The reading of a true value that has arrived.
+    /// Sensor reading of a true value that has arrived.
     #[inline]
     pub fn show(&self, arrived: S) -> S {
         let scaled = self.gain.map_or(arrived, |gain| gain * arrived);
         self.offset.map_or(scaled, |offset| scaled + offset)
     }
 
-    /// The true signal at sample `k` behind readings given sample by sample, of which `last` is the last; past it they hold.
+    /// True signal at sample `k` behind sensor readings given sample by sample. Of these `last` is the last; past it
+    /// they hold.
     #[inline]
     pub fn undo(&self, k: usize, last: usize, time_step: f64, reading: impl Fn(usize) -> S) -> S {
         let shifted = self.undo_rate(k, last, time_step, reading);

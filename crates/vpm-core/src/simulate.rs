@@ -53,7 +53,7 @@ pub struct Stepping {
 }
 
 impl Stepping {
-    /// Checks the settings of the time steps and keeps them.
+    /// Checks the settings of a simulation's time steps and keeps them.
     pub fn new(time_step: f64, substeps: usize, method: Method) -> Result<Self> {
         check_time_step(time_step)?;
         method.check()?;
@@ -69,7 +69,7 @@ impl Stepping {
         Ok(Self { time_step, substeps, method })
     }
 
-    /// Length of one integration step, s.
+    /// Length of one integration step of a simulation, s.
     pub fn step(&self) -> f64 {
         self.time_step / self.substeps as f64
     }
@@ -110,8 +110,8 @@ pub struct Setting<'a> {
     pub interrupt: Interrupt<'a>,
 }
 
-/// Free run on `inputs` (N x inputs: commands, then pressures of logged supplies) from `initial_state`; a mere table is held from each
-/// sample to the next.
+/// Simulates a free run on `inputs` from `initial_state`. Inputs are N x inputs: commands, then pressures of logged
+/// supplies. A mere table is held from each sample to the next.
 pub fn free_run<'a>(setting: Setting<'a>, initial_state: &'a [f64], inputs: impl Into<Inputs<'a>>) -> Result<Run> {
     let inputs = inputs.into();
     inputs.expect(&setting)?;
@@ -123,8 +123,9 @@ pub fn free_run<'a>(setting: Setting<'a>, initial_state: &'a [f64], inputs: impl
     )
 }
 
-/// Closed loop: the controllers follow `references`; `disturbances` are added to their commands (both N x inputs). What no controller
-/// commands, other actuators and the pressures of logged supplies, is given by the disturbances alone.
+/// Simulates in closed loop: the controllers follow `references`, with `disturbances` on commands. Both are N x inputs.
+/// What no controller commands, other actuators and the pressures of logged supplies, is given by the disturbances
+/// alone.
 pub fn closed_loop(
     setting: Setting<'_>,
     initial_state: &[f64],
@@ -143,8 +144,8 @@ pub fn closed_loop(
     execute(setting, Plan { drive, initial: initial_state, starts: &[0], horizon: rows, gains: None })
 }
 
-/// Free runs of `horizon` samples from each sample in `starts`, from the row of `initial_states` that belongs to it. Delayed commands
-/// reach back into the record before the start; sensor delays see the start value held.
+/// Simulates free runs of `horizon` samples from each sample in `starts`. Each begins in its row of `initial_states`.
+/// Delayed commands reach back into the record before the start; sensor delays see the start value held.
 pub fn restarts<'a>(
     setting: Setting<'a>,
     initial_states: Table<'a>,
@@ -193,7 +194,7 @@ struct Simulation<'a> {
 }
 
 impl<'a> Simulation<'a> {
-    /// What corrects states corrects angles.
+    /// Stepper of a simulation; states in it are corrected as angles.
     fn stepper<S: Scalar>(&self, theta: &[S]) -> Result<Stepper<'a, S>> {
         match self.plan.gains {
             Some(_) => Stepper::of(&self.setting, &self.plan, theta, self.setting.description.system(theta)?),
@@ -203,7 +204,7 @@ impl<'a> Simulation<'a> {
 }
 
 impl Simulation<'_> {
-    /// The moves for differences, where derivatives may be these and there is no machine code of those of the steps.
+    /// Moves for difference quotients in a simulation, where steps have no machine code of derivatives.
     fn moves(&self) -> Option<&[f64]> {
         let Setting { theta, sensitivities: by, .. } = self.setting;
         let moves = self.plan.gains.and_then(|gains| gains.moves).filter(|moves| !moves.is_empty())?;
@@ -244,7 +245,7 @@ fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
     Ok(Run { outputs: pair.first, states: pair.second, jacobian })
 }
 
-/// Complains about one of the `initial` states that the machine cannot be in, see [`check_start`].
+/// Checks the `initial` states of a simulation, see [`check_start`].
 pub(crate) fn check_starts(setting: Setting<'_>, initial: &[f64]) -> Result<()> {
     let Setting { description, theta, .. } = setting;
     if description.n_states() == 2 * description.n_coordinates() {
@@ -257,7 +258,7 @@ pub(crate) fn check_starts(setting: Setting<'_>, initial: &[f64]) -> Result<()> 
         .try_for_each(|state| check_start(description, theta, &mut dynamics, state))
 }
 
-/// A sampled drive whose effort went astray at sample `row` of the piece that begins at `start`.
+/// Error of a simulation whose sampled drive went astray at sample `row` of the piece from `start`.
 pub(crate) fn strayed<S: Scalar>(stepper: &Stepper<'_, S>, astray: Astray, (row, start): (usize, usize)) -> Error {
     let stepping = stepper.stepping();
     let at = ((start + row) as f64 * stepping.time_step, start + row);
@@ -270,7 +271,7 @@ pub(crate) fn strayed<S: Scalar>(stepper: &Stepper<'_, S>, astray: Astray, (row,
     }
 }
 
-/// The error of a run in which a state left its bounds, in the words of the model.
+/// Error of a simulation in which a state left its bounds, in the words of the model.
 pub(crate) fn diverged<S: Scalar>(
     stepper: &Stepper<'_, S>,
     (what, event): (String, String),
@@ -281,20 +282,21 @@ pub(crate) fn diverged<S: Scalar>(
     lost(stepper.stepping(), what, event, (row, start), stepper.before(row))
 }
 
-/// A piston that steps of a fixed length carried `beyond` (m) the end of its stroke, as no stop lets it: the steps leapt over the impact.
+/// Error of a simulation in which fixed steps carried a piston `beyond` (m) the end of its stroke. No stop lets it: the
+/// steps leapt over the impact.
 pub(crate) fn leapt<S: Scalar>(stepper: &Stepper<'_, S>, what: String, beyond: f64, at: (usize, usize)) -> Error {
     let event = format!("is {beyond:.6} m beyond the end of its stroke, where these steps leapt over its stop,");
     let repair = "use the integrator adaptive, or guarded where the time of a step has a bound";
     lost(stepper.stepping(), what, (event, repair), at, stepper.before(at.0))
 }
 
-/// A ball joint whose coordinates failed on the way to sample `row`.
+/// Error of a simulation whose ball joint's coordinates failed on the way to sample `row`.
 pub(crate) fn troubled<S: Scalar>(stepper: &Stepper<'_, S>, trouble: Trouble, row: usize, start: usize) -> Error {
     let (what, event, repair) = trouble_in_words(stepper.description(), trouble);
     lost(stepper.stepping(), what, (event, repair), (row, start), stepper.before(row))
 }
 
-/// Which joint, what happened to it and what helps.
+/// Sentence on a ball joint that failed in a simulation: which one, what happened, and what helps.
 pub(crate) fn trouble_in_words(description: &Description, trouble: Trouble) -> (String, String, &'static str) {
     let (number, angle) = match trouble {
         Trouble::Singular(number, angle) | Trouble::Leap(number, angle) => (number, angle),
@@ -338,7 +340,8 @@ fn loops_in_words(description: &Description) -> String {
     format!("the closed loops ({})", names.join(", "))
 }
 
-/// What went astray at sample `row` of a piece that begins at `start`; `tables` are the outputs and states of its samples until then.
+/// Error of a simulation at sample `row` of the piece from `start`, with the partial run. `tables` are the outputs and
+/// states of its samples until then.
 fn lost(
     stepping: Stepping,
     what: String,
@@ -359,8 +362,8 @@ fn lost(
     }))
 }
 
-/// What the step control could not follow on the way from a sample (number `sample`, counted with its time from the beginning), in the
-/// words of the model; `tables` are the outputs and states of the samples until then.
+/// Error of a simulation whose step control could not follow from a sample, with the partial run. The sample has its
+/// number and its time from the beginning, in the words of the model. `tables` are the outputs and states until then.
 pub(crate) fn halted(
     description: &Description,
     stepping: Stepping,

@@ -50,7 +50,7 @@ enum Newton {
 }
 
 impl Statics {
-    /// Prepares the search for rest, with the beams and the joints `passive` free and all other joints held.
+    /// Statics of beams and the joints `passive`, all other joints held: prepares the search for rest.
     pub(crate) fn new(description: &Description, theta: &[f64], passive: &[usize]) -> Result<Self> {
         let plain: Dynamics<f64> = description.dynamics(theta)?;
         let free: Vec<usize> = passive.iter().copied().chain(plain.joints()..plain.coordinates()).collect();
@@ -59,7 +59,8 @@ impl Statics {
         Ok(Self { plain, unbalance, free, passive })
     }
 
-    /// The free coordinates at rest under gravity with the other joints held at `joints`; passive ones are sought from there.
+    /// Static free coordinates under gravity with the other joints held at `joints`. Passive ones are sought from
+    /// there.
     ///
     /// Law: `bias(q, 0) + K q = effects(q, 0)` on the free coordinates, by Newton's method from the straight beams with exact
     /// derivatives (of the recorded load). Where that goes astray the weight is put on in stages, so that of several places at rest it is the
@@ -86,7 +87,7 @@ impl Statics {
         }
     }
 
-    /// Rest under a weight that grows in equal stages, if each stage leads smoothly to a stable one.
+    /// Static rest under a weight that grows in equal stages, if each stage leads smoothly to a stable one.
     fn staged(&mut self, start: &[f64], stages: usize) -> Option<Rest> {
         let mut last = None;
         let mut coordinates = start.to_vec();
@@ -100,7 +101,7 @@ impl Statics {
         last
     }
 
-    /// Newton's method under a share of the weight; a step that leads away is halved.
+    /// Newton's method for statics under a share of the weight; a step that leads away is halved.
     fn newton(&mut self, mut coordinates: Vec<f64>, weight: f64) -> Newton {
         let mut smooth = true;
         let mut residual = self.residual(&coordinates, weight);
@@ -139,7 +140,8 @@ impl Statics {
         Error::Setting { setting: "the load that the machine at rest misses", condition, value, repair }
     }
 
-    /// Moves a passive joint to where its load changes its sign, the other coordinates standing still; nowhere if it does not.
+    /// Moves a passive joint to static rest where its load changes its sign. The other coordinates stand still; nowhere
+    /// if it does not.
     fn push(&mut self, coordinates: &mut [f64], place: usize) {
         let joint = self.free[place];
         let start = coordinates[joint];
@@ -168,7 +170,7 @@ impl Statics {
         DVector::from_iterator(self.free.len(), self.free.iter().map(|&place| load[place]))
     }
 
-    /// The derivative of the residual.
+    /// Tangent of the static residual.
     fn tangent(&mut self, q: &[f64], weight: f64) -> DMatrix<f64> {
         let (n, free) = (q.len(), &self.free);
         let (mut matrix, mut load) = (vec![0.0; n * n], vec![0.0; n]);
@@ -179,7 +181,7 @@ impl Statics {
         DMatrix::from_fn(free.len(), free.len(), |row, column| matrix[free[row] * n + free[column]])
     }
 
-    /// Efforts that hold the joints at rest, with those of the effects taken off.
+    /// Static efforts that hold the joints at rest, with those of the effects taken off.
     pub(crate) fn holding_efforts(&mut self, rest: &Rest) -> Vec<f64> {
         let n = rest.coordinates.len();
         let (zero, mut efforts) = (vec![0.0; n], vec![0.0; n]);
@@ -188,7 +190,8 @@ impl Statics {
         efforts
     }
 
-    /// Natural frequencies in Hz of the beams about rest with the joints held, slowest first; negative for growth instead of vibration.
+    /// Natural frequencies in Hz of the beams about static rest with the joints held, slowest first. Negative for
+    /// growth instead of vibration.
     ///
     /// Law: `K_t a = omega^2 M a` over the elastic coordinates, K_t the stiffness with that of gravity.
     pub(crate) fn natural_frequencies(&mut self, rest: &Rest) -> Result<Vec<f64>> {
@@ -204,7 +207,7 @@ impl Statics {
     }
 }
 
-/// What the coordinates miss at rest under a share of the weight, for the checked parameters `theta`; first under all of it.
+/// Static residual under a share of the weight, for the checked parameters `theta`; first under all of it.
 fn unbalance<S: Scalar>(description: &Description, theta: &[S]) -> Result<Routine<S>> {
     let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
     let mut routine = Routine::new(description.functions().function(&Kind::Unbalance, &values)?, theta);
@@ -212,8 +215,8 @@ fn unbalance<S: Scalar>(description: &Description, theta: &[S]) -> Result<Routin
     Ok(routine)
 }
 
-/// All coordinates at rest with the joints held at `joints` but for `passive` ones, with exact derivatives: one Newton step over the
-/// number type from the solution in plain numbers (the implicit function theorem).
+/// Static coordinates with the joints held at `joints` but for `passive` ones, with exact derivatives. One Newton step
+/// over the number type from the solution in plain numbers (the implicit function theorem).
 pub(crate) fn settled<S: Scalar>(
     description: &Description,
     theta: &[S],

@@ -104,7 +104,7 @@ pub struct Dynamics<S> {
 }
 
 impl<S: Scalar> Dynamics<S> {
-    /// Puts the parts together. The joints, lines and supplies that effects and actuators name must exist.
+    /// Puts the parts of a system together. The joints, lines and supplies that effects and actuators name must exist.
     pub fn new(
         model: Model<S>,
         effects: Vec<(Seat<S>, JointEffect<S>)>,
@@ -140,37 +140,37 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// These dynamics with contacts, bushings and load cells.
+    /// System with contacts, bushings and load cells.
     #[must_use]
     pub fn connected(self, connections: Connections<S>) -> Self {
         Self { connections, ..self }
     }
 
-    /// These dynamics with closed loops.
+    /// System with closed loops.
     #[must_use]
     pub(crate) fn closed_by(self, loops: Option<Loops<S>>) -> Self {
         Self { loops: loops.map(Box::new), ..self }
     }
 
-    /// These dynamics with joints of three angles.
+    /// System with joints of three angles.
     #[must_use]
     pub(crate) fn with_balls(self, balls: Vec<Ball>) -> Self {
         Self { balls, ..self }
     }
 
-    /// These dynamics with effects that remember.
+    /// System with effects that remember.
     #[must_use]
     pub(crate) fn remembering(self, memories: Memories<S>) -> Self {
         Self { memories, ..self }
     }
 
-    /// Number of joints.
+    /// Number of joints of the system.
     #[inline]
     pub fn joints(&self) -> usize {
         self.model.n_joints()
     }
 
-    /// Number of coordinates: joints, then elastic ones.
+    /// Number of coordinates of the system: joints, then elastic ones.
     #[inline]
     pub fn coordinates(&self) -> usize {
         self.model.n_coordinates()
@@ -241,24 +241,24 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Whether the states have units of like size: no pressures, beside which rates are small, and no elastic coordinates.
+    /// Whether the system's states have units of like size: no pressures, and no elastic coordinates.
     fn is_well_scaled(&self) -> bool {
         let hydraulic = |actuator: &Actuator<S>| matches!(actuator.drive, Drive::Hydraulic(_));
         self.model.n_elastic() == 0 && self.supplies.is_empty() && !self.actuators.iter().any(hydraulic)
     }
 
-    /// Whether beams are all that is stiff in it.
+    /// Whether beams are all that is stiff in the system.
     fn is_stiff_by_beams_alone(&self) -> bool {
         self.model.n_elastic() > 0 && self.ideal && self.connections.is_free() && self.loops.is_none()
     }
 
-    /// dx/dt at x.
+    /// Right-hand side dx/dt of the system at x.
     #[inline]
     pub fn rhs(&mut self, x: &[S], dxdt: &mut [S]) {
         self.rhs_with(x, dxdt, (add_effects, ContactFriction::resistance));
     }
 
-    /// dx/dt at x, with the efforts of the effects at (q, v) and the resistances of contacts by `laws`.
+    /// Right-hand side dx/dt of the system at x, with effects at (q, v) and contact resistances by `laws`.
     #[inline]
     fn rhs_with(
         &mut self,
@@ -277,13 +277,14 @@ impl<S: Scalar> Dynamics<S> {
         dxdt[n..2 * n].copy_from_slice(&self.data.acceleration);
     }
 
-    /// Whether the right-hand side leaves a mass matrix and its factors: where no recursion does without.
+    /// Whether the system's right-hand side leaves a mass matrix and its factors.
     #[inline]
     fn has_mass_matrix(&self) -> bool {
         !self.model.is_recursive() && !self.model.is_articulated()
     }
 
-    /// Moves lines and frames to (q, v), as far as anything acts on them, and of a machine that is no rigid tree all that its dynamics need.
+    /// Moves lines and frames of the system to (q, v), as far as anything acts on them. Of a machine that is no rigid
+    /// tree all that its dynamics need is moved.
     #[inline]
     fn locate(&mut self, q: &[S], v: &[S]) {
         let (full, pulls) = (self.has_mass_matrix(), self.stretches || !self.connections.is_free());
@@ -305,8 +306,8 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Accelerations under the efforts and tensions that stand, and efforts on the elastic coordinates if any are given, left in the
-    /// data; after [`Dynamics::locate`] at the same place.
+    /// Accelerations of the system under its present efforts and tensions, left in the data. Efforts on the elastic
+    /// coordinates count if any are given. It follows [`Dynamics::locate`] at the same place.
     #[inline]
     fn accelerate(
         &mut self,
@@ -345,7 +346,7 @@ impl<S: Scalar> Dynamics<S> {
     }
 }
 
-/// Adds to `total` the efforts of all effects on the joints at coordinates q and rates v, where the actuators push with u.
+/// Adds the efforts of all the system's effects to `total`, at q and v, where actuators push with u.
 #[inline]
 pub(crate) fn add_effects<S: Scalar>(effects: &[(Seat<S>, JointEffect<S>)], [q, v, u]: [&[S]; 3], total: &mut [S]) {
     for (seat, effect) in effects {
@@ -374,8 +375,8 @@ pub(crate) struct Machine<'a, S> {
 pub trait Build {
     /// What can go wrong.
     type Error;
-    /// The right-hand side with the parameters `theta`.
+    /// Right-hand side of the system with the parameters `theta`.
     fn dynamics<S: Scalar>(&self, theta: &[S]) -> Result<Dynamics<S>, Self::Error>;
-    /// The sensors with the parameters `theta`.
+    /// Sensors of the system with the parameters `theta`.
     fn sensors<S: Scalar>(&self, theta: &[S]) -> Vec<Sensor<S>>;
 }

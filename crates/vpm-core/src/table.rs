@@ -27,7 +27,7 @@ impl<'a> Table<'a> {
         Ok(Self { numbers, rows, columns })
     }
 
-    /// A single row of `length` numbers, one per `each`.
+    /// Table of a single row of `length` numbers, one per `each`.
     pub(crate) fn vector(name: &str, numbers: &'a [f64], length: usize, each: &str) -> Result<Self> {
         if numbers.len() != length {
             let (what, each) = (name.to_owned(), each.to_owned());
@@ -36,28 +36,28 @@ impl<'a> Table<'a> {
         Self::new(name, numbers, 1, length)
     }
 
-    /// Number of samples.
+    /// Number of samples in a table.
     pub fn rows(&self) -> usize {
         self.rows
     }
 
-    /// Number of channels.
+    /// Number of channels in a table.
     pub fn columns(&self) -> usize {
         self.columns
     }
 
-    /// All numbers, row by row.
+    /// All numbers of a table, row by row.
     pub fn numbers(&self) -> &'a [f64] {
         self.numbers
     }
 
-    /// The number of a channel at a sample.
+    /// Number of a channel at a sample of a table.
     #[inline]
     pub fn at(&self, row: usize, column: usize) -> f64 {
         self.numbers[row * self.columns + column]
     }
 
-    /// The channels of a sample.
+    /// Channels of a sample in a table.
     #[inline]
     pub fn row(&self, row: usize) -> &'a [f64] {
         &self.numbers[row * self.columns..(row + 1) * self.columns]

@@ -29,7 +29,7 @@ pub struct Course<'a> {
 }
 
 impl<'a> Course<'a> {
-    /// Checked inputs (N x inputs) from this state on.
+    /// Course for timing from this state on, with checked inputs (N x inputs).
     pub fn new(setting: Setting<'a>, initial_state: &'a [f64], inputs: Table<'a>) -> Result<Self> {
         let rows = inputs.rows();
         inputs.expect("inputs", rows, setting.description.n_inputs())?;
@@ -49,12 +49,12 @@ impl<'a> Course<'a> {
         Ok(Self { stepper: Stepper::new(&setting, &plan, setting.theta)?, setting, rows, next: 0 })
     }
 
-    /// Steps by machine code from now on, as long runs and compiled simulations do; or says why there is none.
+    /// Compiles the steps to be timed, as long runs and compiled simulations do; or says why not.
     pub fn compile(&mut self) -> std::result::Result<(), String> {
         self.stepper.compile()
     }
 
-    /// Makes as many steps as there are places and writes the duration of each, s. Allocates nothing.
+    /// Times as many steps as there are places and writes the duration of each, s. Allocates nothing.
     pub fn time(&mut self, durations: &mut [f64]) -> Result<()> {
         for duration in durations {
             let row = self.begin();
@@ -96,7 +96,7 @@ impl<'a> Course<'a> {
         Ok(parts)
     }
 
-    /// The row of the next step; at the first the machine is where the way begins.
+    /// Row of the next timed step; at the first the machine is where the way begins.
     fn begin(&mut self) -> usize {
         let row = self.next % self.rows;
         if row == 0 {

@@ -30,7 +30,7 @@ pub struct Ratio<P> {
 }
 
 impl<P> Ratio<P> {
-    /// The same ratio over another parameter type.
+    /// Transmission ratio over another parameter type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Ratio<T> {
         Ratio { joint: self.joint, ratio: f(&self.ratio) }
     }

@@ -34,12 +34,12 @@ impl Numbers {
         }
     }
 
-    /// All numbers, row by row.
+    /// All numbers of an array from Python, row by row.
     pub(crate) fn values(&self) -> &[f64] {
         &self.values
     }
 
-    /// Rows of exactly `N` numbers each.
+    /// Array rows of exactly `N` numbers each.
     pub(crate) fn rows_of<const N: usize>(&self) -> PyResult<Vec<[f64; N]>> {
         if self.columns != N {
             let wanted = format!("rows of {N}");
@@ -48,12 +48,12 @@ impl Numbers {
         Ok(self.values.as_chunks::<N>().0.to_vec())
     }
 
-    /// The copy as a table that the core can read.
+    /// Array copy as a table that the core can read.
     pub(crate) fn as_table(&self) -> Result<Table<'_>, vpm_core::Error> {
         Table::new(self.name, &self.values, self.rows, self.columns)
     }
 
-    /// Number of rows.
+    /// Number of an array's rows.
     pub(crate) fn rows(&self) -> usize {
         self.rows
     }
@@ -80,7 +80,7 @@ impl<'py> Vector<'py> {
         Numbers::vector(name, array).map(Self::Copied)
     }
 
-    /// The numbers.
+    /// Numbers of an array of one dimension.
     #[inline]
     pub(crate) fn values(&self) -> PyResult<&[f64]> {
         match self {
@@ -104,12 +104,12 @@ fn wrong_shape(name: &str, wanted: &str, shape: &[usize]) -> PyErr {
     CoreError::new_err(format!("`{name}` must have {wanted}, got shape {shape:?}; reshape it"))
 }
 
-/// Places in a list that Python may have counted from the end or beyond.
+/// Array of places in a list that Python may have counted from the end or beyond.
 pub(crate) fn places(name: &str, numbers: &[i64]) -> PyResult<Vec<usize>> {
     numbers.iter().map(|&number| place(name, number)).collect()
 }
 
-/// A place that Python may have counted from the end or beyond.
+/// Place in an array that Python may have counted from the end or beyond.
 pub(crate) fn place(name: &str, number: i64) -> PyResult<usize> {
     usize::try_from(number)
         .map_err(|_| CoreError::new_err(format!("`{name}` must not be negative, got {number}; count from 0")))

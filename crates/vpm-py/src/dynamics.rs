@@ -34,7 +34,8 @@ pub(crate) struct Dynamics {
 }
 
 impl Dynamics {
-    /// The buffers. With the interpreter lock held they are always free; without one (free-threaded Python) a call may find them taken.
+    /// Buffers of `Dynamics`. With the interpreter lock held they are always free; without one (free-threaded Python) a
+    /// call may find them taken.
     #[inline]
     fn prepared(&self) -> PyResult<MutexGuard<'_, Prepared>> {
         self.prepared.try_lock().map_err(|_| {
@@ -52,7 +53,7 @@ impl Dynamics {
         Ok(Self { prepared: Mutex::new(system.checked(py, prepared)?) })
     }
 
-    /// Efforts (n,) that accelerations (n,) need, effects carried as well.
+    /// Inverse dynamics of `Dynamics`: efforts (n,) that accelerations (n,) need, effects carried as well.
     fn inverse_dynamics<'py>(
         &self,
         py: Python<'py>,
@@ -68,7 +69,7 @@ impl Dynamics {
         result.map(|effort| PyArray1::from_slice(py, effort)).map_err(|error| exception(py, error, 0, 0))
     }
 
-    /// Accelerations (n,) that efforts (n,) give, with all effects.
+    /// Forward dynamics of `Dynamics`: accelerations (n,) that efforts (n,) give, with all effects.
     fn forward_dynamics<'py>(
         &self,
         py: Python<'py>,
@@ -84,7 +85,7 @@ impl Dynamics {
         result.map(|a| PyArray1::from_slice(py, a)).map_err(|error| exception(py, error, 0, 0))
     }
 
-    /// Mass matrix (n, n), payloads included.
+    /// Mass matrix (n, n) of `Dynamics`, payloads included.
     fn mass_matrix<'py>(&self, py: Python<'py>, position: &Any<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let q = Vector::new("position", position)?;
         let mut prepared = self.prepared()?;
@@ -96,7 +97,7 @@ impl Dynamics {
         }
     }
 
-    /// Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential.
+    /// Kinetic and potential energy of `Dynamics` in J: of bodies in gravity, and of effects with a potential.
     fn energy(&self, py: Python<'_>, position: &Any<'_>, velocity: &Any<'_>) -> PyResult<(f64, f64)> {
         let (q, v) = (Vector::new("position", position)?, Vector::new("velocity", velocity)?);
         let (q, v) = (q.values()?, v.values()?);
@@ -104,7 +105,7 @@ impl Dynamics {
         unbroken(|| prepared.energy(q, v))?.map_err(|error| exception(py, error, 0, 0))
     }
 
-    /// Jacobian (6, n) of a marker by number: angular velocity, then velocity of its origin, in world axes.
+    /// Jacobian (6, n) of a marker by `Dynamics`: angular velocity, then velocity of its origin, in world axes.
     fn jacobian<'py>(&self, py: Python<'py>, position: &Any<'py>, marker: i64) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let q = Vector::new("position", position)?;
         let marker = place("marker", marker)?;

@@ -17,7 +17,7 @@ thread_local! {
     static WATCH: RefCell<Option<Py<PyAny>>> = const { RefCell::new(None) };
 }
 
-/// Lets long computations of the calling thread also stop when `asked()` is true, or raises: Ctrl-C reaches the main thread alone, and
+/// Lets long computations be interrupted when `asked()` is true, or raises. Ctrl-C reaches the main thread alone, and
 /// this is how it tells the threads that work for it. None ends it.
 #[pyfunction]
 #[pyo3(signature = (asked))]
@@ -25,7 +25,7 @@ pub(crate) fn stop_when(asked: Option<Py<PyAny>>) {
     WATCH.set(asked);
 }
 
-/// Raises if there is a reason to stop: a signal, or what the thread was told to watch.
+/// Raises if there is an interrupt: a signal, or what the thread was told to watch.
 fn check(py: Python<'_>) -> PyResult<()> {
     py.check_signals()?;
     let watch = WATCH.with_borrow(|watch| watch.as_ref().map(|asked| asked.clone_ref(py)));
@@ -68,7 +68,8 @@ pub(crate) fn interruptible<T: Send>(
     })
 }
 
-/// Runs a short `job` on this thread; a panic, which would be a mistake of the core, becomes an ordinary exception.
+/// Runs a short `job` without interrupts on this thread; a panic becomes an ordinary exception. It would be a mistake
+/// of the core.
 #[inline]
 pub(crate) fn unbroken<T>(job: impl FnOnce() -> T) -> PyResult<T> {
     catch_unwind(AssertUnwindSafe(job)).map_err(|_| crashed())

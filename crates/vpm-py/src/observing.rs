@@ -30,7 +30,7 @@ impl Kalman {
     }
 }
 
-/// A matrix as an array.
+/// Matrix of the observing filter as an array.
 fn matrix_of<'py>(py: Python<'py>, (values, shape): (Vec<f64>, [usize; 2])) -> PyResult<Table<'py>> {
     matrix(py, values, shape)
 }
@@ -69,7 +69,8 @@ impl Kalman {
         Ok(Self { filter: Mutex::new(system.checked(py, filter)?) })
     }
 
-    /// State (nx,), corrected by the readings (m,) of this sample, and innovations (m,); the inputs (n_inputs,) are held to the next.
+    /// Step of the observing filter: corrected state (nx,) and innovations (m,) from readings (m,). The inputs
+    /// (n_inputs,) are held to the next sample.
     fn step<'py>(&self, py: Python<'py>, readings: &Any<'py>, inputs: &Any<'py>) -> PyResult<(Row<'py>, Row<'py>)> {
         let (readings, inputs) = (Numbers::vector("readings", readings)?, Numbers::vector("inputs", inputs)?);
         let mut filter = self.filter()?;
@@ -79,18 +80,18 @@ impl Kalman {
         Ok((PyArray1::from_slice(py, found.state.as_slice()), PyArray1::from_slice(py, found.innovation.as_slice())))
     }
 
-    /// Covariance (nx, nx) of the last estimate, and (m, m) of the last innovations.
+    /// Covariance (nx, nx) of the observing filter's last estimate, and (m, m) of the last innovations.
     fn covariances<'py>(&self, py: Python<'py>) -> PyResult<(Table<'py>, Table<'py>)> {
         let filter = self.filter()?;
         Ok((matrix_of(py, by_rows(&filter.estimate().covariance))?, matrix_of(py, by_rows(&filter.estimate().spread))?))
     }
 
-    /// State (nx,) that is expected at the coming sample.
+    /// State (nx,) that the observing filter expects at the coming sample.
     fn expected<'py>(&self, py: Python<'py>) -> PyResult<Row<'py>> {
         Ok(PyArray1::from_slice(py, self.filter()?.expected()))
     }
 
-    /// Begins again in a state (nx,) of this covariance (nx, nx).
+    /// Resets the observing filter to a state (nx,) of this covariance (nx, nx).
     fn reset(&self, py: Python<'_>, state: &Any<'_>, covariance: &Any<'_>) -> PyResult<()> {
         let (state, covariance) = (Numbers::vector("state", state)?, Numbers::table("covariance", covariance)?);
         let mut filter = self.filter()?;
@@ -98,7 +99,8 @@ impl Kalman {
         checked(py, filter.description(), result)
     }
 
-    /// Keeps a gain (nx, m) from now on, under which the estimate has this covariance (nx, nx) and the innovations that one (m, m).
+    /// Holds a gain (nx, m) of the observing filter from now on. The estimate then has this covariance (nx, nx) and the
+    /// innovations that one (m, m).
     fn hold_gain(&self, py: Python<'_>, gain: &Any<'_>, covariance: &Any<'_>, spread: &Any<'_>) -> PyResult<()> {
         let (gain, covariance) = (Numbers::table("gain", gain)?, Numbers::table("covariance", covariance)?);
         let spread = Numbers::table("spread", spread)?;
@@ -107,7 +109,8 @@ impl Kalman {
         checked(py, filter.description(), result)
     }
 
-    /// Transition (nx, nx) over a sample from the expected state, measured outputs by the state (m, nx), covariance of what moves it (nx, nx).
+    /// Linearised machine of the observing filter at the expected state. Transition (nx, nx) over a sample, measured
+    /// outputs by the state (m, nx), covariance of what moves it (nx, nx).
     fn linearised<'py>(&self, py: Python<'py>, inputs: &Any<'py>) -> PyResult<(Table<'py>, Table<'py>, Table<'py>)> {
         let inputs = Numbers::vector("inputs", inputs)?;
         let mut filter = self.filter()?;

@@ -30,7 +30,8 @@ impl Loop {
         Ok(Self { core, rights: Some(Rights::ask(lock_memory, priority)) })
     }
 
-    /// Sleeps until the next deadline; its number, how late the wake-up was in s, and the deadlines missed since the last one.
+    /// Waits in the real-time loop for the next deadline. Gives its number, how late the wake-up was in s, and the
+    /// deadlines missed since the last one.
     fn wait(&mut self, py: Python<'_>) -> PyResult<(u64, f64, u64)> {
         let Self { core, rights } = self;
         if rights.is_none() {
@@ -51,12 +52,13 @@ impl Loop {
         }
     }
 
-    /// Gives memory and priority back. What was recorded stays.
+    /// Closes the real-time loop: gives memory and priority back. What was recorded stays.
     fn close(&mut self) {
         self.rights = None;
     }
 
-    /// Whether the system gave locked memory and priority, each None (not asked), an empty text (given) or a sentence (refused).
+    /// Rights of the real-time loop to locked memory and priority. Each is None (not asked), an empty text (given) or a
+    /// sentence (refused).
     #[getter]
     fn rights(&self) -> (Option<String>, Option<String>) {
         let told = |right: &Right| match right {
@@ -67,24 +69,24 @@ impl Loop {
         self.rights.as_ref().map_or((None, None), |rights| (told(&rights.memory), told(&rights.priority)))
     }
 
-    /// Wake-ups recorded.
+    /// Wake-ups that the real-time loop recorded.
     #[getter]
     fn wakes(&self) -> u64 {
         self.core.wakes()
     }
 
-    /// Deadlines missed.
+    /// Deadlines that the real-time loop missed.
     #[getter]
     fn missed(&self) -> u64 {
         self.core.missed()
     }
 
-    /// Time from a deadline to its wake-up, s: the quantiles asked for, each between 0 and 1.
+    /// Latencies of the real-time loop from a deadline to its wake-up, s, at quantiles between 0 and 1.
     fn latencies(&self, quantiles: Vec<f64>) -> Vec<f64> {
         quantiles.into_iter().map(|quantile| self.core.latency(quantile)).collect()
     }
 
-    /// Time from a wake-up to the next wait, s: the quantiles asked for.
+    /// Work of the real-time loop from a wake-up to the next wait, s, at these quantiles.
     fn work(&self, quantiles: Vec<f64>) -> Vec<f64> {
         quantiles.into_iter().map(|quantile| self.core.work(quantile)).collect()
     }

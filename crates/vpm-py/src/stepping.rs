@@ -21,14 +21,14 @@ type Stepped<'py> = (Bound<'py, PyArray2<f64>>, Vec<Option<String>>);
 /// Samples between two questions whether to stop.
 const PATIENCE: usize = 256;
 
-/// Checked settings from what Python gave.
+/// Checked settings for stepping from what Python gave.
 pub(crate) fn stepping((time_step, substeps, integrator): (f64, i64, &str)) -> PyResult<Result<Stepping, Error>> {
     let substeps = usize::try_from(substeps)
         .map_err(|_| CoreError::new_err(format!("substeps must be at least 1, got {substeps}; use 1 to begin with")))?;
     Ok(Method::from_name(integrator).and_then(|method| Stepping::new(time_step, substeps, method)))
 }
 
-/// Complains with `CoreError` about a name that is no integrator's, or a tolerance in it that means nothing.
+/// Refuses with `CoreError` a name of no integrator for stepping, or a meaningless tolerance in it.
 #[pyfunction]
 pub(crate) fn check_integrator(name: &str) -> PyResult<()> {
     Method::from_name(name).map(|_| ()).map_err(|error| CoreError::new_err(error.to_string()))
@@ -42,7 +42,7 @@ pub(crate) struct Snapshot {
 
 #[pymethods]
 impl Snapshot {
-    /// Time of the simulation when it was taken, s.
+    /// Time of a stepping simulation when its snapshot was taken, s.
     #[getter]
     fn time(&self) -> f64 {
         self.live.time()
@@ -76,7 +76,8 @@ pub(crate) struct Simulation {
 }
 
 impl Simulation {
-    /// The simulation, if no other thread is at work with it: to wait for that thread here could block the interpreter.
+    /// Stepping simulation, if no other thread is at work with it. To wait for that thread here could block the
+    /// interpreter.
     fn live(&self) -> PyResult<MutexGuard<'_, Live>> {
         self.live.try_lock().map_err(|_| {
             CoreError::new_err("this simulation is at work in another thread; give each thread its own simulation")
@@ -102,7 +103,7 @@ impl Simulation {
         Ok(Self { live: Mutex::new(system.checked(py, live)?) })
     }
 
-    /// Go on by machine code from now on.
+    /// Compiles the stepping simulation to machine code from now on.
     ///
     /// Returns
     /// -------
@@ -113,25 +114,25 @@ impl Simulation {
         unbroken(|| live.compile().err())
     }
 
-    /// Time since the beginning, s.
+    /// Time of the stepping simulation since the beginning, s.
     #[getter]
     fn time(&self) -> PyResult<f64> {
         Ok(self.live()?.time())
     }
 
-    /// State now (n_states,); a copy.
+    /// State of the stepping simulation now (n_states,); a copy.
     #[getter]
     fn state<'py>(&self, py: Python<'py>) -> PyResult<Row<'py>> {
         Ok(PyArray1::from_slice(py, self.live()?.state()))
     }
 
-    /// What the sensors show now (n_outputs,); a copy.
+    /// Outputs of the stepping simulation now, as sensors show them (n_outputs,); a copy.
     #[getter]
     fn outputs<'py>(&self, py: Python<'py>) -> PyResult<Row<'py>> {
         Ok(PyArray1::from_slice(py, self.live()?.outputs()))
     }
 
-    /// Holds the commands (n_inputs,) for the time of one sample; outputs (n_outputs,) at its end.
+    /// Steps the simulation: holds the commands (n_inputs,) for one sample; outputs (n_outputs,) at its end.
     fn step<'py>(&self, py: Python<'py>, inputs: &Any<'py>) -> PyResult<Row<'py>> {
         let inputs = Vector::new("inputs", inputs)?;
         let mut live = self.live()?;
@@ -140,7 +141,8 @@ impl Simulation {
         checked(py, live.description(), result)
     }
 
-    /// A step for each row of the commands (N, n_inputs); outputs (N, n_outputs), each at the end of its step.
+    /// Steps the simulation for each row of the commands (N, n_inputs). Outputs (N, n_outputs), each at the end of its
+    /// step.
     fn run<'py>(&self, py: Python<'py>, inputs: &Any<'py>) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let inputs = Numbers::table("inputs", inputs)?;
         let mut live = self.live()?;
@@ -161,7 +163,7 @@ impl Simulation {
         matrix(py, outputs, [inputs.rows(), width])
     }
 
-    /// Begins again at time zero in a state (n_states,), with nothing remembered.
+    /// Resets the stepping simulation to time zero in a state (n_states,), with nothing remembered.
     fn reset(&self, py: Python<'_>, state: &Any<'_>) -> PyResult<()> {
         let state = Numbers::vector("state", state)?;
         let mut live = self.live()?;
@@ -169,12 +171,12 @@ impl Simulation {
         checked(py, live.description(), result)
     }
 
-    /// All that it is now, with what delays and sampled drives remember.
+    /// Snapshot of the stepping simulation, with what delays and sampled drives remember.
     fn snapshot(&self) -> PyResult<Snapshot> {
         Ok(Snapshot { live: self.live()?.clone() })
     }
 
-    /// Goes back to where it was when the snapshot was taken; complains about that of another simulation.
+    /// Restores the stepping simulation from a snapshot; refuses that of another simulation.
     fn restore(&self, snapshot: &Snapshot) -> PyResult<()> {
         let mut live = self.live()?;
         if !live.is_alike(&snapshot.live) {
@@ -191,8 +193,8 @@ impl Simulation {
     }
 }
 
-/// Holds inputs (E, n_inputs) in E simulations of the same machine over so many samples: outputs (E, n_outputs) at their end, and of each
-/// simulation that could not go on why, or None.
+/// Steps E simulations of the same machine with inputs (E, n_inputs) over so many samples. Gives outputs (E, n_outputs)
+/// at their end, and of each simulation that could not go on why, or None.
 #[pyfunction]
 pub(crate) fn step_all<'py>(
     py: Python<'py>,

@@ -8,7 +8,7 @@ from pathlib import Path
 
 
 def describe() -> str:
-    """Processor, cores, operating system, and what is known of its readiness for real time."""
+    """Machine in words: processor, cores, operating system, and readiness for real time."""
     return ", ".join(part for part in (_processor(), _cores(), _system()) if part)
 
 

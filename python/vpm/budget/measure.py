@@ -35,7 +35,7 @@ def budget(
     compiled: bool = True,
     tell: Callable[[str], None] | None = None,
 ) -> BudgetReport:
-    """Time single steps of a model along a command.
+    """Measure single steps of a model along a command.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def budget(
 
 
 def _rank(rate: float, priority: int | None) -> str:
-    """Priority of the timed thread in words, such as ", at priority 80"; empty where none was asked for."""
+    """Priority of the measured thread in words, such as ", at priority 80"; or empty."""
     if priority is None:
         return ""
     with Loop(rate, priority=priority) as loop:
@@ -124,14 +124,14 @@ def _rank(rate: float, priority: int | None) -> str:
 
 
 def _stages(timed: Timed) -> tuple[Stage, ...]:
-    """Stages of a step, and what the median step takes beside them."""
+    """Measured stages of a step, and what the median step takes beside them."""
     parts = [Stage(name, seconds * calls, calls) for name, seconds, calls in timed.stages]
     rest = float(np.median(timed.seconds)) - sum(part.seconds for part in parts)
     return (*parts, Stage(REST, max(rest, 0.0), 1.0))
 
 
 def _latency(rate: float, seconds: float, tell: Callable[[str], None] | None) -> dict[str, float]:
-    """How late a real-time loop without work wakes up."""
+    """Measured latency: how late a real-time loop without work wakes up."""
     if tell:
         tell(f"watching an idle loop for {seconds:g} s")
     with Loop(rate) as loop:

@@ -84,22 +84,22 @@ class BudgetReport(Result):
 
     @property
     def taken(self) -> float:
-        """Share of the period that a step takes at its 99.9 % quantile."""
+        """Reported share of the period that a step takes at its 99.9 % quantile."""
         return self.quantiles["p99.9"] * self.rate
 
     @property
     def holds(self) -> bool:
-        """Whether a step takes at most its allowed share of the period, and no step asks for memory."""
+        """Whether the reported budget holds: steps are short enough, and none asks for memory."""
         return self.taken <= self.share and self.allocations == 0
 
     @property
     def largest(self) -> Stage:
-        """The stage that takes most of a step."""
+        """Largest stage of a step in the report."""
         return max(self.stages, key=lambda stage: stage.seconds)
 
     @property
     def verdict(self) -> str:
-        """One sentence: whether the budget holds, or what breaks it."""
+        """Verdict of the report: whether the budget holds, or what breaks it."""
         taken = f"{100 * self.taken:.3g} % of the period at p99.9, {100 * self.share:g} % allowed"
         if self.allocations:
             return f"the budget does not hold: the steps asked for memory {self.allocations} times ({taken})"
@@ -110,7 +110,7 @@ class BudgetReport(Result):
         return f"the budget does not hold: {taken}; most of a step, {part:.0f} %, is: {most.name}"
 
     def __str__(self) -> str:
-        """A few lines for the terminal."""
+        """Text of the report, a few lines for the terminal."""
         lines = [
             f"{self.model_name}, {self.integrator}, {self.steps} steps at {self.rate:g} Hz on {self.machine}",
             f"  {_times(self.quantiles)}; {self.overruns} steps were longer than the period",
@@ -140,7 +140,7 @@ class BudgetReport(Result):
         return {"quantile": list(self.quantiles), "seconds": list(self.quantiles.values())}
 
     def plot(self) -> Figure:
-        """Quantiles against the period. Needs the extra ``plot``."""
+        """Plot the report: quantiles against the period. Needs the extra ``plot``."""
         from vpm.plot import plot_step_cost
 
         return plot_step_cost(self.quantiles, 1.0 / self.rate)

@@ -147,7 +147,7 @@ def _ahead(rate: float, priority: int | None) -> AbstractContextManager[object]:
 
 
 def start_state(model: Model, experiment: Experiment | None) -> Array | None:
-    """Where a model starts while it is timed: where a record does, if contacts or oil make zero no place to be.
+    """Start state of timed steps: a record's, if contacts or oil make zero impossible.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def start_state(model: Model, experiment: Experiment | None) -> Array | None:
 
 
 def commands(model: Model, rate: float, experiment: Experiment | None = None) -> Array:
-    """Inputs (N, inputs) that drive a model while it is timed.
+    """Inputs (N, inputs) that drive timed steps of a model.
 
     Parameters
     ----------
@@ -183,7 +183,7 @@ def commands(model: Model, rate: float, experiment: Experiment | None = None) ->
 
 
 def _driving(model: Model, experiment: Experiment) -> list[Array]:
-    """Commands of a record; where controllers give them, what these say along its references."""
+    """Commands of a record for timed steps; where controllers give them, along its references."""
     missing = [name for name in model.input_channels if name not in experiment]
     if not missing or not model.controlled_actuators:
         return [experiment[name] for name in model.input_channels]

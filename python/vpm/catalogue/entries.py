@@ -45,7 +45,7 @@ class Catalogue(Mapping[str, EffectType]):
         return sum(1 for _ in self)
 
     def _take(self, plugin: Plugin) -> None:
-        """Import an effect; a warning says why one cannot be used."""
+        """Import an effect's entry; a warning says why one cannot be used."""
         if plugin.name in self.troubles:
             return
         try:

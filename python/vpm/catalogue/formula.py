@@ -39,7 +39,7 @@ class Formula:
     constants: tuple[float, ...]
 
     def __call__(self, q: float, v: float, parameters: Sequence[float]) -> float:
-        """Effort, as the core computes it.
+        """Effort of a formula, as the core computes it.
 
         Parameters
         ----------
@@ -81,7 +81,7 @@ def _combined(operation: str, first: float, second: float) -> float:
 
 
 def compile_formula(text: str, names: Sequence[str]) -> Formula:
-    """Compile the law of a user's effect into a postfix program.
+    """Compile a user's formula into a postfix program.
 
     Parameters
     ----------
@@ -123,7 +123,7 @@ class _Compiler:
         self.constants: list[float] = []
 
     def write(self, node: ast.expr) -> int:
-        """Append the program of a node; gives how many numbers wait at the most."""
+        """Write the program of a formula's node; gives how many numbers wait at the most."""
         match node:
             case ast.Constant(value=int() | float() as value) if not isinstance(value, bool):
                 return self._constant(float(value))

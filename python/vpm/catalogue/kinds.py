@@ -34,7 +34,7 @@ Side = Literal["motor", "link"]
 
 
 def in_words(at: str, side: Side) -> str:
-    """Component and side in words; of the motor side nothing is said."""
+    """Component and side of an effect kind in words; of the motor side nothing is said."""
     return at if side == "motor" else f"{at}, {side} side"
 
 
@@ -172,32 +172,32 @@ class EffectType(Traits):
 
     @property
     def has_law(self) -> bool:
-        """Whether an effect has a law of its own, and is not a form for what no law explains."""
+        """Whether a kind of effect has a law of its own, and is no form for what no law explains."""
         return any(not parameter.shape and not parameter.optional for parameter in self.parameters)
 
     @property
     def has_sides(self) -> bool:
-        """Whether it may sit on either side of a compliance or backlash; the motor side if nothing is said."""
+        """Whether a kind of effect may sit on either side of a compliance or backlash."""
         return self.site == "joint" and not self.motor_side_alone
 
     @property
     def rubs(self) -> bool:
-        """Whether an effect is friction: it turns round with the motion, within a transition velocity."""
+        """Whether a kind of effect is friction: it turns round with the motion, within a transition velocity."""
         return any(parameter.name == "transition_velocity" for parameter in self.parameters)
 
     @property
     def adds_inertia(self) -> bool:
-        """Whether a mass or an inertia is among the parameters of an effect."""
+        """Whether a mass or an inertia is among the parameters of a kind of effect."""
         return any(parameter.scale in {"mass", "inertia"} for parameter in self.parameters)
 
     @property
     def title(self) -> str:
-        """Name in words: ``"Coulomb friction"``."""
+        """Name of a kind of effect in words: ``"Coulomb friction"``."""
         words = self.name.replace("_", " ")
         return words.replace("coulomb", "Coulomb").replace("stribeck", "Stribeck").replace("lugre", "LuGre")
 
     def parameter(self, name: str) -> EffectParameter:
-        """Parameter of an effect by its short name.
+        """Parameter of a kind of effect by its short name.
 
         Raises
         ------
@@ -222,7 +222,7 @@ def size(
     neutral: float = 0.0,
     linear: bool = True,
 ) -> EffectParameter:
-    """Size of a law that can be evaluated for every number; the effort is linear in it unless said otherwise."""
+    """Kind of parameter: size of a law, in which the effort is linear unless said otherwise."""
     return EffectParameter(
         name=name,
         suffix=suffix,
@@ -249,7 +249,7 @@ def shape(
     bounds: Range = ABOVE_ZERO,
     learnt: bool = False,
 ) -> EffectParameter:
-    """Shape parameter; law and physics have the same range."""
+    """Kind of parameter: shape; law and physics have the same range."""
     return EffectParameter(
         name=name,
         suffix=suffix,
@@ -278,7 +278,7 @@ def nonlinear(
     evaluable: Range,
     typical: float = 1.0,
 ) -> EffectParameter:
-    """Size of an effect in which nothing is linear."""
+    """Kind of parameter: size of an effect in which nothing is linear."""
     return EffectParameter(
         name=name,
         suffix=suffix,

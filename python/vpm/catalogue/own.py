@@ -30,7 +30,7 @@ def entry_of(
     not_negative: Collection[str] = (),
     confused_with: Mapping[str, str] | None = None,
 ) -> EffectType:
-    """Catalogue entry of a law of a user; see `vpm.catalogue.register`.
+    """Catalogue entry of a user's own law; see `vpm.catalogue.register`.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def _shape(name: str, short: str, unit: str, start: float, positive: bool) -> Ef
 
 
 def _check_law(name: str, formula: Formula, sizes: Mapping[str, str], shapes: list[float]) -> bool:
-    """Whether a registered law is linear in its sizes; it has to vanish with them and to be finite."""
+    """Whether a user's own law is linear in its sizes; it has to vanish with them and to be finite."""
 
     def at(q: float, v: float, numbers: list[float]) -> float:
         try:

@@ -28,7 +28,7 @@ SLOW_AND_FAST = "Motion in both directions at several constant speeds, with slow
 
 
 def transition(suffix: str) -> EffectParameter:
-    """Speed at which a friction law bends."""
+    """Shared parameter: speed at which a friction law bends."""
     return shape(
         "transition_velocity",
         suffix,
@@ -50,7 +50,7 @@ def shares(driving: str, driven: str) -> tuple[EffectParameter, EffectParameter]
 
 
 def law_of_load(effort: str) -> str:
-    """Law of friction in proportion to an effort, which is said in words."""
+    """Shared law of friction in proportion to an effort, which is said in words."""
     return (
         "tau = -|u| s (driving + driven + (driving - driven) s sign(u))/2, s = tanh(v/transition_velocity), "
         f"u {effort}, each share within 0.95"
@@ -58,7 +58,7 @@ def law_of_load(effort: str) -> str:
 
 
 def motor_inertia(suffix: str) -> EffectParameter:
-    """Inertia before a spring or play, which has nothing to swing against without."""
+    """Shared parameter: inertia before a spring or backlash."""
     return shape(
         "inertia",
         suffix,
@@ -72,7 +72,7 @@ def motor_inertia(suffix: str) -> EffectParameter:
 
 
 def delay(meaning: str) -> EffectParameter:
-    """Parameter of a delay: time by which something is late."""
+    """Shared parameter of a delay: time by which something is late."""
     return nonlinear(
         "time", "delay.time", "s", "time", meaning, neutral=0.0, physical=NOT_NEGATIVE, evaluable=NOT_NEGATIVE
     )
@@ -81,7 +81,7 @@ def delay(meaning: str) -> EffectParameter:
 def over_described(
     name: str, suffix: str, unit: str, scale: Scale, meaning: str, typical: float, evaluable: Range = ANY
 ) -> EffectParameter:
-    """Size of what comes on top of a described value of a hydraulic drive, so that its neutral value is zero."""
+    """Shared size of what comes on top of a described value of a hydraulic drive."""
     return nonlinear(
         name,
         suffix,

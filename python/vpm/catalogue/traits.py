@@ -83,30 +83,30 @@ class Traits:
 
     @property
     def shifts(self) -> bool:
-        """Whether an effect shifts in time what it passes on, as a lag nearly does."""
+        """Trait: whether an effect shifts in time what it passes on, as a lag nearly does."""
         return self.late in {"delay", "lag"}
 
     @property
     def has_play(self) -> bool:
-        """Whether an effect has a gap within which its two sides move without each other, as a backlash has."""
+        """Trait: whether an effect has a gap within which its two sides move without each other."""
         return self.impacts and bool(self.motion)
 
     @property
     def stops(self) -> bool:
-        """Whether an effect ends the way of a joint."""
+        """Trait: whether an effect ends the way of a joint."""
         return self.impacts and not self.motion
 
     @property
     def elastic(self) -> bool:
-        """Whether an effect is a spring with a motion of its own."""
+        """Trait: whether an effect is a spring with a motion of its own."""
         return bool(self.motion) and not self.impacts
 
     @property
     def winds_up(self) -> bool:
-        """Whether an effect is a spring between a motor and its link."""
+        """Trait: whether an effect is a spring between a motor and its link."""
         return self.elastic and self.motion == "deflection"
 
     @property
     def splits(self) -> bool:
-        """Whether an effect splits a joint into motor side and link side."""
+        """Trait: whether an effect splits a joint into motor side and link side."""
         return self.motion == "deflection"

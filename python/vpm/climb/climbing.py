@@ -42,7 +42,7 @@ class _Remembered(OutputErrorProblem):
     _last: tuple[Model, Array, tuple[int, ...], tuple[Array, Array]] | None = None
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
-        """Residual and derivative, see `Problem`; from memory where no more is asked than was asked last."""
+        """Residual and derivative while climbing, see `Problem`; from memory for the same question."""
         if self._last is not None:
             of, at, known, (residual, jacobian) = self._last
             if of is model and set(columns) <= set(known) and np.array_equal(at, theta):
@@ -83,7 +83,7 @@ def climb(
     patience: int = 2,
     tell: Callable[[str], None] | None = None,
 ) -> Climb:
-    """Identify a model at each level of detail, as far up as validation records tell that detail pays.
+    """Climb in detail: identify a model at each level, as far up as validation records tell that it pays.
 
     The levels are: rigid with ideal actuators, rigid with what the actuators do, then the flexible links from springs
     between rigid segments over modes, Bezier curves and elements to the model's own; of each kind finer ones while the
@@ -159,7 +159,7 @@ def climb(
 
 
 def _through(family: Family, data: _Data, reached: list[_Reached], say: Callable[[str], None]) -> bool:
-    """Fit levels of one kind, finer and finer as long as that lowers the error; whether one of them paid."""
+    """Climb through levels of one kind, finer as long as that lowers the error; whether one paid."""
     paid, error = False, np.inf
     for name, machine in family:
         say(name)
@@ -180,7 +180,7 @@ def _best(reached: Sequence[_Reached]) -> _Reached | None:
 
 
 def _climbed(name: str, machine: Model, data: _Data, below: _Reached | None, best: _Reached | None) -> _Reached | None:
-    """A level fitted and judged on validation records; None where it cannot be simulated."""
+    """Level climbed, fitted and judged on validation records; None where it cannot be simulated."""
     known = {} if below is None else below.known
     try:
         start = _start(machine, known, data.train)
@@ -214,7 +214,7 @@ def _climbed(name: str, machine: Model, data: _Data, below: _Reached | None, bes
 
 
 def _start(machine: Model, known: dict[str, float], problem: OutputErrorProblem) -> Model:
-    """Model with the parameters of the level below, or with its own where these are nearer to the data."""
+    """Start of a climbed level: parameters of the level below, or its own where nearer to the data."""
     learnt = machine.with_parameters({key: value for key, value in known.items() if key in machine.parameters})
     if np.array_equal(learnt.theta, machine.theta):
         return machine
@@ -226,7 +226,7 @@ def _start(machine: Model, known: dict[str, float], problem: OutputErrorProblem)
 
 
 def _seen(machine: Model, problem: OutputErrorProblem) -> tuple[str, ...]:
-    """Adjustable parameters that the data see at this level."""
+    """Adjustable parameters that the data show at a climbed level."""
     free = [parameter for parameter in machine.parameters.values() if parameter.adjustable]
     residual, jacobian = problem.evaluate(machine, machine.theta, [machine.index(each.name) for each in free])
     size = np.linalg.norm(residual)
@@ -241,7 +241,7 @@ def _fitted(machine: Model, problem: OutputErrorProblem, free: Sequence[str]) ->
 
 
 def families(model: Model) -> list[Family]:
-    """Levels that the machine can have, by kind, the simplest first, its own last.
+    """Levels to climb, by kind, the simplest first, the machine's own last.
 
     Effects at actuators (a lag, a delay, a dead zone) are left out of the lowest one; flexible links are rigid in it.
     Levels of links whose model would not be a valid one are skipped.
@@ -265,7 +265,7 @@ def families(model: Model) -> list[Family]:
 
 
 def _made(model: Model, beams: Mapping[str, Any], level: str) -> Model | None:
-    """Model with links at one level, each at most as fine as its own; None where nothing changes or it is invalid."""
+    """Model of a climbed level, links at most as fine as their own; None where nothing changes."""
     finer = {name: level for name, beam in beams.items() if 0 < size_of(level, beam) < size_of(beam["level"], beam)}
     if not finer:
         return None

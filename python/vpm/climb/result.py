@@ -47,7 +47,7 @@ class Level(Storable):
 
     @property
     def error(self) -> float:
-        """Root mean square of the errors of the channels."""
+        """Result of a level: root mean square of the channels' errors."""
         return math.sqrt(sum(error**2 for error in self.errors.values()) / len(self.errors))
 
     def __str__(self) -> str:
@@ -83,12 +83,12 @@ class Climb(Result):
 
     @property
     def chosen(self) -> Level:
-        """The level at which more detail stops to pay."""
+        """Result of a climb: the level at which more detail stops to pay."""
         return next(level for level in self.levels if level.name == self.top)
 
     @property
     def drifts(self) -> dict[str, float]:
-        """How far each parameter moved from its first level to the chosen one, in its standard deviations there.
+        """Result of a climb: parameter changes from first to chosen level, in standard deviations.
 
         What drifts by many took over physics that the lower levels did not have.
         """
@@ -103,7 +103,7 @@ class Climb(Result):
 
     @property
     def verdict(self) -> str:
-        """One sentence: how far detail pays."""
+        """Result of a climb in one sentence: how far detail pays."""
         if self.levels[-1].name == self.top:
             end = f"the finest level that the model has; it leaves {100 * self.chosen.error:.2f} %"
         else:
@@ -111,7 +111,7 @@ class Climb(Result):
         return f"detail pays up to {self.top}, {end}"
 
     def __str__(self) -> str:
-        """The levels and the verdict."""
+        """Text of a climb's result: levels and verdict."""
         lines = [
             f"levels on validation data, {self.mode} (* pays):",
             *(f"  {level}" for level in self.levels),
@@ -136,7 +136,7 @@ class Climb(Result):
         }
 
     def plot(self) -> Figure:
-        """Error against level, and the parameters at each. Needs the extra ``plot``."""
+        """Plot a climb's result: error against level, and the parameters at each. Needs the extra ``plot``."""
         from vpm.plot import plot_climb
 
         return plot_climb(self.levels, self.top)

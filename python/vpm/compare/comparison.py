@@ -70,11 +70,11 @@ class ChannelComparison(Storable):
 
     @property
     def residual(self) -> Array:
-        """Measured minus simulated, shape (N,)."""
+        """Residual of a compared channel: measured minus simulated, shape (N,)."""
         return self.measured - self.simulated
 
     def __str__(self) -> str:
-        """One line."""
+        """Line on a compared channel."""
         share = "of a signal that does not change"
         if np.isfinite(self.relative_error):
             share = f"{self.relative_error:.3g} % of the signal, fit {self.fit:.4g} %"
@@ -124,7 +124,7 @@ class Comparison(Result):
         )
 
     def __str__(self) -> str:
-        """A line per channel."""
+        """Text of a comparison, a line per channel."""
         lines = [f"{self.model_name} against {self.experiment_name}, {self.mode}"]
         return "\n".join([*lines, *(f"  {each}" for each in self.channels)])
 
@@ -157,7 +157,7 @@ class Comparison(Result):
         return columns
 
     def plot(self) -> Figure:
-        """Overlay, residual over time and over velocity, a row per channel. Needs the extra ``plot``."""
+        """Plot a comparison: overlay, residual over time and over velocity. Needs the extra ``plot``."""
         from vpm.plot import plot_comparison
 
         return plot_comparison(self)

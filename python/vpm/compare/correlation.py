@@ -121,7 +121,7 @@ def cross_correlation(residual: Array, signal: Array, pieces: Sequence[slice], d
 
 
 def effective_samples(residual: Array, pieces: Sequence[slice]) -> float:
-    """How many independent samples the residual is worth: ``N / (1 + 2 sum rho_k)``.
+    """Number of independent samples of a residual by its correlation: ``N / (1 + 2 sum rho_k)``.
 
     The sum ends where two neighbouring correlations together are no longer positive (C. Geyer, *Statistical Science* 7,
     1992).

@@ -18,7 +18,7 @@ FIELDS = ("measured", "simulated", "residual")
 
 
 def write_mcap(comparison: Comparison, path: str | PathLike[str]) -> tuple[Path, Path]:
-    """Write what was measured, simulated and is left of each channel, with the time stamps of the log.
+    """Export measured, simulated and residual channels as MCAP, with the time stamps of the log.
 
     Each channel ``axis.position`` is a topic ``/axis/position`` of JSON messages, whose schema says the unit.
 
@@ -62,7 +62,7 @@ def write_mcap(comparison: Comparison, path: str | PathLike[str]) -> tuple[Path,
 
 
 def topic_of(channel: str) -> str:
-    """Topic of a channel; points separate topics from fields where they are plotted."""
+    """Topic of an exported channel; points separate topics from fields where they are plotted."""
     return "/" + channel.replace(".", "/")
 
 
@@ -72,7 +72,7 @@ def _schema(channel: ChannelComparison) -> dict[str, Any]:
 
 
 def _layout(comparison: Comparison) -> dict[str, Any]:
-    """Layout of Foxglove: of each channel measured and simulated, and the residual beside."""
+    """Layout to export for Foxglove: each channel measured and simulated, and the residual."""
     plots: dict[str, Any] = {}
     rows: list[Any] = []
     for at, each in enumerate(comparison.channels):

@@ -173,7 +173,7 @@ def _measured(run: SimulatedRun, experiment: Experiment) -> Array:
 def _picked(
     run: SimulatedRun, experiment: Experiment, measured: Array, channels: Sequence[str] | None
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
-    """Channels to compare, and a sentence on each that is not."""
+    """Channels to measure the error of, and a sentence on each that is left out."""
     known = [bool(np.isfinite(column).all()) for column in measured.T]
     there = [channel for channel, is_known in zip(run.channels, known, strict=True) if is_known]
     for channel in channels or ():
@@ -207,7 +207,7 @@ def _picked(
 
 
 def _state(run: SimulatedRun, experiment: Experiment) -> tuple[dict[str, Array], dict[str, str]]:
-    """Motion of every joint at the samples of the run: from the log where it has positions, else as simulated."""
+    """Joint motion beside measured errors: from the log where it has positions, else as simulated."""
     state, units = {}, {}
     joints = [name.removesuffix(".position") for name in experiment.channels if name.endswith(".position")]
     for joint in joints if len(experiment) >= FEWEST_SAMPLES else ():
@@ -227,7 +227,7 @@ def _state(run: SimulatedRun, experiment: Experiment) -> tuple[dict[str, Array],
 
 
 def _inputs(run: SimulatedRun, experiment: Experiment, dt: float) -> dict[str, Array]:
-    """Inputs that vary, at the samples of the run and within its band."""
+    """Varying inputs beside measured errors, at the samples of the run and within its band."""
     found = {}
     factor = dt / experiment.dt
     for channel in experiment.channels:
@@ -240,7 +240,7 @@ def _inputs(run: SimulatedRun, experiment: Experiment, dt: float) -> dict[str, A
 def _state_regions(
     channel: str, residual: Array, unit: str, state: dict[str, Array], units: dict[str, str]
 ) -> list[Region]:
-    """Regions of the channel's own joint, or of all joints where it belongs to none."""
+    """Regions in which a channel's error is measured: of its own joint, or of all."""
     joints = list(dict.fromkeys(name.rpartition(".")[0] for name in state))
     own = channel.rpartition(".")[0]
     regions = []

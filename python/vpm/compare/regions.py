@@ -75,7 +75,7 @@ class Region(Storable):
 
     @property
     def worst(self) -> Bin:
-        """The bin with the largest share of the energy."""
+        """Worst bin of a region, with the largest share of the energy."""
         return max(self.bins, key=lambda b: b.share)
 
 
@@ -104,19 +104,19 @@ class Where(Storable):
 
 
 def time_region(residual: Array, time: Array) -> Region:
-    """Shares of 20 equal slices of time."""
+    """Region by time: shares of 20 equal slices."""
     bins = _bins(residual, time, np.linspace(time.min(), time.max(), TIME_SLICES + 1))
     return Region("time", "s", bins, _concentration(bins, "s", "of the time"))
 
 
 def restart_region(residual: Array, since: Array) -> Region:
-    """Shares of five parts of the time since a restart: whether the error grows with the horizon."""
+    """Region by time since the start of a piece: shares of five parts."""
     bins = _bins(residual, since, np.linspace(0.0, since.max(), 6))
     return Region("time since restart", "s", bins, _concentration(bins, "s after a restart", "of the samples"))
 
 
 def frequency_region(residual: Array, signal: Array, pieces: Sequence[slice], dt: float) -> Region:
-    """Shares of octaves, from half of the sampling rate downward; the lowest band includes the mean."""
+    """Region by frequency: shares of octaves from half of the sampling rate downward."""
     nyquist = 0.5 / dt
     edges = np.concatenate([[0.0], nyquist * 2.0 ** np.arange(-OCTAVES, 1.0)])
     powers = [_band_power(values, pieces, dt, edges) for values in (residual, signal)]
@@ -137,7 +137,7 @@ def frequency_region(residual: Array, signal: Array, pieces: Sequence[slice], dt
 def state_regions(
     residual: Array, joint: str, state: Mapping[str, Array], *, unit: str, residual_unit: str
 ) -> list[Region]:
-    """Shares over speed, velocity, acceleration and position of a joint.
+    """Regions by a joint's state: shares over speed, velocity, acceleration and position.
 
     Parameters
     ----------
@@ -165,7 +165,7 @@ def _speed_region(residual: Array, joint: str, velocity: Array, unit: str) -> Re
 
 
 def _velocity_region(residual: Array, joint: str, velocity: Array, unit: str, residual_unit: str) -> Region:
-    """Signed velocity: a friction that is missing shows as a mean that changes sign with it."""
+    """Region by signed velocity: missing friction shows as a mean that changes sign with it."""
     highest = float(np.abs(velocity).max())
     rising = highest * np.array([AT_REST, 0.1, 0.25, 0.5, 0.75, 1.0])
     bins = _bins(residual, velocity, np.concatenate([-rising[::-1], rising]))
@@ -192,7 +192,7 @@ def _position_region(residual: Array, joint: str, position: Array, unit: str) ->
 
 
 def _bins(residual: Array, values: Array, edges: Array) -> tuple[Bin, ...]:
-    """Energy, samples and mean between neighbouring edges; values beyond the ends count for the outer bins."""
+    """Bins of a region: energy, samples and mean between neighbouring edges."""
     place = np.clip(np.searchsorted(edges, values, side="right") - 1, 0, edges.size - 2)
     counts = np.bincount(place, minlength=edges.size - 1)
     energy = np.bincount(place, weights=residual**2, minlength=edges.size - 1)
@@ -211,7 +211,7 @@ def _bins(residual: Array, values: Array, edges: Array) -> tuple[Bin, ...]:
 
 
 def _concentrated(bins: Sequence[Bin]) -> tuple[int, int]:
-    """Neighbouring bins whose share exceeds their occupancy the most (J. Kadane's largest sum of neighbours)."""
+    """Neighbouring bins of a region whose share exceeds their occupancy most (J. Kadane's largest sum)."""
     best, first, last, running, begin = -np.inf, 0, len(bins), 0.0, 0
     for at, each in enumerate(bins):
         if running <= 0.0:
@@ -253,7 +253,7 @@ def _percent(share: float) -> str:
 
 
 def _band_power(values: Array, pieces: Sequence[slice], dt: float, edges: Array) -> Array:
-    """Energy between the edges, by the periodogram of each piece."""
+    """Energy of a frequency region between the edges, by the periodogram of each piece."""
     power = np.zeros(edges.size - 1)
     for piece in pieces:
         part = values[piece]

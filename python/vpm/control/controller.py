@@ -87,7 +87,7 @@ class FlexibleController:
         self.reset()
 
     def _schedule(self, feedback: StateFeedback, noise: Noise, integrator: str) -> None:
-        """Gains of every sample, worked out now: a step then takes a row of a table."""
+        """Gains of the controller at every sample, computed once: a step then takes a row of a table."""
         step, places = self.feedforward.time_step, feedback.schedule
         observer = Observer(self.model, step, self.channels, noise, state=self._states[0], integrator=integrator)
         self._steady = [
@@ -103,7 +103,7 @@ class FlexibleController:
         self._observer, self._time_step = observer, step
 
     def reset(self, state: Mapping[str, float] | ArrayLike | None = None) -> None:
-        """Begin again, with the machine in this state; by default in the first reference.
+        """Reset the controller, with the machine in this state; by default in the first reference.
 
         Parameters
         ----------
@@ -115,7 +115,7 @@ class FlexibleController:
             self._observer.reset(self._states[0] if state is None else state)
 
     def step(self, measurements: ArrayLike = ()) -> Array:
-        """Commands of the sample that begins now, from the readings at its beginning.
+        """Step of the controller: commands of this sample from the readings at its beginning.
 
         Parameters
         ----------
@@ -162,12 +162,12 @@ class FlexibleController:
 
     @property
     def time(self) -> float:
-        """Time of the coming sample, s; the target begins at zero."""
+        """Time of the controller's coming sample, s; the target begins at zero."""
         return float(self.feedforward.time[0] + self._sample * self.feedforward.time_step)
 
     @property
     def estimate(self) -> Array:
-        """State as it was last corrected (nx,); without a feedback the reference."""
+        """State (nx,) that the controller last corrected; without a feedback the reference."""
         return self._states[min(self._sample, self._last)] if self._observer is None else self._observer.state
 
     def step_times(self, steps: int = 2000, clock: Callable[[], float] = perf_counter) -> Array:

@@ -54,7 +54,7 @@ class StateFeedback(Result):
 
     @property
     def damping_ratios(self) -> Array:
-        """Smallest damping ratio of the closed loop at each point (points,), of poles ``log(z) / h``."""
+        """Smallest damping ratio under feedback at each point (points,), of poles ``log(z) / h``."""
         rates = np.log(self.poles) / self.time_step
         return np.asarray((-rates.real / np.maximum(np.abs(rates), 1e-300)).min(axis=1))
 
@@ -216,7 +216,7 @@ def _row(linear: LinearModel, name: str) -> Array:
 
 
 def _reached(linear: LinearModel, A: Array, B: Array, names: Sequence[str], complaint: str) -> None:
-    """Refuse a motion that does not die out by itself and that B does not reach.
+    """Refuse a motion that feedback does not reach and that does not die out by itself.
 
     Test of Popov, Belevitch and Hautus: the rank of ``[A - z, B]`` at each eigenvalue (T. Kailath, "Linear Systems",
     1980, section 2.4), with states in units in which none is large beside the others.
@@ -236,7 +236,7 @@ def _reached(linear: LinearModel, A: Array, B: Array, names: Sequence[str], comp
 
 
 def at_axes(schedule: Schedule, model: Model, time: Array, position: Array) -> Array:
-    """Values of a schedule's axes at every sample of a motion (N, axes)."""
+    """Values of a feedback schedule's axes at every sample of a motion (N, axes)."""
     if schedule.axes == (TIME,):
         return time.reshape(-1, 1)
     return np.take(position, [model.joints.index(name) for name in schedule.axes], axis=1)

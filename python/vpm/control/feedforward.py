@@ -110,7 +110,7 @@ def flexible_feedforward(
 
 
 def _start(model: Model, start: Mapping[str, float] | ArrayLike | None) -> Array:
-    """Coordinates near the first pose: joints as given, links as gravity bends them there."""
+    """Coordinates near the first pose of a feed-forward: joints as given, links bent by gravity."""
     joints: Array = np.zeros(len(model.joints))
     if isinstance(start, Mapping):
         for name, value in start.items():
@@ -163,7 +163,7 @@ def _inverted(
 def _algebraic(
     task: Task, motion: TargetMotion, near: Array, step: float, actuation: tuple[float, float], order: int
 ) -> FlexibleFeedforward:
-    """Poses by balance under loads of the motion before: none for the first two methods."""
+    """Poses of a feed-forward by balance under loads of the motion before."""
     times, stiff = _times(motion, step, actuation), order == 0
     q = along(task, motion.at(times)[0], near, stiff=stiff)
     found = _loaded(task, motion, times, q) if METHODS[order] == "inertial" else course(times, q, times)
@@ -176,7 +176,7 @@ def _algebraic(
 
 
 def _loaded(task: Task, motion: TargetMotion, times: Array, q: Array) -> tuple[Array, Array, Array]:
-    """Positions, velocities and accelerations with the loads of inertia, from poses under gravity.
+    """Positions, velocities and accelerations of a feed-forward with the loads of inertia.
 
     They are sought at times so far apart that four derivatives leave little of rounding.
     """
@@ -218,7 +218,7 @@ def _plan(
 
 
 def _strains(model: Model, q: Array, names: tuple[str, ...]) -> Array:
-    """What gauges show at the poses (N, gauges)."""
+    """Gauge strains at the poses of a feed-forward (N, gauges)."""
     if not names:
         return np.zeros((len(q), 0))
     from vpm._core import Simulation
@@ -249,7 +249,7 @@ def _held(way: Array, inside: Array, times: Array) -> Array:
 
 
 def _internal(matrix: Array, stiffness: float, outputs: int) -> NDArray[np.complex128]:
-    """Poles of the internal motions: those of the following machine but for two of each output."""
+    """Poles of a feed-forward's internal motions: the machine's but for two of each output."""
     poles = split(matrix).poles.astype(np.complex128)
     far = np.argsort(np.abs(poles + stiffness))
     return np.asarray(poles[np.sort(far[2 * outputs :])])
@@ -270,7 +270,7 @@ def _lengths(
 
 
 def _needed(rates: Array) -> float:
-    """How long the slowest of these rates (1/s) takes to leave little, s."""
+    """Time that the slowest of a feed-forward's rates (1/s) needs to leave little, s."""
     return float(-np.log(LEFT) / rates.min()) if rates.size else 0.0
 
 

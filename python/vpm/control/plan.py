@@ -59,21 +59,21 @@ class FlexibleFeedforward(Result):
 
     @property
     def time_step(self) -> float:
-        """Time between samples of a feed-forward, s."""
+        """Time between samples of a feed-forward plan, s."""
         return float(self.time[1] - self.time[0])
 
     @property
     def pre_actuation(self) -> float:
-        """How long before the target the machine is moved, s."""
+        """Time before the target in which a plan already moves the machine, s."""
         return abs(float(self.time[0]))
 
     @property
     def state(self) -> Array:
-        """Reference of the state (N, nx), named by ``model.state_names``."""
+        """Planned reference of the state (N, nx), named by ``model.state_names``."""
         return np.concatenate([self.position, self.velocity], axis=1)
 
     def to_experiment(self, model: Model) -> Experiment:
-        """The feed-forward as a log, for `vpm.simulate`, files and `vpm simulate`.
+        """Feed-forward plan as a log, for `vpm.simulate`, files and `vpm simulate`.
 
         Parameters
         ----------
@@ -126,7 +126,7 @@ class FlexibleFeedforward(Result):
         return columns | {name: self.strain[:, place] for place, name in enumerate(self.strains)}
 
     def plot(self) -> Figure:
-        """Outputs, commands, joints and strains over time. Needs the extra ``plot``."""
+        """Plot a plan: outputs, commands, joints and strains over time. Needs the extra ``plot``."""
         from vpm.plot import plot_channels
 
         kinds = (

@@ -28,7 +28,7 @@ def poses(
     *,
     stiff: bool = False,
 ) -> tuple[Array, Array]:
-    """Coordinates and inputs at which the outputs are as wanted, and efforts balance.
+    """Poses of rest: coordinates and inputs with wanted outputs, and efforts in balance.
 
     Law: ``M(q) a + h(q, v) = B(q) u`` and ``y(q) = y_d`` for given ``v`` and ``a``.
 
@@ -94,7 +94,7 @@ def along(task: Task, wanted: Array, start: Array, *, stiff: bool = False, betwe
 
 
 def loaded(task: Task, times: Array, wanted: Array, q: Array) -> Array:
-    """Poses (N, n) under gravity and the inertial forces of their own motion, from those under gravity.
+    """Poses (N, n) under gravity and inertial forces of their own motion, from those of rest.
 
     Each round takes the loads of the motion before, which adds two derivatives of the target. Such a series converges
     at first where the target is slow beside the internal motions, and diverges in the end: it ends where its terms

@@ -42,13 +42,13 @@ class Schedule(Storable):
 
     @classmethod
     def along(cls, motion: FlexibleFeedforward, points: int) -> Schedule:
-        """Points at even times along a feed-forward."""
+        """Schedule points at even times along a feed-forward."""
         rows = np.unique(np.linspace(0, len(motion.time) - 1, max(points, 1)).astype(int))
         return cls((TIME,), (motion.time[rows],), motion.state[rows], motion.commands[rows])
 
     @classmethod
     def over(cls, model: Model, joints: Mapping[str, ArrayLike]) -> Schedule:
-        """Poses of rest at all combinations of positions of some joints; others are at zero.
+        """Schedule points: poses of rest at all combinations of some joints' positions.
 
         Raises
         ------
@@ -74,7 +74,7 @@ class Schedule(Storable):
         return cls(tuple(joints), grid, np.array(states), np.array(commands))
 
     def weights(self, values: Array) -> tuple[NDArray[np.intp], Array]:
-        """Points around a place, one value for each axis, and their shares by linear interpolation."""
+        """Schedule points around a place, and their shares by linear interpolation."""
         places, shares = np.zeros(1, dtype=np.intp), np.ones(1)
         for axis, value in zip(self.grid, values, strict=True):
             count = len(axis)
@@ -89,7 +89,7 @@ class Schedule(Storable):
 
 
 def _holding(model: Model, state: Array, effort: Array) -> Array:
-    """Commands that hold a pose, by the levers of all inputs about it."""
+    """Commands that hold a pose of the schedule, by the levers of all inputs about it."""
     n, joints = len(model.coordinates), len(model.joints)
     if len(state) != model.core.n_states:
         raise SimulationError(f"{model.name}: drives with states of their own cannot be scheduled; use ideal drives")

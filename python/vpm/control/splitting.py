@@ -33,7 +33,7 @@ class Split(NamedTuple):
 
 
 def split(matrix: Array) -> Split:
-    """Left invariant subspaces of a matrix, by the real Schur form of its transpose.
+    """Splitting of a matrix into left invariant subspaces, by the real Schur form of its transpose.
 
     Poles on the imaginary axis count as forward in time: what neither dies out nor grows follows from the past.
     """
@@ -47,7 +47,7 @@ def split(matrix: Array) -> Split:
 
 
 def solve(rates: Rates, times: Array, guess: Array, ends: tuple[Array, Array]) -> Array:
-    """States (N, nx) of ``x' = f(t, x)`` whose stable part begins at rest, and whose unstable part ends there.
+    """States (N, nx) of ``x' = f(t, x)`` by splitting: stable part from rest, unstable part to rest.
 
     Collocation by cubic splines (three-stage Lobatto IIIA, order 4: U. Ascher, R. Mattheij, R. Russell, "Numerical
     Solution of Boundary Value Problems for Ordinary Differential Equations", 1995, section 5.4). It treats growing and
@@ -99,7 +99,7 @@ def solve(rates: Rates, times: Array, guess: Array, ends: tuple[Array, Array]) -
 
 
 def _turning(rates: Rates, times: Array, guess: Array) -> str:
-    """Where along the way another number of internal motions grows than at its start, in words; else nothing.
+    """Place where the splitting changes: another number of growing motions than at the start, in words.
 
     Then what grows in one part may die out in another, and nothing bounded need be left (the dichotomy of W. Coppel,
     "Dichotomies in Stability Theory", 1978).
@@ -113,14 +113,14 @@ def _turning(rates: Rates, times: Array, guess: Array) -> str:
 
 
 def between(times: Array, states: Array, slopes: Array) -> tuple[Array, Array]:
-    """Times and states in the middle of all intervals, by cubic splines."""
+    """Times and states for splitting in the middle of all intervals, by cubic splines."""
     step = times[1] - times[0]
     middle = 0.5 * (states[:-1] + states[1:]) + step / 8.0 * (slopes[:-1] - slopes[1:])
     return 0.5 * (times[:-1] + times[1:]), middle
 
 
 def _collocation(rates: Rates, times: Array, states: Array) -> tuple[Array, Array, Array]:
-    """What the splines miss (N - 1, nx), with derivatives by the states before and after (N - 1, nx, nx)."""
+    """Collocation errors of a split problem (N - 1, nx), with derivatives (N - 1, nx, nx)."""
     step, unit = times[1] - times[0], np.eye(states.shape[1])
     slopes, by_state = rates(times, states)
     middle_slopes, by_middle = rates(*between(times, states, slopes))
@@ -132,7 +132,7 @@ def _collocation(rates: Rates, times: Array, states: Array) -> tuple[Array, Arra
 
 
 def _banded(parts: tuple[Array, Array, Array, Array], right: Array) -> Array:
-    """Solution of the almost block diagonal system: conditions at the start, intervals, conditions at the end."""
+    """Solution of the split problem's almost block diagonal system."""
     from scipy.linalg import solve_banded
 
     first, before, after, last = parts

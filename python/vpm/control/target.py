@@ -40,7 +40,7 @@ class TargetMotion:
 
     @classmethod
     def rest_to_rest(cls, start: ArrayLike, end: ArrayLike, duration: float) -> TargetMotion:
-        """The straight way from one value to another, by the polynomial of degree 9 that is flattest at both ends.
+        """Target from one value to another: the flattest polynomial of degree 9.
 
         Parameters
         ----------
@@ -68,7 +68,7 @@ class TargetMotion:
 
     @classmethod
     def through(cls, times: ArrayLike, points: ArrayLike) -> TargetMotion:
-        """A spline of degree 5 through points, from rest to rest; the first time becomes zero.
+        """Target through points: a spline of degree 5 from rest to rest; the first time becomes zero.
 
         Parameters
         ----------
@@ -104,7 +104,7 @@ class TargetMotion:
 
     @classmethod
     def from_log(cls, experiment: Experiment, channels: Sequence[str]) -> TargetMotion:
-        """The motion that channels of a log show, through every sample.
+        """Target motion that channels of a log show, through every sample.
 
         Raises
         ------
@@ -120,11 +120,11 @@ class TargetMotion:
 
     @property
     def width(self) -> int:
-        """How many outputs it is about."""
+        """Number of outputs of a target."""
         return int(self.coefficients.shape[2])
 
     def at(self, times: ArrayLike) -> tuple[Array, Array, Array]:
-        """Values with first and second derivatives, each of shape (N, m); held before and after.
+        """Target values with first and second derivatives, each of shape (N, m); held before and after.
 
         Parameters
         ----------

@@ -48,7 +48,7 @@ class Task:
     outputs: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        """Check the names."""
+        """Check the names of an inversion task."""
         known = self.model.inputs
         for name in self.inputs:
             if name not in known:
@@ -74,18 +74,18 @@ class Task:
 
     @cached_property
     def columns(self) -> list[int]:
-        """Places of the inputs among those of the model."""
+        """Places of a task's inputs among those of the model."""
         return [self.model.inputs.index(name) for name in self.inputs]
 
     def levers(self, q: Array) -> Array:
-        """Efforts on all coordinates per unit of each input (N, n, m)."""
+        """Efforts on all coordinates per unit of each task input (N, n, m)."""
         if self._constant is not None:
             return np.broadcast_to(self._constant, (len(q), *self._constant.shape))
         return np.array([self._lever(row) for row in q])
 
     @cached_property
     def _constant(self) -> Array | None:
-        """The levers where they are the same in two poses that no symmetry joins; otherwise nothing."""
+        """Levers of a task where they are the same in two poses that no symmetry joins."""
         n = len(self.model.coordinates)
         poses = np.random.default_rng(1).uniform(-0.3, 0.3, (2, n))
         poses[:, len(self.model.joints) :] = 0.0
@@ -103,7 +103,7 @@ class Task:
     # ---- the outputs -------------------------------------------------------------------------------------------------
 
     def values(self, q: Array) -> Array:
-        """Outputs of a machine that follow a target (N, m)."""
+        """Outputs of a task that follow the target (N, m)."""
         poses = {name: self.model.forward_kinematics(name, q) for name in self._markers}
         columns = [
             q[:, self.model.joints.index(owner)] if end == "position" else poses[owner][:, AXES[end] - 3, 3]
@@ -112,7 +112,7 @@ class Task:
         return np.column_stack(columns)
 
     def jacobian(self, q: Array) -> Array:
-        """Derivative of the outputs by the coordinates (N, m, n)."""
+        """Derivative of a task's outputs by the coordinates (N, m, n)."""
         tables = {name: self.model.jacobian(name, q) for name in self._markers}
         unit = np.eye(q.shape[1])
         rows = [
@@ -124,7 +124,7 @@ class Task:
         return np.stack(rows, axis=1)
 
     def curvature(self, q: Array) -> Array:
-        """Second derivative of the outputs (N, m, n, n), by differences of exact Jacobians."""
+        """Second derivative of a task's outputs (N, m, n, n), by differences of exact Jacobians."""
         n = q.shape[1]
         if not self._markers:
             return np.zeros((len(q), len(self.outputs), n, n))
@@ -147,7 +147,7 @@ class Task:
     # ---- the machine that follows ------------------------------------------------------------------------------------
 
     def follow(self, target: TargetMotion, times: Array, states: Array, stiffness: float) -> Answer:
-        """Accelerations and inputs by which the outputs have the accelerations of the target.
+        """Accelerations and inputs by which a task's outputs follow the target.
 
         Law: ``M a + h = B u``, ``J a + (dJ/dt) v = y_d'' + 2 k (y_d' - J v) + k^2 (y_d - y)``: input-output
         linearisation (A. Isidori, "Nonlinear Control Systems", 1995, section 5.1), whose errors die out at the rate

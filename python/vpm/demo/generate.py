@@ -24,7 +24,7 @@ COLUMNS = ("time_s", "q_rad", "u_A", "qref_rad")
 
 
 def train_reference(time: float) -> float:
-    """Reference of the training record: five sines that never repeat, faded in over one second.
+    """Generate the reference of the training record: five sines that never repeat, faded in.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def train_reference(time: float) -> float:
 
 
 def validation_reference(time: float) -> float:
-    """Reference of the validation record: moves from angle to angle, each followed by a short rest.
+    """Generate the reference of the validation record: moves from angle to angle, with short rests.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def validation_reference(time: float) -> float:
 
 
 def _smooth_step(progress: float) -> float:
-    """Rise from 0 to 1 with no jump in velocity and acceleration (the minimum-jerk polynomial)."""
+    """Generate a rise from 0 to 1 without jumps of velocity and acceleration (minimum jerk)."""
     x = min(max(progress, 0.0), 1.0)
     return x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
 
@@ -71,7 +71,7 @@ def _smooth_step(progress: float) -> float:
 def record(
     machine: Machine, reference: Callable[[float], float], duration: float, noise: np.random.Generator
 ) -> npt.NDArray[np.float64]:
-    """Run the machine under its controller and log it.
+    """Generate a record: run the machine under its controller and log it.
 
     The controller reads the encoder at a sample, computes ``u = kv (kp (r - y) - dy)`` within its limit, and holds it
     until the next; ``dy`` is the backward difference of the mean of the last two readings.
@@ -111,7 +111,7 @@ def record(
 
 
 def _reading(machine: Machine, state: State, disturbance: float) -> float:
-    """What the encoder reads of the angle at a sample, or of an earlier one [rad]."""
+    """Generate the encoder's reading of the angle at a sample, or of an earlier one [rad]."""
     late = round(machine.sensor_delay / SAMPLE_TIME)
     angle = state.positions[max(len(state.positions) - 1 - late, 0)]
     count = math.tau / machine.encoder_counts
@@ -119,7 +119,7 @@ def _reading(machine: Machine, state: State, disturbance: float) -> float:
 
 
 def write_log(path: Path, rows: npt.NDArray[np.float64]) -> None:
-    """Write a log as comma-separated values.
+    """Write a generated log as comma-separated values.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def write_log(path: Path, rows: npt.NDArray[np.float64]) -> None:
 
 
 def _write(path: Path, text: str) -> None:
-    """Write beside the place and move into it; by itself, as the demo's log is made without the rest of vpm."""
+    """Write a generated file beside the place and move it into it."""
     beside = path.with_name(f".{path.name}.part")
     try:
         beside.write_text(text, encoding="utf-8", newline="\n")
@@ -144,7 +144,7 @@ def _write(path: Path, text: str) -> None:
 
 
 def truth(hidden: str) -> str:
-    """Text of ``truth.toml``: the hidden effect and the true values of what the model file knows only roughly.
+    """Generate the text of ``truth.toml``: the hidden effect and the true values.
 
     Parameters
     ----------
@@ -181,7 +181,7 @@ def truth(hidden: str) -> str:
 
 
 def generate(folder: Path, hidden: str = DEFAULT, seed: int = SEED) -> None:
-    """Write the demo's files: ``train.csv``, ``validation.csv``, ``truth.toml`` and a copy of ``model.toml``.
+    """Generate the demo's files: ``train.csv``, ``validation.csv``, ``truth.toml`` and ``model.toml``.
 
     Parameters
     ----------
@@ -213,7 +213,7 @@ def generate(folder: Path, hidden: str = DEFAULT, seed: int = SEED) -> None:
 
 
 def main() -> None:
-    """Read the command line and write the files."""
+    """Read the command line and generate the files."""
     parser = argparse.ArgumentParser(description="Make a log of a machine with a hidden effect.")
     parser.add_argument("--out", type=Path, default=Path(__file__).parent, help="folder to write to")
     parser.add_argument("--hidden", choices=sorted(HIDDEN), default=DEFAULT, help="the hidden effect")

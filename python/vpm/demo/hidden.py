@@ -44,14 +44,14 @@ _SITES: Mapping[str, SiteKind] = {
 
 
 def _owner(parameter: str) -> tuple[str, str]:
-    """Effect and site that a parameter of the model belongs to."""
+    """Effect and site of a hidden parameter of the model."""
     site, _, suffix = parameter.partition(".")
     named = {own.suffix: effect.name for effect in effects_for_site(_SITES[site]) for own in effect.parameters}
     return named[suffix], site
 
 
 def _case(machine: Machine, parameters: Mapping[str, float], refused: str = "") -> tuple[str, Hidden, str]:
-    """A name, that of the first parameter's effect, what it stands for, and why it cannot be asked for."""
+    """Hidden case: its name, first parameter's effect, meaning, and why it cannot be asked for."""
     (name, site), *others = dict.fromkeys(map(_owner, parameters))
     return name, Hidden(machine, site, parameters, tuple(others)), refused
 

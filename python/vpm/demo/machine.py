@@ -176,7 +176,7 @@ def advance(machine: Machine, state: State, commands: Sequence[float]) -> None:
 
 
 def _driven(machine: Machine, state: State, command: float) -> float:
-    """Torque of the drive [N m]."""
+    """Torque of the demo machine's drive [N m]."""
     command = math.copysign(max(abs(command) - machine.dead_zone, 0.0), command)
     command = min(max(command, -machine.saturation), machine.saturation)
     if machine.lag > 0.0:
@@ -187,7 +187,7 @@ def _driven(machine: Machine, state: State, command: float) -> float:
 
 
 def _through_gear(machine: Machine, state: State, motor: float, inertia: float) -> float:
-    """Move the link behind a gear that is not rigid by a step; the torque that the gear takes from the motor [N m]."""
+    """Step of the demo machine's link behind a gear; returns the gear's torque on the motor [N m]."""
     link = state.link_position + 0.5 * STEP * state.link_velocity
     twist, half = motor - link, 0.5 * machine.gear_play
     beyond = twist - min(max(twist, -half), half)
@@ -202,7 +202,7 @@ def _through_gear(machine: Machine, state: State, motor: float, inertia: float) 
 
 
 def _load(machine: Machine, state: State, angle: float) -> float:
-    """Torque that gravity and the hidden effects ask for, but for friction [N m]."""
+    """Load torque of the demo machine by gravity and hidden effects, but for friction [N m]."""
     load = machine.mass * machine.gravity * machine.center_of_mass * math.sin(angle + machine.tilt) + machine.bias
     if machine.ripple:
         load += machine.ripple * math.cos(math.tau * angle / machine.ripple_period - machine.ripple_phase)
@@ -224,7 +224,7 @@ def _load(machine: Machine, state: State, angle: float) -> float:
 
 
 def _friction(machine: Machine, velocity: float) -> tuple[float, float]:
-    """Viscous friction [N m s/rad] and dry friction [N m] at a speed."""
+    """Viscous friction [N m s/rad] and dry friction [N m] of the demo machine at a speed."""
     half = math.copysign(0.5, velocity)
     dry = machine.coulomb + half * machine.coulomb_difference
     if machine.stribeck:

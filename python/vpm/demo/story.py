@@ -81,7 +81,7 @@ def run_demo(
 
 
 def check_hidden(name: str) -> None:
-    """Complain about an effect that the demo cannot hide.
+    """Refuse an effect that the demo's story cannot hide.
 
     Raises
     ------
@@ -95,7 +95,7 @@ def check_hidden(name: str) -> None:
 
 
 def print_list(console: Console) -> list[dict[str, str]]:
-    """Print what can be hidden, a line each, with site and law.
+    """Print what the demo's story can hide, a line each, with site and law.
 
     Parameters
     ----------
@@ -115,7 +115,7 @@ def print_list(console: Console) -> list[dict[str, str]]:
 
 
 def _reveal(diagnosis: Diagnosis, path: Path, say: Callable[[str], None]) -> None:
-    """Compare with the truth, which nothing above has read."""
+    """Reveal the truth at the end of the demo's story, which nothing above has read."""
     truth = tomllib.loads(path.read_text(encoding="utf-8"))
     hidden = truth["hidden"]
     found = [f"{e.name} at {e.site}" for e in diagnosis.effects]

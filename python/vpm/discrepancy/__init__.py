@@ -1,4 +1,4 @@
-"""Discrepancy: where simulation and data disagree, and the name of what is missing."""
+"""Diagnosis by residuals: preparation of records, the search for missing effects in sub-packages, and the result."""
 
 from vpm.discrepancy.diagnosis import (
     AcceptedEffect,

@@ -1,4 +1,4 @@
-"""The answer of a diagnosis: verdict, effects in the order of what they add, and everything needed to doubt it."""
+"""Diagnosis, the result: verdict, accepted and refused effects, and everything needed to doubt them."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from vpm.discrepancy.evidence import Evidence
 from vpm.discrepancy.provenance import Provenance
 from vpm.files import write_text
 from vpm.identify import Fit
+from vpm.json_values import plain
 from vpm.model import Model
-from vpm.plain import plain
 from vpm.results import Result, Storable
 
 if TYPE_CHECKING:
@@ -32,7 +32,7 @@ OBSERVED = "observed"
 
 @dataclass(frozen=True, repr=False, eq=False)
 class EffectParameterEstimate(Storable):
-    """One parameter of an accepted effect: short name, dotted name, SI value, unit and standard deviation."""
+    """Estimate of one parameter of an accepted effect: names, SI value, unit and standard deviation."""
 
     name: str
     dotted: str
@@ -43,7 +43,7 @@ class EffectParameterEstimate(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class AcceptedEffect(Storable):
-    """An effect that the data named.
+    """Accepted effect in a diagnosis: what it says of the machine, with estimates and evidence.
 
     Attributes
     ----------
@@ -80,7 +80,7 @@ class AcceptedEffect(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class RefusedEffect(Storable):
-    """A candidate that was tried and not accepted, with the reason."""
+    """Refused effect in a diagnosis: a candidate that was tried and not accepted, with the reason."""
 
     name: str
     site: str
@@ -89,7 +89,7 @@ class RefusedEffect(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class RankedCandidate(Storable):
-    """A candidate in the order of predicted gain.
+    """Ranked candidate in a diagnosis, in the order of predicted gain.
 
     Attributes
     ----------
@@ -117,7 +117,7 @@ class RankedCandidate(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Ambiguity(Storable):
-    """Effects that these data do not discriminate from an accepted one, and why."""
+    """Ambiguity in a diagnosis: effects that these data do not discriminate from an accepted one, and why."""
 
     name: str
     site: str
@@ -127,7 +127,7 @@ class Ambiguity(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class EmpiricalTerm(Storable):
-    """One term of an empirical force: joint, term as text, dotted parameter, coefficient, deviation and unit."""
+    """Term of an empirical force in a diagnosis: joint, text, dotted parameter, coefficient, deviation and unit."""
 
     joint: str
     term: str
@@ -139,7 +139,7 @@ class EmpiricalTerm(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Empirical(Storable):
-    """A residual that no effect explains: on what it depends, and a formula that is no more than a fit.
+    """Empirical description in a diagnosis: states on which an unexplained residual depends, and a fitted formula.
 
     Attributes
     ----------
@@ -176,7 +176,7 @@ class Empirical(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class ChannelGap(Storable):
-    """Root mean square gap of one channel on validation data, at each stage.
+    """Root mean square error of one channel on validation data at each stage of a diagnosis.
 
     Attributes
     ----------
@@ -200,13 +200,13 @@ class ChannelGap(Storable):
     mode: str
 
     def share(self, value: float) -> float:
-        """An error as a share of the measured signal; NaN without one."""
+        """Share of an error in the measured signal of a diagnosed channel; NaN without one."""
         return value / self.signal if self.signal > 0.0 else float("nan")
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class ProposedExperiment(Storable):
-    """A discriminating experiment for two effects.
+    """Experiment that a diagnosis proposes to discriminate two effects.
 
     Attributes
     ----------
@@ -237,18 +237,18 @@ class ProposedExperiment(Storable):
 
     @property
     def ratio(self) -> float:
-        """Difference in units of the noise."""
+        """Predicted difference of a proposed experiment in units of the noise."""
         return self.difference / self.noise if self.noise > 0.0 else float("inf")
 
     def to_dict(self) -> dict[str, object]:
-        """Plain numbers and text, without the samples."""
+        """Plain numbers and text of a proposed experiment, without its samples."""
         content = {name: value for name, value in super().to_dict().items() if name != "excitation"}
         return {**content, "signal": self.excitation.name, "ratio": self.ratio}
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Step(Storable):
-    """The model after one stage of the search.
+    """Step of a diagnosis: the model after one stage of the search.
 
     Attributes
     ----------
@@ -273,7 +273,7 @@ class Step(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Picture(Storable):
-    """Samples for the plots: one joint of the first validation record, at the retained samples.
+    """Samples for the plots of a diagnosis: one joint of the first validation record.
 
     Attributes
     ----------
@@ -299,7 +299,7 @@ class Picture(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Trace(Storable):
-    """One channel of the first validation record, measured and simulated.
+    """Trace in a diagnosis: one channel of the first validation record, measured and simulated.
 
     Attributes
     ----------
@@ -322,7 +322,7 @@ class Trace(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Diagnosis(Result):
-    """What is missing in a model, as far as the data can say.
+    """Diagnosis of a model: the effects that it is missing, as far as the data can say.
 
     Attributes
     ----------
@@ -330,8 +330,8 @@ class Diagnosis(Result):
     summary : str
         The verdict in a sentence or two.
     effects : tuple of AcceptedEffect
-        By what each adds to the prediction of validation data given all the others, the most first; in the order in
-        which they were found where a ranking named them.
+        By what each adds to the prediction of validation data beside all others, the most first. Effects that a ranking
+        named stand in the order in which it found them.
     gap : dict of str to ChannelGap
         On validation data.
     refused : tuple of RefusedEffect
@@ -397,13 +397,13 @@ class Diagnosis(Result):
 
     @property
     def order(self) -> str:
-        """In which order the effects stand, in words."""
+        """Sentence on the order in which a diagnosis lists its effects."""
         if any(not np.isnan(effect.evidence_nats) for effect in self.effects):
             return "in the order in which the ranking found them"
         return "by what each adds beside all the others, the most first"
 
     def to_dict(self) -> dict[str, object]:
-        """Content of ``report.json``: plain numbers and text, SI; what is not known is null."""
+        """Content of a diagnosis for ``report.json``: plain numbers and text, SI; unknown values are null."""
         effects = [
             {
                 "name": e.name,
@@ -448,7 +448,7 @@ class Diagnosis(Result):
         return document
 
     def save_json(self, path: Path) -> Path:
-        """Write ``report.json``."""
+        """Write a diagnosis to ``report.json``."""
         return write_text(path, json.dumps(plain(self.to_dict()), indent=2, allow_nan=False) + "\n")
 
     def _headline(self) -> Mapping[str, object]:
@@ -460,7 +460,7 @@ class Diagnosis(Result):
         return {name: [getattr(c, name) for c in self.candidates] for name in fields}
 
     def plot(self) -> Figure:
-        """Residual before and after, over time, velocity and position. Needs the extra ``plot``.
+        """Plot a diagnosis: residual before and after, over time, velocity and position. Needs the extra ``plot``.
 
         Where no efforts follow from a motion: what was measured, and what an observer makes of the model.
         """

@@ -1,4 +1,4 @@
-"""Evidence of a finding: the validation residual over the state that the effect depends on, without it and with it.
+"""Evidence of an accepted effect: the validation residual over the state it depends on, without it and with it.
 
 The residual "without" is that of the model with everything but the effect, all other parameters as they were fitted
 with it. So it is the residual of the repaired model plus what the effect contributes: a partial residual (W. A. Larsen
@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.discrepancy.view import View
+from vpm.discrepancy.site_states import View
 from vpm.errors import VpmError
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
@@ -28,7 +28,7 @@ LAW_SAMPLES = 3000
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Evidence(Storable):
-    """Samples for the picture of one accepted effect, of the validation record in which it does most.
+    """Evidence for the picture of one accepted effect, from the validation record in which it does most.
 
     Attributes
     ----------
@@ -69,7 +69,7 @@ class Evidence(Storable):
 def gather(
     model: Model, effects: Sequence[tuple[str, str]], validation: InverseDynamicsProblem, floor: Mapping[str, float]
 ) -> tuple[Evidence, ...]:
-    """Evidence of each effect that can be taken out again; one without which nothing can be computed has none.
+    """Gather the evidence of each accepted effect; none where the model without it cannot be computed.
 
     Parameters
     ----------

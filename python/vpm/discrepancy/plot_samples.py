@@ -1,11 +1,11 @@
-"""Samples of the first validation record for the pictures of a diagnosis; masked samples are NaN."""
+"""Samples for the plots of a diagnosis, of the first validation record; masked samples are NaN."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from vpm.compare import compare
-from vpm.discrepancy.confirmation import Data, Judged
+from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import Picture, Trace
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
@@ -14,7 +14,7 @@ from vpm.simulate import Run
 
 
 def traces(data: Data, nominal: Judged, final: Judged) -> tuple[Trace, ...]:
-    """Channels of the first validation record as they were simulated to judge by."""
+    """Samples for the plot of simulated and measured channels of the first validation record."""
     problem = data.simulation
     if problem is None or final.simulated is None:
         return ()
@@ -34,7 +34,7 @@ def traces(data: Data, nominal: Judged, final: Judged) -> tuple[Trace, ...]:
 
 
 def pictures(data: Data, nominal: Judged, recalibrated: Judged, final: Judged) -> tuple[Picture, ...]:
-    """One for each joint of the first validation record."""
+    """Samples for the residual plots, one for each joint of the first validation record."""
     found = []
     problem = data.validation
     position, velocity, _ = problem.state(0)

@@ -1,4 +1,4 @@
-"""What a diagnosis prepares: training and validation records, the nominal and the recalibrated model."""
+"""Preparation of a diagnosis: training and validation records, the nominal and the recalibrated model."""
 
 from __future__ import annotations
 
@@ -8,12 +8,12 @@ from functools import partial
 
 import numpy as np
 
-from vpm.discrepancy.candidates import slow_speeds
-from vpm.discrepancy.confirmation import Data, Judged, judge, judged_anyhow
-from vpm.discrepancy.filters import filters
-from vpm.discrepancy.moving import check_moving, check_stuck
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge, judged_anyhow
+from vpm.discrepancy.motion_filters import filters
+from vpm.discrepancy.parallel_candidates import SideBySide
 from vpm.discrepancy.prior_departure import moved_far
-from vpm.discrepancy.side_by_side import SideBySide
+from vpm.discrepancy.screening.candidates import slow_speeds
+from vpm.discrepancy.stuck_channels import check_moving, check_stuck
 from vpm.errors import DiagnosisError, DivergedError
 from vpm.experiment import Experiment, joints_from_shafts
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
@@ -31,7 +31,7 @@ Records = tuple[tuple[Experiment, ...], tuple[Experiment, ...], list[str]]
 
 
 def records_of(model: Model, experiments: Sequence[Experiment], validate: Sequence[Experiment]) -> Records:
-    """Records to fit, records to judge on, and notes on both."""
+    """Prepare records for fit and validation, with notes on both."""
     training = tuple(joints_from_shafts(record, model, free=model.adjustable) for record in experiments)
     if not training:
         raise DiagnosisError("no record was given; pass at least one experiment")
@@ -54,7 +54,7 @@ def data_of(
     setup: Setup,
     notes: list[str],
 ) -> Data:
-    """Problems of the records, filtered and counted alike, with a note on each."""
+    """Prepare residual problems of the records with common filters and sample masks, with a note on each."""
     balance = partial(InverseDynamicsProblem, model, hold=setup.course)
     fitted = balance(training, cutoff=cutoff)
     states, bands = filters(model, fitted, cutoff)
@@ -73,7 +73,7 @@ def data_of(
 
 
 def nominal_of(model: Model, data: Data, notes: list[str]) -> Judged:
-    """The model as it stands; a nominal model that cannot simulate the records is still compared by effort."""
+    """Prepare the nominal model: it is judged by the residual alone if it cannot simulate the records."""
     try:
         return judge(model, (), data, {})
     except DivergedError as error:
@@ -82,7 +82,7 @@ def nominal_of(model: Model, data: Data, notes: list[str]) -> Judged:
 
 
 def recalibrated_of(model: Model, data: Data, notes: list[str], each: SideBySide) -> Judged:
-    """The model with its uncertain parameters fitted, compared by effort alone where it cannot simulate the records."""
+    """Prepare the recalibrated model: uncertain parameters fitted, judged by the residual if it cannot simulate."""
     free = model.adjustable
     if not free:
         notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
@@ -98,7 +98,7 @@ def recalibrated_of(model: Model, data: Data, notes: list[str], each: SideBySide
 
 
 def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[float, float]]:
-    """Transition velocities of the dry friction that the model has, with bounds from the data.
+    """Prepared transition velocities of dry friction to recalibrate, with bounds from data.
 
     Nobody knows them beforehand, and a wrong one leaves an error at every reversal, where small effects show.
     """
@@ -114,10 +114,10 @@ def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[
 
 
 def _within_reach(model: Model, free: Sequence[str]) -> dict[str, tuple[float, float]]:
-    """Bounds of positive parameters that the model is not linear in, from their stated uncertainties.
+    """Prepared bounds for positive nonlinear parameters, from their stated uncertainties.
 
-    With something large missing, a fit may flee to where nothing shows any more, such as oil as soft as air, from where
-    no effect leads back. What is linear comes back by itself.
+    With something large missing, a fit may end where nothing shows any more, such as oil as soft as air. No effect
+    leads back from there. What is linear comes back by itself.
     """
     found = {}
     for name in free:

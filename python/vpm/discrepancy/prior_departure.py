@@ -1,13 +1,13 @@
-"""Parameters that a fit moves far from the stated uncertainties of the model file.
+"""Departure of parameters from their prior: a fit moves them far from the model file's stated uncertainty.
 
 A stated uncertainty is a measurement. A correct effect brings the known parameters back to it. An effect that imitates
-another force together with a shifted centre of mass moves them away: a linear spring with an inverted pendulum imitates
-a hardening spring.
+another force together with a shifted centre of mass moves them away. For example, a linear spring with an inverted
+pendulum imitates a hardening spring.
 """
 
 from __future__ import annotations
 
-from vpm.discrepancy.confirmation import Judged
+from vpm.discrepancy.confirmation.confirmation import Judged
 from vpm.model import Model, Parameter
 from vpm.numbers import NORMAL_95, short
 
@@ -17,7 +17,7 @@ FAR = 3.0
 
 
 def moved_far(model: Model, recalibrated: Judged) -> list[str]:
-    """Notes on parameters that a recalibration has moved far from a model file."""
+    """Notes on parameters that a recalibration moved far from their prior in the model file."""
     notes = []
     for name in recalibrated.free:
         before, after = model.parameters[name], recalibrated.model.parameters[name]
@@ -31,7 +31,7 @@ def moved_far(model: Model, recalibrated: Judged) -> list[str]:
 
 
 def driven_away(nominal: Model, recalibrated: Judged, final: Judged, ranked: Model | None = None) -> dict[str, float]:
-    """Parameters that effects surely drive far from what the model file says of them.
+    """Parameters that accepted effects clearly drive away from their prior in the model file.
 
     Parameters
     ----------
@@ -45,8 +45,8 @@ def driven_away(nominal: Model, recalibrated: Judged, final: Judged, ranked: Mod
     Returns
     -------
     dict of str to float
-        Stated uncertainties by which the parameter stands away, the farthest first. Those are left out that were as far
-        before, for then the file is wrong whatever is missing, and those that the data hardly show beside the effects.
+        Stated uncertainties by which the parameter stands away, the farthest first. Parameters that were as far before
+        are left out: the file is wrong whatever is missing. So are those that the data hardly show beside the effects.
     """
     found = {}
     for name, std in zip(final.free, final.fit.std, strict=True):
@@ -65,5 +65,5 @@ def driven_away(nominal: Model, recalibrated: Judged, final: Judged, ranked: Mod
 
 
 def _stated(parameter: Parameter) -> float:
-    """Stated uncertainty; infinite where nothing is stated, or nothing is known."""
+    """Prior deviation of a parameter as the model file states it; infinite if nothing is stated."""
     return parameter.uncertainty or float("inf")

@@ -1,4 +1,4 @@
-"""Where a diagnosis comes from: program, files with their checksums, and the settings that are not the usual ones."""
+"""Provenance of a diagnosis: program, files with checksums, and settings that differ from the defaults."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from vpm.sending import vpm_version
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Source(Storable):
-    """Something that was read.
+    """Source file in the provenance of a diagnosis.
 
     Attributes
     ----------
@@ -36,7 +36,7 @@ class Source(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Provenance(Storable):
-    """What a diagnosis was made by and of.
+    """Provenance of a diagnosis: program, versions, sources and settings.
 
     Attributes
     ----------
@@ -64,7 +64,7 @@ def provenance(
     command: str,
     settings: Mapping[str, tuple[object, object]],
 ) -> Provenance:
-    """Provenance of what is done now.
+    """Provenance of the diagnosis that runs now.
 
     Parameters
     ----------
@@ -83,13 +83,13 @@ def provenance(
 
 
 def own_settings(given: object, name: str) -> dict[str, tuple[object, object]]:
-    """Fields of a settings dataclass with their defaults, for `provenance`."""
+    """Settings of a dataclass with their defaults, for `provenance`."""
     usual = type(given)()
     return {f"{name}.{f.name}": (getattr(given, f.name), getattr(usual, f.name)) for f in fields(given)}  # type: ignore[arg-type]
 
 
 def _checksum(path: str | None, otherwise: bytes) -> str:
-    """Of a file; of ``otherwise`` where there is none, or none any more."""
+    """Checksum of a source file for the provenance; of ``otherwise`` where no file exists."""
     try:
         content = otherwise if path is None else Path(path).read_bytes()
     except OSError:

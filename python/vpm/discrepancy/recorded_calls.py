@@ -1,4 +1,4 @@
-"""A diagnosis in another process, with its calls of ``tell`` and ``progress`` recorded."""
+"""Recorded calls of ``tell`` and ``progress``, for a diagnosis in another process."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from vpm.discrepancy.diagnosis import Diagnosis
-from vpm.discrepancy.side_by_side import Progress
+from vpm.discrepancy.parallel_candidates import Progress
 
 
 @dataclass(frozen=True)
 class RecordedDiagnosis:
-    """A diagnosis and the calls of ``tell`` and ``progress`` that it made, each in their order."""
+    """Diagnosis with its recorded calls of ``tell`` and ``progress``, each in their order."""
 
     diagnosis: Diagnosis
     sentences: tuple[str, ...]
     steps: tuple[tuple[str, str, int, int], ...]
 
     def repeat(self, tell: Callable[[str], None] | None, progress: Progress | None) -> Diagnosis:
-        """The diagnosis, once those who wanted to hear it have heard it.
+        """Repeat the recorded calls in this process and return the diagnosis.
 
         Parameters
         ----------
@@ -34,7 +34,7 @@ class RecordedDiagnosis:
 
 
 def recorded(diagnosed: Callable[..., Diagnosis], *given: object) -> RecordedDiagnosis:
-    """Diagnose, and keep what is said.
+    """Diagnose with all calls of ``tell`` and ``progress`` recorded.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""The answer in one word and a few sentences, from what was found and what is left."""
+"""Verdict of a diagnosis in one word and a few sentences, from the effects found and the remaining error."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.special import ndtri
 
-from vpm.discrepancy.candidates import joint_at
-from vpm.discrepancy.confirmation import Data, Judged
+from vpm.discrepancy.confirmation.confirmation import Data, Judged
+from vpm.discrepancy.confirmation.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN, MOST_OF_IT, NEGLIGIBLE
 from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap
+from vpm.discrepancy.noise.residual_structure import Structure
 from vpm.discrepancy.prior_departure import driven_away
-from vpm.discrepancy.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN, MOST_OF_IT, NEGLIGIBLE
-from vpm.discrepancy.remainder import Remainder
-from vpm.discrepancy.residual_by_joint import FLOOR_FACTOR, MOSTLY_OPEN, Joints
-from vpm.discrepancy.search import Search
-from vpm.discrepancy.structure import Structure
+from vpm.discrepancy.remainder.remainder import Remainder
+from vpm.discrepancy.remainder.residual_by_joint import FLOOR_FACTOR, MOSTLY_OPEN, Joints
+from vpm.discrepancy.screening.candidates import joint_at
+from vpm.discrepancy.search.search import Search
 from vpm.identify import gain, segments
 from vpm.numbers import percent, short
 
@@ -26,22 +26,22 @@ _OPEN = " What is left at {joints} is structured, and no effect of the catalogue
 
 
 def main_gaps(gap: Mapping[str, ChannelGap]) -> list[ChannelGap]:
-    """Those of the residual."""
+    """Errors of the residual's channels, on which the verdict stands."""
     return [g for g in gap.values() if g.mode == "inverse_dynamics"]
 
 
 def is_negligible(gap: Mapping[str, ChannelGap]) -> bool:
-    """Whether what is left is nothing beside the efforts; of a gap hardly larger, effects may still explain little."""
+    """Whether the remaining error is negligible beside the efforts, for the verdict that nothing is missing."""
     return all(map(_is_nothing, main_gaps(gap)))
 
 
 def _is_nothing(gap: ChannelGap) -> bool:
-    """Whether what is left of one channel is nothing beside its signal; of drives that are off, beside its noise."""
+    """Whether the remaining error of one channel is negligible beside its signal, or its noise if a drive is off."""
     return gap.after <= (NEGLIGIBLE * gap.signal or FLOOR_FACTOR * gap.noise_floor)
 
 
 def _above(main: list[ChannelGap]) -> float:
-    """How far what is left stands above the noise, in the channel where it does most; 0 without channels."""
+    """Ratio of the remaining error to the noise in the verdict's worst channel; 0 without channels."""
     return max((g.after / g.noise_floor if g.noise_floor > 0.0 else np.inf for g in main), default=0.0)
 
 
@@ -54,7 +54,7 @@ def verdict(
     left: Structure | None,
     rest: Remainder | None,
 ) -> tuple[str, str, bool]:
-    """Verdict, summary, and whether something is left that should be described.
+    """Verdict, summary, and whether the remaining error should be described.
 
     Parameters
     ----------
@@ -121,12 +121,12 @@ def verdict(
 
 
 def _is_worse_than_none(gap: ChannelGap) -> bool:
-    """Whether effects leave more of a measured effort than a model without any force would."""
+    """Whether effects leave more of a measured effort than a model without any force, which spoils the verdict."""
     return gap.recalibrated < gap.signal < gap.after
 
 
 def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], tracked: float) -> bool:
-    """Whether named effects leave most of a measured effort where they act, or more than a model without any force.
+    """Whether the verdict on named effects is spoiled: they leave most of a measured effort where they act.
 
     No noise excuses that: the floor of a drive that gives next to nothing is as large as its effort. A backlash is hard
     to balance: where little is left of what a tracker sees, that says more.
@@ -139,19 +139,19 @@ def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], tracked: float) ->
 
 
 def _is_unmeasured(found: Search, data: Data | None) -> bool:
-    """Whether all that was named acts at joints that the residual does not see."""
+    """Whether all named effects act at joints without a residual, so that the verdict rests on a tracker."""
     at = _joints(found)
     return data is not None and bool(at) and not at & {*data.training.joints, ""}
 
 
 def _joints(found: Search) -> set[str]:
-    """Joints at which named effects act, "" for those that act on all."""
+    """Joints of the verdict at which named effects act; "" for effects on all."""
     model, sites = found.final.model, [entry.key[1] for entry in found.accepted]
     return {model.joint_of_body(site) if site in model.bodies else joint_at(model, site) for site in sites}
 
 
 def _clear_of_noise(gap: ChannelGap) -> float:
-    """How far what was left before effects stands above the noise, as a share of the signal."""
+    """Error before effects that is clear of noise, as a share of the signal, for the verdict."""
     floor = gap.noise_floor if np.isfinite(gap.noise_floor) else 0.0
     return float(np.sqrt(max(gap.recalibrated**2 - floor**2, 0.0))) / gap.signal if gap.signal else 0.0
 
@@ -161,7 +161,7 @@ def _is_described_better(rest: Remainder | None) -> bool:
 
 
 def _is_explanation(found: Search, tracked: float, mostly_open: bool) -> bool:
-    """Whether what was found explains the gap, where the residual is said to leave it mostly open or not.
+    """Whether the verdict is that named effects explain the model error.
 
     The share ``tracked`` of the error power that a tracker has left, of the joint that is explained best, decides where
     it is clear. Effects that leave little there are the explanation; those that leave more than there was are none.
@@ -174,13 +174,13 @@ def _is_explanation(found: Search, tracked: float, mostly_open: bool) -> bool:
 
 
 def _farthest(away: Mapping[str, float]) -> str:
-    """The parameter that stands farthest from what the model file says of it."""
+    """Sentence of the verdict on the parameter farthest from the model file, by its stated uncertainty."""
     name, times = next(iter(away.items()))
     return f"{name} would be off by {times:.1f} times its stated uncertainty"
 
 
 def _shown_by_predictions(found: Search) -> bool:
-    """Whether all accepted effects come from closed-loop predictions, and explain most of their error.
+    """Whether the verdict rests on closed-loop predictions: all effects come from them and explain their error.
 
     What the inverse-dynamics residual hardly shows may leave as much of it as there was, and be the explanation.
     """
@@ -196,7 +196,7 @@ def _nothing_missing(
     both: tuple[list[ChannelGap], list[ChannelGap]],
     worst: ChannelGap,
 ) -> tuple[str, str]:
-    """Of gaps of the residual, and of an observer of joints that it does not see."""
+    """Verdict that nothing is missing: by errors of the residual, and by an observer of other joints."""
     (main, beside), numbers = both, _stages(worst)
     small = max((g.before / g.signal if g.signal > 0.0 else 0.0 for g in main), default=0.0) <= NEGLIGIBLE
     agrees = small or max((g.before / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main) <= FLOOR_FACTOR
@@ -214,13 +214,13 @@ def _nothing_missing(
 
 
 def _is_better(nominal: Judged, recalibrated: Judged, data: Data) -> bool:
-    """Whether other values of the known parameters surely lower the residual of the validation records."""
+    """Verdict on calibration: whether other known parameters surely lower the validation residual."""
     better = gain(nominal.validation, recalibrated.validation, segments(data.validation))
     return better.relative > LEAST_GAIN and better.score > float(ndtri(1.0 - FALSE_ALARM_LEVEL))
 
 
 def _was_closed(gap: ChannelGap) -> bool:
-    """Whether other values of the known parameters have closed a gap that was there."""
+    """Verdict on calibration: whether other known parameters explain the model error."""
     was_there = gap.before > FLOOR_FACTOR * gap.noise_floor and gap.before > NEGLIGIBLE * gap.signal
     return was_there and gap.recalibrated < gap.before * np.sqrt(1.0 - LEAST_GAIN)
 
@@ -230,7 +230,7 @@ def _stages(gap: ChannelGap) -> str:
 
 
 def _closed(gap: ChannelGap) -> float:
-    """Share of the signal by which other values of the known parameters lower an error; negative where it grew."""
+    """Share of the signal by which other known parameters lower an error in the verdict; negative if it grew."""
     return (gap.before - gap.recalibrated) / gap.signal if gap.signal > 0.0 else 0.0
 
 

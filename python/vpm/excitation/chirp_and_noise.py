@@ -20,7 +20,7 @@ def chirp(
     time_step: float,
     mean: float = 0.0,
 ) -> Excitation:
-    """Sine whose frequency moves evenly from one to another, with the phase ``(w_s + (w_e - w_s) t / (2 T)) t``.
+    """Chirp: a sine with the phase ``(w_s + (w_e - w_s) t / (2 T)) t`` and linearly changing frequency.
 
     The phase is the integral of the frequency, so the last frequency is reached and not passed
     (`vpm.scenario.signals.chirp`).

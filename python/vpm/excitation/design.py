@@ -39,7 +39,7 @@ def fourier_trajectory(
     seed: int = 0,
     progress: Progress | None = None,
 ) -> FourierTrajectory:
-    """Periodic motion that tells base parameters best, within limits.
+    """Design of a Fourier trajectory that tells base parameters best, within limits.
 
     Every joint moves on a finite Fourier series that begins at rest (J. Swevers et al., "Optimal robot excitation and
     identification", *IEEE Trans. Robotics and Automation* 13, 1997). The regressor is the exact derivative of the
@@ -119,7 +119,7 @@ def _evolve(
     counts: tuple[int, int],
     progress: Progress | None,
 ) -> Array:
-    """One parent and one child; steps grow after a success and shrink so that one in five succeeds."""
+    """Evolve a design by one parent and one child; one in five steps succeeds."""
     parent, step = start, 0.5
     for count in range(counts[0] + 1, counts[1] + 1):
         child = parent + step * rng.standard_normal(search.size)
@@ -166,7 +166,7 @@ def _result(search: Worth, best: Array, time: Array, starts: Array) -> FourierTr
 
 
 def _units(model: Model) -> list[str]:
-    """Units of the channels of the result, joint by joint."""
+    """Units of a design's channels, joint by joint."""
     units = []
     for joint in model.joints:
         base = model.channel_unit(f"{joint}.position")
@@ -175,7 +175,7 @@ def _units(model: Model) -> list[str]:
 
 
 def _within_effort(search: Worth, offset: Array, cosine: Array, sine: Array) -> tuple[Array, Array, Array]:
-    """The motion, made smaller until its efforts hold, if the search left any beyond their limit."""
+    """Designed motion, made smaller until its efforts hold."""
     if search.effort_share(offset, cosine, sine) <= 1.0:
         return offset, cosine, sine
     low, high = 0.0, 1.0

@@ -52,7 +52,7 @@ class Excitation(Result):
     notes: tuple[str, ...]
 
     def __post_init__(self) -> None:
-        """Freeze the arrays."""
+        """Freeze the arrays of an excitation."""
         for attribute in ("time", "data"):
             values = np.array(getattr(self, attribute), dtype=np.float64)
             values.setflags(write=False)
@@ -64,11 +64,11 @@ class Excitation(Result):
         return float(self.time[-1] - self.time[0]) / (self.time.size - 1)
 
     def __len__(self) -> int:
-        """Count of samples."""
+        """Count of an excitation's samples."""
         return self.time.size
 
     def __getitem__(self, channel: str) -> Array:
-        """Values of a channel, shape (N,)."""
+        """Values of an excitation's channel, shape (N,)."""
         if channel not in self.channels:
             raise ExcitationError(
                 f'{self.name} has no channel "{channel}"; {near_match(channel, self.channels, what="it has")}'
@@ -80,12 +80,12 @@ class Excitation(Result):
         return self.units[self.channels.index(channel)] if channel in self.channels else str(self[channel])
 
     def crest_factor(self, channel: str) -> float:
-        """Largest absolute sample over the root mean square; the square root of two for a sine."""
+        """Crest factor of an excitation: largest sample over the root mean square; sqrt(2) for a sine."""
         values = self[channel]
         return float(np.max(np.abs(values)) / np.sqrt(np.mean(values**2)))
 
     def spectrum(self, channel: str) -> tuple[Array, Array]:
-        """Amplitude of each sine in a channel, taken as one period.
+        """Amplitude of each sine in an excitation's channel, taken as one period.
 
         Returns
         -------
@@ -102,7 +102,7 @@ class Excitation(Result):
         return np.asarray(np.fft.rfftfreq(values.size, self.time_step), dtype=np.float64), amplitude
 
     def to_csv(self, path: str | PathLike[str]) -> Path:
-        """Write a table for the robot: ``time [s]`` and each channel with its unit in brackets.
+        """Write an excitation for the robot: ``time [s]`` and each channel with its unit in brackets.
 
         `vpm.Experiment.load` reads it back without a channel table.
         """
@@ -129,7 +129,7 @@ class Excitation(Result):
         return Experiment.from_arrays(self.time, values, units, self.name)
 
     def to_points(self, channel: str) -> Mapping[str, object]:
-        """A channel as the signal ``points`` of a scenario file; write it with any TOML library."""
+        """Channel of an excitation as the signal ``points`` of a scenario file."""
         return {
             "type": "points",
             "time": {"value": self.time.tolist(), "unit": "s"},
@@ -159,7 +159,7 @@ class Excitation(Result):
         )
 
     def plot(self) -> Figure:
-        """All channels over time. Needs the extra ``plot``."""
+        """Plot all channels of an excitation over time. Needs the extra ``plot``."""
         from vpm.plot import plot_channels
 
         return plot_channels(self.time, self.data, self.channels, self.units, title=self.name)
@@ -178,7 +178,7 @@ class Excitation(Result):
 
 
 def clock(duration: float, time_step: float, *, whole: bool = False) -> Array:
-    """Times of the samples, s: over a whole number of periods without the last one, otherwise with both ends.
+    """Sample times of an excitation, s: whole periods without the last sample, otherwise with both ends.
 
     Raises
     ------
@@ -202,7 +202,7 @@ def clock(duration: float, time_step: float, *, whole: bool = False) -> Array:
 
 
 def check_band(low: float, high: float, time_step: float, what: str) -> None:
-    """Refuse a band that is empty or that the samples do not carry."""
+    """Refuse an excitation band that is empty or that the samples do not carry."""
     nyquist = 0.5 / time_step
     if not 0.0 <= low <= high < nyquist:
         raise ExcitationError(
@@ -212,6 +212,6 @@ def check_band(low: float, high: float, time_step: float, what: str) -> None:
 
 
 def check_positive(value: float, what: str) -> None:
-    """Refuse what has to be a positive finite number."""
+    """Refuse a number of an excitation that is not positive and finite."""
     if not (np.isfinite(value) and value > 0.0):
         raise ExcitationError(f"the {what} is {value:g}, and it has to be positive; correct it")

@@ -55,7 +55,7 @@ class FourierTrajectory(Excitation):
     start_conditions: Array
 
     def at(self, time: Array) -> tuple[Array, Array, Array]:
-        """Position, velocity and acceleration at any times, each of shape (N, n)."""
+        """Fourier motion at any times: position, velocity and acceleration, each of shape (N, n)."""
         return motion_at(np.asarray(time, dtype=np.float64), self.fundamental, self.offset, self.cosine, self.sine)
 
     def _headline(self) -> Mapping[str, object]:
@@ -64,7 +64,7 @@ class FourierTrajectory(Excitation):
 
 
 def motion_at(time: Array, fundamental: float, offset: Array, cosine: Array, sine: Array) -> tuple[Array, Array, Array]:
-    """Position, velocity and acceleration of the series, each of shape (N, n)."""
+    """Motion of a Fourier series: position, velocity and acceleration, each of shape (N, n)."""
     rate = 2.0 * np.pi * fundamental * np.arange(1, cosine.shape[1] + 1)
     angle = np.outer(time, rate)
     c, s = np.cos(angle), np.sin(angle)
@@ -75,14 +75,14 @@ def motion_at(time: Array, fundamental: float, offset: Array, cosine: Array, sin
 
 
 def at_rest(cosine: Array, sine: Array) -> tuple[Array, Array]:
-    """The nearest coefficients whose motion begins, and ends each period, at rest: ``sum a = 0, sum l b = 0``."""
+    """Nearest Fourier coefficients whose motion begins at rest: ``sum a = 0, sum l b = 0``."""
     lines = np.arange(1, cosine.shape[1] + 1)
     still = cosine - cosine.mean(axis=1, keepdims=True)
     return still, sine - np.outer(sine @ lines, lines) / float(lines @ lines)
 
 
 def bound_grid(harmonics: int) -> tuple[int, float]:
-    """Points of a period, and what the largest of them is to be multiplied by to bound the wave between them.
+    """Points of a Fourier period, and a factor that bounds the wave between them.
 
     ``1 / cos(pi n / M)`` for n harmonics on M points (H. Ehlich and K. Zeller, *Mathematische Zeitschrift* 86, 1964).
     """
@@ -93,7 +93,7 @@ def bound_grid(harmonics: int) -> tuple[int, float]:
 def within_limits(
     fundamental: float, offset: Array, cosine: Array, sine: Array, limits: list[JointLimits]
 ) -> tuple[Array, Array]:
-    """Coefficients of the same form, scaled joint by joint until the first limit of motion is touched, not passed."""
+    """Fourier coefficients, scaled joint by joint until the first limit of motion is touched."""
     count, factor = bound_grid(cosine.shape[1])
     time = np.arange(count) / (count * fundamental)
     position, velocity, acceleration = motion_at(time, fundamental, np.zeros_like(offset), cosine, sine)

@@ -108,7 +108,7 @@ def multisine(
 
 
 def schroeder_phases(amplitudes: Array) -> Array:
-    """Phases of low peaks, rad: ``-2 pi sum_{l<k} (k - l) p_l`` with the shares ``p`` of the power.
+    """Multisine phases of low peaks, rad: ``-2 pi sum_{l<k} (k - l) p_l`` with power shares ``p``.
 
     For equal amplitudes of K sines that is ``-pi k (k - 1) / K``.
     """
@@ -117,7 +117,7 @@ def schroeder_phases(amplitudes: Array) -> Array:
 
 
 def peak_bound(lines: NDArray[np.int64], amplitudes: Array, angles: Array) -> float:
-    """Bound of the largest absolute value of a sum of cosines over all times.
+    """Bound of a multisine's largest absolute value over all times.
 
     The largest of M samples, divided by ``cos(pi n / M)`` for a highest multiple n (S. Bernstein's inequality; H.
     Ehlich and K. Zeller, *Mathematische Zeitschrift* 86, 1964): 0.5 % above it at most, with 32 samples to each.
@@ -157,7 +157,7 @@ def _phases(lines: NDArray[np.int64], amplitudes: Array, kind: str, seed: int, p
 
 
 def _optimised(lines: NDArray[np.int64], amplitudes: Array, progress: Progress | None) -> Array:
-    """Least peak by way of norms of rising power, each started where the last one ended; never worse than the start."""
+    """Multisine phases of least peak, by norms of rising power; never worse than the start."""
     from scipy.optimize import minimize
 
     count = 1 << int(np.ceil(np.log2(OVERSAMPLING * lines[-1])))
@@ -192,7 +192,7 @@ def _optimised(lines: NDArray[np.int64], amplitudes: Array, progress: Progress |
 def _log_norm(
     angles: Array, lines: NDArray[np.int64], amplitudes: Array, count: int, power: int
 ) -> tuple[float, Array]:
-    """Logarithm of the norm of a power of the wave, and its derivative by the phases."""
+    """Logarithm of a multisine's norm of a power, and its derivative by the phases."""
     wave = _wave(lines, amplitudes, angles, count)
     top = float(np.max(np.abs(wave)))
     relative = wave / top

@@ -24,7 +24,7 @@ class Move(NamedTuple):
     duration: float
 
     def at(self, time: Array) -> tuple[Array, Array, Array]:
-        """Position, velocity and acceleration; at rest before and after. At a corner the later acceleration holds."""
+        """Position, velocity and acceleration of a trapezoid; at rest before and after."""
         t = np.clip(time, 0.0, self.duration)
         speed = self.distance / (self.duration - self.ramp) if self.duration > 0.0 else 0.0
         rate = speed / self.ramp if self.ramp > 0.0 else 0.0
@@ -114,7 +114,7 @@ def trapezoid(
 
 
 def _move(start: float, end: float, limits: JointLimits) -> Move:
-    """The fastest move: a ramp to the top speed, or a triangle where that is not reached."""
+    """Fastest trapezoid: a ramp to the top speed, or a triangle where that is not reached."""
     distance = abs(end - start)
     if distance == 0.0:
         return Move(start, 0.0, 0.0, 0.0)

@@ -44,7 +44,7 @@ class Worth:
         self._bounded = np.isfinite(efforts)
 
     def motion(self, point: Array) -> tuple[Array, Array, Array]:
-        """Offset and coefficients, at rest in the beginning and within the limits of motion."""
+        """Motion whose worth is computed: offset and coefficients, from rest and within limits."""
         table = point.reshape(len(self.limits), -1)
         low, high = np.array([limit.position for limit in self.limits]).T
         offset = 0.5 * (low + high) + 0.5 * OFFSET_SHARE * (high - low) * np.tanh(table[:, 0])
@@ -52,7 +52,7 @@ class Worth:
         return offset, *within_limits(self.fundamental, offset, cosine, sine, self.limits)
 
     def cost(self, point: Array) -> float:
-        """Logarithm of the criterion, and a penalty for efforts beyond their limits."""
+        """Worth of a motion: logarithm of the criterion, and a penalty for too large efforts."""
         shape = self.motion(point)
         excess = max(0.0, self.effort_share(*shape) - 1.0)
         values = self.singular_values(*shape)
@@ -63,26 +63,26 @@ class Worth:
         return float(told) + PENALTY * excess
 
     def condition(self, offset: Array, cosine: Array, sine: Array) -> float:
-        """Condition number of the scaled regressor over one period."""
+        """Condition number of the scaled regressor over one period: a motion's worth."""
         values = self.singular_values(offset, cosine, sine)
         return float(values[0] / values[-1]) if values[-1] > 0.0 else float("inf")
 
     def singular_values(self, offset: Array, cosine: Array, sine: Array) -> Array:
-        """Singular values of the scaled regressor, as root mean squares over one period, the largest first."""
+        """Singular values behind a motion's worth, of the scaled regressor, the largest first."""
         states = motion_at(self._time, self.fundamental, offset, cosine, sine)
         columns = regressor(self.model, *states, self.names) * self._scales / self._largest[:, None]
         rows = columns.reshape(-1, len(self.names)) / np.sqrt(self._time.size)
         return np.asarray(np.linalg.svd(rows, compute_uv=False))
 
     def effort_share(self, offset: Array, cosine: Array, sine: Array) -> float:
-        """Largest effort as a share of its limit; zero where none is given."""
+        """Largest effort as a share of its limit, beside a motion's worth; zero where none is given."""
         if not self._bounded.any():
             return 0.0
         effort = self.effort(*motion_at(self._time, self.fundamental, offset, cosine, sine))
         return float(np.max(np.abs(effort[:, self._bounded]) / self._largest[self._bounded]))
 
     def effort(self, position: Array, velocity: Array, acceleration: Array) -> Array:
-        """Efforts that a motion needs, (N, n)."""
+        """Efforts (N, n) that a motion needs, beside its worth."""
         inputs = np.zeros((len(position), len(self.model.inputs)))
         core, theta = self.model.core, self.model.theta
         return core.inverse_dynamics(theta, position, velocity, acceleration, inputs, 1.0, [])[0]

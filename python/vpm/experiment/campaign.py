@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def as_records(experiments: Experiment | Sequence[Experiment]) -> list[Experiment]:
-    """Records in a list, where one alone may be given.
+    """Records of a campaign in a list, where one alone may be given.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ class Campaign(Result, Sequence[Experiment]):
     experiments: tuple[Experiment, ...]
 
     def __post_init__(self) -> None:
-        """Check that the records belong together."""
+        """Check that the campaign's records belong together."""
         object.__setattr__(self, "experiments", tuple(self.experiments))
         if not self.experiments:
             raise ExperimentError("a campaign has at least one record, and none was given; name its files")
@@ -111,20 +111,20 @@ class Campaign(Result, Sequence[Experiment]):
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Channels that every record has."""
+        """Channels that every record of a campaign has."""
         return self.experiments[0].channels
 
     @property
     def duration(self) -> float:
-        """Time of all records together, s."""
+        """Time of all records of a campaign together, s."""
         return sum(record.duration for record in self.experiments)
 
     def __len__(self) -> int:
-        """Count of records."""
+        """Count of a campaign's records."""
         return len(self.experiments)
 
     def __iter__(self) -> Iterator[Experiment]:
-        """Records in their order."""
+        """Records of a campaign in their order."""
         return iter(self.experiments)
 
     @overload

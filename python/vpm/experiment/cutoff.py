@@ -105,7 +105,7 @@ def choose_cutoff(position: Array, rate: float) -> CutoffChoice:
 
 
 def position_spectrum(position: Array, rate: float) -> tuple[Array, Array, Array]:
-    """Smoothed one-sided power spectrum of a position and the level of its noise floor.
+    """Power spectrum of a position for its cut-off, smoothed and one-sided, and the noise floor.
 
     Welch's method on second differences, divided by their gain ``(2 - 2 cos w)^2``: positions fall so steeply with
     frequency that without this the leakage of the slow motion would drown all the rest.
@@ -162,7 +162,7 @@ def _expected_error(frequency: Array, motion: Array, spectrum: Array, rate: floa
 
 
 def _smooth(power: Array) -> Array:
-    """Running mean over a tenth of each frequency to both sides, at least two bins."""
+    """Spectrum for the cut-off as a running mean over a tenth of each frequency, at least two bins."""
     index = np.arange(power.size)
     half = np.maximum(2, (index + 1) // 10)
     low, high = np.maximum(index - half, 0), np.minimum(index + half + 1, power.size)

@@ -54,7 +54,7 @@ class Dialect:
     comma: bool
 
     def rows(self, path: str | PathLike[str]) -> Iterator[tuple[int, list[str]]]:
-        """Cells of each row of numbers that is not blank, as they stand there, with its line."""
+        """Cells of each row of numbers in a dialect, as they stand there, with its line."""
         with Path(path).open(encoding=self.encoding, newline="") as file:
             lines = islice(file, self.skipped, None)
             if self.delimiter is None:
@@ -65,12 +65,12 @@ class Dialect:
             yield from ((number, row) for number, row in split if any(cell.strip() for cell in row))
 
     def number(self, cell: str) -> str:
-        """A cell with a decimal point."""
+        """Cell of a dialect with a decimal point."""
         return cell.replace(",", ".") if self.comma else cell
 
 
 def read_dialect(path: str | PathLike[str]) -> Dialect:
-    """Find out how a text file writes its table.
+    """Read the dialect in which a text file writes its table.
 
     Remarks and blank lines may stand above the names, and the names may be a remark themselves, as ``numpy.savetxt``
     writes them. Blanks separate where the names hold no other separator. Commas are decimal ones where another
@@ -110,7 +110,7 @@ def _content(path: str | PathLike[str]) -> bytes:
 
 
 def _encoding(path: str | PathLike[str], content: bytes) -> str:
-    """UTF-8, or the Latin letters of Windows where the bytes are none: older programs write the sign of degrees so."""
+    """Encoding of a dialect: UTF-8, or the Latin letters of Windows that older programs write."""
     odd = len(content.translate(None, _CONTROLS)) < len(content)
     for encoding in () if odd else _ENCODINGS:
         try:
@@ -122,7 +122,7 @@ def _encoding(path: str | PathLike[str], content: bytes) -> str:
 
 
 def _names(path: str | PathLike[str], lines: Sequence[str], told: Sequence[int]) -> tuple[int, str]:
-    """Place and text of the line of names: the first that is no remark, or the last remark above the numbers."""
+    """Names line of a dialect: the first line that is no remark, or the last remark above the numbers."""
     first = next((place for place in told if not lines[place].startswith(REMARKS)), None)
     if first is None:
         what = f"holds {len(told)} lines of remarks and no numbers" if told else "is empty"
@@ -144,7 +144,7 @@ def _cells(line: str, separator: str | None) -> list[str]:
 
 
 def _units(cells: Sequence[str], columns: int) -> tuple[str, ...]:
-    """Units of a row below the names, if all of its cells are units, in brackets or without; else none."""
+    """Units line of a dialect below the names, if all of its cells are units; else none."""
     units = tuple(re.sub(r"^[\[(](.*)[\])]$", r"\1", cell.strip()) for cell in cells)
     units = tuple("1" if unit in ("", "-") else unit for unit in units)
     are_units = len(units) == columns and not any(map(is_number, cells)) and all(map(_is_unit, units))
@@ -160,13 +160,13 @@ def _is_unit(text: str) -> bool:
 
 
 def _is_numbers(line: str) -> bool:
-    """Whether all cells of a line are numbers, whatever separates them."""
+    """Whether all cells of a line are numbers in any dialect."""
     cells = [cell for cell in re.split(r"[,;\t| ]+", line.replace('"', "")) if cell]
     return all(map(is_number, cells))
 
 
 def is_number(cell: str) -> bool:
-    """Whether a cell is a number with a decimal point."""
+    """Whether a cell of a dialect is a number with a decimal point."""
     try:
         float(cell)
     except ValueError:

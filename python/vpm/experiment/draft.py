@@ -45,7 +45,7 @@ class Draft:
 
 
 def mapped_draft(log: Log, table: Mapping[str, ChannelEntry], model: Model | None) -> Draft:
-    """Columns that a channel table names."""
+    """Draft of channels from columns that a channel table names."""
     path = log.path
     present = _present_columns(path, table, log)
     columns = list(dict.fromkeys(column for found in present.values() for column in found.values()))
@@ -74,7 +74,7 @@ def mapped_draft(log: Log, table: Mapping[str, ChannelEntry], model: Model | Non
 def _present_columns(
     path: str | PathLike[str], table: Mapping[str, ChannelEntry], log: Log
 ) -> dict[str, dict[str, str]]:
-    """Columns of each channel that the file has, by their names there; channels without have to be optional."""
+    """Columns of each drafted channel that the file has; channels without have to be optional."""
     if "time" not in table:
         raise ExperimentError(
             f'{path}: the channel table maps no column to "time"; add time = {{ column = "...", unit = "s" }}',
@@ -116,7 +116,7 @@ def _map_channel(
     columns: Mapping[str, str] | None,
     model: Model | None,
 ) -> None:
-    """Scale, shift and convert one channel: (column or value * scale + offset) in the unit of the entry."""
+    """Draft of one channel in the unit of the entry: (column or value * scale + offset)."""
     factor, zero, unit = to_si(entry.unit, channel, model, draft.source.name)
     draft.units[channel] = unit
     if columns is None:
@@ -148,7 +148,7 @@ def _map_channel(
 
 
 def _clock(draft: Draft, content: Table, channel: str, columns: Mapping[str, str]) -> Array | None:
-    """Clock of the columns of a channel, which has to be one; None where it is that of the record."""
+    """Clock of a drafted channel's columns, which has to be one; None where it is that of the record."""
     first, *others = (content.clocks.get(column) for column in columns.values())
     for own, column in zip(others, list(columns.values())[1:], strict=True):
         if not np.array_equal(draft.time if own is None else own, draft.time if first is None else first):
@@ -162,7 +162,7 @@ def _clock(draft: Draft, content: Table, channel: str, columns: Mapping[str, str
 
 
 def _built(draft: Draft, content: Table, channel: str, entry: ChannelEntry, columns: Mapping[str, str]) -> Array:
-    """Value over several columns, in the unit of the entry."""
+    """Value of a drafted channel over several columns, in the unit of the entry."""
     units = {name: parse_unit(part.unit) for name, part in entry.columns.items()}
     parts = {
         name: Quantity(content.columns[column] * units[name].factor + units[name].zero, units[name].dimension)
@@ -185,7 +185,7 @@ def _built(draft: Draft, content: Table, channel: str, entry: ChannelEntry, colu
 
 
 def plain_draft(log: Log) -> Draft:
-    """Every column a channel of its own name; a unit may stand in brackets behind it."""
+    """Draft with every column as a channel of its own name; a unit may stand in brackets behind it."""
     path, (names, clock) = log.path, _plain_columns(log)
     content = log.read(log.header, clock)
     source = Source(str(path), content.lines, str(path))
@@ -206,7 +206,7 @@ def plain_draft(log: Log) -> Draft:
 
 
 def plain_table(path: str | PathLike[str], model: Model) -> dict[str, ChannelEntry]:
-    """The channel table that says what is read of a log without one; columns that the model does not know stay out.
+    """Draft of a channel table for a log without one; columns that the model does not know stay out.
 
     Raises
     ------
@@ -226,13 +226,13 @@ def plain_table(path: str | PathLike[str], model: Model) -> dict[str, ChannelEnt
 
 
 def _plain_columns(log: Log) -> tuple[dict[str, tuple[str, str]], str]:
-    """Of a log without a channel table, name and unit of each column, and which of these is the clock."""
+    """Name and unit of each column for a draft without a channel table, and the clock among them."""
     names = {column: _stated(column, log) for column in log.header}
     return names, _clock_column(log.path, names)
 
 
 def _clock_column(path: str | PathLike[str], names: Mapping[str, tuple[str, str]]) -> str:
-    """The column that is named like a clock; in files with groups, the only one whose last word is."""
+    """Clock column of a draft by its name; in files with groups, the only one whose last word is."""
     clocks = [column for column, (name, _) in names.items() if name in TIME_COLUMNS]
     inner = [column for column, (name, _) in names.items() if re.split(r"[./]", name)[-1] in TIME_COLUMNS]
     if not clocks and len(inner) == 1:
@@ -247,7 +247,7 @@ def _clock_column(path: str | PathLike[str], names: Mapping[str, tuple[str, str]
 
 
 def _stated(column: str, log: Log) -> tuple[str, str]:
-    """Name and unit of a column: the unit that the file states, or in brackets behind the name."""
+    """Name and unit of a drafted column: the unit of the file, or in brackets behind the name."""
     if column in log.units:
         return column, log.units[column]
     return bracketed(column) if log.bracketed_units else (column, "")

@@ -54,18 +54,18 @@ class Source:
     path: str | None = None
 
     def at(self, sample: int) -> str:
-        """Place of a sample in its file, in words, such as ``log.csv, line 12``."""
+        """Place of a grid's sample in its file, in words, such as ``log.csv, line 12``."""
         if self.lines is None:
             return f"{self.name}, sample {sample}"
         return f"{self.name}, line {self.lines[sample]}"
 
     def error(self, message: str, *, channel: str | None = None, time: float | None = None) -> ExperimentError:
-        """Error that carries the path."""
+        """Error about a grid that carries the path."""
         return ExperimentError(message, path=self.path, channel=channel, time=time)
 
 
 def check_finite(values: Array, time: Array, what: str, source: Source, *, channel: str | None = None) -> None:
-    """Refuse NaN, infinity and what no machine can be at.
+    """Refuse NaN, infinity and what no machine can be at, on the grid.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def check_finite(values: Array, time: Array, what: str, source: Source, *, chann
 
 
 def check_increasing(time: Array, source: Source) -> None:
-    """Refuse a record that is too short, or a time that stands still or goes back.
+    """Refuse a grid that is too short, or whose time stands still or goes back.
 
     Raises
     ------
@@ -118,7 +118,7 @@ def check_increasing(time: Array, source: Source) -> None:
 
 
 def check_uniform(time: Array, source: Source) -> str:
-    """Refuse gaps and uneven steps.
+    """Refuse gaps and uneven steps of a grid.
 
     Returns
     -------
@@ -228,7 +228,7 @@ def check_grid(time: Array, step: float, growth: float, source: Source) -> None:
 
 
 def is_smooth(channel: str) -> bool:
-    """Whether a channel is a motion, which has no jumps."""
+    """Whether a channel on the grid is a motion, which has no jumps."""
     return channel.rpartition(".")[2] in SMOOTH_QUANTITIES
 
 

@@ -60,7 +60,7 @@ def array_parts(
     resample: float | None,
     name: str,
 ) -> Parts:
-    """Parts of a record from arrays; see `Experiment.from_arrays`."""
+    """Loaded parts of a record from arrays; see `Experiment.from_arrays`."""
     clock = array_of(time, f"{name}: the time", ExperimentError)
     if clock.ndim != 1:
         raise ExperimentError(f"{name}: the time has shape {clock.shape}; give one number per sample")
@@ -91,7 +91,7 @@ def array_parts(
 def channel_table(
     channels: Mapping[str, ChannelEntry] | str | PathLike[str] | None, model: Model | None
 ) -> Mapping[str, ChannelEntry] | None:
-    """Entries by channel name, the clock among them under "time"; None where nobody gave a table.
+    """Loaded channel-table entries by name, the clock under "time"; None where nobody gave a table.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def channel_table(
 
 
 def _finish(draft: Draft, name: str, irregular: str, resample: float | None) -> Parts:
-    """Check the clock, make it uniform if asked to, move back what lags, and resample."""
+    """Finish loading: check the clock, make it uniform if asked to, move back what lags, and resample."""
     if irregular not in {"error", "interpolate"}:
         raise ExperimentError(f'irregular="{irregular}" is not known; choose "error" or "interpolate"')
     check_finite(draft.time, draft.time, "the time", draft.source, channel="time")

@@ -16,7 +16,7 @@ from vpm.files import exists
 
 
 def check_channels(first: Experiment, record: Experiment) -> None:
-    """Refuse a record whose channels or units are not those of the first."""
+    """Refuse a record as a member whose channels or units are not those of the first."""
     for one, other in ((first, record), (record, first)):
         lost = [channel for channel in one.channels if channel not in other]
         if lost:
@@ -35,13 +35,13 @@ def check_channels(first: Experiment, record: Experiment) -> None:
 
 
 def shared(records: Sequence[Experiment]) -> list[Experiment]:
-    """Records with the channels that all of them have, in the order of the first."""
+    """Member records with the channels that all of them have, in the order of the first."""
     common = [channel for channel in records[0].channels if all(channel in record for record in records)]
     return [record.select(common) for record in records]
 
 
 def files_of(path: str | PathLike[str]) -> list[Path]:
-    """The file, all that fit a pattern in the order of their names, or the episodes of a data set of LeRobot."""
+    """Member files: one, all that fit a pattern by name, or the episodes of a LeRobot data set."""
     if is_data_set(path):
         with reading(path):
             return episodes_of(path)
@@ -54,6 +54,6 @@ def files_of(path: str | PathLike[str]) -> list[Path]:
 
 
 def record_names(files: Sequence[Path]) -> list[str]:
-    """Names of the files without their ending, with the folder before them where that alone tells them apart."""
+    """Names of member files without their ending, with the folder where that alone discriminates."""
     counts = Counter(file.stem for file in files)
     return [file.stem if counts[file.stem] == 1 else f"{file.parent.name}/{file.stem}" for file in files]

@@ -96,7 +96,7 @@ def merge_clocks(
 
 
 def _onto(grid: Array, step: float, own: Array, values: Array, channel: str, source: Source) -> tuple[Array, str]:
-    """Values on the grid; one that comes faster than the grid passes a filter first, as in `Experiment.resample`."""
+    """Values merged onto the grid; faster ones pass a filter first, as in `Experiment.resample`."""
     steps = np.diff(own)
     usual = float(np.median(steps))
     smooth = is_smooth(channel)

@@ -39,19 +39,19 @@ class Machine(Protocol):
 
     @property
     def name(self) -> str:
-        """Name of the model."""
+        """Name of the model whose motion is derived."""
 
     @property
     def joints(self) -> Iterable[str]:
-        """Names of the joints."""
+        """Names of the joints whose motion is derived."""
 
     @property
     def input_channels(self) -> Iterable[str]:
-        """Channels of the log that drive it."""
+        """Input channels of the log beside the motion."""
 
     @property
     def optional_inputs(self) -> Collection[str]:
-        """Input channels that are zero where the log does not hold them."""
+        """Input channels beside the motion that are zero where the log does not hold them."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -114,17 +114,17 @@ class Motion(Result):
 
     @property
     def band(self) -> float:
-        """Highest frequency that `parallel` keeps, Hz."""
+        """Highest frequency of the motion that `parallel` keeps, Hz."""
         return 0.5 * RETAINED_BAND / (self.decimation * self.dt)
 
     @property
     def retained(self) -> NDArray[np.int64]:
-        """Samples, counted from the beginning of the record, that the decimation leaves between the two ends."""
+        """Retained samples of the motion, counted from the record's beginning, between the two ends."""
         first = -(-self.edge // self.decimation) * self.decimation
         return np.arange(first, self.time.size - self.edge, self.decimation)
 
     def parallel(self, values: Array) -> Array:
-        """The parallel filter over a record, of which the `retained` samples are given.
+        """Parallel filter over a motion's record, of which the `retained` samples are given.
 
         An end at rest is filtered with the rest: there is nothing to settle. At an end in motion the derivatives within
         `edge` are wrong, and what they make of a balance would ring on inside; it is cut off before.
@@ -145,7 +145,7 @@ class Motion(Result):
         return np.ascontiguousarray(filtered[(retained - begin) // self.decimation])
 
     def _rests(self, end: slice) -> bool:
-        """Whether no joint moves within one end of the record."""
+        """Whether the motion rests within one end of the record."""
         speed = np.abs(self.velocity)
         return bool(np.all(speed[end].max(axis=0, initial=0.0) <= REST_SHARE * speed[self.kept].max(axis=0)))
 
@@ -180,7 +180,7 @@ def motion(
     measured: Collection[str] = (),
     band: float | None = None,
 ) -> Motion:
-    """Filtered positions, velocities, accelerations and inputs of a log, as inverse dynamics needs them.
+    """Motion from a log: filtered positions, velocities, accelerations and inputs for inverse dynamics.
 
     Positions pass a zero-phase Butterworth filter of order 4 and two central differences, the customary preparation
     for inverse dynamic identification (M. Gautier, "Dynamic identification of robots with power model", ICRA 1997).
@@ -282,7 +282,7 @@ def _of(owners: tuple[str, ...], quantity: str) -> tuple[str, ...]:
 def _channels(
     experiment: Experiment, model: Machine, channels: tuple[str, ...], optional: Collection[str] = ()
 ) -> Array:
-    """Columns of a log; zeros for optional ones that it does not hold."""
+    """Columns of a log for its motion; zeros for optional ones that it does not hold."""
     for channel in channels:
         if channel not in experiment and channel not in optional:
             near = near_match(channel, experiment.channels, what="the log holds")

@@ -56,7 +56,7 @@ def noise_std(values: Array) -> float:
 
 
 def quantisation_step(values: Array) -> float | None:
-    """Step of the grid on which all values of a channel lie.
+    """Quantisation noise: step of the grid on which all values of a channel lie.
 
     The greatest common measure of the differences between neighbours (Euclid's algorithm with a tolerance).
 
@@ -88,7 +88,7 @@ def quantisation_step(values: Array) -> float | None:
 
 
 def _measure(step: float, differences: Array, rounding: float) -> tuple[float, float | None]:
-    """Step fitted to its multiples, from the small ones up, and the first remainder that is none of its multiples.
+    """Quantisation step fitted to noisy multiples, and the first remainder that is none of them.
 
     Each round takes in multiples ten times larger, which it can count because the last one has sharpened the step.
     """

@@ -81,7 +81,7 @@ class Experiment(Result):
     unused_columns: tuple[str, ...] = field(default=())
 
     def __post_init__(self) -> None:
-        """Take read-only copies of the arrays and check that the parts fit together."""
+        """Take read-only copies of a record's arrays and check that the parts fit together."""
         for attribute in ("time", "data"):
             values = np.array(
                 array_of(getattr(self, attribute), f"{self.name}: {attribute}", ExperimentError), order="C"
@@ -102,7 +102,7 @@ class Experiment(Result):
         self._check()
 
     def _check(self) -> None:
-        """Check the numbers as those of a file are."""
+        """Check the numbers of a record as those of a file are."""
         source = Source(self.name)
         check_finite(self.time, self.time, "the time", source, channel="time")
         check_increasing(self.time, source)
@@ -122,7 +122,7 @@ class Experiment(Result):
         resample: float | None = None,
         name: str | None = None,
     ) -> Self:
-        """Read a log: CSV, Parquet, MATLAB, HDF5, a ROS bag or MCAP, MDF, TDMS, ULog, or what `save` wrote.
+        """Load a record: CSV, Parquet, MATLAB, HDF5, a ROS bag or MCAP, MDF, TDMS, ULog, or what `save` wrote.
 
         The ending of the name says which. Formats beside CSV and MATLAB up to 7.2 need an extra (``parquet``,
         ``hdf5``, ``ros``, ``mdf``, ``tdms``, ``ulog``).
@@ -178,7 +178,7 @@ class Experiment(Result):
         return None
 
     def __setstate__(self, state: dict[str, object]) -> None:
-        """Take what was pickled; arrays are read-only again."""
+        """Take a pickled record; arrays are read-only again."""
         self.__dict__.update(state)
         self.time.setflags(write=False)
         self.data.setflags(write=False)
@@ -269,11 +269,11 @@ class Experiment(Result):
 
     @property
     def duration(self) -> float:
-        """Time from the first to the last sample, s."""
+        """Time from the first to the last sample of a record, s."""
         return float(self.time[-1] - self.time[0])
 
     def __len__(self) -> int:
-        """Count of samples."""
+        """Count of a record's samples."""
         return self.time.size
 
     def __contains__(self, channel: object) -> bool:
@@ -281,15 +281,15 @@ class Experiment(Result):
         return channel in self.channels
 
     def __iter__(self) -> Iterator[str]:
-        """Names of the channels."""
+        """Names of a record's channels."""
         return iter(self.channels)
 
     def __getitem__(self, channel: str) -> Array:
-        """Values of a channel, shape (N,), in SI units."""
+        """Values of a record's channel, shape (N,), in SI units."""
         return self.data[:, self._index(channel)]
 
     def unit(self, channel: str) -> str:
-        """SI unit of a channel."""
+        """SI unit of a record's channel."""
         return self.units[self._index(channel)]
 
     def trim(self, start: float | None = None, stop: float | None = None) -> Self:
@@ -441,7 +441,7 @@ class Experiment(Result):
         return self._changed(sentence, time=self.time[inside], data=data)
 
     def to_csv(self, path: str | PathLike[str]) -> Path:
-        """Write a table, ``time [s]`` and each channel with its unit in brackets, as `load` reads it by itself.
+        """Write a record as a table, ``time [s]`` and each channel with its unit in brackets, for `load`.
 
         Parameters
         ----------
@@ -455,7 +455,7 @@ class Experiment(Result):
         return Path(path)
 
     def plot(self) -> Figure:
-        """All channels over time. Needs the extra ``plot``."""
+        """Plot all channels of a record over time. Needs the extra ``plot``."""
         from vpm.plot import plot_channels
 
         return plot_channels(self.time, self.data, self.channels, self.units, title=self.name)

@@ -22,35 +22,35 @@ class Geared(Protocol):
 
     @property
     def name(self) -> str:
-        """Name of the model."""
+        """Name of a model with shafts."""
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Names of the joints."""
+        """Names of the joints that shafts turn."""
 
     @property
     def transmissions(self) -> tuple[str, ...]:
-        """Names of the transmissions."""
+        """Names of the transmissions, which are shafts."""
 
     @property
     def theta(self) -> Array:
-        """Values of the parameters."""
+        """Parameter values of a model with shafts."""
 
     def ratios(self, transmission: str) -> Mapping[str, str]:
-        """Parameter that is the ratio of each joint of a transmission."""
+        """Parameter that is the ratio of each joint to a shaft."""
 
     def index(self, name: str) -> int:
-        """Place of a parameter."""
+        """Index of a parameter of a model with shafts."""
 
     def channel_unit(self, channel: str) -> str:
-        """SI unit of a channel."""
+        """SI unit of a channel of shafts and joints."""
 
     def sensor_of(self, channel: str) -> str | None:
-        """Sensor that reads a channel."""
+        """Sensor that reads a channel of shafts and joints."""
 
     @property
     def parameter_names(self) -> tuple[str, ...]:
-        """Names of the parameters."""
+        """Parameter names of a model with shafts."""
 
 
 def joints_from_shafts(
@@ -117,7 +117,7 @@ def _check_regular(
 def _check_known(
     experiment: Experiment, model: Geared, shafts: Mapping[str, Mapping[str, str]], joint: str, free: Collection[str]
 ) -> None:
-    """Complain about ratios and sensors that are to be fitted, and about late sensors."""
+    """Refuse shafts whose ratios and sensors are to be fitted, and delayed sensors."""
     errors = [parameter for name in shafts for parameter in _errors(model, name)]
     taken = [parameter for ratios in shafts.values() for parameter in ratios.values()] + errors
     repair = f'log the joints themselves, such as "{joint}.position"'

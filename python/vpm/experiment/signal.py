@@ -29,7 +29,7 @@ UNDISTORTED_BAND = 0.4
 
 
 def lowpass(values: Array, rate: float, cutoff: float, order: int = MOTION_FILTER_ORDER) -> Array:
-    """Zero-phase Butterworth low-pass, forward and backward over time.
+    """Low-pass signal: zero-phase Butterworth, forward and backward over time.
 
     The gain is ``1 / (1 + (tan(pi f/rate) / tan(pi cutoff/rate))^(2 order))``: one half at the cut-off frequency
     (A. Oppenheim and R. Schafer, *Discrete-Time Signal Processing*, bilinear transform of the Butterworth prototype,
@@ -66,7 +66,7 @@ def lowpass(values: Array, rate: float, cutoff: float, order: int = MOTION_FILTE
 
 
 def check_cutoff(cutoff: float, rate: float, samples: int) -> None:
-    """Complain about a cut-off frequency that a record cannot have.
+    """Refuse a cut-off frequency that a signal cannot have.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def check_cutoff(cutoff: float, rate: float, samples: int) -> None:
 
 
 def settling_samples(rate: float, cutoff: float) -> int:
-    """Samples after which the response of the order-4 Butterworth filter has decayed below 0.1 %.
+    """Samples after which a signal filter of order 4 has decayed below 0.1 %.
 
     Its slowest pair of poles decays as ``exp(-2 pi cutoff sin(pi/8) t)``, which is 7e-4 at ``t = 3/cutoff``.
     """
@@ -100,7 +100,7 @@ def settling_samples(rate: float, cutoff: float) -> int:
 
 
 def differentiate(values: Array, dt: float) -> Array:
-    """Derivative by central differences of fourth order.
+    """Derivative of a signal by central differences of fourth order.
 
     ``dy/dt = (y[k-2] - 8 y[k-1] + 8 y[k+1] - y[k+2]) / (12 dt)``, with error ``dt^4 y'''''/30`` (B. Fornberg,
     *Mathematics of Computation* 51, 1988); second order at the two samples next to each end.
@@ -131,14 +131,14 @@ def differentiate(values: Array, dt: float) -> Array:
 
 
 def differentiator_gain(frequency: Array, rate: float) -> Array:
-    """Gain of `differentiate` relative to the true derivative: ``(8 sin w - sin 2w) / (6 w)``, ``w = 2 pi f/rate``."""
+    """Gain of a signal's `differentiate` over the true derivative: ``(8 sin w - sin 2w) / (6 w)``."""
     w = 2.0 * np.pi * np.asarray(frequency, dtype=np.float64) / rate
     safe = np.where(w == 0.0, 1.0, w)
     return np.where(w == 0.0, 1.0, (8.0 * np.sin(safe) - np.sin(2.0 * safe)) / (6.0 * safe))
 
 
 def decimation_for(rate: float, cutoff: float) -> int:
-    """Decimation whose retained band ends where the motion filter begins to act.
+    """Decimation of a signal whose retained band ends where the motion filter begins to act.
 
     Keeps ``0.8 * rate/2 / d`` at ``0.4 * cutoff``, where the filter has taken 0.07 % of the amplitude; 10 for 100 Hz
     at 1 kHz.
@@ -147,7 +147,7 @@ def decimation_for(rate: float, cutoff: float) -> int:
 
 
 def parallel_filter(values: Array, decimation: int) -> Array:
-    """Low-pass and keep every `decimation`-th sample: the same linear map for residuals and for regressor columns.
+    """Low-pass a signal and keep every `decimation`-th sample, for residuals and regressors alike.
 
     A Chebyshev filter of order 8 with 0.05 dB ripple up to 80 % of the new Nyquist frequency, forward and backward.
     Filtering both sides of a linear regression alike leaves its solution unbiased and its residual uncorrelated
@@ -179,20 +179,20 @@ def parallel_filter(values: Array, decimation: int) -> Array:
 
 
 def anti_alias(values: Array, factor: float) -> Array:
-    """Zero-phase Chebyshev low-pass (order 8, 0.05 dB) at 80 % of the Nyquist frequency that is left after `factor`."""
+    """Anti-aliased signal: zero-phase Chebyshev (order 8, 0.05 dB), 80 % of Nyquist after `factor`."""
     return _forward_backward(_anti_alias_sections(factor), values, ceil(40 * factor))
 
 
 @lru_cache(maxsize=32)
 def _anti_alias_sections(factor: float) -> Array:
-    """Designed once for each factor: a fit filters with the same one hundreds of times."""
+    """Sections of the signal's anti-alias filter, designed once for each factor."""
     from scipy.signal import cheby1
 
     return np.asarray(cheby1(8, 0.05, RETAINED_BAND / factor, output="sos"), dtype=np.float64)
 
 
 def interpolate(time: Array, values: Array, at: Array, *, smooth: bool) -> Array:
-    """Values at other times of the record.
+    """Values of a signal at other times of the record.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def interpolate(time: Array, values: Array, at: Array, *, smooth: bool) -> Array
 
 
 def _forward_backward(sections: Array, values: Array, padding: int) -> Array:
-    """Over the record and back, both ends continued by point reflection, from the filter's rest at what stands there.
+    """Filter a signal over the record and back, both ends continued by point reflection.
 
     As ``scipy.signal.sosfiltfilt``, but for that rest, which is solved for once and not at every call.
     """
@@ -233,7 +233,7 @@ def _forward_backward(sections: Array, values: Array, padding: int) -> Array:
 
 @lru_cache(maxsize=32)
 def _rest(sections: bytes, count: int) -> Array:
-    """States of the sections after a long time of one."""
+    """Rest states of a signal filter's sections after a long time of one."""
     from scipy.signal import sosfilt_zi
 
     return np.asarray(sosfilt_zi(np.frombuffer(sections).reshape(count, 6)))

@@ -105,7 +105,7 @@ def read_table(path: str | PathLike[str], dialect: Dialect, wanted: Sequence[str
 
 
 def _numbers(path: str | PathLike[str], dialect: Dialect, places: Sequence[int]) -> Array:
-    """Columns of numbers; a file with decimal commas is read through a text with points."""
+    """Columns of numbers of a text table; decimal commas become points."""
     source: str | PathLike[str] | Iterable[str] = path
     if dialect.comma:
         lines = Path(path).read_text(encoding=dialect.encoding).splitlines()
@@ -123,7 +123,7 @@ def _numbers(path: str | PathLike[str], dialect: Dialect, places: Sequence[int])
 
 
 def missing_column(path: str | PathLike[str], name: str, header: Sequence[str], channel: str = "") -> ExperimentError:
-    """Error for a column that the file does not have."""
+    """Error for a column that the text table does not have."""
     use = f' for the channel "{channel}"' if channel else ""
     return _error(
         path,
@@ -133,7 +133,7 @@ def missing_column(path: str | PathLike[str], name: str, header: Sequence[str], 
 
 
 def _line_numbers(path: str | PathLike[str], dialect: Dialect, rows: int) -> NDArray[np.int64]:
-    """Line of each row, once every line is known to have as many cells as the header.
+    """Line numbers of a text table's rows, all with as many cells as the header.
 
     Counting delimiters takes no time; only where the counts differ, as in a table with quoted cells, is every row read.
     """
@@ -151,7 +151,7 @@ def _line_numbers(path: str | PathLike[str], dialect: Dialect, rows: int) -> NDA
 
 
 def _diagnose(path: str | PathLike[str], dialect: Dialect, places: Sequence[int]) -> ExperimentError | None:
-    """Find the first row of the wrong length, or the first cell at `places` that is no number."""
+    """Diagnose a text table: the first row of the wrong length, or the first cell without a number."""
     try:
         for number, row in dialect.rows(path):
             problem = _row_problem(row, dialect, places)

@@ -24,9 +24,9 @@ from scipy.optimize import nnls
 
 from vpm.errors import VpmError
 from vpm.experiment import Experiment, Motion, noise_std
-from vpm.identify.along import bends, has_hidden, has_own_drives
 from vpm.identify.first_states import begun_again
 from vpm.identify.inverse_dynamics import InverseDynamicsProblem
+from vpm.identify.response_along_motion import bends, has_hidden, has_own_drives
 from vpm.identify.settings import OwnSimulation
 from vpm.initial import initial_state, measured_states
 from vpm.model import Model
@@ -55,7 +55,7 @@ class Own(NamedTuple):
 def own_residual(
     model: Model, data: InverseDynamicsProblem, settings: OwnSimulation | None = None, seed: int = 0
 ) -> Own | None:
-    """What ``data`` leaves of simulations of ``model`` on the commands of its records.
+    """Closed-loop predictions' residual: what ``data`` leaves of simulations of ``model`` itself.
 
     Parameters
     ----------
@@ -106,7 +106,7 @@ def _own(model: Model, data: InverseDynamicsProblem, how: OwnSimulation, random:
 
 
 def _pushes(model: Model) -> bool | None:
-    """Whether commands push as efforts do, or move as openings of valves do; None where drives are of both kinds."""
+    """Whether commands act as efforts in a closed-loop prediction, or as valve openings; None for both kinds."""
     kinds = {model.actuator_type(name) != "hydraulic" for name in model.actuators}
     return kinds.pop() if len(kinds) == 1 else None
 
@@ -114,7 +114,7 @@ def _pushes(model: Model) -> bool | None:
 def _beside(
     model: Model, log: Experiment, m: Motion, channels: Sequence[str], how: OwnSimulation, start: Array
 ) -> tuple[float, Experiment] | None:
-    """Bandwidth that keeps the model by a log, and the log as it would have been without noise; None without any."""
+    """Bandwidth of a closed-loop prediction beside a log, and the log without noise; None without any."""
     joints = [f"{joint}.position" for joint in m.joints]
     for band in how.bands:
         (made,) = _drawn(model, log, m, channels, how, band, np.zeros((1, *log.data.shape)), start)
@@ -133,7 +133,7 @@ def _drawn(
     told: Array,
     start: Array,
 ) -> list[Experiment]:
-    """Simulations on the commands of a log, to which a slow controller adds what keeps them by the motion of the log.
+    """Closed-loop predictions: simulations with a slow controller that keeps them by the log's motion.
 
     Drives deliver beside their commands what is ``told`` (runs, N, channels) in the columns of these, and no log tells.
     All runs go side by side: most of the time of one would be that of asking and telling, sample by sample.
@@ -158,7 +158,7 @@ def _drawn(
 
 
 def _start(model: Model, data: InverseDynamicsProblem, record: int) -> Array:
-    """The state at the first sample; what nobody measured is where the inverse dynamics has it."""
+    """First state of a closed-loop prediction; the inverse dynamics gives what nobody measured."""
     log, m = data.experiments[record], data.motions[record]
     if tuple(m.joints) == tuple(model.joints):
         start = np.array(measured_states(model, log, model.theta, np.zeros(1, dtype=np.int64), m.cutoff, m)[0])
@@ -170,7 +170,7 @@ def _start(model: Model, data: InverseDynamicsProblem, record: int) -> Array:
 
 
 def _written(log: Experiment, m: Motion, channels: Sequence[str], outputs: Array, commands: Array) -> Experiment:
-    """A log with other readings (N, channels) and other commands (N, nu)."""
+    """Log with predicted readings (N, channels) and other commands (N, nu)."""
     data = np.array(log.data)
     for values, names in ((outputs, channels), (commands, m.drivers)):
         for column, channel in enumerate(names):
@@ -180,7 +180,7 @@ def _written(log: Experiment, m: Motion, channels: Sequence[str], outputs: Array
 
 
 def commands_to_draw(model: Model, m: Motion, omega: float, damping: float) -> tuple[Array, Array]:
-    """Commands per missing position and velocity (nu, n) that draw joints to a log at a bandwidth, rad/s."""
+    """Commands of a closed-loop prediction per missing position and velocity (nu, n), by bandwidth, rad/s."""
     if _pushes(model):
         pushing = _commands_per_effort(model, m, 1.0 / omega) @ _mass_matrix(model, m)
         return omega**2 * pushing, 2.0 * damping * omega * pushing
@@ -189,21 +189,21 @@ def commands_to_draw(model: Model, m: Motion, omega: float, damping: float) -> t
 
 
 def _mass_matrix(model: Model, m: Motion) -> Array:
-    """Inertia of the measured joints (n, n) in the middle of the motion, links held as they hang there."""
+    """Inertia of the measured joints (n, n) for the prediction's controller, in the middle of the motion."""
     places, position = _middle(model, m)
     coordinates = model.core.equilibrium(model.theta, position)[0] if bends(model) else position
     return np.asarray(model.core.mass_matrix(model.theta, coordinates))[np.ix_(places, places)]
 
 
 def _middle(model: Model, m: Motion) -> tuple[list[int], Array]:
-    """Numbers of the measured joints, and the middle of the motion of all joints; others stand at zero."""
+    """Middle of the motion of all joints for the prediction's controller; others stand at zero."""
     places, position = [model.joints.index(joint) for joint in m.joints], np.zeros(len(model.joints))
     position[places] = np.mean(m.position, axis=0)
     return places, position
 
 
 def _commands_per_velocity(model: Model, m: Motion) -> Array:
-    """By how much commands have to change for a velocity of each joint (nu, n), as they did along the log."""
+    """Change of commands per joint velocity (nu, n) along the log, for a closed-loop prediction."""
     commands, velocities = (values - np.mean(values, axis=0) for values in (m.inputs, m.velocity))
     moved = np.zeros((len(model.joints), m.inputs.shape[1]))
     for column, name in enumerate(model.actuators):
@@ -214,7 +214,7 @@ def _commands_per_velocity(model: Model, m: Motion) -> Array:
 
 
 def _commands_per_effort(model: Model, m: Motion, after: float) -> Array:
-    """By how much commands have to change for an effort at each joint (nu, n), at the sizes that they have.
+    """Change of commands per joint effort (nu, n) at their sizes, for a closed-loop prediction.
 
     What drives deliver is that ``after`` a while, s: by then windings and delays have passed on what they were told.
     """
@@ -252,7 +252,7 @@ class Noise:
     drives: Array
 
     def drawn(self, records: Sequence[Experiment], random: np.random.Generator) -> list[tuple[Array, Array]]:
-        """One draw for each record: noise of its readings, and of its drives, both of the shape of its data."""
+        """Noise draw of a closed-loop prediction for each record: of readings and drives, in the data's shape."""
         return [
             (seen * random.standard_normal(e.data.shape), told * random.standard_normal(e.data.shape))
             for e, seen, told in zip(records, self.instruments, self.drives, strict=True)
@@ -260,14 +260,14 @@ class Noise:
 
 
 def mirrored(draw: Sequence[tuple[Array, Array]]) -> tuple[Sequence[tuple[Array, Array]], ...]:
-    """A draw, and the same turned round: what a residual is linear in cancels from the mean of both."""
+    """Noise draw of a closed-loop prediction and its mirror image: linear effects cancel in their mean."""
     return draw, [(-seen, -told) for seen, told in draw]
 
 
 def noise_of(
     model: Model, data: InverseDynamicsProblem, quiet: Sequence[Experiment], random: np.random.Generator
 ) -> Noise:
-    """The noise in the records of a residual, as a fitted model understands them.
+    """Noise of the records for closed-loop predictions, as a fitted model understands them.
 
     Parameters
     ----------
@@ -299,12 +299,12 @@ def noise_of(
 
 
 def compared(data: InverseDynamicsProblem) -> tuple[str, ...]:
-    """Readings that the residual compares."""
+    """Readings that the residual of a closed-loop prediction compares."""
     return (*(f"{joint}.position" for joint in data.motions[0].joints), *data.shown)
 
 
 def noisy(model: Model, data: InverseDynamicsProblem, noise: Noise, random: np.random.Generator, draws: int) -> Array:
-    """The residual of a fitted model with draws of noise added to its records, shape (draws, n)."""
+    """Residuals of closed-loop predictions with noise draws added to the records, shape (draws, n)."""
     found = []
     for _ in range(draws):
         both = noise.drawn(data.experiments, random)
@@ -314,7 +314,7 @@ def noisy(model: Model, data: InverseDynamicsProblem, noise: Noise, random: np.r
 
 
 def _commands_moved(data: InverseDynamicsProblem) -> list[Array]:
-    """For each command of the records a small part of its size (records, channels), zero where it never changes."""
+    """Small part of each command's size in the records (records, channels), for closed-loop predictions."""
     commands = [name for name in data.motions[0].drivers if name.endswith(".command")]
     sizes = [
         np.array([[MOVED * float(np.std(e[c])) if c == command else 0.0 for c in e.channels] for e in data.experiments])
@@ -324,7 +324,7 @@ def _commands_moved(data: InverseDynamicsProblem) -> list[Array]:
 
 
 def _powers(data: InverseDynamicsProblem, residual: Array) -> Array:
-    """Mean square of the differences of each block's residual, where all that they reach counts."""
+    """Mean square of each block's differences of predicted residuals, where all that they reach counts."""
     found = []
     for block in data.blocks:
         counts = np.convolve(block.moving > 0.0, np.ones(ORDER + 1), "valid") > ORDER + 0.5

@@ -43,7 +43,7 @@ def problem(
     workers: int = 1,
     offsets: Sequence[str] = (),
 ) -> Compared:
-    """Set up the residual of ``model`` against ``experiments`` in one of the modes of a fit.
+    """Comparison of ``model`` and ``experiments`` as a residual in one of the modes of a fit.
 
     ``channels`` are the compared outputs of simulated modes, ``offsets`` those of them that are off by a constant in
     each record, ``workers`` the records that are simulated at a time.
@@ -99,7 +99,7 @@ def comparison(
 
 
 def _check_offsets(model: Model, mode: str, fitting: Fitting) -> None:
-    """Complain about offsets that a mode has not, or of readings that a simulation begins from."""
+    """Refuse offsets that a comparison's mode has not, or of readings that begin a simulation."""
     if fitting.offsets and mode not in OUTPUT_ERROR:
         raise IdentificationError(
             f"offsets belong to compared outputs, and mode '{mode}' is none of {', '.join(OUTPUT_ERROR)}; take one of "
@@ -138,7 +138,7 @@ class RelativeProblem(InverseDynamicsProblem):
     def evaluate(
         self, model: Model, theta: Array, columns: Sequence[int] = (), origin: Array | None = None
     ) -> tuple[Array, Array]:
-        """Residual and its derivative, relative to the delivered effort; see :class:`Problem`.
+        """Comparison relative to the delivered effort: residual and derivative; see :class:`Problem`.
 
         So is what is expected: where all forces are larger, that is as well.
         """
@@ -160,19 +160,19 @@ class RelativeProblem(InverseDynamicsProblem):
         return residual - self.expected, jacobian
 
     def _strengths(self, model: Model, theta: Array) -> Array:
-        """Size of what drives deliver at each joint; 1 where that is nothing, as at joints without a drive."""
+        """Effort of drives at each joint to which a comparison is relative; 1 where that is nothing."""
         strengths = self.strengths(model, theta)
         return np.where(strengths > 0.0, strengths, 1.0)
 
     def _slope(self, model: Model, theta: Array, column: int) -> Array:
-        """Derivative of the strengths by one parameter."""
+        """Derivative by one parameter of the efforts to which a comparison is relative."""
         return difference(partial(self._strengths, model), theta, column, OF_PARAMETER * (abs(theta[column]) or 1.0))
 
 
 def relative_to_drives(
     model: Model, data: InverseDynamicsProblem, free: Sequence[str], ties: Mapping[str, str]
 ) -> InverseDynamicsProblem:
-    """The residual relative to what drives deliver, if a parameter of a drive is free that nothing logged holds.
+    """Comparison relative to drive efforts, if a free drive parameter is held by no log.
 
     Pressures of a cylinder hold its areas and valves. A current holds no torque constant.
     """

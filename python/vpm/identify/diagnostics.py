@@ -33,7 +33,7 @@ LOST = 1.0
 
 
 def resting(fit: Fit, box: Mapping[str, tuple[float, float]]) -> tuple[str, ...]:
-    """Names of estimates that rest on a bound, or lie next to it by no more than a trace of their deviation."""
+    """Diagnostics of estimates on a bound, or nearer to it than a trace of their deviation."""
     low, high = (np.array([box[name][side] for name in fit.names]) for side in (0, 1))
     near = TOUCHING_STD * np.where(np.isfinite(fit.std), fit.std, 0.0)
     at = (fit.values - low <= near) | (high - fit.values <= near)
@@ -42,7 +42,7 @@ def resting(fit: Fit, box: Mapping[str, tuple[float, float]]) -> tuple[str, ...]
 
 
 def contradictions(model: Model, fit: Fit, checks: Checks) -> list[str]:
-    """Sentences about estimates that lie further from the model file than both deviations together allow."""
+    """Diagnostics of estimates that contradict the model file by both deviations."""
     told = []
     for name, value, std in zip(fit.names, fit.values, fit.std, strict=True):
         before = model.parameters[name]
@@ -65,7 +65,7 @@ def remarks(
     others: int = 0,
     reasons: Mapping[str, str] | None = None,
 ) -> list[str]:
-    """Warnings about the parameters of a fit, as sentences.
+    """Diagnostics of a fit's parameters, as sentences.
 
     Parameters
     ----------
@@ -110,7 +110,7 @@ def remarks(
 
 
 def constant_channels(model: Model, records: Sequence[Experiment], blocks: Sequence[Block]) -> list[str]:
-    """Sentences about compared channels and inputs of a record that never change."""
+    """Diagnostics of compared channels and inputs of a record that never change."""
     compared = list(dict.fromkeys((b.experiment, b.channel) for b in blocks))
     inputs = [(e.name, c) for e in records for c in model.input_channels]
     held = {e.name: e for e in records}
@@ -122,7 +122,7 @@ def constant_channels(model: Model, records: Sequence[Experiment], blocks: Seque
 
 
 def lost_channels(fit: Fit) -> list[str]:
-    """Sentence about the output that a simulation is furthest from, if that is more than the output's whole size."""
+    """Diagnostic of the output that a simulation misses by more than its whole size."""
     channel, share = max(((c, s) for c, (_, s, _) in fit.after.items()), key=lambda pair: pair[1], default=("", 0.0))
     if fit.mode in {"inverse_dynamics", "input_error"} or not share > LOST:
         return []

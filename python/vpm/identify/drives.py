@@ -22,7 +22,7 @@ SLOPE_STEP = 2e-3
 
 
 def picked(model: Model, outputs: Array, jacobian: Array, rows: slice, channels: Sequence[str]) -> tuple[Array, Array]:
-    """Some outputs and their derivative, by the names of channels; zero for those that a machine lacks."""
+    """Outputs of drives and their derivative, by the names of channels; zero for those that a machine lacks."""
     known = [column for column, channel in enumerate(channels) if channel in model.output_channels]
     places = [model.output_channels.index(channels[column]) for column in known]
     kept, slopes = outputs[rows], jacobian[rows]
@@ -59,7 +59,7 @@ def _shown(model: Model, outputs: Array, slopes: Array, channels: Sequence[str])
 
 
 def _thinned(m: Motion, every: int) -> Motion:
-    """Every so many samples of a motion, with commands that hold in the mean what they held."""
+    """Thinned samples of a motion for drives, with commands of the same mean."""
     rows = np.arange(0, len(m.time), every)
     held = np.add.reduceat(m.inputs, rows) / np.diff(np.append(rows, len(m.time)))[:, None]
     motion = {name: getattr(m, name)[rows] for name in ("time", "position", "velocity", "acceleration")}
@@ -67,7 +67,7 @@ def _thinned(m: Motion, every: int) -> Motion:
 
 
 def _between(slopes: Array, every: int, samples: int) -> Array:
-    """Derivatives at all samples by cubic splines through those at every so many."""
+    """Derivatives of drives at all samples by cubic splines through every so many."""
     from scipy.interpolate import CubicSpline
 
     grid = every * np.arange(len(slopes))

@@ -67,7 +67,7 @@ def fit_problem(
     begin: Array | None = None,
     executor: Executor | Callable[[], Executor] | None = None,
 ) -> Found:
-    """Fit free parameters, and first states if the problem has them.
+    """Engine of a fit: free parameters, and first states if the problem has them.
 
     Parameters
     ----------
@@ -126,14 +126,14 @@ def _weighs_later(fitting: Fitting) -> bool:
 
 
 def _plain(fitting: Fitting) -> Fitting:
-    """Settings of a fit with the squares of residuals over the spread of their channel as its cost."""
+    """Settings of the fit engine for plain least squares, with residuals over their channel's spread."""
     return replace(fitting, loss="squares", noise="spread", priors=False, noise_levels={})
 
 
 def _search(
     objective: Objective, begun: Sequence[Array], fitting: Fitting, tolerance: float
 ) -> tuple[list[Descent], bool]:
-    """Descents from all starts, side by side on threads, and whether Ctrl-C ended them."""
+    """Descents of the engine from all starts, on threads, and whether Ctrl-C ended them."""
     jobs = [partial(_descent, objective, x, fitting, tolerance) for x in begun]
     found, interrupted = until_interrupted(jobs, worker_count(fitting.workers or None))
     return [descent for descent in found if descent is not None], interrupted
@@ -147,7 +147,7 @@ def _search_elsewhere(
     executor: Executor | Callable[[], Executor],
     progress: Progress | None,
 ) -> tuple[list[Descent], bool]:
-    """Descents from all starts by an executor; a start whose worker died again and again is told, and left out."""
+    """Descents of the engine from all starts by an executor; a start whose worker keeps dying is left out."""
     shared = Parcel.of(objective)
 
     def heard(ended: Sequence[Done[int]]) -> None:
@@ -169,7 +169,7 @@ def _search_elsewhere(
 
 
 def _sent_descent(shared: Parcel, x: Array, fitting: Fitting, tolerance: float) -> tuple[Descent, int]:
-    """A descent on a copy of the objective, and how often it was evaluated."""
+    """Descent of the engine on a copy of the objective, and how often it was evaluated."""
     objective: Objective = shared.open()
     before = objective.count
     return _descent(objective, x, fitting, tolerance), objective.count - before
@@ -191,7 +191,7 @@ def onward(
     tolerance: float,
     evaluate: Callable[[Array], Point] | None = None,
 ) -> Descent:
-    """Descend from a point of ``objective``, or of ``evaluate``, with the scales of its coordinates.
+    """Descend with the engine from a point of ``objective``, or of ``evaluate``, with coordinate scales.
 
     Parameters
     ----------
@@ -216,7 +216,7 @@ def onward(
 
 
 def _reweighed(objective: Objective, point: Point, fitting: Fitting, tolerance: float, ended: str) -> tuple[Point, str]:
-    """Weights from the residual, a fit with them, and again until they stay."""
+    """Fit of the engine with weights from the residual, again until they stay."""
     for _ in range(ROUNDS):
         before = dict(objective.noise)
         levels = noise_levels(objective.data.blocks, point.raw[0], robust=fitting.loss != "squares")
@@ -232,7 +232,7 @@ def _reweighed(objective: Objective, point: Point, fitting: Fitting, tolerance: 
 
 
 def starts(model: Model, free: Sequence[str], objective: Objective, fitting: Fitting) -> list[Array]:
-    """Coordinates of all starts: the model's own values, then a Latin hypercube over what is thought possible.
+    """Start coordinates of the engine: the model's own values, then a Latin hypercube.
 
     Around the model's value with its uncertainty if it has one, evenly between bounds that are not wide apart (of a
     positive parameter, evenly in its logarithm), else within a factor `Fitting.spread`.
@@ -300,14 +300,14 @@ def _found(objective: Objective, point: Point, free: Sequence[str], costs: Array
 
 
 def _weights(point: Point) -> Array:
-    """What each row of a residual was multiplied with, by loss and noise; 1 where it moves with nothing."""
+    """Weights of a residual's rows in the engine by loss and noise; 1 where a row moves with nothing."""
     before = np.linalg.norm(point.raw[1], axis=1)
     after = np.linalg.norm(point.jacobian[: len(before)], axis=1)
     return np.where(before > 0.0, after / np.where(before > 0.0, before, 1.0), 1.0)
 
 
 def _covariance(objective: Objective, point: Point, labels: Sequence[str], unseen: Sequence[Combination]) -> Array:
-    """Covariance of parameters and first states: sandwich over records, with priors as what they claim to be."""
+    """Covariance of parameters and first states in the engine: sandwich over records, with priors."""
     rows, told = len(point.residual), objective.data.blocks[-1].samples.stop
     data = rows - objective.priors
     expected = point.residual.copy()

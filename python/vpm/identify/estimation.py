@@ -56,7 +56,7 @@ class Estimate:
         return np.sqrt(np.diag(self.covariance))
 
     def on(self, model: Model, ties: Mapping[str, str] | None = None) -> Model:
-        """A model at these values, and at those of what follows them by ``ties``."""
+        """Model at estimated values, and at those of what follows them by ``ties``."""
         values = dict(zip(self.names, map(float, self.values), strict=True))
         followers = {follower: values[leader] for follower, leader in (ties or {}).items() if leader in values}
         return model.with_parameters({**values, **followers})
@@ -75,7 +75,7 @@ def estimate(
     worth: Worth | None = None,
     feasible: bool = False,
 ) -> Estimate:
-    """Move ``free`` parameters of ``model`` until the residual of ``data`` is least.
+    """Estimate ``free`` parameters of ``model``: the residual of ``data`` becomes least.
 
     A first step solves the problem as if it were linear (which on the inverse-dynamics regressor it mostly is); the
     trust-region reflective method of SciPy finishes where it is not.
@@ -164,11 +164,11 @@ class Worth:
     evaluations: int
 
     def lost(self, reached: Sequence[float]) -> bool:
-        """Whether the sums of squares of a fit have not come down to its goal, and hardly come nearer."""
+        """Whether an estimation is lost: its sums of squares are far from the goal and hardly come nearer."""
         return reached[-1] > self.cost and self._hardly_nearer(reached, PROGRESS)
 
     def creeps(self, reached: Sequence[float]) -> bool:
-        """Whether the sums of squares of a fit still fall, but by so little that it decides nothing."""
+        """Whether an estimation creeps: its sums of squares still fall, but by so little that it decides nothing."""
         return self._hardly_nearer(reached, CREEPING)
 
     def _hardly_nearer(self, reached: Sequence[float], progress: float) -> bool:
@@ -247,7 +247,7 @@ class _Counter:
             raise _HopelessError
 
     def _evaluate(self, x: Array, columns: list[int]) -> tuple[Array, Array]:
-        """Infinite where the values make no machine (an inertia that no body has): a step to there is not taken."""
+        """Evaluate for an estimation; infinite where the values make no machine."""
         theta = self.theta.copy()
         theta[self.columns] = self.frame.parameters(x)
         try:
@@ -261,7 +261,7 @@ class _Counter:
 
 
 def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Array:
-    """The bounded minimiser of the linearised problem, if it is indeed better than the start."""
+    """Bounded linear step of an estimation, if it is better than the start."""
     residual, jacobian = counter(start)
     lengths = column_lengths(jacobian)
     if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(lengths))):
@@ -283,7 +283,7 @@ def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Ar
 
 
 def _nearest(counter: _Counter, found: Array, start: Array, low: Array, high: Array) -> Array:
-    """Fitted values moved back to the start along directions that the data do not see, with the same sum of squares.
+    """Estimated values moved back to the start along unidentifiable directions.
 
     Parameters stay where they were if that makes a machine, else the coordinates do.
     """
@@ -338,7 +338,7 @@ def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance:
 
 
 def _strictly_inside(x: Array, low: Array, high: Array) -> Array:
-    """SciPy asks for a start that does not touch the bounds."""
+    """Estimation start strictly inside the bounds, as SciPy needs it."""
     width = np.where(np.isfinite(high - low), high - low, np.maximum(1.0, np.abs(x)))
     return np.clip(x, np.where(np.isfinite(low), low + 1e-9 * width, low), high - 1e-9 * np.minimum(width, 1e300))
 
@@ -350,13 +350,13 @@ def touching(names: Sequence[str], values: Array, low: Array, high: Array, near:
 
 
 def limits(model: Model, free: Sequence[str], replaced: Mapping[str, tuple[float, float]]) -> tuple[Array, Array]:
-    """Least and largest value of each free parameter: as replaced, or of the model."""
+    """Limits of each estimated parameter: as replaced, or of the model."""
     pairs = [replaced.get(n, _range(model, n, free)) for n in free]
     return np.array([p[0] for p in pairs], dtype=float), np.array([p[1] for p in pairs], dtype=float)
 
 
 def _range(model: Model, name: str, free: Sequence[str]) -> tuple[float, float]:
-    """Bounds of the model file, and for a single free principal inertia what the other two allow.
+    """Bounds for estimation from the model file; for a single principal inertia what the others allow.
 
     No principal moment of a body exceeds the sum of the other two, nor is it less than their difference.
     """
@@ -376,14 +376,14 @@ def _range(model: Model, name: str, free: Sequence[str]) -> tuple[float, float]:
 def _covariance(
     data: Problem, residual: Array, jacobian: Array, unseen: tuple[Combination, ...], free: Sequence[str]
 ) -> Array:
-    """Robust covariance; infinite variance for every parameter that takes part in an unseen combination."""
+    """Robust covariance of an estimation; infinite for parameters in unidentifiable combinations."""
     lengths = column_lengths(jacobian)
     covariance = robust_covariance(jacobian / lengths, residual, segments(data)) / np.outer(lengths, lengths)
     return blinded(covariance, unseen, free)
 
 
 def blinded(covariance: Array, unseen: Sequence[Combination], names: Sequence[str]) -> Array:
-    """A covariance with infinite variance for every name that takes part in an unseen combination."""
+    """Covariance of an estimation with infinite variance for names in unidentifiable combinations."""
     covariance = covariance.copy()
     blind = [i for i, name in enumerate(names) if any(name in combination.names for combination in unseen)]
     covariance[blind, :] = 0.0

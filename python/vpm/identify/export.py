@@ -18,7 +18,7 @@ _COLUMNS = ("name", "start", "value", "std", "low", "high", "unit")
 
 
 def told(fit: Fit) -> list[str]:
-    """Lines that tell a fit: values with deviations, first states, offsets, agreement of starts, noise, warnings."""
+    """Export of a fit as lines: values with deviations, first states, offsets, starts, noise, warnings."""
     lines = [_line(*row) for row in zip(fit.names, fit.values, fit.std, fit.units, strict=True)]
     lines += [_line(label, value, fit.states_std[label], "first state") for label, value in fit.states.items()]
     lines += [_line(label, value, fit.offsets_std[label], "offset") for label, value in fit.offsets.items()]
@@ -41,7 +41,7 @@ def _line(name: str, value: float, std: float, unit: str) -> str:
 
 
 def told_unseen(judged: tuple[Gaps, Gaps]) -> list[str]:
-    """Gaps on records that were never fitted, before and after, a line each."""
+    """Export of validation errors, before and after a fit, a line each."""
     before, after = judged
     return [
         f"unseen {channel}: {rms:.4g} {unit}, {_of_the_signal(share)}; before it {before[channel][0]:.4g}"
@@ -56,7 +56,7 @@ def _of_the_signal(share: float) -> str:
 def intervals(
     fit: Fit, records: Sequence[Experiment], profile: Sequence[str], replicates: int, seed: int, cutoff: float | None
 ) -> list[Profile | Bootstrap]:
-    """Intervals by profile of some parameters, and by bootstrap if ``replicates`` are asked for."""
+    """Intervals to export: by profile of some parameters, and by bootstrap if ``replicates`` are asked for."""
     found: list[Profile | Bootstrap] = []
     if profile:
         found += profile_intervals(fit, records, profile, cutoff=cutoff)
@@ -66,7 +66,7 @@ def intervals(
 
 
 def told_intervals(found: Sequence[Profile | Bootstrap]) -> list[str]:
-    """Lines that tell profile and bootstrap intervals of a fit, one each."""
+    """Export of profile and bootstrap intervals of a fit as lines, one each."""
     lines = []
     for one in found:
         if isinstance(one, Profile):
@@ -81,7 +81,7 @@ def told_intervals(found: Sequence[Profile | Bootstrap]) -> list[str]:
 
 
 def write_fit(fit: Fit, folder: Path, lines: Sequence[str] = ()) -> list[Path]:
-    """Write ``model.toml``, ``parameters.csv``, ``report.md``, ``fit.npz`` and, with the extra ``plot``, ``fit.png``.
+    """Export ``model.toml``, ``parameters.csv``, ``report.md``, ``fit.npz`` and, with extra ``plot``, ``fit.png``.
 
     Parameters
     ----------

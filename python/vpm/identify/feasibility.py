@@ -36,7 +36,7 @@ MOST_STEPS = 200
 
 
 def pseudo_inertia(ten: Array) -> Array:
-    """Matrix (4, 4) of ten parameters: mass, first moment, inertia xx yy zz xy xz yz about the frame's origin."""
+    """Pseudo-inertia (4, 4) for feasibility, from mass, first moment and inertia xx yy zz xy xz yz."""
     mass, first, (xx, yy, zz, xy, xz, yz) = ten[0], ten[1:4], ten[4:]
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     second = 0.5 * np.trace(inertia) * np.eye(3) - inertia
@@ -44,7 +44,7 @@ def pseudo_inertia(ten: Array) -> Array:
 
 
 def fault(ten: Array) -> str:
-    """What no body can have in ten parameters; empty if some body has them."""
+    """Why ten inertial parameters are not feasible; empty if some body has them."""
     mass = float(ten[0])
     if not mass > 0.0:
         return f"mass {mass:.4g} kg is not positive"
@@ -59,7 +59,7 @@ def fault(ten: Array) -> str:
 
 
 def faults(regression: InertialRegression, values: Array) -> dict[str, str]:
-    """What is impossible, by body or parameter; empty text where nothing is."""
+    """Infeasible parameters by body or name; empty text where nothing is."""
     place = {name: k for k, name in enumerate(regression.names)}
     found = {body: fault(values[[place[name] for name in ten]]) for body, ten in regression.bodies.items()}
     for name in regression.positive:
@@ -105,7 +105,7 @@ class Distance:
         self._inverses = [np.linalg.inv(pseudo_inertia(start[ten])) for ten in self._tens]
 
     def __call__(self, values: Array) -> float:
-        """The distance; infinite where it has no finite value."""
+        """Distance from the feasible border; infinite where it has no finite value."""
         total = float(np.sum(((values - self.start)[self._free] / self._scale) ** 2))
         ratio = values[self._positive] / self.start[self._positive]
         if np.any(ratio <= 0.0):
@@ -122,7 +122,7 @@ class Distance:
         return total
 
     def root(self, values: Array) -> tuple[Array, Array]:
-        """Matrix C (k, p) and vector c (k,) with the Hessian ``C'C`` and the gradient ``C'c``."""
+        """Root of the feasibility distance: C (k, p) and c (k,) with Hessian ``C'C`` and gradient ``C'c``."""
         count = len(values)
         rows, right = [], []
         for ten, inverse in zip(self._tens, self._inverses, strict=True):
@@ -144,7 +144,7 @@ class Distance:
 
 
 def nearest(columns: Array, right: Array, distance: Distance) -> Array:
-    """Parameters (p,) that make ``|columns p - right|^2 / 2 + WEIGHT distance`` least.
+    """Nearest feasible parameters (p,): ``|columns p - right|^2 / 2 + WEIGHT distance`` is least.
 
     Newton's method from the nominal values, with weights of the distance that fall by tens down to the last.
 
@@ -189,7 +189,7 @@ def _newton(columns: Array, right: Array, distance: Distance, values: Array, wei
 
 
 def _extended(ten: Array) -> Array:
-    """A point mass or a thin rod gets a little extent in all directions."""
+    """Feasible extent: a point mass or a thin rod gets a little in all directions."""
     matrix = pseudo_inertia(ten)
     if not ten[0] > 0.0 or not fault(ten):
         return ten

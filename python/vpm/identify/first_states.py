@@ -44,7 +44,7 @@ SETTLED = 1e-3
 
 
 def difference(function: Callable[[Array], Array], at: Array, place: Place, step: float) -> Array:
-    """Central difference of a function by the entries ``at[place]`` of its argument, which move together."""
+    """Central difference by first states or other entries ``at[place]`` of the argument, which move together."""
     sides = []
     for sign in (1.0, -1.0):
         moved = at.copy()
@@ -80,7 +80,7 @@ class BegunAnywhere:
         return self.changed(_space=basis(slopes) if slopes.shape[1] else None)
 
     def changed(self, **attributes: object) -> Self:
-        """A copy of the problem with other attributes."""
+        """Copy of a problem with unknown first states, with other attributes."""
         same = copy(self)
         vars(same).update(attributes)
         return same
@@ -139,7 +139,7 @@ def begun_again(model: Model, data: AnyBegun) -> AnyBegun:
 
 
 def _nearer(model: Model, data: AnyBegun, early: Rows) -> AnyBegun:
-    """The problem begun where this leaves least of its early rows (n,), by the method of Gauss and Newton."""
+    """Problem with first states at which its early rows (n,) are least, by Gauss-Newton steps."""
     (sizes, records), residual = data.open_states(model), _residual(model, data.begun(data.departures), early)
     places = np.flatnonzero(sizes)
     for _ in range(STEPS if np.all(np.isfinite(residual)) else 0):
@@ -169,7 +169,7 @@ def _early(data: BegunAnywhere, share: float) -> Rows:
 
 
 def _solved(slopes: Array, residual: Array) -> Array:
-    """Least-squares solution along the directions that the data show."""
+    """Least-squares solution for first states along the directions that the data show."""
     lengths = np.linalg.norm(slopes, axis=0)
     lengths[lengths == 0.0] = 1.0
     return np.asarray(np.linalg.lstsq(slopes / lengths, residual, rcond=DEPENDENT)[0] / lengths)
@@ -180,7 +180,7 @@ def _departures(data: BegunAnywhere, sizes: Array, records: int) -> Array:
 
 
 def _residual(model: Model, data: BegunAnywhere, rows: Rows | bool = True) -> Array:
-    """Residual (n,), 0 but for some rows; infinite in these where the machine leaves the finite numbers."""
+    """Residual (n,) of first states, 0 but for some rows; infinite where the machine diverges."""
     try:
         residual = data.evaluate(model, model.theta)[0]
     except (DivergedError, ValueError):

@@ -148,7 +148,7 @@ def _names(model: Model, free: Sequence[str] | None) -> tuple[str, ...]:
 
 
 def _plainly(model: Model, data: Problem, names: tuple[str, ...], tolerance: float, progress: Progress | None) -> _Ways:
-    """Least squares from the model's own values."""
+    """Fit by least squares from the model's own values."""
 
     def again(fitted: Model, less: Problem, _: Estimate) -> Estimate:
         return estimate(fitted, less, names, tolerance=tolerance, feasible=True)
@@ -223,7 +223,7 @@ def _judged(
 
 
 def _with_own_gains(model: Model, data: Problem, names: tuple[str, ...], tolerance: float) -> Problem:
-    """An observer with the gains and the noise of the values that it leads to; other problems as they are."""
+    """Fit of an observer with the gains and noise of its own values; other problems as they are."""
     if not isinstance(data, PredictionErrorProblem):
         return data
     columns = [model.index(name) for name in names]
@@ -239,7 +239,7 @@ def _with_own_gains(model: Model, data: Problem, names: tuple[str, ...], toleran
 
 
 def check_bounds(free: Sequence[str], fitting: Fitting) -> None:
-    """Complain about bounds that cannot be meant.
+    """Refuse bounds of a fit that cannot be meant.
 
     Raises
     ------

@@ -123,13 +123,13 @@ class Fit(Result):
 
     @property
     def intervals(self) -> Array:
-        """95 % intervals, shape (p, 2)."""
+        """95 % intervals of a fit, shape (p, 2)."""
         known = np.isfinite(self.freedom)
         half = np.where(known, stdtrit(np.where(known, self.freedom, 1.0), 0.975), ndtri(0.975)) * self.std
         return np.column_stack([self.values - half, self.values + half])
 
     def __getitem__(self, name: str) -> float:
-        """Identified value of one parameter, SI."""
+        """Fitted value of one parameter, SI."""
         if name not in self.names:
             raise IdentificationError(f"'{name}' was not free in this fit; free were {', '.join(self.names)}")
         return float(self.values[self.names.index(name)])
@@ -154,7 +154,7 @@ class Fit(Result):
         }
 
     def plot(self) -> Figure:
-        """Values with their intervals, relative to the start. Needs the extra ``plot``."""
+        """Plot fitted values with their intervals, relative to the start. Needs the extra ``plot``."""
         from vpm.plot import plot_parameters
 
         return plot_parameters(self.names, self.values, self.std, self.start, self.units)

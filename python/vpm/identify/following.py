@@ -51,7 +51,7 @@ class Answer:
 
     @property
     def numbers(self) -> int:
-        """How many numbers a remembered answer holds."""
+        """Number of values that a remembered answer of a following machine holds."""
         return self.values.size * (1 + len(self.slopes))
 
 
@@ -65,7 +65,7 @@ class Memo:
         self._numbers = 0
 
     def recall(self, key: Hashable, names: Sequence[str], work: Callable[[Sequence[str]], Pair]) -> Pair:
-        """Numbers (n, k) and derivatives (n, k, names); ``work`` gives those by the names that are not known."""
+        """Values (n, k) and derivatives (n, k, names) of a following machine; ``work`` computes unknown names."""
         known = self.known(key)
         missing = [name for name in names if known is None or name not in known.slopes]
         if known is None or missing:
@@ -78,14 +78,14 @@ class Memo:
         return known.values, np.stack(columns, axis=2) if columns else np.zeros((*known.values.shape, 0))
 
     def known(self, key: Hashable) -> Answer | None:
-        """An answer that is remembered."""
+        """Remembered answer of a following machine."""
         with self._lock:
             if key in self._answers:
                 self._answers.move_to_end(key)
             return self._answers.get(key)
 
     def once(self, key: Hashable, build: Callable[[], Built]) -> Built:
-        """Object that does not depend on parameter values, such as a part, built when it is asked for first."""
+        """Object of a following machine that no parameter changes, built at the first call."""
         with self._lock:
             if key in self._built:
                 return self._built[key]  # type: ignore[return-value]
@@ -97,7 +97,7 @@ class Memo:
         return built
 
     def keep(self, key: Hashable, answer: Answer) -> None:
-        """Remember an answer; what was asked for longest ago is forgotten."""
+        """Remember an answer of a following machine; the oldest one is forgotten."""
         with self._lock:
             before = self._answers.pop(key, None)
             self._answers[key] = answer
@@ -137,7 +137,7 @@ class Following:
     memo: Memo = field(default_factory=Memo)
 
     def filtered(self, values: Array, slopes: Array) -> Pair:
-        """Numbers (N, k) and their derivatives (N, k, columns) at the samples that are compared."""
+        """Values (N, k) of a following machine and derivatives (N, k, columns), filtered at compared samples."""
         (rows, *shape), width = slopes.shape, values.shape[1]
         # All side by side: each pass of the filter begins with the same solution of its equations at rest.
         both = self.keep(np.hstack([values, slopes.reshape(rows, math.prod(shape))]))
@@ -152,7 +152,7 @@ class Following:
         more: Hashable = (),
         origin: Array | None = None,
     ) -> Pair:
-        """Filtered numbers (n, k) of a part and their derivative (n, k, columns).
+        """Filtered values (n, k) of a following part and their derivative (n, k, columns).
 
         Parameters
         ----------
@@ -186,7 +186,7 @@ class Following:
     def share(
         self, one: tuple[Part, Array], others: Sequence[tuple[Part, Array, Sequence[str]]], more: Hashable
     ) -> None:
-        """Let other parts have the answer of ``one``, each with the values of its whole machine.
+        """Let other following parts have the answer of ``one``, each with its machine's values.
 
         Of its own parameters, which come last, those that ``one`` was not differentiated by have no influence.
         """
@@ -201,7 +201,7 @@ class Following:
             self.memo.keep(self._key(other, values[other.places], more), Answer(known.values, slopes))
 
     def _key(self, part: Part, values: Array, more: Hashable) -> Hashable:
-        """Key under which the answer of a part is remembered: record, structure and parameter values."""
+        """Key of a following part's remembered answer: record, structure and parameter values."""
         return self.record, part.model.structure, values[part.felt].tobytes(), more
 
 
@@ -224,7 +224,7 @@ class Hold:
     gain: Array
 
     def arguments(self, model: Model) -> tuple[Array, Array]:
-        """Rates (N, all gauges) and gains (all gauges) in the order of a model's gauges, zero for the others."""
+        """Gauge rates (N, all gauges) and gains for following links, in the model's order; zero for the others."""
         rate, gain = np.zeros((len(self.rate), len(model.gauges))), np.zeros(len(model.gauges))
         for column, name in enumerate(self.gauges):
             if name in model.gauges:
@@ -234,7 +234,7 @@ class Hold:
 
 
 def gauge_gains(model: Model, experiments: Sequence[Experiment], position: Array) -> dict[str, float]:
-    """How firmly each gauge of a link that bends may hold it, for those that all logs hold.
+    """Gains by which gauges hold bending links that follow a record, for those that all logs hold.
 
     With the joints held, a gauge sees the modes by their shares of its compliance, ``(C phi)^2 / omega^2`` at shapes of
     modal mass one. Alone it gives the one with the largest share the damping ratio `DAMPING_RATIO`.
@@ -275,7 +275,7 @@ def gauge_gains(model: Model, experiments: Sequence[Experiment], position: Array
 
 
 def hold_of(gains: dict[str, float], experiment: Experiment, m: Motion) -> Hold | None:
-    """Measured rates and gains of the gauges that hold links along one record; None where no gauge does."""
+    """Rates and gains of gauges that hold links following one record; None where no gauge does."""
     if not gains:
         return None
     strains = np.column_stack([experiment[f"{name}.strain"] for name in gains])

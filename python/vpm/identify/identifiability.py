@@ -54,7 +54,7 @@ class Combination(Storable):
     singular_value: float
 
     def __str__(self) -> str:
-        """One sentence."""
+        """Sentence on an unidentifiable combination."""
         if len(self.names) == 1:
             return f"{self.names[0]} has no effect on these data"
         terms = ", ".join(f"{name} {weight:+.3g}" for name, weight in zip(self.names, self.weights, strict=True))
@@ -62,7 +62,7 @@ class Combination(Storable):
 
 
 def column_lengths(jacobian: Array) -> Array:
-    """Euclidean length of each column; 1 for a column of zeros."""
+    """Euclidean length of each column, for identifiability; 1 for a column of zeros."""
     lengths: Array = np.linalg.norm(jacobian, axis=0)
     return np.where(lengths > 0.0, lengths, 1.0)
 
@@ -70,7 +70,7 @@ def column_lengths(jacobian: Array) -> Array:
 def unseen_combinations(
     jacobian: Array, names: Sequence[str], tolerance: float = RANK_TOLERANCE
 ) -> tuple[Combination, ...]:
-    """Directions of the parameter space whose relative singular value is below ``tolerance``.
+    """Unidentifiable directions of the parameters: relative singular values below ``tolerance``.
 
     Parameters
     ----------
@@ -93,7 +93,7 @@ def unseen_combinations(
 
 
 def explained_share(column: Array, others: Array) -> float:
-    """Share of the squared length of ``column`` that lies in the span of ``others``, 0 to 1."""
+    """Share of ``column``'s squared length in the span of ``others``, 0 to 1, for identifiability."""
     power = float(column @ column)
     if power == 0.0:
         return 1.0
@@ -105,7 +105,7 @@ def explained_share(column: Array, others: Array) -> float:
 
 
 def is_alias(column: Array, others: Array, residual: Array) -> bool:
-    """Whether the data show ``column`` only together with ``others``.
+    """Whether ``column`` is identifiable only together with ``others``.
 
     A constant load and a weight that hardly turns are nearly the same column; what differs may still be just what the
     residual asks for, and then they are two effects.
@@ -129,13 +129,13 @@ def is_alias(column: Array, others: Array, residual: Array) -> bool:
 
 
 def closest_column(column: Array, others: Array) -> int:
-    """Index of the column of ``others`` that is most nearly parallel to ``column``."""
+    """Index of the column of ``others`` most nearly parallel to ``column``, for identifiability."""
     cosine = np.abs(column @ (others / column_lengths(others)))
     return int(np.argmax(cosine))
 
 
 def _combination(direction: Array, lengths: Array, names: Sequence[str], value: float) -> Combination:
-    """Combination of parameters along a direction (n,) of the scaled derivatives, weights in the parameters' units."""
+    """Unidentifiable combination of parameters along a direction (n,), in the parameters' units."""
     share = np.abs(direction) / np.max(np.abs(direction))
     order = [int(i) for i in np.argsort(-share) if share[i] > 1e-3]
     weights = direction / lengths
@@ -165,24 +165,24 @@ class Base:
 
     @property
     def rank(self) -> int:
-        """Number of independent columns of a regressor."""
+        """Number of identifiable base parameters."""
         return len(self.kept)
 
     @property
     def condition(self) -> float:
-        """Condition number of the independent directions, columns of equal length."""
+        """Condition number of the identifiable directions, columns of equal length."""
         return float(1.0 / self.singular_values[self.rank - 1])
 
     @property
     def map(self) -> Array:
-        """Matrix (rank, parameters) from parameters to base parameters."""
+        """Matrix (rank, parameters) from parameters to identifiable base parameters."""
         matrix = np.zeros((self.rank, self.rank + len(self.dropped) + len(self.unseen)))
         matrix[np.arange(self.rank), list(self.kept)] = 1.0
         matrix[:, list(self.dropped)] = self.weights
         return matrix
 
     def words(self, names: Sequence[str]) -> tuple[str, ...]:
-        """What each kept column stands for: ``m1 +0.31 m2``."""
+        """Text of each identifiable base parameter: ``m1 +0.31 m2``."""
         sentences = []
         for row, place in enumerate(self.kept):
             terms = [
@@ -195,7 +195,7 @@ class Base:
 
 
 def find_base(columns: Array, *, tolerance: float = RANK_TOLERANCE, prefer: Sequence[int] = ()) -> Base:
-    """Rank of a regressor by its singular values, and independent columns by QR factorisation.
+    """Identifiable base of a regressor: rank by singular values, independent columns by QR factorisation.
 
     Parameters
     ----------
@@ -232,7 +232,7 @@ def find_base(columns: Array, *, tolerance: float = RANK_TOLERANCE, prefer: Sequ
 
 
 def _preferred(triangle: Array, prefer: Sequence[int], rank: int) -> list[int]:
-    """Order of the columns, independent ones first: the preferred ones as far as they are, then by pivoting."""
+    """Order of columns for the identifiable base: preferred ones first, then by pivoting."""
     chosen: list[int] = []
     span = np.zeros((len(triangle), 0))
     for column in prefer:

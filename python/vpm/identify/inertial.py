@@ -121,7 +121,7 @@ def _regression(
 
 
 def _base_and_noise(regression: InertialRegression, tolerance: float) -> tuple[Base, Array]:
-    """Base parameters, and the noise of each channel about their best fit, by turns."""
+    """Inertial base parameters, and the noise of each channel about their best fit, by turns."""
     size = np.sqrt(np.mean(regression.effort**2, axis=0))
     noise = np.where(size > 0.0, size, 1.0)
     count = len(regression.names)
@@ -154,7 +154,7 @@ def _refuse_incomplete(regression: InertialRegression, base: Base, noise: Array,
 
 
 def _prior(regression: InertialRegression, prior: float | Mapping[str, float] | None) -> Array | None:
-    """Standard deviation (p,) of each parameter beforehand, infinite where nothing is known."""
+    """Prior standard deviation (p,) of each inertial parameter, infinite where nothing is known."""
     if prior is None:
         return None
     if isinstance(prior, Mapping):
@@ -182,7 +182,7 @@ def _prior(regression: InertialRegression, prior: float | Mapping[str, float] | 
 
 
 def _directions(regression: InertialRegression, noise: Array, size: Array, std: float) -> int:
-    """Singular directions of relative changes that noise leaves better known than ``std``."""
+    """Directions of inertial parameters that noise leaves better known than ``std``."""
     table, _ = weighted(regression, noise)
     values = np.linalg.svd(np.linalg.qr(table.reshape(-1, size.size) * size, mode="r"), compute_uv=False)
     return int(np.sum(values * std >= 1.0))

@@ -96,33 +96,33 @@ class InertialFit(Result):
 
     @property
     def rank(self) -> int:
-        """Number of base parameters."""
+        """Number of base parameters in an inertial fit."""
         return len(self.base_names)
 
     @property
     def feasible(self) -> bool:
-        """Whether some body can have the estimates."""
+        """Whether some body can have the estimates of an inertial fit."""
         return not any(self.faults.values())
 
     @property
     def intervals(self) -> Array:
-        """95 % intervals of the parameters, shape (p, 2)."""
+        """95 % intervals of an inertial fit's parameters, shape (p, 2)."""
         half = self.quantile * self.std
         return np.stack([self.values - half, self.values + half], axis=1)
 
     @property
     def base_intervals(self) -> Array:
-        """95 % intervals of the base parameters, shape (rank, 2)."""
+        """95 % intervals of an inertial fit's base parameters, shape (rank, 2)."""
         half = self.quantile * self.base_std
         return np.stack([self.base_values - half, self.base_values + half], axis=1)
 
     @property
     def difference(self) -> Array:
-        """Estimate over CAD value, less one, shape (p,); NaN without a CAD value or where it is zero."""
+        """Inertial estimate over CAD value, less one, shape (p,); NaN without a CAD value or where it is zero."""
         return self.values / np.where(self.nominal == 0.0, np.nan, self.nominal) - 1.0
 
     def combine(self, values: ArrayLike) -> Array:
-        """Base parameters (rank,) of parameters (p,), such as those of a machine that is known."""
+        """Base parameters (rank,) of an inertial fit from parameters (p,) of a known machine."""
         return np.asarray(self.base_map @ np.asarray(values, dtype=np.float64))
 
     def __getitem__(self, name: str) -> float:
@@ -131,7 +131,7 @@ class InertialFit(Result):
         return float(self.values[self.names.index(name)])
 
     def repaired(self, model: Model) -> Model:
-        """The model that was fitted with the estimates in place of its values, for simulation and diagnosis.
+        """Model with the estimates of an inertial fit, for simulation and diagnosis.
 
         What the data leave open stands as near to the CAD values as the rest allows: sums are right, not each number.
 
@@ -147,7 +147,7 @@ class InertialFit(Result):
     def judged_on(
         self, model: Model, experiments: Experiment | Sequence[Experiment], *, cutoff: float | None = None
     ) -> tuple[Gaps, Gaps]:
-        """How far efforts of other records are from those predicted by a model, and by the same model repaired.
+        """Effort errors on other records of a model, and of the same model with the inertial fit.
 
         Returns
         -------
@@ -170,7 +170,7 @@ class InertialFit(Result):
 
     @property
     def summary(self) -> tuple[str, ...]:
-        """Rank, condition, noise and feasibility, one sentence each."""
+        """Sentences on an inertial fit: rank, condition, noise and feasibility."""
         known = sum(word == KNOWN for word in self.identifiable)
         shares = ", ".join(f"{channel} {noise:.3g}" for channel, noise in zip(self.channels, self.noise, strict=True))
         impossible = [f"{name}: {text}" for name, text in self.faults.items() if text]
@@ -184,7 +184,7 @@ class InertialFit(Result):
         )
 
     def table(self, *, all_parameters: bool = False) -> str:
-        """CAD value, estimate, deviation, difference and what the data know, as in D'Imperio (2016), Table 5.1.
+        """Table of an inertial fit: CAD value, estimate, deviation, difference, as D'Imperio (2016), Table 5.1.
 
         Parameters
         ----------
@@ -207,7 +207,7 @@ class InertialFit(Result):
         return "\n".join([head, *rows])
 
     def base_table(self) -> str:
-        """Base parameters: CAD value, estimate, deviation, and what each stands for."""
+        """Table of an inertial fit's base parameters: CAD value, estimate, deviation, and meaning."""
         head = f"{'CAD':>11s} {'identified':>11s} {'std':>9s} {'std/value':>10s}  base parameter"
         rows = [
             f"{cad:11.4g} {value:11.4g} {std:9.2g} {100.0 * std / abs(value) if value else np.inf:8.1f} %  {words}"
@@ -218,7 +218,7 @@ class InertialFit(Result):
         return "\n".join([head, *rows])
 
     def __str__(self) -> str:
-        """Summary, and both tables."""
+        """Text of an inertial fit: summary, and both tables."""
         return "\n".join([*self.summary, "", self.table(), "", self.base_table()])
 
     def _headline(self) -> Mapping[str, object]:
@@ -246,7 +246,7 @@ class InertialFit(Result):
         }
 
     def plot(self) -> Figure:
-        """Estimates with their intervals over the CAD values, base parameters below.
+        """Plot of an inertial fit: estimates with intervals over the CAD values, base parameters below.
 
         Returns
         -------

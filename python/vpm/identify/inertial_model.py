@@ -97,7 +97,7 @@ class InertialModel:
         return np.concatenate([self.model.standard_parameters, self.model.theta[others]])
 
     def lacking(self, state: tuple[Array, Array, Array], inputs: Array, dt: float) -> tuple[Array, Array]:
-        """What actuators give beyond what parts that are not sought need (N, n), and the regressor (N, n, p)."""
+        """Missing effort for the sought inertial parameters (N, n), and the regressor (N, n, p)."""
         core = self.model.core
         required, applied, table = core.inverse_dynamics(self._plain, *state, inputs, dt, self._columns)
         plain = np.tile(PLAIN, len(self.bodies))
@@ -105,7 +105,7 @@ class InertialModel:
         return applied - required + table @ np.concatenate([plain, rest]), table
 
     def check(self, state: tuple[Array, Array, Array], inputs: Array, dt: float) -> None:
-        """Complain if the effort is not linear in what is sought."""
+        """Refuse an inertial model whose effort is not linear in what is sought."""
         effort, table = self.lacking(state, inputs, dt)
         for name in (None, *self.others):
             theta, values = self.model.theta.copy(), self.nominal

@@ -31,18 +31,18 @@ class Solution:
 
 
 def weighted(regression: InertialRegression, noise: Array) -> tuple[Array, Array]:
-    """Regressor and effort in units of each channel's noise."""
+    """Inertial regressor and effort in units of each channel's noise, to be solved."""
     return regression.regressor / noise[:, None], regression.effort / noise
 
 
 def least_squares(columns: Array, right: Array) -> Array:
-    """Least squares with columns scaled to equal length."""
+    """Solve least squares for inertial parameters with columns scaled to equal length."""
     lengths = column_lengths(columns)
     return np.asarray(np.linalg.lstsq(columns / lengths, right, rcond=None)[0] / lengths)
 
 
 def solve_free(regression: InertialRegression, base: Base, noise: Array, nominal: Array) -> Solution:
-    """Base parameters by least squares; single parameters as near to the nominal ones as those allow."""
+    """Solve for base parameters; single inertial parameters as near to the nominal ones as those allow."""
     table, effort = weighted(regression, noise)
     mine = table[:, :, list(base.kept)]
     columns = mine.reshape(-1, base.rank)
@@ -58,7 +58,7 @@ def solve_free(regression: InertialRegression, base: Base, noise: Array, nominal
 
 
 def solve_pulled(regression: InertialRegression, noise: Array, nominal: Array, deviations: Array) -> Solution:
-    """Least squares with one more equation for each parameter that is known beforehand."""
+    """Solve for inertial parameters with one more equation for each that is known beforehand."""
     table, effort = weighted(regression, noise)
     count = len(nominal)
     known = np.diag(1.0 / deviations)
@@ -75,7 +75,7 @@ def solve_pulled(regression: InertialRegression, noise: Array, nominal: Array, d
 def solve_physical(
     regression: InertialRegression, noise: Array, nominal: Array, deviations: Array | None, free: Solution
 ) -> Solution:
-    """Least squares among what bodies can have.
+    """Solve for inertial parameters among what bodies can have.
 
     Deviations stay those without the constraint. In the norm of the data an estimate in a convex set is no farther from
     any truth in that set than the free one, while deviations at the border itself would promise far too much.
@@ -91,7 +91,7 @@ def solve_physical(
 
 
 def _inverse(columns: Array) -> Array:
-    """``(A'A)^-1`` by the singular values of A, columns of equal length."""
+    """Inverse ``(A'A)^-1`` for an inertial solution by the singular values of A."""
     lengths = column_lengths(columns)
     _, values, directions = np.linalg.svd(np.linalg.qr(columns / lengths, mode="r"), full_matrices=False)
     usable = values > 1e-14 * values[0]
@@ -104,7 +104,7 @@ def _small_sample(covariance: Array, rows: int, unknowns: int) -> Array:
 
 
 def channel_noise(residual: Array, effort: Array, unknowns: int) -> Array:
-    """Standard deviation (n,) of each channel's residual (N, n); at least what rounding leaves of its effort."""
+    """Noise deviation (n,) of each channel's inertial residual (N, n); at least rounding."""
     size = np.sqrt(np.mean(effort**2, axis=0))
     count = residual.size / max(residual.size - unknowns, 1)
     spread = np.sqrt(np.mean(residual**2, axis=0) * count)
@@ -112,7 +112,7 @@ def channel_noise(residual: Array, effort: Array, unknowns: int) -> Array:
 
 
 def score_covariance(regressor: Array, residual: Array, records: Sequence[slice]) -> Array:
-    """Covariance (k, k) of ``sum_t regressor_t' noise_t`` for noise that is stationary but not white.
+    """Covariance (k, k) of ``sum_t regressor_t' noise_t`` for an inertial solution; noise need not be white.
 
     The noise of each channel is an autoregression, its order the one of least BIC, found from the residual by the
     Yule-Walker equations; the innovations of the channels may resemble each other. Its spectra weigh the regressor's
@@ -154,7 +154,7 @@ def score_covariance(regressor: Array, residual: Array, records: Sequence[slice]
 
 
 def effective_samples(white: Array, robust: Array, rows: int) -> float:
-    """Equations that independent noise would need for the same intervals: ``rows`` times the mean ratio of variances.
+    """Effective number of equations in an inertial solution under autocorrelated noise.
 
     Parameters
     ----------

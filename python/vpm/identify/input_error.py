@@ -115,7 +115,7 @@ class InputErrorProblem:
         self.blocks = self._lay_out(model)
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
-        """Residual of the commands and its derivative; see :class:`vpm.identify.Problem`."""
+        """Input error: residual of the commands and its derivative; see :class:`vpm.identify.Problem`."""
         jobs = [partial(self._record, model, theta, list(columns), stretches) for stretches in self._stretches]
         blocks = iter(self.blocks)
         residuals, jacobians = [], []
@@ -128,7 +128,7 @@ class InputErrorProblem:
         return np.concatenate(residuals), np.concatenate(jacobians)
 
     def _record(self, model: Model, theta: Array, columns: list[int], stretches: _Stretches) -> tuple[Array, Array]:
-        """Correction of each command in each stretch (S, m), and its derivative (S, m, k).
+        """Input error of each command in each stretch (S, m), and its derivative (S, m, k).
 
         Gauss-Newton steps on commands and first states ``z``, from those of the log. At their end ``z`` solves
         ``A^T e = h^2 z`` with output errors ``e``, the response ``A`` to ``z`` and the hold ``h`` of first states, so
@@ -152,7 +152,7 @@ class InputErrorProblem:
     def _response(
         self, model: Model, theta: Array, stretches: _Stretches, z: Array, columns: list[int]
     ) -> tuple[Array, Array]:
-        """Change of the weighted outputs by ``z`` (S, n, z), and its derivative by parameters (S, n, z, k)."""
+        """Change of weighted outputs by input corrections ``z`` (S, n, z), and derivative (S, n, z, k)."""
         values, slopes = [], []
         for place in range(self._unknowns):
             sides = []
@@ -167,7 +167,7 @@ class InputErrorProblem:
     def _outputs(
         self, model: Model, theta: Array, stretches: _Stretches, z: Array, columns: list[int]
     ) -> tuple[Array, Array]:
-        """Weighted outputs of each stretch (S, n) but for its first sample, and their derivative (S, n, k).
+        """Weighted outputs of each stretch (S, n) for the input error, and derivative (S, n, k).
 
         ``z`` (S, m + nx) corrects commands and first states, in units of their sizes.
         """
@@ -204,7 +204,7 @@ class InputErrorProblem:
     def _follow_commands(
         self, model: Model, inputs: Array, states: Array, starts: NDArray[np.int64], experiment: Experiment
     ) -> None:
-        """Give states that the commands alone move, such as spools and lags, their values of a run of the record."""
+        """Give states that inputs alone move, such as spools and lags, values of a record's run."""
         if not self._followed:
             return
         setup = self._setup
@@ -243,7 +243,7 @@ class InputErrorProblem:
         return tuple(blocks)
 
     def _strength(self, model: Model, stretches: _Stretches) -> Array:
-        """Least change of the outputs in each stretch (S,), in their spread, for commands of their own size."""
+        """Least output change in each stretch (S,) by inputs of their own size."""
         z = np.zeros((len(stretches.starts), self._unknowns))
         response, _ = self._response(model, model.theta, stretches, z, [])
         m = len(self._commands)
@@ -261,19 +261,19 @@ class InputErrorProblem:
 
 
 def _solved(square: Array, right: Array) -> Array:
-    """Solution of the normal equations of all stretches; what moves nothing stays where it is."""
+    """Solution of the input error's normal equations of all stretches; what moves nothing stays."""
     inverse = np.linalg.pinv(square, rcond=CLEAR**2, hermitian=True)
     return np.asarray(np.einsum("sml,sl...->sm...", inverse, right))
 
 
 def _sizes(states: Array) -> Array:
-    """Size of each state (nx,): its root mean square over stretches; 1 where it is zero in all."""
+    """Size of each state (nx,) for the input error: root mean square over stretches; 1 where zero."""
     size = np.sqrt(np.mean(states**2, axis=0))
     return np.where(size > 0.0, size, 1.0)
 
 
 def _check_state(model: Model, experiments: Sequence[Experiment]) -> None:
-    """Complain, with the way on, if a stretch cannot begin at the measured state."""
+    """Refuse a stretch of the input error that cannot begin at the measured state."""
     if model.core.n_elastic:
         elastic = [name for name in model.beams if model.levels[name] != "rigid"]
         raise SimulationError(

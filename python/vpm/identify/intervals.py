@@ -91,7 +91,7 @@ class Bootstrap(Result):
 
     @property
     def std(self) -> Array:
-        """Standard deviation of each parameter, shape (p,)."""
+        """Standard deviation of each parameter by the bootstrap intervals, shape (p,)."""
         return np.asarray(np.std(self.values, axis=0, ddof=1))
 
     @property
@@ -191,7 +191,7 @@ def _end(
 
 
 def _conditional(objective: Objective, at: Point, bread: Array, place: int, held: float) -> Point:
-    """Least cost with one coordinate held, begun where the linear model has it."""
+    """Least cost with one coordinate held, for a profile interval."""
     x = at.x + bread[:, place] / bread[place, place] * (held - at.x[place])
     x[place] = held
     low, high = objective.low.copy(), objective.high.copy()
@@ -256,7 +256,7 @@ def _piece(residual: Array, blocks: Sequence[Block]) -> int:
 def _drawn(
     blocks: Sequence[Block], records: Sequence[str], length: int, rows: int, random: np.random.Generator
 ) -> Array:
-    """Weights of a block bootstrap: how often each row of the residual is drawn; gaps and priors count once."""
+    """Weights of block-bootstrap intervals: how often each row of the residual is drawn."""
     weights = np.ones(rows)
     whole = random.multinomial(len(records), np.full(len(records), 1.0 / len(records)))
     for place, record in enumerate(records):

@@ -12,7 +12,12 @@ from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, IdentificationError
 from vpm.experiment import Experiment, Motion
-from vpm.identify.along import (
+from vpm.identify.first_states import BegunAnywhere
+from vpm.identify.following import Following, Memo, gauge_gains, hold_of
+from vpm.identify.parallel import in_order
+from vpm.identify.parts import Bending
+from vpm.identify.problem import FEWEST_SAMPLES, Block
+from vpm.identify.response_along_motion import (
     Response,
     bending_of,
     bends,
@@ -23,11 +28,6 @@ from vpm.identify.along import (
     respond,
     shown_channels,
 )
-from vpm.identify.first_states import BegunAnywhere
-from vpm.identify.following import Following, Memo, gauge_gains, hold_of
-from vpm.identify.parallel import in_order
-from vpm.identify.parts import Bending
-from vpm.identify.problem import FEWEST_SAMPLES, Block
 from vpm.identify.sample_mask import SampleMask, settled
 from vpm.initial import joint_motion
 from vpm.model import Model
@@ -48,9 +48,9 @@ class InverseDynamicsProblem(BegunAnywhere):
     filtering of the inverse dynamic identification model (M. Gautier, *Annual Reviews in Control*, 1997; A. Janot et
     al., *IEEE Trans. Control Systems Technology* 22, 2014).
 
-    What nobody measures is worked out along the motion, see `vpm.identify.along`: states inside of drives, elastic
-    coordinates, joints without a sensor. Of what shows of it, all that the logs hold is compared too: pressures,
-    currents, strains.
+    What nobody measures is worked out along the motion, see `vpm.identify.response_along_motion`: states inside of
+    drives, elastic coordinates, joints without a sensor. Of what shows of it, all that the logs hold is compared too:
+    pressures, currents, strains.
 
     Samples at which a joint stands still do not count, as long as half of them remain: friction at rest takes whatever
     value holds the joint, which nothing here can predict. Nor do those at which a piston touches an end of its stroke.
@@ -114,7 +114,7 @@ class InverseDynamicsProblem(BegunAnywhere):
         )
 
     def on(self, experiments: Sequence[Experiment]) -> InverseDynamicsProblem:
-        """The problem on other records of the same lengths, filtered, counted and weighed as these are."""
+        """Inverse-dynamics problem on other records of the same lengths, filtered and weighed alike."""
         motions = self._motions(experiments, [m.cutoff for m in self.motions])
         pairs = list(zip(motions, experiments, strict=True))
         return self.changed(
@@ -127,20 +127,20 @@ class InverseDynamicsProblem(BegunAnywhere):
         )
 
     def less(self, expected: Array) -> InverseDynamicsProblem:
-        """The problem less the residual ``expected`` at the true values, shape (n,)."""
+        """Inverse-dynamics problem less the residual ``expected`` at the true values, shape (n,)."""
         return self.changed(expected=expected)
 
     def side_by_side(self, workers: int) -> InverseDynamicsProblem:
-        """The problem worked out by ``workers`` threads, a record each."""
+        """Inverse-dynamics problem computed by ``workers`` threads, a record each."""
         return self.changed(workers=workers)
 
     @property
     def integrators(self) -> tuple[str, ...]:
-        """How drives with states of their own are run along each record."""
+        """Integrators of drives with states along each record, for inverse dynamics."""
         return tuple(known.integrator for known in self._known)
 
     def take_long_steps(self) -> None:
-        """Run drives by one step of second order for each sample, along the records where that shows nothing.
+        """Run drives of inverse dynamics by one second-order step for each sample, where that is exact enough.
 
         A search runs them hundreds of times, and the nominal model tells once whether steps as long as a sample do: the
         band that is compared ends far below the sampling rate.
@@ -158,7 +158,7 @@ class InverseDynamicsProblem(BegunAnywhere):
                 self._known = (*self._known[:record], quick, *self._known[record + 1 :])
 
     def later(self) -> InverseDynamicsProblem:
-        """The problem with commands one sample later: each holds from the sample after its own on."""
+        """Inverse-dynamics problem with commands one sample later."""
         moved = tuple(replace(m, inputs=np.concatenate([m.inputs[:1], m.inputs[:-1]])) for m in self._whole)
         # What drives answered to commands at their own times is no answer to these; what the motion needs is.
         return self.changed(_whole=moved, _known=tuple(replace(known, commands=1) for known in self._known))
@@ -166,7 +166,7 @@ class InverseDynamicsProblem(BegunAnywhere):
     def evaluate(
         self, model: Model, theta: Array, columns: Sequence[int] = (), origin: Array | None = None
     ) -> tuple[Array, Array]:
-        """The residual and its derivative; see :class:`Problem`.
+        """Inverse-dynamics residual and its derivative; see :class:`Problem`.
 
         With ``origin``, values of the parameters, links bend and drives answer as on the tangent there.
         """
@@ -178,7 +178,7 @@ class InverseDynamicsProblem(BegunAnywhere):
         return self._left(self._stack(residuals)) - self.expected, self._left(self._stack(jacobians))
 
     def _hold_gains(self, model: Model) -> dict[str, float]:
-        """How firmly gauges hold links, the same for all records and for all models that are compared."""
+        """Gauge gains that hold links in inverse dynamics, the same for all compared models."""
         if not bends(model):
             return {}
         names, m = self.motions[0].joints, self.motions[0]
@@ -200,12 +200,12 @@ class InverseDynamicsProblem(BegunAnywhere):
         )
 
     def begun(self, departures: Array | None) -> Self:
-        """The problem with other first states, coordinates, then rates; see :class:`BegunAnywhere`."""
+        """Inverse-dynamics problem with other first states, coordinates, then rates; see :class:`BegunAnywhere`."""
         known = self._held(self.experiments, self.motions, self.integrators, departures)
         return super().begun(departures).changed(_known=known)
 
     def open_states(self, model: Model) -> tuple[Array, int]:
-        """Sizes of unknown first states of unmeasured joints and links without gauges; see :class:`BegunAnywhere`."""
+        """Sizes of unknown first states of inverse dynamics: unmeasured joints, links without gauges."""
         coordinates, joints = len(model.coordinates), self.motions[0].joints
         free = np.array([joint not in joints for joint in model.joints] + [not self._gains] * model.core.n_elastic)
         sizes = np.zeros(2 * coordinates)
@@ -216,15 +216,15 @@ class InverseDynamicsProblem(BegunAnywhere):
         return sizes, len(self.motions)
 
     def hidden_states(self, model: Model, record: int) -> Array:
-        """Coordinates, then rates (N, 2 coordinates), along one record."""
+        """States of unmeasured motion in inverse dynamics, coordinates, then rates, along one record."""
         return guided(model, model.theta, self._whole[record], (), self._known[record])[1]
 
     def bending(self, model: Model) -> Bending | None:
-        """Split of a machine into parts that bend or fly along these records; see `vpm.identify.parts.bending`."""
+        """Split of inverse dynamics into parts that bend or fly; see `vpm.identify.parts.bending`."""
         return bending_of(model, self.motions[0].joints, self._known[0])
 
     def share(self, whole: Model, others: Sequence[tuple[Model, Sequence[str]]]) -> None:
-        """Let ``others`` have how links bend from ``whole``, of which this was asked and which moves as they do.
+        """Let ``others`` in inverse dynamics have how links bend from ``whole``, which moves alike.
 
         With each goes the list of its own parameters: those that ``whole`` was not differentiated by have no influence.
         """
@@ -236,7 +236,7 @@ class InverseDynamicsProblem(BegunAnywhere):
             known.share((source.bare, whole.theta), targets, read)
 
     def added(self, efforts: Sequence[Array]) -> Array:
-        """Part of the residual (n, k) that given efforts add, filtered and weighed as it is.
+        """Part of the inverse-dynamics residual (n, k) that given efforts add.
 
         Parameters
         ----------
@@ -252,7 +252,7 @@ class InverseDynamicsProblem(BegunAnywhere):
         return self._stack(records)
 
     def effort(self, model: Model, theta: Array, record: int) -> tuple[Array, Array, Array]:
-        """Time, applied and required effort (n, joints) of one record, filtered as in the residual."""
+        """Time, applied and required effort (n, joints) of one record, as inverse dynamics filters them."""
         m = self.motions[record]
         answer = self._answer(model, theta, record)
         return m.time[m.retained], answer.applied[:, self._joints], answer.required[:, self._joints]
@@ -266,12 +266,12 @@ class InverseDynamicsProblem(BegunAnywhere):
         origin: Array | None = None,
         known: Following | None = None,
     ) -> Response:
-        """Filtered efforts and outputs along one record, with derivatives; see `Response`."""
+        """Filtered efforts and outputs of inverse dynamics along one record; see `Response`."""
         whole, experiment, known = self._whole[record], self.experiments[record], known or self._known[record]
         return respond(model, theta, whole, experiment, columns, self.shown, known, origin)
 
     def strengths(self, model: Model, theta: Array | None = None) -> Array:
-        """Root mean square of the applied effort on each joint over all records: what its errors are relative to."""
+        """Root mean square of the applied effort on each joint, the scale of inverse-dynamics errors."""
         theta = model.theta if theta is None else theta
         power, count = np.zeros(len(self.joints)), np.zeros(len(self.joints))
         for record in range(len(self.motions)):
@@ -282,13 +282,13 @@ class InverseDynamicsProblem(BegunAnywhere):
         return np.asarray(np.sqrt(power / np.maximum(count, 1.0)))
 
     def standstill(self, record: int) -> float:
-        """Share of the samples of one record that do not count because a joint stands still."""
+        """Share of one record's samples outside of inverse dynamics because a joint stands still."""
         blocks = self.efforts(record)
         away = settled(len(blocks[0].time), self.motions[record].decimation) > 0.0
         return 1.0 - float(np.mean([block.moving[away].mean() for block in blocks]))
 
     def state(self, record: int) -> tuple[Array, Array, Array]:
-        """Position, velocity and acceleration (n, joints) of one record at the retained samples."""
+        """Position, velocity and acceleration (n, joints) of one record in inverse dynamics."""
         m = self.motions[record]
         position, velocity, acceleration = (
             x[m.retained][:, self._joints] for x in (m.position, m.velocity, m.acceleration)
@@ -296,12 +296,12 @@ class InverseDynamicsProblem(BegunAnywhere):
         return position, velocity, acceleration
 
     def efforts(self, record: int) -> tuple[Block, ...]:
-        """Blocks of the efforts of one record, one for each of `joints`."""
+        """Effort blocks of one record in inverse dynamics, one for each of `joints`."""
         first = record * (len(self.joints) + len(self.shown))
         return self.blocks[first : first + len(self.joints)]
 
     def _measured(self, m: Motion, experiment: Experiment) -> Array:
-        """Logged channels (n, shown), filtered."""
+        """Logged channels (n, shown) beside inverse dynamics, filtered."""
         columns = [experiment[channel] for channel in self.shown]
         return m.parallel(np.column_stack(columns)) if columns else np.zeros((len(m.retained), 0))
 
@@ -322,7 +322,7 @@ class InverseDynamicsProblem(BegunAnywhere):
         return tuple(blocks)
 
     def _sizes(self, model: Model) -> tuple[list[Array], list[Array]]:
-        """Size of each channel by record, and the samples (n, channels) that count.
+        """Size of each inverse-dynamics channel by record, and the samples (n, channels) that count.
 
         Efforts are as large as what the drives deliver, and of a joint that coasts as what its inertia takes; of other
         channels, such as pressures, it is the spread.
@@ -349,19 +349,19 @@ class InverseDynamicsProblem(BegunAnywhere):
         return sizes, moving
 
     def _inertial(self, model: Model, record: int) -> Array:
-        """Root mean square of what the inertia at each joint takes by itself, all joints at zero."""
+        """Root mean square effort of the inertia at each joint alone, for inverse dynamics."""
         places = [model.joints.index(joint) for joint in self.joints]
         return np.asarray(model.masses_at_zero[places] * np.sqrt(np.mean(self.state(record)[2] ** 2, axis=0)))
 
     def _stack(self, records: list[Array]) -> Array:
-        """Concatenate (n, channels, ...) arrays block by block and apply the weights."""
+        """Stacked inverse-dynamics blocks (n, channels, ...) with their weights."""
         columns = [record[:, c] for record in records for c in range(record.shape[1])]
         scaled = zip(columns, self.blocks, strict=True)
         return np.concatenate([(x.T * (block.weight * block.moving)).T for x, block in scaled])
 
 
 def _alike(exact: Response, rough: Response, measured: Array) -> bool:
-    """Whether two answers of drives differ by less than `ROUGH` of their size, or of what was measured in their place.
+    """Whether two drive answers in inverse dynamics differ by less than `ROUGH` of their size.
 
     Where something is missing the one may be many times the other, and it is the measured one that is to be explained.
     """
@@ -374,5 +374,5 @@ def _alike(exact: Response, rough: Response, measured: Array) -> bool:
 
 
 def _each(value: float | Sequence[float] | None, records: Sequence[Experiment]) -> Sequence[float | None]:
-    """One number for each record, such as a cut-off (Hz); a single one stands for all of them."""
+    """One number of inverse dynamics for each record, such as a cut-off (Hz); a single one stands for all."""
     return [value] * len(records) if value is None or isinstance(value, int | float) else value

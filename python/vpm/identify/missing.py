@@ -50,7 +50,7 @@ Groups = Callable[[Sequence[str], Block], list[_Law]]
 def whiteness(
     model: Model, records: Sequence[Experiment], data: Problem, residual: Array, jacobian: Array, checks: Checks
 ) -> tuple[Whiteness, ...]:
-    """Judge what is left of each channel of each record.
+    """Judge whether effects are missing by what is left of each channel of each record.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def _judge(
 
 
 def _joints(model: Model, channel: str) -> tuple[str, ...]:
-    """The joint a channel belongs to, those that its drive moves, or all."""
+    """Joints at which a channel may miss an effect: its own, those that its drive moves, or all."""
     owner = channel.rpartition(".")[0]
     if owner in model.joints:
         return (owner,)
@@ -117,7 +117,7 @@ def _joints(model: Model, channel: str) -> tuple[str, ...]:
 def _of_motion(
     model: Model, problem: InverseDynamicsProblem, record: int, checks: Checks, unseen: Sequence[Array]
 ) -> Groups:
-    """Laws of the motion of joints, of the effort that it needs and of that which drives deliver, as they are compared.
+    """Laws of possibly missing effects by joint motion and efforts, as they are compared.
 
     What a drive did without being told is in the one, and what its controller heard of noise in the other.
     """
@@ -137,7 +137,7 @@ def _of_motion(
 
 
 def _of_unseen(model: Model, problem: InverseDynamicsProblem) -> list[Array]:
-    """What each effect would add (n, sizes) at joints that nobody measures: how these move, no channel tells."""
+    """Contribution (n, sizes) of possibly missing effects at joints that nobody measures."""
     sites = [joint for joint in model.joints if joint not in (*problem.motions[0].joints, *model.added_joints)]
     found = []
     for site, law in product(sites, effects_for_site("joint")):
@@ -153,7 +153,7 @@ def _of_unseen(model: Model, problem: InverseDynamicsProblem) -> list[Array]:
 
 
 def _of_log(model: Model, record: Experiment, checks: Checks) -> Groups:
-    """Laws of the motion of joints and of commands, at the times of a block."""
+    """Laws of possibly missing effects by motion and commands, at the times of a block."""
 
     def groups(joints: Sequence[str], block: Block) -> list[_Law]:
         m = joint_motion(record, model)
@@ -175,7 +175,7 @@ def _of_log(model: Model, record: Experiment, checks: Checks) -> Groups:
 
 
 def _laws(motion: Sequence[Array], efforts: Sequence[Array], checks: Checks) -> list[_Law]:
-    """Efforts (n, k) of single effects: springs, friction, masses, ripple; delays, compliance; backlash, dead zones."""
+    """Efforts (n, k) of possibly missing effects: springs, friction, masses, ripple, delays, backlash and others."""
     sharp = [np.tanh(effort / (SHARPNESS * (float(np.sqrt(np.mean(effort**2))) or 1.0))) for effort in efforts]
     late = [tuple(shifted(effort) for effort in each) for each in (efforts, sharp) if each]
     steady = [*(powers(part) for part in motion), *waves(motion[0], checks.waves, checks.waves_each)]
@@ -183,7 +183,7 @@ def _laws(motion: Sequence[Array], efforts: Sequence[Array], checks: Checks) -> 
 
 
 def missing_effects(judged: Sequence[Whiteness], checks: Checks) -> list[str]:
-    """Sentences about channels whose residual repeats with the motion."""
+    """Sentences on missing effects: channels whose residual repeats with the motion."""
     level = checks.level / max(1, len(judged))
     return [
         f"the residual of {one.channel} in {one.experiment} repeats with the motion, which explains "

@@ -33,19 +33,19 @@ class Coordinates:
     matrix: Array | None = None
 
     def parameters(self, x: Array) -> Array:
-        """Parameters (p,) at coordinates (p,)."""
+        """Parameters (p,) at coordinates (p,) of moments of inertia."""
         return x if self.matrix is None else np.asarray(self.matrix @ x)
 
     def at(self, parameters: Array) -> Array:
-        """Coordinates (p,) of parameters (p,)."""
+        """Coordinates (p,) for moments of inertia from parameters (p,)."""
         return parameters if self.matrix is None else np.asarray(np.linalg.solve(self.matrix, parameters))
 
     def by_coordinates(self, jacobian: Array) -> Array:
-        """Derivative (n, p) by the coordinates, of that by the parameters."""
+        """Derivative (n, p) by the coordinates of moments, from that by the parameters."""
         return jacobian if self.matrix is None or not jacobian.size else np.asarray(jacobian @ self.matrix)
 
     def by_parameters(self, jacobian: Array) -> Array:
-        """Derivative (n, p) by the parameters, of that by the coordinates."""
+        """Derivative (n, p) by the parameters, from that by the coordinates of moments."""
         return jacobian if self.matrix is None else np.asarray(np.linalg.solve(self.matrix.T, jacobian.T).T)
 
 

@@ -72,30 +72,30 @@ class Objective:
         self.noise: dict[str, float] = dict(fitting.noise_levels)
 
     def __getstate__(self) -> dict[str, object]:
-        """All but who is told: that is a function of one process."""
+        """State of an objective for other processes, without the function that is told of progress."""
         return {**vars(self), "_progress": None}
 
     @property
     def priors(self) -> int:
-        """Number of rows at the end of a weighted residual that stand for what is known of the parameters."""
+        """Number of prior rows at the end of an objective's weighted residual."""
         return len(self._prior)
 
     def coordinates(self, theta: Array, states: Array | None = None) -> Array:
-        """Coordinates of free parameters (p,) and of first states in units of their size."""
+        """Coordinates of an objective: free parameters (p,) and first states in units of their size."""
         safe = np.where(self.log, theta, 1.0)
         return np.concatenate([np.where(self.log, np.log(safe), theta), self.first if states is None else states])
 
     def parameters(self, x: Array) -> Array:
-        """Free parameters of a fit at coordinates."""
+        """Free parameters at an objective's coordinates."""
         mine = x[: len(self.columns)]
         return np.where(self.log, np.exp(np.where(self.log, mine, 0.0)), mine)
 
     def slopes(self, x: Array) -> Array:
-        """Derivative of each parameter, and each first state, by its own coordinate."""
+        """Derivative of each parameter and first state by its coordinate in the objective."""
         return np.concatenate([np.where(self.log, self.parameters(x), 1.0), self.sizes])
 
     def __call__(self, x: Array) -> Point:
-        """Simulate and weigh; the cost is infinite where the values make no machine or the simulation diverges."""
+        """Evaluate the objective: simulate and weigh; infinite where no machine exists or it diverges."""
         theta = self.model.theta.copy()
         theta[self.columns] = self.parameters(x)
         given = {"unknown": x[len(self.columns) :] * self.sizes} if self.shooting else {}
@@ -113,7 +113,7 @@ class Objective:
         return point
 
     def weigh(self, x: Array, residual: Array, jacobian: Array) -> Point:
-        """Point from a residual and its derivative by the coordinates, with the weights as they are now."""
+        """Point of the objective from a residual and its derivative, with the present weights."""
         factors = self._factors(residual.size)
         r, slopes = residual * factors, jacobian * factors[:, None]
         compared = self.data.blocks[-1].samples.stop
@@ -146,7 +146,7 @@ class Objective:
 
 
 def losses_and_weights(residual: Array, loss: str, scale: float) -> tuple[Array, Array]:
-    """Loss of each residual in units of its noise, and its weight, the loss's derivative over that of the square.
+    """Loss of each residual in the objective, in units of noise, and its weight.
 
     Parameters
     ----------
@@ -167,7 +167,7 @@ def losses_and_weights(residual: Array, loss: str, scale: float) -> tuple[Array,
 
 
 def noise_levels(blocks: Sequence[Block], residual: Array, *, robust: bool) -> Mapping[str, float]:
-    """Standard deviation of each channel's residual, in its unit; ``robust`` by the median, which outliers do not move.
+    """Noise deviation of each channel in the objective, in its unit; ``robust`` by the median.
 
     Parameters
     ----------

@@ -39,7 +39,7 @@ class Channels(dict[str, Array]):
 
 
 def check_choices(both: bool, force: bool, balance: str, estimator: str, extra: Sequence[str]) -> None:
-    """Refuse unknown words and balances for which there are no channels."""
+    """Check choices for the oil: unknown words, and balances without channels."""
     for word, known, what in ((balance, BALANCES, "balance"), (estimator, ESTIMATORS, "estimator")):
         if word not in known:
             raise IdentificationError(f'the {what} "{word}" is unknown; {near_match(word, known)}')
@@ -63,7 +63,7 @@ def check_choices(both: bool, force: bool, balance: str, estimator: str, extra: 
 
 
 def check_record(time: ArrayLike, geometry: CylinderGeometry, channels: Mapping[str, ArrayLike]) -> Channels:
-    """Columns of one length, or one sentence about the first that cannot be right.
+    """Check an oil record's columns: one length, or one sentence about the first that cannot be right.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def _check_motion(record: Channels) -> None:
 
 
 def _check_units(record: Channels, geometry: CylinderGeometry) -> None:
-    """Numbers that no cylinder can have in SI: they are MPa, bar or mm."""
+    """Check units of an oil record: numbers that no cylinder has in SI are MPa, bar or mm."""
     supply, tank = record["supply"], record["tank"]
     if not (supply.max() >= SUPPLIES[0] and supply.max() <= SUPPLIES[1]):
         raise IdentificationError(
@@ -171,7 +171,7 @@ def _check_units(record: Channels, geometry: CylinderGeometry) -> None:
 
 
 def check_answer(fit: OilFit, rows: Rows, rate: float, *, ruled: bool, strict: bool) -> tuple[str, ...]:
-    """Sentences about an answer that is not to be trusted; the first one as an error if `strict`."""
+    """Check the estimated oil: sentences about an untrustworthy answer; an error if `strict`."""
     found, names, values, share = [], fit.names, fit.values, fit.noise_share
     reach = NORMAL_95 * fit.std
     why = _reason(share, rate, ruled=ruled, integral=rows.constants.shape[1] > 0)
@@ -201,7 +201,7 @@ def check_answer(fit: OilFit, rows: Rows, rate: float, *, ruled: bool, strict: b
 
 
 def _left_over(rows: Rows, values: Array, residual: Array) -> tuple[str, ...]:
-    """A sentence about a residual of integrals that noise does not explain."""
+    """Sentence of the oil check about a residual of integrals that noise does not explain."""
     if not rows.constants.shape[1]:
         return ()
     left, noise, compressed = unexplained(rows, values, residual)
@@ -216,7 +216,7 @@ def _left_over(rows: Rows, values: Array, residual: Array) -> tuple[str, ...]:
 
 
 def _reason(share: float, rate: float, *, ruled: bool, integral: bool) -> str:
-    """The likely cause, and the repair."""
+    """Likely cause in an oil check, and the repair."""
     column = "force or pressure" if integral else "force rate"
     if share > NOISY:
         repair = "log both chamber pressures and reverse the valve more often"

@@ -34,7 +34,7 @@ AIR_PRESSURE, AIR_EXPONENT = 101325.0, 1.4
 class _Machine(Protocol):
     @property
     def parameters(self) -> Mapping[str, Any]:
-        """Parameters by their dotted names."""
+        """Parameters for the oil equations by their dotted names."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -83,7 +83,7 @@ class CylinderGeometry(Storable):
 
     @classmethod
     def of(cls, model: _Machine, actuator: str) -> CylinderGeometry:
-        """Areas, stroke and line volumes of the cylinder of a hydraulic actuator of a model.
+        """Areas, stroke and line volumes for the oil equations, from a model's hydraulic actuator.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class CylinderGeometry(Storable):
         return cls(area, ratio, value["stroke"], value["line_a"], value["line_b"])
 
     def volumes(self, position: Array) -> tuple[Array, Array]:
-        """Volumes a and b (m^3) at places of the piston from mid-stroke (m), positive where side a is large."""
+        """Oil volumes a and b (m^3) at piston places from mid-stroke (m), positive where side a is large."""
         half = 0.5 * self.stroke
         side_b = self.area_ratio * self.area * (half - position)
         return self.line_a + self.area * (half + position), self.line_b + side_b
@@ -116,7 +116,7 @@ class CylinderGeometry(Storable):
 def pressures_from_force(
     force: Array, opening: Array, supply: Array, tank: Array, geometry: CylinderGeometry, rule: str = "steady"
 ) -> tuple[Array, Array]:
-    """Both pressures of a cylinder from its force and a rule that the valve is thought to keep.
+    """Both oil pressures of a cylinder from its force and a rule that the valve is thought to keep.
 
     Parameters
     ----------
@@ -190,7 +190,7 @@ def balances(
     ports: tuple[Array, Array],
     force: Array | None,
 ) -> tuple[Equation, ...]:
-    """Balances of both chambers, or that of the force.
+    """Oil balances of both chambers, or that of the force.
 
     Parameters
     ----------
@@ -222,12 +222,12 @@ def balances(
 
 
 def signed_root(drop: Array) -> Array:
-    """``sign(d) sqrt(|d|)``: a chamber above the supply or below the tank sends its flow back."""
+    """Signed root in the oil equations, ``sign(d) sqrt(|d|)``: flow may go back."""
     return np.asarray(np.sign(drop) * np.sqrt(np.abs(drop)), dtype=np.float64)
 
 
 def _air(pressure: Array) -> Array:
-    """Stored volume of a unit of air, ``-(p0/p)^(1/kappa)``.
+    """Stored volume of a unit of air in the oil, ``-(p0/p)^(1/kappa)``.
 
     The compliance of 4.15 corrected, to first order in the fraction of air, integrated over the pressure.
     """
@@ -235,7 +235,7 @@ def _air(pressure: Array) -> Array:
 
 
 def through_spool(command: Array, dt: float, spool: tuple[float, float], *, held: bool = False) -> Array:
-    """Place of a spool of second order behind its command, exactly.
+    """Spool place behind its command by second-order equations, exactly.
 
     Parameters
     ----------

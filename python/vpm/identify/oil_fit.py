@@ -73,7 +73,7 @@ class OilFit(Result):
 
     @property
     def intervals(self) -> Array:
-        """95 % intervals, shape (p, 2)."""
+        """95 % intervals of an oil fit, shape (p, 2)."""
         reach = NORMAL_95 * self.std
         return np.column_stack([self.values - reach, self.values + reach])
 
@@ -84,7 +84,7 @@ class OilFit(Result):
 
     @property
     def bulk_modulus_interval(self) -> tuple[float, float]:
-        """95 % interval, Pa: the ends of that of 1/beta, upside down; open upwards where that reaches zero."""
+        """95 % interval of the oil's bulk modulus, Pa, from that of 1/beta; open upwards if that has zero."""
         low, high = self.intervals[0]
         if high <= 0.0:
             return (np.nan, np.nan)
@@ -92,12 +92,12 @@ class OilFit(Result):
 
     @property
     def flow_gain(self) -> float:
-        """K_v of one edge, m^3/(s sqrt(Pa)) by unit of the command."""
+        """Flow gain K_v of one valve edge in an oil fit, m^3/(s sqrt(Pa)) by unit of the command."""
         return self["flow_gain"]
 
     @property
     def flow_gain_interval(self) -> tuple[float, float]:
-        """95 % interval of `flow_gain`."""
+        """95 % interval of an oil fit's `flow_gain`."""
         low, high = self.intervals[1]
         return (float(low), float(high))
 
@@ -224,7 +224,7 @@ def identify_oil(
 def _equations(
     record: Channels, geometry: CylinderGeometry, opening: Array, rule: str | None, balance: str
 ) -> tuple[tuple[Equation, ...], str]:
-    """Balances, and where their pressures come from."""
+    """Balances of an oil fit, and where their pressures come from."""
     ports = record["supply"], record["tank"]
     if rule is None:
         pressures, origin = _measured(record, geometry)
@@ -240,7 +240,7 @@ def _equations(
 
 
 def _measured(record: Channels, geometry: CylinderGeometry) -> tuple[tuple[Array, Array], str]:
-    """Both pressures, one of them from the other and the force if need be."""
+    """Both pressures of an oil fit, one of them from the other and the force if need be."""
     if "pressure_b" not in record:
         side_b = (record["pressure_a"] - record["force"] / geometry.area) / geometry.area_ratio
         return (record["pressure_a"], side_b), "side a measured, side b with the force"
@@ -251,7 +251,7 @@ def _measured(record: Channels, geometry: CylinderGeometry) -> tuple[tuple[Array
 
 
 def _pieces(count: int, dt: float, window: float | None) -> tuple[slice, ...]:
-    """Contiguous pieces of nearly equal length, none shorter than twenty samples."""
+    """Contiguous pieces of an oil fit of nearly equal length, none shorter than twenty samples."""
     if window is None:
         return (slice(0, count),)
     if not window >= 20.0 * dt:

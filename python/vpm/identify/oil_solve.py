@@ -70,7 +70,7 @@ def integral_rows(
     *,
     instrument: bool,
 ) -> Rows:
-    """Rows ``stored X + int(flow) X + c = -place``, each piece with a constant of its own."""
+    """Integral rows to solve for oil: ``stored X + int(flow) X + c = -place``, a constant each piece."""
     count = len(opening)
     constants = np.zeros((count, len(pieces)))
     for k, piece in enumerate(pieces):
@@ -128,7 +128,7 @@ def rate_rows(
 
 
 def solve(rows: Rows, weights: Array | None, *, weighted: bool) -> tuple[Array, Array, Array]:
-    """Estimate, covariance, and residual in units of the place (or speed) of the piston.
+    """Solve for the oil: estimate, covariance, and residual in units of piston place (or speed).
 
     The covariance counts the correlation of residuals in time (W. Newey and K. West, *Econometrica* 55, 1987) and of
     the balances at one instant. Integrals gather the noise of the pressures under their roots as a random walk, too
@@ -152,7 +152,7 @@ def solve(rows: Rows, weights: Array | None, *, weighted: bool) -> tuple[Array, 
 
 
 def _once(rows: Rows, factor: Array, mixing: Array) -> tuple[Array, Array, Array]:
-    """Least squares for one weighting; columns are brought to one size first, for they differ by ten orders."""
+    """Solve the oil's least squares for one weighting, with columns of one size."""
     constants = rows.constants[None] * factor[:, :, None]
     spread = np.einsum("fe,enc->fnec", mixing, constants).reshape(len(mixing), factor.shape[1], -1)
     size = np.sqrt(np.mean((rows.regressors * factor[:, :, None]) ** 2, axis=(0, 1)))
@@ -183,7 +183,7 @@ def _once(rows: Rows, factor: Array, mixing: Array) -> tuple[Array, Array, Array
 
 
 def _walk(steps: Array, Z: Array, mixing: Array, factor: Array) -> Array:
-    """Covariance of the normal equations by a random walk whose steps have the noise of `steps`, shape (e, n)."""
+    """Covariance of the oil's normal equations by a random walk with the noise of `steps`, shape (e, n)."""
     noise = _white_noise(steps)
     reach = np.einsum("fnp,fe,en->npe", Z, mixing, factor)
     ahead = np.cumsum(reach[::-1], axis=0)
@@ -191,7 +191,7 @@ def _walk(steps: Array, Z: Array, mixing: Array, factor: Array) -> Array:
 
 
 def _white_noise(signals: Array) -> Array:
-    """Covariance of the white noise on signals of shape (e, n).
+    """Covariance of white noise on oil signals of shape (e, n).
 
     A third difference leaves nothing of a parabola, and of white noise twenty times its variance. Where a valve
     reverses, flow and pressure have corners; those differences are no noise.
@@ -203,7 +203,7 @@ def _white_noise(signals: Array) -> Array:
 
 
 def noise_share(rows: Rows, equations: Sequence[Equation], dt: float) -> float:
-    """Share of the power of the first column, beside the other columns, that white noise of its sensor explains."""
+    """Share of the first oil column's power that white noise of its sensor explains."""
     from_noise = power = 0.0
     integral = rows.constants.shape[1] > 0
     for k, equation in enumerate(equations):
@@ -219,7 +219,7 @@ def noise_share(rows: Rows, equations: Sequence[Equation], dt: float) -> float:
 
 
 def unexplained(rows: Rows, values: Array, residual: Array) -> tuple[float, float, float]:
-    """Root mean squares of the residual, of its white noise, and of what 1/beta explains, in units of the place.
+    """Root mean squares of an oil solution: residual, its white noise, and the part of 1/beta.
 
     A residual that is neither white noise nor small beside the compression of the oil has a cause of its own.
     """
@@ -230,14 +230,14 @@ def unexplained(rows: Rows, values: Array, residual: Array) -> tuple[float, floa
 
 
 def _integral(values: Array, dt: float) -> Array:
-    """Integral of a sampled function from the first sample on, by the trapezoidal rule."""
+    """Integral of a sampled function for the oil from the first sample on, by the trapezoidal rule."""
     total = np.zeros_like(values)
     np.cumsum(0.5 * dt * (values[1:] + values[:-1]), out=total[1:])
     return total
 
 
 def _from_command(opening: Array, dt: float) -> list[Array]:
-    """Functions of the command that move with the pressures, and of which none holds noise of a pressure sensor."""
+    """Instruments to solve for oil: functions of the command without noise of pressure sensors."""
     size = float(np.abs(opening).max())
     relative = opening / size
     found = [_integral(relative, dt), _integral(np.abs(relative), dt)]
@@ -253,7 +253,7 @@ def _from_command(opening: Array, dt: float) -> list[Array]:
 
 
 def _projected(values: Array, basis: Array) -> Array:
-    """Part of a signal that a basis explains."""
+    """Part of an oil signal that a basis explains."""
     size = np.sqrt(np.mean(basis**2, axis=0))
     scaled = basis / np.where(size > 0.0, size, 1.0)
     return np.asarray(scaled @ np.linalg.lstsq(scaled, values, rcond=1e-10)[0], dtype=np.float64)

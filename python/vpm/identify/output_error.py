@@ -79,20 +79,20 @@ class OutputErrorProblem(BegunAnywhere):
 
     @property
     def setup(self) -> Setup:
-        """Integrator, substeps and horizon of the simulations that a fit compares."""
+        """Setup of the output-error simulations: integrator, substeps and horizon."""
         return self._setup
 
     @property
     def offset_blocks(self) -> tuple[Block, ...]:
-        """Channels of records that are off by a constant."""
+        """Output channels of records that are off by a constant."""
         return tuple(block for block in self.blocks if block.channel in self.offsets)
 
     def with_offsets_left(self) -> Self:
-        """The problem with the constant offsets of sensors left in its residual."""
+        """Output-error problem with constant sensor offsets left in its residual."""
         return self.changed(offsets=())
 
     def _left(self, values: Array) -> Array:
-        """Residual (n,) or its derivative (n, columns) without what offsets and first states explain of it."""
+        """Output error (n,) or derivative (n, columns) without offsets and first states."""
         return super()._left(less_means(values, self.offset_blocks))
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
@@ -114,7 +114,7 @@ class OutputErrorProblem(BegunAnywhere):
         return self._left(np.concatenate(residuals)), self._left(np.concatenate(jacobians))
 
     def open_states(self, model: Model) -> tuple[Array, int]:
-        """Sizes of unknown first states: all where whole records are simulated; see :class:`BegunAnywhere`.
+        """Sizes of unknown first states of an output-error problem; see :class:`BegunAnywhere`.
 
         Of machines with closed loops none: first states next to one another would leave their loops open.
         """
@@ -136,7 +136,7 @@ class OutputErrorProblem(BegunAnywhere):
         followed: Motion | None,
         record: int,
     ) -> SimulatedArrays:
-        """Simulation of one record; its derivative knows what parameters do to the first state of a whole record."""
+        """Simulated outputs of one record; the derivative covers its first state."""
         run = partial(simulate_arrays, model, experiment, self.mode, theta=theta, setup=self._setup)
         if self.mode not in WHOLE:
             return run(columns=columns, followed=followed)
@@ -168,22 +168,22 @@ class OutputErrorProblem(BegunAnywhere):
         return tuple(blocks)
 
     def _rows(self, record: int) -> NDArray[np.int64]:
-        """Rows of a log that are compared."""
+        """Rows of a log that output errors compare."""
         return simulated_rows(self.experiments[record], self.mode, self._setup, self._followed[record])
 
     def _check_offsets(self) -> None:
-        """Complain about offsets of channels that are not compared."""
+        """Refuse offsets of outputs that are not compared."""
         for channel in self.offsets:
             if channel not in self._channels:
                 repair = near_match(channel, self._channels)
                 raise IdentificationError(f"offsets: \"{channel}\" is not compared in mode '{self.mode}'; {repair}")
 
     def _scale(self, channel: str, measured: Array) -> float:
-        """Size of a measured signal, of which an unknown offset is no part."""
+        """Size of a measured output, without an unknown offset."""
         return float(np.std(measured) if channel in self.offsets else np.sqrt(np.mean(measured**2)))
 
     def _counted(self, experiment: Experiment) -> NDArray[np.bool_]:
-        """Samples that count: not those while the first state settles."""
+        """Samples of an output error that count: not those while the first state settles."""
         settling = 0.0 if self.mode == "restarts" else self._setup.settling
         counted = experiment.time - experiment.time[0] >= settling - 0.5 * experiment.dt
         if settling > 0.0 and counted.sum() < FEWEST_SAMPLES:
@@ -225,7 +225,7 @@ def _compared(model: Model, experiments: Sequence[Experiment], mode: str) -> tup
 
 
 def _check_channels(model: Model, experiments: Sequence[Experiment], channels: Sequence[str]) -> None:
-    """Complain about compared channels that the model does not give or a log does not hold."""
+    """Refuse compared outputs that the model does not give or a log does not hold."""
     for channel in channels:
         if channel not in model.output_channels:
             repair = near_match(channel, model.output_channels)
@@ -239,13 +239,13 @@ def _check_channels(model: Model, experiments: Sequence[Experiment], channels: S
 
 
 def offset_blocks(data: Problem) -> tuple[Block, ...]:
-    """Channels of records that a fit takes to be off by an unknown constant."""
+    """Output channels of records that a fit takes to be off by an unknown constant."""
     plain = untied(data)
     return plain.offset_blocks if isinstance(plain, OutputErrorProblem) else ()
 
 
 def with_offsets(fit: Fit, data: Problem, weights: Array) -> Fit:
-    """Fit with offsets of sensors and their deviations, from the covariance of parameters, first states and constants.
+    """Output-error fit with sensor offsets and their deviations.
 
     Parameters
     ----------
@@ -275,7 +275,7 @@ def with_offsets(fit: Fit, data: Problem, weights: Array) -> Fit:
 
 
 def taken_by_offsets(fit: Fit, data: Problem) -> dict[str, str]:
-    """What to say of parameters whose whole effect is a constant that offsets leave open."""
+    """Message on parameters whose whole effect on outputs is a constant that offsets leave open."""
     blind = [c.names[0] for c in fit.unidentifiable if len(c.names) == 1]
     if not offset_blocks(data) or not blind:
         return {}
@@ -293,7 +293,7 @@ def taken_by_offsets(fit: Fit, data: Problem) -> dict[str, str]:
 
 
 def _with_constants(fit: Fit, data: Problem) -> tuple[Array, Array]:
-    """Residual of a fit with its offsets in it, and its derivative by parameters and first states."""
+    """Output error of a fit with its offsets in it, and derivative by parameters and first states."""
     plain, model = untied(data), fit.model
     whole = tied(plain.with_offsets_left() if isinstance(plain, OutputErrorProblem) else plain, fit.ties)
     given = {"unknown": np.array(list(fit.states.values()))} if fit.states else {}
@@ -301,14 +301,14 @@ def _with_constants(fit: Fit, data: Problem) -> tuple[Array, Array]:
 
 
 def _seen(slopes: Array) -> Array:
-    """Directions (p, k) in which a fit moved: in others it stayed where it was, and offsets are those beside that."""
+    """Directions (p, k) in which an output-error fit moved."""
     lengths = column_lengths(slopes)
     _, values, directions = np.linalg.svd(np.linalg.qr(slopes / lengths, mode="r"))
     return np.asarray(directions[values > RANK_TOLERANCE * values[0]].T / lengths[:, None])
 
 
 def _priors(fit: Fit, columns: int) -> Array:
-    """Rows that stand for what was known of the parameters."""
+    """Prior rows of an output-error fit's parameters."""
     known = [fit.model.parameters[name].uncertainty for name in fit.names]
     rows = np.zeros((len(known), columns))
     if fit.fitting is not None and fit.fitting.priors:

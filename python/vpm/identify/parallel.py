@@ -13,7 +13,7 @@ T = TypeVar("T")
 
 
 def worker_count(workers: int | None) -> int:
-    """Number of threads: as asked, or one per core.
+    """Number of parallel threads: as asked, or one per core.
 
     Raises
     ------
@@ -27,7 +27,7 @@ def worker_count(workers: int | None) -> int:
 
 
 def in_order(jobs: Sequence[Callable[[], T]], workers: int) -> list[T]:
-    """What each job gives, in the order of the jobs whatever the number of ``workers``.
+    """Results of parallel jobs in their order, whatever the number of ``workers``.
 
     The first job that fails raises its error. Ctrl-C stops all of them.
 

@@ -84,7 +84,7 @@ def whole(model: Model) -> Part:
 
 
 def carried(model: Model) -> Part:
-    """The machine without cylinders, supplies and controllers: all that the effort of a motion depends on.
+    """Part of a machine without cylinders, supplies and controllers: the effort of a motion depends on it.
 
     Friction that follows a load needs a drive to be read; where that was a cylinder, an idle one stands there.
     """
@@ -106,7 +106,7 @@ def carried(model: Model) -> Part:
 
 
 def drives_of(model: Model, joints: tuple[str, ...]) -> Drives | None:
-    """Split a machine into what its drives do on the measured ``joints``, which they feel alone.
+    """Parts of a machine that its drives are, each with the measured ``joints`` it feels.
 
     The motor side of a joint that effects have split keeps the measured motion and the drives: these answer as in the
     machine without such effects. None where that has other joints.
@@ -123,13 +123,13 @@ def drives_of(model: Model, joints: tuple[str, ...]) -> Drives | None:
 
 
 def moves_drives(model: Model, name: str) -> bool:
-    """Whether a parameter can change what drives do along a given motion; none of bodies, joints and gravity can."""
+    """Whether a parameter can change the drive parts along a given motion."""
     owner = _owner(name)
     return owner not in model.joints and owner not in model.bodies and owner != "world"
 
 
 def bending(model: Model, joints: tuple[str, ...], *, wound: bool | None = None) -> Bending | None:
-    """Split a machine whose measured ``joints`` are all that it has beside plays; None where nothing bends or flies.
+    """Parts of a machine that bend or fly, if its measured ``joints`` are all others; else None.
 
     Joints that are ``wound`` up count as plays do. By default they do where a joint remembers its way: a motion that is
     worked out carries no memory along, and the measured joint, on the side of the motor, is the one that remembers.
@@ -168,7 +168,7 @@ def _bending(model: Model, plays: Sequence[Effect], aside: Sequence[Effect]) -> 
 
 
 def _without(content: Content, effects: Sequence[Effect], *, rigid: bool = False) -> Model:
-    """The machine of a model file's content without some effects, and with rigid links."""
+    """Part of a machine without some effects, and with rigid links."""
     gone = {(effect.name, effect.at, effect.side) for effect in effects}
     of = itemgetter("type", "at")
     kept = [entry for entry in content.get("effects", ()) if (*of(entry), entry.get("side", "motor")) not in gone]
@@ -179,7 +179,7 @@ def _without(content: Content, effects: Sequence[Effect], *, rigid: bool = False
 
 
 def _groups(model: Model) -> list[tuple[str, ...]]:
-    """Names of drives that belong together: those of one supply with a state, such as a pressure that sags."""
+    """Names of drives in one part: those of one supply with a state, such as a sagging pressure."""
     if model.beams:
         return [tuple(model.actuators)]
     giving_way = {_owner(name) for name in model.internal_names} & set(model.supplies)
@@ -191,7 +191,7 @@ def _groups(model: Model) -> list[tuple[str, ...]]:
 
 
 def _drives(model: Model, machine: Model, group: Sequence[str]) -> Part:
-    """Some of the drives, without laws of joints, controllers and all that belongs to other drives alone."""
+    """Part with some of the drives, without joint laws, controllers and other drives."""
     content = model.to_dict()
     content.pop("controllers", None)
     joints = {joint for name in group for joint in model.joints_of_actuator(name)}
@@ -225,6 +225,6 @@ def _part(model: Model, alone: Model, felt: Collection[str], within: Model | Non
 
 
 def _places(names: Sequence[str], among: Sequence[str]) -> Indices:
-    """Numbers of names in a list; that of an idle drive, which stands nowhere and does nothing, is 0."""
+    """Numbers of names in a part's list; that of an idle drive is 0."""
     places = {name: place for place, name in enumerate(among)}
     return np.array([places.get(name, 0) for name in names], dtype=np.int64)

@@ -62,12 +62,12 @@ class PredictionErrorProblem:
         self.blocks = self._lay_out(model)
 
     def renewed(self, model: Model) -> PredictionErrorProblem:
-        """The problem with the noise and the gains of another model."""
+        """Prediction-error problem with the noise and the gains of another model."""
         given = {"channels": self._channels, "setup": self._setup, "noise": self._stated}
         return PredictionErrorProblem(model, self.experiments, workers=self.workers, **given)  # type: ignore[arg-type]
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
-        """Whitened innovations and their derivative; see :class:`Problem`."""
+        """Prediction errors, whitened, and their derivative; see :class:`Problem`."""
         jobs = [
             partial(self._followed, model, theta, list(columns), *pair)
             for pair in zip(self.records, self.passes, strict=True)
@@ -79,7 +79,7 @@ class PredictionErrorProblem:
         return np.concatenate(residuals), np.concatenate(jacobians)
 
     def log_likelihood(self, residual: Array) -> float:
-        """Logarithm of the probability density of all readings, of the residual that `evaluate` gave."""
+        """Log-likelihood of all readings from the prediction errors of `evaluate`."""
         ends = np.cumsum([one.innovations.size for one in self.passes])[:-1]
         pairs = zip(self.passes, np.split(residual, ends), strict=True)
         return sum(one.log_likelihood(part) for one, part in pairs)
@@ -87,7 +87,7 @@ class PredictionErrorProblem:
     def _followed(
         self, model: Model, theta: Array, columns: list[int], record: Record, gains: Pass
     ) -> tuple[Array, Array]:
-        """Whitened innovations (N, m) of one record, and their derivative (N, m, k)."""
+        """Whitened prediction errors (N, m) of one record, and their derivative (N, m, k)."""
         places = [model.output_channels.index(name) for name in record.channels]
         outputs, slopes = self._observed(model, theta, columns, record, gains)
         innovations = record.readings - outputs[:, places]
@@ -101,7 +101,7 @@ class PredictionErrorProblem:
     def _observed(
         self, model: Model, theta: Array, columns: list[int], record: Record, gains: Pass
     ) -> tuple[Array, Array]:
-        """Outputs (N, outputs) of one record, and the derivative of the measured ones (N, m, k)."""
+        """Predicted outputs (N, outputs) of one record, and derivative of the measured ones (N, m, k)."""
         places = [model.output_channels.index(name) for name in record.channels]
         stepping = (record.dt, self._setup.substeps, self._setup.method(model), columns, self._setup.course)
         table = gains.gains.reshape(len(record.time), -1)

@@ -64,16 +64,16 @@ class Problem(Protocol):
     blocks: tuple[Block, ...]
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
-        """Residual, shape (n,), and its derivative by the named parameters, shape (n, len(columns))."""
+        """Residual of the problem, shape (n,), and its derivative by the named parameters, shape (n, len(columns))."""
 
 
 def segments(problem: Problem) -> list[slice]:
-    """The contiguous pieces of the residual vector."""
+    """Contiguous pieces of a problem's residual vector."""
     return [block.samples for block in problem.blocks]
 
 
 def less_means(values: Array, blocks: Sequence[Block]) -> Array:
-    """Residual (n,) or its derivative (n, columns) less the mean of each of some blocks.
+    """Residual (n,) or derivative (n, columns) of a problem less the mean of each of some blocks.
 
     The least squares beside constants are those of what is left (R. Frisch and F. Waugh, *Econometrica* 1, 1933;
     variable projection: G. Golub and V. Pereyra, *SIAM J. Numerical Analysis* 10, 1973). Values are zero where a
@@ -93,7 +93,7 @@ def less_means(values: Array, blocks: Sequence[Block]) -> Array:
 
 
 def gaps(problem: Problem, residual: Array) -> Gaps:
-    """Root mean square residual of each channel over all records, its share of the measured signal, and the unit."""
+    """Root mean square residual of a problem by channel, its share of the measured signal, and unit."""
     result = {}
     for channel in dict.fromkeys(block.channel for block in problem.blocks):
         mine = [block for block in problem.blocks if block.channel == channel]
@@ -124,7 +124,7 @@ class TiedProblem:
     def evaluate(
         self, model: Model, theta: Array, columns: Sequence[int] = (), unknown: Array | None = None
     ) -> tuple[Array, Array]:
-        """Residual and its derivative, those by the followers added to those by what they follow.
+        """Residual of a tied problem and its derivative; followers count with what they follow.
 
         ``unknown`` are first states, for a `ShootingProblem`; derivatives by them come last.
         """
@@ -152,7 +152,7 @@ def tied(data: Problem, ties: Mapping[str, str]) -> Problem:
 
 
 def check_ties(model: Model, ties: Mapping[str, str], free: Sequence[str]) -> None:
-    """Complain about ties that have no single meaning.
+    """Refuse ties of a problem that have no single meaning.
 
     Parameters
     ----------

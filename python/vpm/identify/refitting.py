@@ -35,7 +35,7 @@ UNKNOWN, UNSETTLED = "unknown", "unsettled"
 
 
 def beside_first_states(model: Model, data: Problem, ties: Mapping[str, str]) -> Problem:
-    """A balance beside the first states of what moves along the motion that nobody measured; others as they are.
+    """Problem to refit beside first states of unmeasured motion; others as they are.
 
     Parameters
     ----------
@@ -51,13 +51,13 @@ def beside_first_states(model: Model, data: Problem, ties: Mapping[str, str]) ->
 
 
 def unknown(data: Problem) -> int:
-    """How many unknown first states a fit is beside."""
+    """Number of unknown first states beside which a fit is refitted."""
     plain = untied(data)
     return plain.unknown if isinstance(plain, BegunAnywhere) else 0
 
 
 def with_first_states(fit: Fit, data: Problem, settled: bool) -> Fit:
-    """Fit with the unknown first states of its records, as its problem knows them."""
+    """Refit with the unknown first states of its records, as its problem knows them."""
     plain = untied(data)
     if not isinstance(plain, BegunAnywhere) or plain.departures is None:
         return fit
@@ -72,7 +72,7 @@ def from_anywhere(
     ties: Mapping[str, str],
     checks: Checks | None = None,
 ) -> tuple[Problem, AnyEstimate, bool]:
-    """The fit beside unknown first states, begun again where they are likeliest at its values, and whether it settled.
+    """Refit beside unknown first states, begun where they are likeliest, and whether it settled.
 
     Where logs suggest them, they are unknown if ``checks`` find them wrong.
     """
@@ -98,7 +98,7 @@ def beside_own(
     onward: Callable[[Model, Problem, AnyEstimate], AnyEstimate],
     ties: Mapping[str, str],
 ) -> tuple[Problem, AnyEstimate, Own | None]:
-    """The fit of an inverse-dynamics residual less that of the model's own simulation, where there is one.
+    """Refit of an inverse-dynamics residual less that of the model's own simulation, if any.
 
     It goes ``onward`` from the fitted model and its estimate.
     What the records do not show a correction would move without end. With it comes the last simulation, or one that is
@@ -124,7 +124,7 @@ def beside_own(
 
 
 def with_noise(fit: Fit, data: Problem, jacobian: Array, lengths: Array, noise: Noise, weights: Array) -> Fit:
-    """Fit with deviations that know how far the noise of the records moves the estimates.
+    """Refit whose deviations contain how far record noise moves the estimates.
 
     Columns of the jacobian are divided by their ``lengths``; rows went into the fit with their ``weights``.
     """
@@ -143,7 +143,7 @@ def with_noise(fit: Fit, data: Problem, jacobian: Array, lengths: Array, noise: 
 
 
 def expected(data: Problem) -> Array | float:
-    """Residual (n,) at the true values that was taken off a problem; 0 without one."""
+    """Expected residual (n,) that was taken off a refitted problem; 0 without one."""
     plain = untied(data)
     return plain.expected if isinstance(plain, InverseDynamicsProblem) else 0.0
 
@@ -151,7 +151,7 @@ def expected(data: Problem) -> Array | float:
 def judged_on(
     fit: Fit, model: Model, experiments: Experiment | Sequence[Experiment], *, cutoff: float | None = None
 ) -> tuple[Gaps, Gaps]:
-    """How far model and validation records are apart before and after a fit, in the fit's own mode.
+    """Errors of model and validation records before and after a refit, in the fit's own mode.
 
     First states that the fit found belong to its own records; here they begin as for any simulation of a log, but for
     those that are known, and for those that nobody measures along a motion: a balance is beside these.

@@ -15,8 +15,8 @@ from scipy.ndimage import maximum_filter1d, uniform_filter1d
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, Motion
-from vpm.identify.along import bends
 from vpm.identify.problem import FEWEST_SAMPLES
+from vpm.identify.response_along_motion import bends
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -63,7 +63,7 @@ class SampleMask:
         return np.asarray(np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0))
 
     def moving(self, model: Model) -> list[Array]:
-        """For each record (n, joints): 1 where a joint moves, 0 where it stands still; all 1 if it mostly stands.
+        """Sample mask of each record (n, joints): 1 where a joint moves, 0 at standstill; all 1 if it mostly stands.
 
         Zero too where the parallel filter settles, and where a piston that moves it touches an end of its stroke.
         """
@@ -91,7 +91,7 @@ class SampleMask:
         return counts
 
     def busy(self, record: int) -> Array:
-        """(n, joints): 0 where a joint is slow in the mean over ``REST_TIME``: noise must not pass for motion."""
+        """Sample mask (n, joints): 0 where a joint is slow in the mean over ``REST_TIME``."""
         m = self.motions[record]
         width = max(1, round(REST_TIME / m.dt))
         mean = np.abs(uniform_filter1d(m.velocity[:, self.places], width, axis=0))
@@ -134,13 +134,13 @@ def _standing(speed: Array, limit: Array, samples: int) -> NDArray[np.bool_]:
 
 
 def _widened(standing: NDArray[np.bool_], m: Motion) -> NDArray[np.bool_]:
-    """Standstill with its surroundings, into which the filters carry what happens in it."""
+    """Sample mask of standstill with its surroundings, into which filters carry it."""
     reach = m.decimation + max(m.decimation, round(1.0 / (m.cutoff * m.dt)))
     return np.asarray(maximum_filter1d(standing.view(np.uint8), 2 * reach + 1, axis=0).astype(np.bool_))
 
 
 def at_stops(model: Model, experiment: Experiment, m: Motion) -> Mapping[str, NDArray[np.bool_]]:
-    """For each hydraulic actuator of ``model``, shape (N,): where its piston is at an end of its stroke or beyond.
+    """Sample mask (N,) for each hydraulic actuator: where its piston is at an end of its stroke or beyond.
 
     Parameters
     ----------
@@ -160,7 +160,7 @@ def at_stops(model: Model, experiment: Experiment, m: Motion) -> Mapping[str, ND
 
 
 def check_left(experiment: Experiment, joint: str, name: str, left: int, fewest: int) -> None:
-    """Complain about a record in which hardly anything happens between the ends of a stroke.
+    """Refuse a record whose sample mask leaves hardly any motion between the ends of a stroke.
 
     Raises
     ------
@@ -174,7 +174,7 @@ def check_left(experiment: Experiment, joint: str, name: str, left: int, fewest:
 
 
 def _lengths(model: Model, experiment: Experiment, m: Motion) -> Iterator[tuple[str, Array, Array]]:
-    """Length or coordinate (N,) that each hydraulic actuator acts on, as measured and as filtered."""
+    """Length or coordinate (N,) of each hydraulic actuator for the sample mask, measured and filtered."""
     cylinders = [name for name in model.actuators if model.actuator_type(name) == "hydraulic"]
     raw = np.column_stack([experiment[f"{joint}.position"] for joint in m.joints]) if cylinders else m.position
     lines = _line_lengths(model, (raw, m.position)) if any(map(model.line_of_actuator, cylinders)) else {}
@@ -189,7 +189,7 @@ def _lengths(model: Model, experiment: Experiment, m: Motion) -> Iterator[tuple[
 
 
 def _line_lengths(model: Model, positions: Sequence[Array]) -> dict[str, list[Array]]:
-    """Length of each line (N,) for several courses of the joints, of the same machine without its drives."""
+    """Length of each line (N,) for the sample mask, for several courses of the joints."""
     content = model.to_dict()
     bare = Model.from_dict({key: content[key] for key in _GEOMETRY if key in content})
     still = np.zeros_like(positions[0])

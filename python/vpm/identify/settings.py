@@ -81,7 +81,7 @@ class Fitting(Storable):
     most_evaluations: int = 60
 
     def __post_init__(self) -> None:
-        """Check the choices."""
+        """Check the settings of a fit."""
         for value, choices, name in ((self.loss, LOSSES, "loss"), (self.noise, NOISES, "noise")):
             if value not in choices:
                 raise IdentificationError(f"{name} is '{value}'; choose one of {', '.join(choices)}")
@@ -107,7 +107,7 @@ class Fitting(Storable):
 
     @property
     def weighs_by_noise(self) -> bool:
-        """Whether residuals have to be in units of their noise: asked for, or needed by the loss or by priors."""
+        """Whether settings need residuals in units of their noise: asked for, or by loss or priors."""
         return self.noise != "spread" or self.loss != "squares" or self.priors
 
 
@@ -142,7 +142,7 @@ class Checks(Storable):
     begun: float = 0.05
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check the settings' numbers."""
         names = ("level", "visible", "far", "clear", "waves", "waves_each", "begun")
         _positive({name: getattr(self, name) for name in names})
 

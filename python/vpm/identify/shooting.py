@@ -39,7 +39,7 @@ class Pieces:
 
     @property
     def rows(self) -> NDArray[np.int64]:
-        """Rows of the log that are compared: each piece without its last sample, which is the next one's first."""
+        """Rows of the log that shooting compares: each piece without its last sample."""
         return np.arange(self.starts[0], self.starts[-1] + self.length)
 
 
@@ -115,27 +115,27 @@ class ShootingProblem(OutputErrorProblem):
 
     @property
     def first_states(self) -> Array:
-        """Fitted states as the log suggests them: records, pieces and states one after the other."""
+        """First states of shooting from the log: records, pieces and states one after the other."""
         return np.concatenate([p.states[:, self._places].ravel() for p in self.pieces])
 
     @property
     def state_sizes(self) -> Array:
-        """Natural size of each of `first_states`."""
+        """Natural size of each of the shooting problem's `first_states`."""
         return np.concatenate([np.tile(self._sizes, len(p.starts)) for p in self.pieces])
 
     @property
     def gap_rows(self) -> int:
-        """Number of rows at the end of the residual that are gaps between pieces."""
+        """Number of rows at the end of the shooting residual that are gaps between pieces."""
         return sum(len(p.starts) - 1 for p in self.pieces) * len(self._gap_columns)
 
     def open_states(self, model: Model) -> tuple[Array, int]:
-        """Sizes of unknown first states: none, because those of all pieces are fitted."""
+        """Sizes of unknown first states in shooting: none, because all pieces' states are fitted."""
         return np.zeros(len(model.state_names)), len(self.experiments)
 
     def evaluate(
         self, model: Model, theta: Array, columns: Sequence[int] = (), unknown: Array | None = None
     ) -> tuple[Array, Array]:
-        """Residual and its derivative by parameters and first states; see :class:`Problem`.
+        """Shooting residual and its derivative by parameters and first states; see :class:`Problem`.
 
         Returns
         -------
@@ -174,7 +174,7 @@ class ShootingProblem(OutputErrorProblem):
     def _record(
         self, model: Model, theta: Array, columns: list[int], number: int, values: Array
     ) -> tuple[Array, Array, Array, Array]:
-        """Residual of the outputs and its derivative, then the gaps and theirs, of one record."""
+        """Shooting residual of one record: outputs and derivative, then gaps and derivative."""
         pieces, experiment = self.pieces[number], self.experiments[number]
         states = pieces.states.copy()
         if len(pieces.starts) == 1:
@@ -211,7 +211,7 @@ class ShootingProblem(OutputErrorProblem):
         return np.concatenate(residuals), np.concatenate(jacobians), gaps, gap_jacobian
 
     def _begun(self, model: Model, experiment: Experiment, theta: Array) -> Array:
-        """First state of a whole record, as the log suggests it at these parameters, or known."""
+        """First state of a whole record in shooting, from the log at these parameters, or known."""
         state = initial_state(model, experiment, theta)
         places, values = list(self._known), list(self._known.values())
         state[places] = values
@@ -222,7 +222,7 @@ class ShootingProblem(OutputErrorProblem):
         return state
 
     def _gaps(self, outputs: Array, by_theta: Array, by_state: Array, pieces: Pieces, p: int) -> tuple[Array, Array]:
-        """End of each piece minus start of the next, in the channels of the fitted states."""
+        """Gaps of shooting: end of each piece minus start of the next, in the fitted states."""
         count, k = len(pieces.starts), len(self.states)
         columns = [column for column, _ in self._gap_columns]
         weights = self._gap_weights * np.sqrt(pieces.length)
@@ -240,7 +240,7 @@ class ShootingProblem(OutputErrorProblem):
     def _outputs(
         self, model: Model, theta: Array, experiment: Experiment, pieces: Pieces, states: Array, columns: list[int]
     ) -> tuple[Array, Array]:
-        """Outputs (pieces, length, channels) and their derivative by ``columns``."""
+        """Outputs of shooting (pieces, length, channels) and their derivative by ``columns``."""
         if len(pieces.starts) == 1:
             run = simulate_arrays(
                 model, experiment, self.mode, theta=theta, columns=columns, setup=self._setup, initial_state=states[0]
@@ -252,7 +252,7 @@ class ShootingProblem(OutputErrorProblem):
         return model.core.restart(theta, states, pieces.starts, pieces.length, inputs, *stepping)
 
     def _state_sizes(self, model: Model) -> Array:
-        """Spread of each fitted state in the log or, where it holds none, in a simulation; 1 if both are constant."""
+        """Spread of each state fitted by shooting, in log or simulation; 1 if constant."""
         sizes = []
         simulated = [
             self._outputs(model, model.theta, e, p, p.states, [])[0]
@@ -272,12 +272,12 @@ class ShootingProblem(OutputErrorProblem):
         return np.array(sizes)
 
     def _rows(self, record: int) -> NDArray[np.int64]:
-        """Rows of one record at which its pieces begin; see `OutputErrorProblem`."""
+        """Rows of one record at which shooting pieces begin; see `OutputErrorProblem`."""
         return self.pieces[record].rows
 
 
 def state_channel(model: Model, name: str) -> str | None:
-    """Output that shows a state: of the same name, or the pressure of a chamber."""
+    """Output that shows a state for shooting: of the same name, or a chamber's pressure."""
     for channel in (name, name.replace(".chamber_", ".pressure_")):
         if channel in model.output_channels:
             return channel
@@ -285,7 +285,7 @@ def state_channel(model: Model, name: str) -> str | None:
 
 
 def _cut(model: Model, experiment: Experiment, seconds: float) -> Pieces:
-    """Pieces of equal length that leave as little of a record as they can."""
+    """Shooting pieces of equal length that leave as little of a record as they can."""
     samples = len(experiment)
     if seconds == 0.0:
         state = initial_state(model, experiment, model.theta)
@@ -302,6 +302,6 @@ def _cut(model: Model, experiment: Experiment, seconds: float) -> Pieces:
 
 
 def _joined(values: Array) -> Array:
-    """Pieces one after the other, each without its last sample but the last piece."""
+    """Shooting pieces joined, each without its last sample but the last piece."""
     pieces = [*values[:-1, :-1], values[-1]]
     return np.concatenate(pieces)

@@ -54,7 +54,7 @@ class Descent:
 
     @property
     def interrupted(self) -> bool:
-        """Whether Ctrl-C ended a descent."""
+        """Whether Ctrl-C ended the solver's descent."""
         return self.ended == "interrupted"
 
 
@@ -85,7 +85,7 @@ def descend(
     tolerance: float,
     most_evaluations: int,
 ) -> Descent:
-    """Least sum of losses inside a box.
+    """Solver: least sum of losses inside a box.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def descend(
 
 
 def _step(at: Point, box: Box, damping: float) -> tuple[Array, float] | None:
-    """Damped step inside the box and the fall of the cost that the linear model predicts; None at a minimum."""
+    """Damped step of the solver inside the box and its predicted fall of cost; None at a minimum."""
     low, high, reach = box.low, box.high, np.broadcast_to(box.reach, at.x.shape)
     gradient = at.jacobian.T @ at.residual
     held = ((at.x <= low) & (gradient > 0.0)) | ((at.x >= high) & (gradient < 0.0))
@@ -150,7 +150,7 @@ def _step(at: Point, box: Box, damping: float) -> tuple[Array, float] | None:
 
 
 def _boxed(matrix: Array, target: Array, low: Array, high: Array) -> Array:
-    """Least-squares solution in a box: what leaves it is put on its edge, and the others are found again."""
+    """Least-squares solution of the solver in a box: coordinates beyond it go to its edge."""
     solution = np.zeros(matrix.shape[1])
     inside = np.ones(solution.size, dtype=np.bool_)
     while np.any(inside):
@@ -165,7 +165,7 @@ def _boxed(matrix: Array, target: Array, low: Array, high: Array) -> Array:
 
 
 def _root(jacobian: Array, residual: Array) -> tuple[Array, Array]:
-    """Square ``R`` with ``R'R = J'J`` and the image ``q`` of the residual with ``R'q = J'r``.
+    """Square root ``R`` for the solver with ``R'R = J'J``, and ``q`` with ``R'q = J'r``.
 
     By orthogonal triangles, which keep all digits; of many columns, whose triangles cost too much, by eigenvectors.
     """

@@ -33,7 +33,7 @@ LEAST_LEFT = 0.1
 
 
 def correlation_length(residual: Array) -> int:
-    """Lag in samples beyond which a residual no longer resembles itself.
+    """Statistic of a residual: lag in samples beyond which it no longer resembles itself.
 
     The first lag at which the autocorrelation stays below the 95 % band of white noise, at most a tenth of the record.
 
@@ -62,7 +62,7 @@ def correlation_length(residual: Array) -> int:
 
 
 def robust_covariance(jacobian: Array, residual: Array, segments: Iterable[slice]) -> Array:
-    """Covariance of a least-squares estimate under autocorrelated, unequal residuals.
+    """Statistical covariance of a least-squares estimate under autocorrelated, unequal residuals.
 
     The sandwich ``B S B`` with ``B = (J'J)^-1`` and ``S`` the Bartlett-weighted sum of the score autocovariances
     (W. Newey and K. West, *Econometrica* 55, 1987), summed over the records of the fit.
@@ -89,7 +89,7 @@ def robust_covariance(jacobian: Array, residual: Array, segments: Iterable[slice
 
 
 def window_sums(score: Array, length: int) -> Array:
-    """Sums over all windows of ``length`` rows, those that hang over the ends too, divided by ``sqrt(length)``.
+    """Sums over windows of ``length`` rows for statistics, also partial ones, over ``sqrt(length)``.
 
     Two rows ``l`` apart share ``length - l`` windows, so the products of these sums carry the Bartlett weights
     ``1 - l/length`` without a loop over lags.
@@ -126,12 +126,12 @@ class Gain:
 
     @property
     def relative(self) -> float:
-        """Share of the residual's mean square that is gone (negative: it grew)."""
+        """Statistic of a gain: share of the residual's mean square that is gone (negative: it grew)."""
         return 1.0 - (self.after / self.before) ** 2 if self.before > 0.0 else 0.0
 
     @property
     def harm(self) -> float:
-        """By how many standard deviations the second residual is the larger one (negative: the smaller one).
+        """Statistic of harm: standard deviations by which the second residual is larger.
 
         Where half of the change is asked for, both are equally large: ``after^2 - before^2 = (1 - 2 weight) change^2``.
         """
@@ -142,7 +142,7 @@ class Gain:
 
 
 def gain(before: Array, after: Array, segments: Sequence[slice]) -> Gain:
-    """Compare two residuals of the same records.
+    """Statistical comparison of two residuals of the same records.
 
     Does the second model know something that the first does not? The first residual is regressed on the change,
     ``before = weight (before - after) + rest``: the test of forecast encompassing (D. Harvey, S. Leybourne, P. Newbold,
@@ -171,7 +171,7 @@ def _rms(values: Array) -> float:
 
 
 def record_groups(blocks: Sequence[Block]) -> list[list[slice]]:
-    """Slices of the residual by record: channels of one record are measured at the same times and disturbed together.
+    """Slices of the residual by record for statistics, since channels of a record are disturbed together.
 
     Channels whose samples are others stand alone.
     """
@@ -182,7 +182,7 @@ def record_groups(blocks: Sequence[Block]) -> list[list[slice]]:
 
 
 def sandwich(jacobian: Array, residual: Array, groups: Sequence[Sequence[slice]], exact: Sequence[int] = ()) -> Array:
-    """Covariance of a least-squares estimate under autocorrelated, unequal residuals, corrected for few samples.
+    """Sandwich statistics: covariance under autocorrelated, unequal residuals, for few samples.
 
     The sandwich ``B S B`` with ``B = (J'J)^-1``. ``S`` is the long-run covariance of the scores: these are freed of
     their autoregression of first order, weighed as by W. Newey and K. West (*Econometrica* 55, 1987) over the lags of
@@ -213,13 +213,13 @@ def sandwich(jacobian: Array, residual: Array, groups: Sequence[Sequence[slice]]
 
 
 def white_sandwich(jacobian: Array, residual: Array) -> Array:
-    """Sandwich covariance for residuals (n,) of unequal size that are independent of each other."""
+    """Sandwich statistics for independent residuals (n,) of unequal size."""
     bread, scores = _bread_and_scores(jacobian, residual)
     return np.asarray(bread @ (scores.T @ scores) @ bread)
 
 
 def _bread_and_scores(jacobian: Array, residual: Array, exact: Sequence[int] = ()) -> tuple[Array, Array]:
-    """``(J'J)^-1``, and the scores with residuals divided by what a fit leaves of each."""
+    """Sandwich statistics' ``(J'J)^-1``, and scores with leverage-corrected residuals."""
     bread = np.asarray(np.linalg.pinv(jacobian.T @ jacobian, hermitian=True), dtype=np.float64)
     left = 1.0 - np.einsum("ij,jk,ik->i", jacobian, bread, jacobian)
     left[list(exact)] = 1.0
@@ -227,7 +227,7 @@ def _bread_and_scores(jacobian: Array, residual: Array, exact: Sequence[int] = (
 
 
 def freedom(jacobian: Array, blocks: Sequence[Block], unknowns: int) -> Array:
-    """Degrees of freedom (p,) of the variance of each estimate, at least 1.
+    """Statistical degrees of freedom (p,) of each estimate's variance, at least 1.
 
     ``(sum q)^2 / sum q^2`` of what stretches of the records share in it, as if all residuals were equally large (F.
     Satterthwaite, *Biometrics* 2, 1946; R. Bell and D. McCaffrey, *Survey Methodology* 28, 2002): few where a few
@@ -259,7 +259,7 @@ def freedom(jacobian: Array, blocks: Sequence[Block], unknowns: int) -> Array:
 
 
 def pooled(variance: Array, freedom: Array, drawn: Array, level: float) -> tuple[Array, Array]:
-    """Variances of estimates and their degrees of freedom, together with how far draws of noise move the estimates.
+    """Pooled statistics: variances and degrees of freedom with how far noise moves the estimates.
 
     The sandwich knows whatever disturbed this one log, the draws how noise is spread over it: where a few moments
     decide, one log holds too few of them to tell how large they might have been. Both are weighed by their degrees of
@@ -282,12 +282,12 @@ def pooled(variance: Array, freedom: Array, drawn: Array, level: float) -> tuple
 
 
 def _lags(samples: float) -> int:
-    """The automatic rule of Newey and West."""
+    """Number of lags for long-run statistics by the automatic rule of Newey and West."""
     return int(np.ceil(4.0 * (samples / 100.0) ** (2.0 / 9.0)))
 
 
 def _long_run(scores: Array) -> Array:
-    """Long-run covariance (p, p), times the number of samples, of scores (n, p)."""
+    """Long-run statistics: covariance (p, p), times the number of samples, of scores (n, p)."""
     n = len(scores)
     if n < 3:
         return np.asarray(scores.T @ scores)
@@ -305,7 +305,7 @@ def _long_run(scores: Array) -> Array:
 
 
 def autoregression(residual: Array, records: Sequence[slice]) -> Array:
-    """Coefficients ``1, a_1, ... a_p`` of the autoregression of least BIC."""
+    """Statistics of the autoregression of least BIC: coefficients ``1, a_1, ... a_p``."""
     count = residual.size
     most = max(0, min(MOST_ORDER, min(record.stop - record.start for record in records) // 10))
     lags = np.zeros(most + 1)

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import DivergedError
-from vpm.identify.along import bends, has_hidden, has_own_drives, shows_drives_alone
 from vpm.identify.estimation import Estimate, Worth, estimate
 from vpm.identify.inverse_dynamics import InverseDynamicsProblem
+from vpm.identify.response_along_motion import bends, has_hidden, has_own_drives, shows_drives_alone
 from vpm.model import Model
 
 Array = NDArray[np.float64]
@@ -35,17 +35,17 @@ class Tangent:
         self.data, self.origin, self.blocks = data, origin, data.blocks
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
-        """Residual and derivative of the linearised problem; see `vpm.identify.problem.Problem`."""
+        """Residual and derivative on the tangent; see `vpm.identify.problem.Problem`."""
         return self.data.evaluate(model, theta, columns, self.origin)
 
 
 def has_tangent(model: Model, data: InverseDynamicsProblem) -> bool:
-    """Whether along the motion links bend, or several drives have states, and nothing else is worked out there."""
+    """Whether a fit on the tangent is possible: links bend, or several drives have states."""
     return drives_on_tangent(model, data) or data.bending(model) is not None
 
 
 def drives_on_tangent(model: Model, data: InverseDynamicsProblem) -> bool:
-    """Whether several drives with states answer to the motion; a single one is as soon simulated."""
+    """Whether several drives with states are taken on the tangent; a single one is as soon simulated."""
     if not has_own_drives(model) or any(has_hidden(model, m.joints) for m in data.motions):
         return False
     return shows_drives_alone(model, data.shown) and len(model.actuators) > 1
@@ -106,12 +106,12 @@ def estimate_on_tangent(
 
 
 def _on_the_way(start: Array, end: Array, share: float) -> Array:
-    """Values after a share of the way, never beyond its ends: a rounded sum may pass a bound at which one lies."""
+    """Values on the way of a tangent fit, never beyond its ends: rounding must not pass a bound."""
     return np.clip(start + share * (end - start), np.minimum(start, end), np.maximum(start, end))
 
 
 def _residual(data: InverseDynamicsProblem, model: Model) -> Array:
-    """Infinite where the machine cannot follow the motion."""
+    """Residual for a tangent fit; infinite where the machine cannot follow the motion."""
     try:
         return data.evaluate(model, model.theta)[0]
     except (DivergedError, ValueError):

@@ -67,7 +67,7 @@ class Whiteness(Storable):
 
 
 def ljung_box(residual: Array, lags: int) -> float:
-    """Probability that white noise has autocorrelations as large as a residual.
+    """Whiteness test: probability of autocorrelations as large in white noise.
 
     ``Q = n (n + 2) sum_k r_k^2 / (n - k)`` is chi-square with ``lags`` degrees of freedom for white noise (G. Ljung and
     G. Box, *Biometrika* 65, 1978).
@@ -88,7 +88,7 @@ def ljung_box(residual: Array, lags: int) -> float:
 
 
 def explained_by(residual: Array, fitted: Array, added: Array, counts: NDArray[np.bool_]) -> tuple[float, float]:
-    """Share of a residual that added regressors explain, and the probability that noise is explained as well.
+    """Whiteness by added regressors: the share of a residual that they explain, and its probability.
 
     Residual and regressors pass the whitening filter of the residual's own autoregression before they are compared.
 
@@ -127,19 +127,19 @@ def explained_by(residual: Array, fitted: Array, added: Array, counts: NDArray[n
 
 
 def explained_size(share: float, residual: Array, weight: float) -> float:
-    """Root mean square of what explains a share of a residual (n,), before it was weighed; nothing without samples."""
+    """Size of what regressors explain in a whiteness test of a residual (n,); nothing without samples."""
     return float(np.sqrt(share * np.mean(residual**2))) / weight if residual.size else 0.0
 
 
 def _left(target: Array, columns: Array) -> tuple[float, Array]:
-    """Sum of squares that columns leave of a target, and their weights."""
+    """Sum of squares that columns leave of a target in a whiteness test, and their weights."""
     weights = np.linalg.lstsq(columns, target, rcond=None)[0]
     rest = target - columns @ weights
     return float(rest @ rest), np.asarray(weights, dtype=np.float64)
 
 
 def basis(columns: Array, others: Array | None = None) -> Array:
-    """Orthonormal basis of what columns add to an orthonormal basis of others."""
+    """Orthonormal basis for a whiteness test of what columns add to another basis."""
     scaled = columns / column_lengths(columns)
     if others is not None:
         scaled = scaled - others @ (others.T @ scaled)
@@ -153,26 +153,26 @@ def default_lags(samples: int) -> int:
 
 
 def powers(signal: Array) -> Array:
-    """A constant, a signal (n,), its rounded sign and its square with the sign, as friction has them: (n, 4)."""
+    """Regressors (n, 4) of a whiteness test: a constant, a signal, its rounded sign and its square with the sign."""
     scaled = signal / (float(np.sqrt(np.mean(signal**2))) or 1.0)
     return np.column_stack([np.ones_like(scaled), scaled, np.tanh(scaled / SHARPNESS), scaled * np.abs(scaled)])
 
 
 def waves(signal: Array, most: int, each: int) -> list[Array]:
-    """Sines and cosines of a signal (n,), whole waves over its range, in groups (n, 2 each)."""
+    """Waves for a whiteness test: sines and cosines of a signal (n,) in groups (n, 2 each)."""
     angle = 2.0 * np.pi * (signal - signal.min()) / (float(np.ptp(signal)) or 1.0)
     groups = [np.arange(first, first + each) for first in range(1, most + 1, each)]
     return [np.column_stack([turn(np.outer(angle, group)) for turn in (np.sin, np.cos)]) for group in groups]
 
 
 def shifted(signal: Array) -> Array:
-    """A signal (n,) up to `REACH` samples earlier and later, its ends held: (n, 2 REACH + 1)."""
+    """Signal (n,) for a whiteness test up to `REACH` samples earlier and later: (n, 2 REACH + 1)."""
     padded = np.pad(signal, REACH, mode="edge")
     return np.column_stack([padded[k : k + signal.size] for k in range(2 * REACH + 1)])
 
 
 def heard(late: Array, residual: Array, fitted: Array, counts: NDArray[np.bool_], clear: float) -> Array:
-    """Directions of a signal at other times in which it stands clear of the noise, beside what was fitted.
+    """Directions of shifted signals clear of noise in a whiteness test, beside what was fitted.
 
     An effort has in it what the residual is made of: noise of encoders, and all that a drive did without being told,
     to which its controller answers. It is the sum of forces that were fitted and of that. Where the rest of it is

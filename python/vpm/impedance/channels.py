@@ -108,7 +108,7 @@ def _numbers(title: str, name: str, given: ArrayLike) -> Array:
 
 
 def check_sense(sense: str) -> float:
-    """Factor that makes a force an applied one.
+    """Check the sense of a force channel: the factor that makes it an applied one.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def check_sense(sense: str) -> float:
 
 
 def check_moves(columns: Columns, displacement: str) -> None:
-    """Refuse a displacement that stands still.
+    """Refuse a displacement channel that stands still.
 
     Raises
     ------

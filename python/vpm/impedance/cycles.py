@@ -44,7 +44,7 @@ def parts(time: Array, rate: float, cycles: int) -> list[NDArray[np.bool_]]:
 
 
 def visible(series: Series, size: int) -> int:
-    """Highest harmonic of the motion that stands out of its noise, by four standard deviations."""
+    """Highest harmonic of the cycles that stands out of its noise, by four standard deviations."""
     limit = max(4.0 * series.noise * np.sqrt(2.0 / size), 1e-9 * float(np.abs(series.amplitudes).max()))
     out = np.flatnonzero(np.abs(series.amplitudes) > limit)
     return int(out[-1]) + 1 if out.size else 1
@@ -66,7 +66,7 @@ class Sums:
         self.damping = self.energy / self.viscous
 
     def spread(self, noise_x: float, noise_f: float) -> tuple[float, float, float]:
-        """Standard deviations of stiffness, damping and energy by white noise, to first order."""
+        """Standard deviations over cycles of stiffness, damping and energy by white noise, to first order."""
         squares = np.abs(self.x) ** 2
         reaction = self.stiffness**2 + (self.orders * self.omega * self.damping) ** 2
         each = 2.0 / self.size * squares * (noise_f**2 + reaction * noise_x**2)

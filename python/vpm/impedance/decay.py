@@ -138,7 +138,7 @@ def identify_decay(record: RecordLike, displacement: str, mass: float) -> Decay:
 
 
 def _motions(time: Array, rate: float, ratio: float) -> Array:
-    """Rest, and two free motions: shape (N, 3)."""
+    """Rest, and two free decaying motions: shape (N, 3)."""
     inner = rate * np.sqrt(abs(1.0 - ratio**2))
     if ratio < 1.0:
         fade = np.exp(-ratio * rate * time)
@@ -179,17 +179,17 @@ class LogarithmicDecrement(Result):
     strokes: int
 
     def stiffness(self, mass: float) -> float:
-        """``m omega_n^2``, N/m, with the natural frequency of the undamped oscillation."""
+        """Stiffness from a decay, ``m omega_n^2``, N/m, with the undamped natural frequency."""
         natural = 2.0 * np.pi * self.frequency / np.sqrt(1.0 - self.damping_ratio**2)
         return float(mass * natural**2)
 
     def damping(self, mass: float) -> float:
-        """Damping of a fading oscillation, ``2 m f delta``, N s/m."""
+        """Damping from a decay, ``2 m f delta``, N s/m."""
         return 2.0 * mass * self.frequency * self.decrement
 
 
 def logarithmic_decrement(record: RecordLike, displacement: str) -> LogarithmicDecrement:
-    """Decrement from the strokes between neighbouring extremes, which need no rest position.
+    """Logarithmic decrement of a decay, from strokes between neighbouring extremes.
 
     Parameters
     ----------
@@ -234,7 +234,7 @@ def logarithmic_decrement(record: RecordLike, displacement: str) -> LogarithmicD
 
 
 def _extremes(time: Array, x: Array, least: float) -> tuple[Array, Array]:
-    """Extremes inside the record whose strokes exceed `least`, each by a parabola through its neighbourhood."""
+    """Extremes of a decay whose strokes exceed `least`, each by a parabola."""
     turns = [0]
     heading = 0.0
     for at in range(1, x.size):
@@ -250,7 +250,7 @@ def _extremes(time: Array, x: Array, least: float) -> tuple[Array, Array]:
 
 
 def _vertex(time: Array, x: Array, at: int, reach: int) -> tuple[float, float]:
-    """Vertex of the parabola that fits the samples about one of them."""
+    """Vertex of the parabola that fits a decay's samples about one of them."""
     part = slice(max(at - reach, 0), at + reach + 1)
     t = time[part] - time[at]
     if t.size < 3:

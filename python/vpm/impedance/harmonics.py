@@ -40,7 +40,7 @@ def basis(time: Array, frequency: float, count: int) -> Array:
 
 
 def fourier(time: Array, values: Array, frequency: float, count: int, drift: int) -> Series:
-    """Fit a Fourier series beside a polynomial drift.
+    """Harmonics of a periodic channel: a Fourier series fitted beside a polynomial drift.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def fourier(time: Array, values: Array, frequency: float, count: int, drift: int
 
 
 def evaluate(amplitudes: Complex, phase: Array) -> Array:
-    """``Re sum_n Y_n exp(i n phase)``, shape of `phase`."""
+    """Sum of harmonics, ``Re sum_n Y_n exp(i n phase)``, shape of `phase`."""
     orders = np.arange(1, amplitudes.size + 1)
     return np.asarray((np.exp(1j * np.outer(phase, orders)) @ amplitudes).real)
 

@@ -98,17 +98,17 @@ class Loop(Result):
 
     @property
     def loss_factor(self) -> float:
-        """``E / (pi k sum n |X_n|^2)``: the share of structural damping, 1."""
+        """Loss factor of a hysteresis loop, ``E / (pi k sum n |X_n|^2)``: structural damping, 1."""
         return self.energy / (self.stiffness * self.structural_measure)
 
     @property
     def coulomb_force(self) -> float:
-        """``E / oint |dx|``: dry friction that loses as much, N."""
+        """Coulomb force of a hysteresis loop, ``E / oint |dx|``: dry friction that loses as much, N."""
         return self.energy / self.path
 
     @property
     def skew_bias(self) -> float:
-        """Error of the damping for each second by which the force is recorded late, (N s/m)/s.
+        """Bias of a hysteresis loop's damping per second of force delay, (N s/m)/s.
 
         ``omega c' = omega c cos(omega d) - k sin(omega d)``, so ``-k`` for delays that are short beside a cycle.
         """
@@ -156,7 +156,7 @@ def identify_loop(
     delay_std: float = 0.0,
     drift: int = 1,
 ) -> Loop:
-    """Stiffness, damping and lost energy of a periodic test.
+    """Identify a hysteresis loop: stiffness, damping and lost energy of a periodic test.
 
     Samples need no even steps, and a hundredth of the last cycle may be missing. Independent white noise on both
     channels biases neither energy nor slope. A force that is recorded late by d looks like damping that is smaller by

@@ -69,7 +69,7 @@ class LoopLike(Protocol):
 
 
 def loop_notes(loop: LoopLike, displacement: Array, step: float, delay_std: float, explained: float) -> tuple[str, ...]:
-    """What to know before the numbers are trusted.
+    """Notes on a hysteresis loop, to know before its numbers are trusted.
 
     Parameters
     ----------
@@ -127,7 +127,7 @@ def loop_notes(loop: LoopLike, displacement: Array, step: float, delay_std: floa
 
 
 def _bend(loop: LoopLike) -> float:
-    """Amplitude of the force that spring and damper leave, as a share of the whole, without what noise makes."""
+    """Bent part of the hysteresis force that spring and damper leave, as a share, for the notes."""
     whole, moved = loop.force_harmonics, loop.displacement_harmonics
     orders = np.arange(1, moved.size + 1)
     left = whole.copy()

@@ -25,7 +25,7 @@ OFF = 0.1
 
 
 def stop_factor(quarters: int) -> float:
-    """``E dt / (c dl^2)`` of a sine that lasts some quarters of its cycle: pi^2/8 for 1, pi^2/2 for 2, 2 pi^2 for 4.
+    """Impact factor ``E dt / (c dl^2)`` of a sine over quarters of its cycle: pi^2/8 for 1, pi^2/2 for 2, 2 pi^2 for 4.
 
     Parameters
     ----------
@@ -78,7 +78,7 @@ def stop_damping(
     stiffness: float = 0.0,
     gravity: float = 0.0,
 ) -> Stop:
-    """Damping that takes the energy of a mass in a stop, or in stop and rebound.
+    """Damping that takes the energy of a mass in an impact, or in impact and rebound.
 
     In a stop a spring beside the damper keeps ``k dl^2 / 2``, which counts as loss if `stiffness` is left at zero; in
     stop and rebound it gives it back. The motion is taken as a sine, which it is for small damping alone:
@@ -162,12 +162,12 @@ class ImpulseBalance(Result):
 
     @property
     def gap(self) -> float:
-        """``int F dt - m g dt - m dv``: what the records disagree by, N s."""
+        """Impulse error of an impact, ``int F dt - m g dt - m dv``, N s."""
         return self.impulse - self.weight - self.momentum
 
     @property
     def mean_force(self) -> float:
-        """``int F dt / dt``, N."""
+        """Mean force of an impact, ``int F dt / dt``, N."""
         return self.impulse / self.duration
 
 
@@ -180,7 +180,7 @@ def impulse_balance(
     *,
     gravity: float = 9.81,
 ) -> ImpulseBalance:
-    """Compare the impulse of a ground force with weight and momentum: a check of force, mass and speeds.
+    """Impulse balance of an impact: ground force against weight and momentum.
 
     Parameters
     ----------

@@ -134,7 +134,7 @@ def identify_landing(
 
 
 def _equations(time: Array, x: Array, f: Array, terms: int) -> tuple[Array, Array, Array]:
-    """Matrix (J, 3) for F0, k, c, right side (J,), and the share of the noise in the normal matrix (3, 3)."""
+    """Equations of a landing: matrix (J, 3) for F0, k, c, right side (J,), and noise shares (3, 3)."""
     span, dt = float(time[-1] - time[0]), float(time[1] - time[0])
     orders = np.pi * np.arange(1, terms + 1)[:, None]
     s = (time - time[0]) / span

@@ -124,14 +124,14 @@ def identify_loss_law(loops: Sequence[Loop]) -> LossLaw:
 
 
 def _largest_square(free: int) -> float:
-    """Sum of squares of `free` normal values that chance exceeds once in a hundred times."""
+    """Sum of squares of `free` normal values that chance exceeds once in a hundred loss tests."""
     from scipy.special import chdtri
 
     return float(chdtri(free, REFUSAL))
 
 
 def _power_law(loops: Sequence[Loop], energy: Array) -> tuple[tuple[float, float], float]:
-    """Exponents of amplitude and frequency, and the scatter about that power law."""
+    """Power law of the loss in amplitude and frequency: exponents, and the scatter about it."""
     columns = [np.log([loop.amplitude for loop in loops]), np.log([loop.frequency for loop in loops])]
     varied = [bool(np.ptp(column) > np.log(1.05)) for column in columns]
     used = [column for column, use in zip(columns, varied, strict=True) if use]
@@ -149,7 +149,7 @@ def _power_law(loops: Sequence[Loop], energy: Array) -> tuple[tuple[float, float
 
 
 def _shares(energy: Array, measures: Mapping[str, Array]) -> dict[str, float]:
-    """Share of each law in the energy of all tests, each weighted alike."""
+    """Share of each law in the energy loss of all tests, each weighted alike."""
     from scipy.optimize import nnls
 
     matrix = np.column_stack([measure / energy for measure in measures.values()])

@@ -23,11 +23,11 @@ class Estimate(Protocol):
 
     @property
     def stiffness(self) -> float:
-        """Stiffness that a test shows, N/m."""
+        """Stiffness that one repeated test shows, N/m."""
 
     @property
     def damping(self) -> float:
-        """Damping that a test shows, N s/m."""
+        """Damping that one repeated test shows, N s/m."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -62,7 +62,7 @@ class Repeated(Result):
 
     @property
     def relative_std(self) -> float:
-        """``std / |mean|``, the sigma of table 5.2."""
+        """Relative deviation of repeated tests, ``std / |mean|``, the sigma of table 5.2."""
         return self.std / abs(self.mean)
 
     @property
@@ -219,7 +219,7 @@ class ImpedanceTable(Result):
 
 
 def _cells(one: Repeated) -> str:
-    """Mean, half of the interval and relative standard deviation."""
+    """Cells for repeated tests: mean, half of the interval and relative standard deviation."""
     return f"{one.mean:12.4g}{f'+- {one.half_width:.2g}':>14s}{100.0 * one.relative_std:6.2g} %"
 
 

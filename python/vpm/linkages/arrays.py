@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 
 
 def rowwise(question: Callable[..., Array], *tables: ArrayLike, what: str) -> Array:
-    """Ask the core about rows of two numbers; a single row gives a single answer.
+    """Ask the core about arrays of two numbers a row; a single row gives a single answer.
 
     Parameters
     ----------

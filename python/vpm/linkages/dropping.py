@@ -56,15 +56,15 @@ class DropLimit(Result):
 
     @property
     def unit(self) -> str:
-        """Unit of the limit of a motion, rad/s or rad/s^2."""
+        """Unit of the motion limit for dropping a term, rad/s or rad/s^2."""
         return "rad/s" if self.term == "velocity" else "rad/s^2"
 
     def share_of_workspace(self, motion: float) -> float:
-        """Share of the configurations in which the term may be left out up to this rate or acceleration."""
+        """Share of the workspace in which a term may be dropped up to this rate or acceleration."""
         return float(np.mean(self.limits >= motion))
 
     def __str__(self) -> str:
-        """One sentence."""
+        """Sentence on dropping a term."""
         return (
             f"the {self.term} terms may be left out up to {self.limit:.3g} {self.unit} with at most "
             f"{100 * self.tolerance:g} % of the effort missing anywhere; up to {2 * self.limit:.3g} {self.unit} in "
@@ -79,7 +79,7 @@ class DropLimit(Result):
         return {"q1_rad": one.ravel(), "q2_rad": two.ravel(), "limit": self.limits.ravel()}
 
     def plot(self) -> Figure:
-        """Map of the limits over the joint angles. Needs the extra ``plot``."""
+        """Map of the limits for dropping a term over the joint angles. Needs the extra ``plot``."""
         from vpm.plot.linkages import plot_shares
 
         worst = np.clip(self.limit / self.limits, 0.0, 1.0)
@@ -96,7 +96,7 @@ def drop_limit(
     first: ArrayLike | None = None,
     second: ArrayLike | None = None,
 ) -> DropLimit:
-    """Find the motion up to which a term may be left out of a leg's dynamics.
+    """Limit of the motion up to which dropping a term of a leg's dynamics is allowed.
 
     The share of a term grows with the motion that makes it, all else the same: the velocity terms with the square of
     the rates, the inertia terms with the accelerations. So each configuration has one limit.
@@ -145,7 +145,7 @@ def drop_limit(
 
 
 def _crossings(places: Array, values: Array, level: float) -> Array:
-    """Where columns of values that grow first reach a level; infinite where they do not, by linear interpolation.
+    """Crossings of growing columns with a level, beyond which no term is dropped; infinite without one.
 
     A column that begins above the level crosses it where it begins.
     """

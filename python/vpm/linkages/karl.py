@@ -97,7 +97,7 @@ class Karl:
         return f"Karl({self.name!r}, medial={g.medial:.6g} m, distal={g.distal:.6g} m, rods={g.rods} m)"
 
     def direct(self, strokes: ArrayLike) -> KarlPoses:
-        """All four assembly modes at two strokes (m). Source: D'Imperio 2016, eqs 2.61 to 2.71.
+        """All four assembly modes of KARL at two strokes (m). Source: D'Imperio 2016, eqs 2.61 to 2.71.
 
         Parameters
         ----------
@@ -118,7 +118,7 @@ class Karl:
         return self._poses(angles, np.tile(pair, (4, 1)))
 
     def inverse(self, target: ArrayLike) -> KarlPoses:
-        """All eight configurations that put the end point C at a target (m).
+        """All eight configurations of KARL that put the end point C at a target (m).
 
         Parameters
         ----------
@@ -140,7 +140,7 @@ class Karl:
         return self._poses(rows[:, :2], rows[:, 2:])
 
     def end_point(self, angles: ArrayLike) -> Array:
-        """The end point C (m) at joint angles (rad). Source: D'Imperio 2016, eq 2.72.
+        """End point C (m) of KARL at joint angles (rad). Source: D'Imperio 2016, eq 2.72.
 
         Parameters
         ----------
@@ -153,7 +153,7 @@ class Karl:
         return self._rows(self._core.end_point, angles)
 
     def transmission(self, angles: ArrayLike, strokes: ArrayLike) -> Array:
-        """Lambda's diagonal (rad/m), infinite at a direct singularity: ``q_dot = Lambda stroke_dot``.
+        """Diagonal of KARL's Lambda (rad/m), infinite at a direct singularity: ``q_dot = Lambda stroke_dot``.
 
         Source: D'Imperio 2016, eqs 2.82 to 2.84.
 
@@ -169,7 +169,7 @@ class Karl:
         return self._rows(self._core.transmission, angles, strokes)
 
     def determinants(self, angles: ArrayLike, strokes: ArrayLike) -> Array:
-        """Determinants of Psi and Omega (m^2), zero at a direct singularity. Source: D'Imperio 2016, eqs 2.77, 2.79.
+        """Determinants of KARL's Psi and Omega (m^2), zero at a direct singularity. Source: D'Imperio 2016, 2.77, 2.79.
 
         Parameters
         ----------
@@ -182,7 +182,7 @@ class Karl:
         return self._rows(self._core.determinants, angles, strokes)
 
     def torques(self, angles: ArrayLike, strokes: ArrayLike, forces: ArrayLike) -> Array:
-        """Joint torques (N m) of actuator forces (N, positive along the stroke): ``tau = Lambda^-T F``.
+        """Joint torques (N m) of KARL's actuator forces (N, positive along the stroke): ``tau = Lambda^-T F``.
 
         Parameters
         ----------
@@ -195,7 +195,7 @@ class Karl:
         return self._rows(self._core.torques, angles, strokes, forces)
 
     def forces(self, angles: ArrayLike, strokes: ArrayLike, torques: ArrayLike) -> Array:
-        """Actuator forces (N) that balance joint torques (N m): ``F = Lambda^T tau``.
+        """Actuator forces (N) of KARL that balance joint torques (N m): ``F = Lambda^T tau``.
 
         Parameters
         ----------
@@ -208,7 +208,7 @@ class Karl:
         return np.asarray(self.transmission(angles, strokes) * np.asarray(torques, dtype=float))
 
     def singularities(self) -> KarlSingularities:
-        """All singular strokes of both actuators, direct ones and inverse ones.
+        """All singular strokes of both KARL actuators, direct ones and inverse ones.
 
         A direct singularity is a zero of the derivative of the constraint by the angle, an inverse one by the stroke.
         The second derivative by the same variable never vanishes there, so the other variable turns back: a boundary,
@@ -230,7 +230,7 @@ class Karl:
         return KarlSingularities(actuators, kinds, forms, where, np.array(strokes), np.array(angles))
 
     def span(self, actuator: int = 0, mode: int = 1) -> float:
-        """Turn of a joint (rad) between its two singular strokes on the positive side, in one assembly mode.
+        """Turn of a KARL joint (rad) between its two singular strokes on the positive side, in one mode.
 
         Parameters
         ----------
@@ -241,7 +241,7 @@ class Karl:
         return self._core.span(actuator, float(mode))
 
     def resultant(self, actuator: int, stroke: float) -> Array:
-        """Coefficients (5,) in s = sin q, lowest power first, of the polynomial whose zeros are the assembly modes.
+        """Resultant of KARL in s = sin q, coefficients (5,), lowest power first; its zeros are assembly modes.
 
         Source: D'Imperio 2016, eq 2.66. Its degree is 2.
 
@@ -256,7 +256,7 @@ class Karl:
     def workspace(
         self, first: ArrayLike | None = None, second: ArrayLike | None = None, mode: int = 0
     ) -> KarlWorkspace:
-        """The end point over a grid of strokes.
+        """Workspace of KARL: the end point over a grid of strokes.
 
         Parameters
         ----------
@@ -287,7 +287,7 @@ class Karl:
 
     @property
     def summary(self) -> tuple[str, ...]:
-        """Singular strokes, one sentence each; what can be assembled at some strokes only has some."""
+        """Sentences on KARL's singular strokes, and on what some strokes only can be assembled."""
         s = self.singularities()
         apart = (
             f"actuator {number + 1}: no stroke assembles it; its rod is too short"
@@ -303,7 +303,7 @@ class Karl:
         return (*apart, *singular)
 
     def plot(self) -> Figure:
-        """Reach, joint angles and transmission between the singular strokes; see `KarlWorkspace.plot`.
+        """Plot KARL's reach, joint angles and transmission; see `KarlWorkspace.plot`.
 
         Returns
         -------

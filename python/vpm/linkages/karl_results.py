@@ -42,7 +42,7 @@ class KarlPoses(Result):
     elbows: Array
 
     def __len__(self) -> int:
-        """Return the number of configurations."""
+        """Number of configurations in KARL's result."""
         return len(self.angles)
 
     def _frame_columns(self) -> Mapping[str, object]:
@@ -54,7 +54,7 @@ class KarlPoses(Result):
         return {"configurations": len(self), "angles": self.angles}
 
     def plot(self) -> Figure:
-        """Both bodies in every configuration.
+        """Plot both bodies of KARL in every configuration.
 
         Returns
         -------
@@ -93,7 +93,7 @@ class KarlSingularities(Result):
     angles: Array
 
     def of(self, actuator: int, kind: str = "direct", arrangement: str | None = None) -> Array:
-        """Strokes of one actuator, of one kind and arrangement.
+        """Singular strokes of one KARL actuator, of one kind and arrangement.
 
         Parameters
         ----------
@@ -144,7 +144,7 @@ class KarlWorkspace(Result):
 
     @property
     def share(self) -> float:
-        """Part of the grid that can be assembled."""
+        """Share of KARL's grid that can be assembled."""
         return float(np.isfinite(self.end_points[..., 0]).mean())
 
     def _frame_columns(self) -> Mapping[str, object]:
@@ -157,7 +157,7 @@ class KarlWorkspace(Result):
         return {"mode": self.mode, "grid": f"{self.first.size} x {self.second.size}", "assembled": self.share}
 
     def plot(self) -> Figure:
-        """Reach of the end point, and how joint angles and transmission follow the strokes up to the singular ones.
+        """Plot KARL's workspace: reach, joint angles and transmission up to the singular strokes.
 
         Returns
         -------

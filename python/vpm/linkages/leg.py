@@ -77,24 +77,24 @@ class Leg:
         return f"Leg({self.name!r}, thigh={p.upper.length:g} m, shank={p.lower.length:g} m)"
 
     def strokes(self, angles: ArrayLike) -> Array:
-        """Lengths (m) of hip and knee cylinder at joint angles (rad), shape (2,) or (N, 2).
+        """Lengths (m) of the leg's hip and knee cylinder at joint angles (rad), shape (2,) or (N, 2).
 
         Source: D'Imperio 2016, eqs 2.88 and 2.90.
         """
         return self._rows(self._core.strokes, angles)
 
     def levers(self, angles: ArrayLike) -> Array:
-        """Lever arms ``ds1/dq1, ds2/dq2`` (m/rad) of the cylinders at joint angles (rad), shape (2,) or (N, 2)."""
+        """Lever arms ``ds1/dq1, ds2/dq2`` (m/rad) of the leg's cylinders at joint angles (rad), (2,) or (N, 2)."""
         return self._rows(self._core.levers, angles)
 
     def points(self, angles: ArrayLike) -> Array:
-        """Points (m), shape (7, 2) or (N, 7, 2): hip, knee, foot, bases of hip and knee cylinder, their tips."""
+        """Points of the leg (m), (7, 2) or (N, 7, 2): hip, knee, foot, cylinder bases and tips."""
         return self._rows(self._core.points, angles)
 
     def stroke_table(
         self, first: tuple[float, float] | None = None, second: tuple[float, float] | None = None, count: int = 1001
     ) -> LegStrokes:
-        """Strokes and lever arms over a range of each joint.
+        """Strokes and lever arms of the leg over a range of each joint.
 
         Parameters
         ----------
@@ -115,7 +115,7 @@ class Leg:
     def terms(
         self, angles: ArrayLike, rates: ArrayLike, derivation: Literal["virtual_work", "lagrange"] = "virtual_work"
     ) -> LegTerms:
-        """Mass matrix, velocity terms and weight at joint angles (rad) and rates (rad/s).
+        """Mass matrix, velocity terms and weight of the leg at joint angles (rad) and rates (rad/s).
 
         Parameters
         ----------
@@ -163,7 +163,7 @@ class Leg:
     def torques(
         self, angles: ArrayLike, rates: ArrayLike, accelerations: ArrayLike, derivation: Derivation = "virtual_work"
     ) -> Array:
-        """Joint torques (N m) that a motion needs, by one of three derivations that share only the points.
+        """Joint torques (N m) that a motion of the leg needs, by one of three derivations.
 
         Parameters
         ----------
@@ -180,18 +180,18 @@ class Leg:
         return self._rows(lambda q, v, a: self.terms(q, v, derivation).torques(a), angles, rates, accelerations)
 
     def regressor(self, angles: ArrayLike, rates: ArrayLike, accelerations: ArrayLike) -> Array:
-        """Derivative of the joint torques by the parameters of `INERTIAL_NAMES`, shape (2, 11) or (N, 2, 11).
+        """Derivative of the leg's joint torques by `INERTIAL_NAMES`, shape (2, 11) or (N, 2, 11).
 
         Torques are this times `inertial_values`. Source: D'Imperio 2016, section 5.1.1.
         """
         return leg_regressor(self, angles, rates, accelerations)
 
     def accelerations(self, angles: ArrayLike, rates: ArrayLike, torques: ArrayLike) -> Array:
-        """Joint accelerations (rad/s^2) under joint torques (N m), shape (2,) or (N, 2)."""
+        """Joint accelerations (rad/s^2) of the leg under joint torques (N m), shape (2,) or (N, 2)."""
         return self._rows(self._core.accelerations, angles, rates, torques)
 
     def cylinder_forces(self, angles: ArrayLike, torques: ArrayLike) -> Array:
-        """Cylinder forces (N) that give joint torques (N m), ``F = tau / (ds/dq)``, shape (2,) or (N, 2).
+        """Cylinder forces (N) of the leg that give joint torques (N m), ``F = tau / (ds/dq)``.
 
         Raises
         ------
@@ -210,7 +210,7 @@ class Leg:
         return forces
 
     def joint_torques(self, angles: ArrayLike, forces: ArrayLike) -> Array:
-        """Joint torques (N m) of cylinder forces (N), ``tau = F ds/dq``, shape (2,) or (N, 2)."""
+        """Joint torques (N m) of the leg's cylinder forces (N), ``tau = F ds/dq``, shape (2,) or (N, 2)."""
         return np.asarray(self.levers(angles) * np.asarray(forces, dtype=float))
 
     def shares(
@@ -223,7 +223,7 @@ class Leg:
         definition: ShareDefinition = "sum_of_norms",
         progress: Callable[[int, int], None] | None = None,
     ) -> ShareMap:
-        """How much of the effort is inertia, velocity and weight, over the workspace: mu_M, mu_V, mu_G.
+        """Shares of inertia, velocity and weight in the leg's effort over the workspace: mu_M, mu_V, mu_G.
 
         Source: D'Imperio 2016, eq 2.109 and section 2.4.2. The printed ratio to the torque is unbounded where the
         torque passes through zero; the sum of norms is the reading that gives the published averages. The
@@ -268,7 +268,7 @@ class Leg:
 
     @property
     def summary(self) -> tuple[str, ...]:
-        """Ranges of the cylinders and shares of dynamics, one sentence each."""
+        """Sentences on the leg's cylinder ranges and shares of dynamics."""
         ranges = [
             f"{name} cylinder: {low:.6f} to {high:.6f} m"
             for name, (low, high) in zip(("hip", "knee"), self.stroke_table().range, strict=True)
@@ -280,7 +280,7 @@ class Leg:
         return (*ranges, *shares)
 
     def plot(self) -> Figure:
-        """Strokes and lever arms of the cylinders over the angles; see `LegStrokes.plot`.
+        """Plot strokes and lever arms of the leg's cylinders over the angles; see `LegStrokes.plot`.
 
         Returns
         -------

@@ -32,7 +32,7 @@ INERTIAL_NAMES = (
 
 
 def inertial_values(p: LegParameters) -> Array:
-    """Masses and moments of inertia (11,) in the order of `INERTIAL_NAMES`.
+    """Masses and moments of inertia (11,) for the leg's regressor, in the order of `INERTIAL_NAMES`.
 
     A cylinder's barrel and rod turn together, so that only the sum of their moments about their centres is seen.
     """
@@ -43,7 +43,7 @@ def inertial_values(p: LegParameters) -> Array:
 
 
 def with_inertial_values(p: LegParameters, values: ArrayLike) -> LegParameters:
-    """The same dimensions with other masses and inertias; an actuator's inertia is divided by its parts' masses."""
+    """Leg of the same dimensions with other regressor parameters: masses and inertias."""
     slider, upper, lower, *parts, one, two, hip, knee = (float(x) for x in np.asarray(values, dtype=np.float64))
 
     def segment(old: Segment, mass: float, inertia: float) -> Segment:

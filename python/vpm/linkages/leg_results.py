@@ -38,7 +38,7 @@ class LegTerms(Result):
     gravity: Array
 
     def torques(self, accelerations: ArrayLike) -> Array:
-        """Joint torques (N, 2) in N m for joint accelerations (2,) or (N, 2) in rad/s^2."""
+        """Torque result of a leg (N, 2) in N m for joint accelerations (2,) or (N, 2) in rad/s^2."""
         a = np.broadcast_to(np.asarray(accelerations, dtype=float), self.velocity.shape)
         inertia: Array = np.einsum("nij,nj->ni", self.mass_matrix, a)
         return inertia + self.velocity + self.gravity
@@ -115,7 +115,7 @@ class LegStrokes(Result):
 
     @property
     def range(self) -> Array:
-        """Shortest and longest length (m) of each cylinder, shape (2, 2), one cylinder per row."""
+        """Range of a leg's cylinder lengths (m), shape (2, 2), one cylinder per row."""
         return np.stack([self.strokes.min(axis=0), self.strokes.max(axis=0)], axis=1)
 
     def _frame_columns(self) -> Mapping[str, object]:
@@ -127,7 +127,7 @@ class LegStrokes(Result):
         return {"hip_m": tuple(map(float, hip)), "knee_m": tuple(map(float, knee))}
 
     def plot(self) -> Figure:
-        """Strokes above, lever arms below, over the angles.
+        """Plot a leg's strokes above, lever arms below, over the angles.
 
         Returns
         -------
@@ -170,7 +170,7 @@ class ShareMap(Result):
 
     @property
     def mean(self) -> Array:
-        """Averages (3,) of mu_M, mu_V, mu_G over the workspace."""
+        """Mean results (3,) of a leg's mu_M, mu_V, mu_G over the workspace."""
         return np.array([table.mean() for table in (self.inertia, self.velocity, self.gravity)])
 
     def _frame_columns(self) -> Mapping[str, object]:
@@ -188,7 +188,7 @@ class ShareMap(Result):
         return {"rate": self.rate, "acceleration": self.acceleration, **shares}
 
     def plot(self) -> Figure:
-        """Three maps over the joint angles, each with its average.
+        """Plot three maps of a leg's shares over the joint angles, each with its average.
 
         Returns
         -------

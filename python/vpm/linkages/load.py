@@ -24,28 +24,28 @@ class _Table:
         self.asked: set[str] = set()
 
     def number(self, key: str, unit: str) -> float:
-        """One number in SI from a table of a linkage file."""
+        """Load one number in SI from a table of a linkage file."""
         value = self._value(key, unit)
         if isinstance(value, list):
             self._refuse(key, f"is a list of {len(value)}, but has to be a number")
         return self._si(key, value, unit)
 
     def pair(self, key: str, unit: str) -> tuple[float, float]:
-        """Two numbers in SI from a table of a linkage file."""
+        """Load two numbers in SI from a table of a linkage file."""
         value = self._value(key, unit)
         if not isinstance(value, list) or len(value) != 2:
             self._refuse(key, "has to be a list of two numbers")
         return self._si(key, value[0], unit), self._si(key, value[1], unit)
 
     def table(self, key: str) -> _Table:
-        """A table inside this one."""
+        """Load a table inside this one."""
         value = self._get(key)
         if not isinstance(value, Mapping):
             self._refuse(key, "has to be a table")
         return _Table(value, self.path, self._place(key))
 
     def text(self, key: str, default: str) -> str:
-        """Text, or the default where it is missing."""
+        """Load a text, or the default where it is missing."""
         self.asked.add(key)
         value = self.content.get(key, default)
         if not isinstance(value, str) or not value:
@@ -53,7 +53,7 @@ class _Table:
         return value
 
     def finish(self) -> None:
-        """Refuse keys that nothing asked for."""
+        """Refuse keys that loading did not ask for."""
         for key in self.content:
             if key not in self.asked:
                 self._refuse(key, f"is not a known key; {near_match(key, self.asked)}")
@@ -92,7 +92,7 @@ class _Table:
 
 
 def load(path: str | PathLike[str]) -> Karl | Leg:
-    """Read a linkage from a TOML file.
+    """Load a linkage from a TOML file.
 
     Parameters
     ----------

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vpm.discrepancy.side_by_side import Progress, SideBySide
+from vpm.discrepancy.parallel_candidates import Progress, SideBySide
 from vpm.errors import ExperimentError, VpmError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
 from vpm.log_check.correction import TIME, Correction
@@ -119,7 +119,7 @@ class _Check:
         self.judge, self.each, self.settings = judge, each, judge.settings
 
     def of(self, record: Experiment, table: Mapping[str, ChannelEntry]) -> tuple[list[Finding], Shares]:
-        """Findings of a record, and what is left of it when they are corrected."""
+        """Checked findings of a record, and the record when they are corrected."""
         record, model = joints_from_shafts(record, self.judge.model), self.judge.model
         outputs = measured_outputs(model, record)
         inputs = tuple(name for name in model.input_channels if name in record)
@@ -146,7 +146,7 @@ class _Check:
 
 
 def _beginning(record: Experiment, outputs: Sequence[str], settings: Settings) -> Experiment:
-    """Beginning of the motion of a record, from rest if it begins so: no tracker knows unmeasured oscillations."""
+    """Beginning of the motion of a checked record, from rest if it begins so."""
     fewest, most = settings.samples
     speeds = np.zeros(len(record))
     for name in outputs:
@@ -167,7 +167,7 @@ def _finding(
     record: str,
     settings: Settings,
 ) -> Finding:
-    """Finding of a correction that explains a record."""
+    """Checked finding of a correction that explains a record."""
     correction, before, after = found.correction, found.before.by_channel, found.after.by_channel
     said = ", or ".join(one.sentence(units) for one in (correction, *found.rivals))
     if found.is_possible:
@@ -190,7 +190,7 @@ def _finding(
 
 
 def _written(correction: Correction, changed: Mapping[str, ChannelEntry]) -> tuple[dict[str, str], str]:
-    """Lines of the channel table as they should be, and the repair in words."""
+    """Lines of the checked channel table as they should be, and the repair in words."""
     lines = {channel: line_of(channel, entry) for channel, entry in changed.items()}
     return lines, f"write {' and '.join(lines.values())}" if lines else correction.repair
 
@@ -198,7 +198,7 @@ def _written(correction: Correction, changed: Mapping[str, ChannelEntry]) -> tup
 def _of_related(
     correction: Correction, related: Related, units: Mapping[str, str], changed: Mapping[str, ChannelEntry], record: str
 ) -> Finding:
-    """Finding of a channel that contradicts the one that tells it."""
+    """Checked finding of a channel that contradicts a related one."""
     lines, repair = _written(correction, changed)
     before, after = related.error(), related.error(correction.factor)
     return Finding(
@@ -216,13 +216,13 @@ def _of_related(
 
 
 def _units(model: Model, record: Experiment, table: Mapping[str, ChannelEntry]) -> dict[str, str]:
-    """Units in which the time and the channels of a record were read that the model has."""
+    """Units of time and channels in a checked record that the model has."""
     own = {name: model.channel_unit(name) for name in record.channels if name in model.channels}
     return {TIME: "s", **own, **{name: entry.unit for name, entry in table.items()}}
 
 
 def _evidence(found: Explanation, place: str) -> str:
-    """Sentence with the numbers by which a correction explains a record."""
+    """Sentence of a check with the numbers by which a correction explains a record."""
     before, after = found.before, found.after
     corrected = "both corrected" if found.at_once else "that corrected"
     if found.is_of_values:
@@ -244,7 +244,7 @@ def _percent(share: float) -> str:
 
 
 def _together(findings: Sequence[Finding]) -> list[Finding]:
-    """Findings with the same mistake of several records as one finding."""
+    """Checked findings of the same mistake in several records, as one."""
     found: list[Finding] = []
     for one in findings:
         place = next((n for n, other in enumerate(found) if one.is_alike(other)), None)

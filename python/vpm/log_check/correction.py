@@ -60,7 +60,7 @@ class Correction:
         return replace(record, data=data)
 
     def entries(self, table: Mapping[str, ChannelEntry]) -> dict[str, ChannelEntry]:
-        """The entries of a channel table that it changes, as they should be."""
+        """Corrected entries of a channel table."""
         known = [name for name in self.channels if name in table]
         if self.swap:
             first, second = self.channels
@@ -121,7 +121,7 @@ class Correction:
 
     @property
     def repair(self) -> str:
-        """What to do where no channel table is at hand."""
+        """Repair of a correction in words, where no channel table is at hand."""
         if self.swap:
             return "exchange their columns in the channel table"
         if self.delay:
@@ -151,12 +151,12 @@ class Pair(NamedTuple):
         return self.second.applied(self.first.applied(record))
 
     def sentence(self, units: Mapping[str, str]) -> str:
-        """What is wrong, for people; ``units`` are those that were read."""
+        """Sentence on the mistakes that a pair of corrections undoes; ``units`` are those read."""
         return f"{self.first.sentence(units)}, and {self.second.sentence(units)}"
 
 
 def factor_between(unit: str, other: str) -> float:
-    """By what values are multiplied that are in ``unit`` and were read as being in ``other``."""
+    """Correction factor of values in ``unit`` that were read as being in ``other``."""
     return parse_unit(unit).factor / parse_unit(other).factor
 
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from vpm.experiment import Experiment
 from vpm.log_check.correction import Correction
 from vpm.model import Model
+from vpm.ranking.model_structure import Structure
 from vpm.ranking.settings import Settings
-from vpm.ranking.structure import Structure
 from vpm.ranking.tracked_records import TrackedRecords, Tracker, among_parameters
 from vpm.simulate import Setup
 from vpm.weighing.priors import Prior

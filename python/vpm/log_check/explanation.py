@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from vpm.discrepancy.side_by_side import Failure, SideBySide
+from vpm.discrepancy.parallel_candidates import Failure, SideBySide
 from vpm.experiment import Experiment
 from vpm.log_check.correction import Correction, Pair
 from vpm.log_check.shares import FORCES, Judge, Shares, Tangent
@@ -48,7 +48,7 @@ class Explanation:
 
     @property
     def is_possible(self) -> bool:
-        """Whether a machine may do by itself what a correction would undo."""
+        """Whether an explanation could also be what the machine does by itself."""
         return any(one.is_possible for one in (self.correction, *self.rivals))
 
 
@@ -111,7 +111,7 @@ class Explainer:
         return []
 
     def _one_by_one(self, ended: Sequence[_Trial], part: Experiment, used: Sequence[str]) -> list[Explanation]:
-        """Two corrections of which the first one leaves less than none does, though not little."""
+        """Explanations by two corrections, of which the first one alone leaves less than none."""
         pairs = []
         firsts = [one for one in ended if one.after.cost < one.before.cost + math.log(self.settings.alike)]
         for correction, before, after in firsts[: self.settings.branches]:
@@ -124,7 +124,7 @@ class Explainer:
         return min(pairs, key=lambda pair: pair[-1].after.order, default=[])
 
     def _ended(self, part: Experiment, used: Sequence[str], left: Shares) -> list[_Trial]:
-        """Corrections with what is left before and after each, the model fitted, the least first."""
+        """Fitted explanations with the errors before and after each correction, the least first."""
         if not left.above(self.settings.negligible) and left.far <= self.settings.far:
             return []
         tangent = self.judge.freed(part, left)
@@ -181,7 +181,7 @@ class Explainer:
         return replace(found, rivals=(mirror, *rivals))
 
     def _finalists(self, part: Experiment, used: Sequence[str], left: Shares) -> list[Correction]:
-        """Corrections for which the model is worth a fit; see `_late` for delays."""
+        """Explanations that are worth a fit of the model; see `_late` for delays."""
         some = left.above(self.settings.negligible)
         everything = list(scales(self.model, used, self.units, self.settings))
         tried = self._about(everything, self._doubtful(left), left)
@@ -196,11 +196,11 @@ class Explainer:
         return set(left.by_channel) if left.far > self.settings.far else left.above(self.settings.doubtful)
 
     def _about(self, corrections: Iterable[Correction], channels: set[str], left: Shares) -> list[Correction]:
-        """Corrections that may have affected one of these channels."""
+        """Explanations that may have affected one of these channels."""
         return [correction for correction in corrections if channels & set(self._affected(correction, left))]
 
     def _affected(self, correction: Correction, left: Shares) -> tuple[str, ...]:
-        """Channels that a mistake affects: its own, those of the joints of a command, all by the clock."""
+        """Channels that an explained mistake affects: its own, joints of a command, all by the clock."""
         found: list[str] = []
         for name in correction.channels:
             owner = name.rpartition(".")[0]
@@ -212,7 +212,7 @@ class Explainer:
         return tuple(found or left.by_channel)
 
     def _hopeful(self, corrections: Sequence[Correction], part: Experiment, before: Shares) -> list[Correction]:
-        """The few that leave least at the values of the model, and less than is left without any."""
+        """Few explanations of least error at the values of the model, better than without any."""
 
         def measure(correction: Correction) -> tuple[Correction, Shares]:
             quick = self.judge.of_sensor(correction, part, before)
@@ -223,7 +223,7 @@ class Explainer:
     def _late(
         self, part: Experiment, used: Sequence[str], tangent: Tangent | None, left: Shares, known: float
     ) -> list[_Trial]:
-        """The few delays that are predicted to leave least if parameters give way: friction looks much like a delay.
+        """Few explanations by a delay of least predicted error if parameters change too.
 
         From fitted values, else from those of the model: a long delay drives fitted ones far away. They have to be
         predicted to leave about as little as the best correction that is ``known``.
@@ -248,7 +248,7 @@ class Explainer:
         return found
 
     def _predicted(self, correction: Correction, part: Experiment, tangent: Tangent) -> tuple[Correction, Shares]:
-        """The delay for which a tangent predicts the least error, by secants: errors are not linear in long ones."""
+        """Explanation by the delay of least predicted error, by secants on a tangent."""
         shares = tangent.shares
         for _ in range(self.settings.rounds):
             corrected = correction.applied(part)
@@ -268,7 +268,7 @@ class Explainer:
     def _few(
         self, tried: Sequence[tuple[Correction, Shares] | Failure], before: Shares, known: float = math.inf
     ) -> list[Correction]:
-        """The corrections that leave least, one of each kind, and less than is left without any or with a known one."""
+        """Few best explanations, one of each kind, better than without any or with a known one."""
         pairs = [pair for pair in tried if not isinstance(pair, Failure) and pair[1].cost < before.cost]
         better = sorted(pairs, key=lambda pair: pair[1].order)
         least = min([known, *(left.cost for _, left in better[:1])])
@@ -280,7 +280,7 @@ class Explainer:
         return hopeful[: self.settings.finalists]
 
     def _fitted(self, correction: Correction, part: Experiment, tangent: Tangent, left: Shares) -> _Trial:
-        """A delay with what is left before and after it is corrected, fitted with the parameters and all forces."""
+        """Explanation by a delay, fitted with the parameters and all forces."""
         refined, after = self.judge.fit_delay(part, correction, tangent)
         return _Trial(refined, left, after)
 
@@ -312,7 +312,7 @@ class Explainer:
         return before.unlikely - after.unlikely > settings.likelier and not doubtful
 
     def _is_throughout(self, affected: Collection[str], before: Shares, after: Shares) -> bool:
-        """Whether half of what was left is gone in each piece of the record: laws slightly wrong look late."""
+        """Whether an explanation removes half of the error in each piece of the record."""
         if before.residual is None or after.residual is None:
             return after.residual is not None
         places = [place for place, name in enumerate(before.by_channel) if name in affected]
@@ -322,7 +322,7 @@ class Explainer:
     def _ordered(
         self, what: str, measure: Callable[[Experiment], Shares], corrections: Sequence[Change], part: Experiment
     ) -> list[tuple[Change, Shares]]:
-        """Corrections with what is left after each, the least first."""
+        """Explanations by the error after each correction, the least first."""
         found = self.each(what, lambda correction: measure(correction.applied(part)), corrections, self._words)
         pairs = [
             (correction, left)
@@ -336,11 +336,11 @@ class Explainer:
 
 
 def _is_same(one: Correction, other: Correction) -> bool:
-    """Whether two corrections move the same channels in time."""
+    """Whether two explanations move the same channels in time."""
     return bool(one.delay) and bool(other.delay) and one.channels == other.channels
 
 
 def _is_no_scale(one: Correction, other: Correction) -> bool:
-    """Whether another factor does as well for the same channels: then none of them is their scale."""
+    """Whether another factor explains as much: then no channel has a wrong scale."""
     scales_both = not (one.delay or other.delay or one.swap or other.swap)
     return scales_both and one.channels == other.channels and abs(one.factor) != abs(other.factor)

@@ -53,7 +53,7 @@ class Finding(Storable):
         return same and self.mistake and other.mistake
 
     def __str__(self) -> str:
-        """Sentence and repair."""
+        """Text of a finding: sentence and repair."""
         where = f"{', '.join(self.records)}: " if self.records else ""
         return f"{where}{self.sentence}; {self.repair}"
 
@@ -76,7 +76,7 @@ class LogCheck(Result):
 
     @property
     def mistakes(self) -> tuple[Finding, ...]:
-        """What no machine does by itself."""
+        """Findings that no machine causes by itself."""
         return tuple(one for one in self.findings if one.mistake)
 
     def __str__(self) -> str:

@@ -35,13 +35,13 @@ class Related:
     expected: Array
 
     def error(self, factor: float = 1.0) -> float:
-        """Mean square of what ``factor`` times the channel is off, as a share of the variance of what tells it."""
+        """Mean square error of ``factor`` times a related channel, as a share of the variance."""
         moved = float(np.var(self.expected))
         return float(np.mean((factor * self.values - self.expected) ** 2)) / moved if moved > 0.0 else 0.0
 
     @property
     def least(self) -> float:
-        """What the best of all factors leaves, see `error`."""
+        """Least error of a related channel with the best of all factors, see `error`."""
         power = float(np.mean(self.values**2))
         return self.error(float(np.mean(self.values * self.expected)) / power) if power > 0.0 else self.error()
 
@@ -49,7 +49,7 @@ class Related:
 def wrong_scales(
     model: Model, record: Experiment, units: Mapping[str, str], settings: Settings
 ) -> Iterator[tuple[Correction, Related]]:
-    """Units and signs of channels that no tracker compares, where one of them explains why another contradicts them.
+    """Wrong units and signs of related channels that no tracker compares.
 
     A machine follows the references of its controllers more or less; derivatives of a position are its acceleration.
 
@@ -84,7 +84,7 @@ def _references(model: Model, record: Experiment) -> Iterator[Related]:
 
 
 def _accelerations(model: Model, record: Experiment) -> Iterator[Related]:
-    """Measured accelerations beside those of the filtered positions, without the ends."""
+    """Related accelerations: measured, and of the filtered positions, without the ends."""
     for joint in model.joints:
         position, acceleration = f"{joint}.position", f"{joint}.acceleration"
         if position not in record or acceleration not in record:

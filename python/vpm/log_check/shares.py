@@ -21,11 +21,11 @@ from vpm.log_check.settings import Settings
 from vpm.model import Model
 from vpm.observer import measured_outputs
 from vpm.ranking.fit import ASTRAY, Fitter, Followed, View, bounded_step
+from vpm.ranking.model_structure import Structure
 from vpm.ranking.noise_model import white_noise
+from vpm.ranking.parameter_priors import stated
 from vpm.ranking.settings import Settings as RankingSettings
-from vpm.ranking.sizes import stated
-from vpm.ranking.stand_in import why_unbalanced
-from vpm.ranking.structure import Structure
+from vpm.ranking.substitute_records import why_unbalanced
 from vpm.ranking.tracked_records import TrackedRecords, Tracker, is_position
 from vpm.simulate import Setup
 from vpm.weighing.priors import Prior, natural_sizes
@@ -204,7 +204,7 @@ class Judge:
         return None if farthest > self.settings.far else structure.theta
 
     def tangent(self, record: Experiment, at: Shares, forces: Collection[str] = FRICTION) -> Tangent | None:
-        """Change of the error with the parameters, about some values of them; None where that cannot be computed."""
+        """Tangent of the error share by the parameters; None where that cannot be computed."""
         if at.residual is None:
             return None
         tracker, structure = self._tracker(record), replace(self._structure(record, forces), theta=at.values)
@@ -219,7 +219,7 @@ class Judge:
         return Tangent(structure, followed.residual, followed.jacobian * structure.slopes, at)
 
     def freed(self, record: Experiment, plain: Shares) -> Tangent | None:
-        """A tangent where all forces have been fitted, from where friction alone left ``plain``.
+        """Tangent of the error share where all forces have been fitted, from friction alone in ``plain``.
 
         Derivatives cost most: secants correct them on the way. They are worked out once more in between, for no tangent
         says where a spring rests that is not there yet; where hardly anything was gained, there is none.
@@ -235,7 +235,7 @@ class Judge:
         return found
 
     def _descended(self, tracked: TrackedRecords, tracker: Tracker, start: Tangent) -> Tangent:
-        """The tangent where secants lead from another one."""
+        """Tangent of the error share where secants lead from another one."""
         noise = white_noise(start.residual, tracked.parts)
         fitted, slopes = Fitter(tracked, tracked.settings).moved(start.followed(tracker), View(noise))
         sizes, kept = np.array(noise.deviations)[:, None, None], np.zeros_like(start.slopes)
@@ -245,7 +245,7 @@ class Judge:
         return Tangent(fitted.structure, fitted.residual, kept, self._with_departure(shares, fitted.structure))
 
     def fit_delay(self, record: Experiment, correction: Correction, tangent: Tangent) -> tuple[Correction, Shares]:
-        """A delay that is fitted with the parameters and all forces, from the values of a tangent without it."""
+        """Error share of a delay that is fitted with the parameters and all forces."""
         tracker, longest_delay = self._tracker(record), self.settings.longest_delay
         structure = with_delay(tangent.structure, correction.delay, longest_delay)
         try:
@@ -279,12 +279,12 @@ class Judge:
         return {name: far for name, far in moved if not self._is_added(name)}
 
     def undetermined(self, tangent: Tangent) -> list[str]:
-        """Uncertain parameters of the model of which a record says next to nothing."""
+        """Uncertain parameters of the model on which a record's error share hardly depends."""
         deviations = zip(tangent.structure.priors, tangent.deviations.tolist(), strict=True)
         return [name for name, left in deviations if left > self.settings.undetermined and not self._is_added(name)]
 
     def of_sensor(self, correction: Correction, record: Experiment, before: Shares) -> Shares | None:
-        """What a correction of sensors that do not draw the model leaves; None where it takes another run."""
+        """Error share of a corrected sensor that does not draw the model; None where it takes another run."""
         if before.residual is None or any(
             name not in before.by_channel or is_position(self.model, name) for name in correction.channels
         ):
@@ -302,12 +302,12 @@ class Judge:
         return replace(before, by_channel=shares)
 
     def _begins_alike(self, corrected: Experiment, record: Experiment) -> bool:
-        """Whether a corrected record begins in the same first state as the record, as closed chambers may not."""
+        """Whether a corrected record begins in the same first state, so that shares compare."""
         first, then = (initial_state(self.model, one, self.model.theta) for one in (record, corrected))
         return bool(np.array_equal(first, then))
 
     def _structure(self, record: Experiment, forces: Collection[str] = FRICTION) -> Structure:
-        """The model with forces at each joint that begin at nothing."""
+        """Model with forces at each joint that begin at nothing, for error shares."""
         model = self.model
         priors, values = stated(model), model.theta.copy()
         for name, joint in self.added:
@@ -324,7 +324,7 @@ class Judge:
         return Structure(model, values, priors, free_places=False)
 
     def _usual(self, record: Experiment, joint: str) -> tuple[dict[str, float], dict[str, float]]:
-        """Sizes of forces at a joint that are nothing unusual, and shapes: its mass turned round on the way seen."""
+        """Usual sizes of forces at a joint, and shapes, for error shares."""
         place, channel = self.model.coordinates.index(joint), f"{joint}.position"
         if channel not in record or np.ptp(record[channel]) == 0.0:
             return natural_sizes(1.0, 1.0, 1.0), {"speed": TRANSITION, "coordinate": 0.0}
@@ -336,7 +336,7 @@ class Judge:
 
     @cached_property
     def _weights(self) -> Array:
-        """Effort that holds each coordinate where all are zero: one machine serves all records."""
+        """Effort that holds each coordinate where all are zero, for error shares."""
         rest = np.zeros(len(self.model.coordinates))
         return np.abs(self.model.inverse_dynamics(rest, rest, rest))
 
@@ -386,7 +386,7 @@ class Tangent:
     shares: Shares
 
     def followed(self, tracker: Tracker) -> Followed:
-        """Residual with derivatives from which a fit begins that need not work out its first ones."""
+        """Residual with derivatives from which a fit of the error share begins."""
         names, jacobian = tuple(self.structure.priors), self.slopes / self.structure.slopes
         return Followed(self.structure, tracker, names, self.residual, jacobian)
 
@@ -400,7 +400,7 @@ class Tangent:
         return np.asarray(sizes * np.sqrt(np.maximum(spread, 0.0)))
 
     def predicted(self, corrected: Experiment, record: Experiment, residual: Array) -> tuple[Shares, float]:
-        """What is left if more or less of a correction is done and all parameters give way, and how much of it that is.
+        """Predicted error share of more or less of a correction if all parameters change too.
 
         ``residual`` is what the same values of the parameters leave of the corrected record.
         """
@@ -419,7 +419,7 @@ class Tangent:
         return replace(self.shares, by_channel=dict(zip(self.shares.by_channel, errors, strict=True))), float(move[-1])
 
     def _weighed(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
-        """Slopes in sizes of what is left of each channel, sample by sample and channel by channel, and these sizes."""
+        """Slopes of the error share, weighed sample by sample and channel by channel, and sizes."""
         # What is drawn to the last digit is known no better than to rounding: squares of its slopes stay finite.
         rounding = np.finfo(np.float64).eps * np.max(np.abs(self.slopes), axis=(0, 2), initial=0.0)
         sizes = np.sqrt(np.mean(self.residual[self.shares.seen] ** 2, axis=0)) + rounding + 1e-150
@@ -428,12 +428,12 @@ class Tangent:
 
 
 def rows_of(part: Experiment, record: Experiment) -> NDArray[np.intp]:
-    """Rows of a record that are the samples of a part of it."""
+    """Rows of a record that are the samples of a part of it, for error shares."""
     return np.asarray(np.round((part.time - record.time[0]) / record.dt), dtype=np.intp)
 
 
 def _seen(tracked: TrackedRecords) -> NDArray[np.intp]:
-    """Samples that count: all but the beginning, which the first state decides."""
+    """Samples that count in an error share: all but the beginning."""
     return np.concatenate([np.arange(part.start, part.stop) for part in tracked.parts])
 
 

@@ -20,7 +20,7 @@ ORDER, OCTAVES, PIECES = 4, 4, 5
 def odd_stretches(
     record: Experiment, outputs: Sequence[str], inputs: Sequence[str], settings: Settings
 ) -> Iterator[Finding]:
-    """Findings of the channels of a record that the model reads.
+    """Odd stretches of a record's channels that the model reads, as findings.
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def _of_sensor(record: Experiment, name: str, settings: Settings) -> Iterator[Fi
 
 
 def _cut_off(values: Array, step: float, settings: Settings) -> bool:
-    """Whether the noise of a channel is the same in two octaves and then falls: a filter does that, no machine.
+    """Whether a stretch's noise falls after two equal octaves: a filter does that, no machine.
 
     Or whether it falls as far between the last two bands: a machine would have to answer like the ninth power of a
     frequency, and a resonance rises before it falls. Noise is as loud at all times; what a machine or its oil does
@@ -106,14 +106,14 @@ def _cut_off(values: Array, step: float, settings: Settings) -> bool:
 
 
 def _powers(values: Array) -> tuple[Array, float]:
-    """Spectral power by piece and octave, the last one halved, and that of white noise of variance one."""
+    """Spectral power of stretches by piece and octave, and that of white noise of variance one."""
     pieces = np.array_split(np.diff(values, n=ORDER), PIECES)
     found = [_octaves(piece, len(pieces[-1])) for piece in pieces]
     return np.array(found), float(np.sum(_window(len(pieces[-1])) ** 2))
 
 
 def _window(count: int) -> Array:
-    """Window (count,) whose leakage falls fast enough that no motion is taken for noise at other frequencies."""
+    """Window (count,) for stretches whose leakage falls fast enough beside noise."""
     return np.asarray(np.hanning(count) ** 3)
 
 
@@ -147,7 +147,7 @@ def _frozen(values: Array, settings: Settings) -> slice | None:
 
 
 def _is_noisy(values: Array, settings: Settings) -> bool:
-    """Whether noise moves a channel from sample to sample, so that no rest of the machine repeats a value."""
+    """Whether noise moves a stretch from sample to sample, so that no rest repeats a value."""
     if values.size <= settings.fewest:
         return False
     usual = float(np.median(np.abs(np.diff(values))))
@@ -155,7 +155,7 @@ def _is_noisy(values: Array, settings: Settings) -> bool:
 
 
 def _longest(same: NDArray[np.bool_]) -> slice:
-    """Slice of the longest run of true values."""
+    """Longest stretch of true values as a slice."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]]).astype(int)))
     if not edges.size:
         return slice(0, 0)
@@ -165,7 +165,7 @@ def _longest(same: NDArray[np.bool_]) -> slice:
 
 
 def _spikes(values: Array, settings: Settings) -> NDArray[np.intp]:
-    """Single samples that are far from both neighbours, to the same side."""
+    """Stretches of one sample, far from both neighbours to the same side."""
     before, after = np.diff(values)[:-1], -np.diff(values)[1:]
     usual = np.abs(values[2:] - values[:-2])
     noise = noise_std(values)
@@ -196,7 +196,7 @@ def _clipped(record: Experiment, name: str, settings: Settings) -> Iterator[Find
 
 
 def _is_abrupt(values: Array, there: NDArray[np.bool_], settings: Settings) -> bool:
-    """Whether a channel comes to a value at full speed, as where it is cut off."""
+    """Whether a stretch comes to a value at full speed, as where it is cut off."""
     begins = np.flatnonzero(there[2:] & ~there[1:-1]) + 2
     steps = np.abs(np.diff(values))
     if not begins.size:

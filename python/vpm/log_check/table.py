@@ -12,7 +12,7 @@ from vpm.model import ChannelEntry
 
 
 def line_of(channel: str, entry: ChannelEntry) -> str:
-    """An entry as a line of TOML; what stands at its default is left out."""
+    """Line of TOML in a channel table for an entry; defaults are left out."""
     parts = [*_source(entry), f"unit = {_quoted(entry.unit)}"]
     numbers = (("scale", entry.scale, 1.0), ("offset", entry.offset, 0.0), ("delay", entry.delay, 0.0))
     parts += [f"{key} = {value!r}" for key, value, default in numbers if value != default]
@@ -21,7 +21,7 @@ def line_of(channel: str, entry: ChannelEntry) -> str:
 
 
 def corrected_lines(findings: Iterable[Finding]) -> dict[str, str]:
-    """Entries as they should be, by channel; the last of several corrections of one has all of them."""
+    """Corrected entries of a channel table, by channel; the last correction has all of them."""
     return {channel: line for one in findings if one.mistake for channel, line in one.lines.items()}
 
 
@@ -50,7 +50,7 @@ def corrected_text(text: str, lines: Mapping[str, str], path: str | Path) -> str
 
 
 def _source(entry: ChannelEntry) -> list[str]:
-    """The column, or the value and its columns."""
+    """Source in a channel table: the column, or the value and its columns."""
     if not entry.value:
         return [f"column = {_quoted(entry.column)}"]
     each = (

@@ -35,7 +35,7 @@ SAME = 0.02
 
 
 def scales(model: Model, used: Sequence[str], units: Mapping[str, str], settings: Settings) -> Iterator[Correction]:
-    """Wrong units, factors and signs of channels, and channels that were exchanged.
+    """Corrections to try: wrong units, factors and signs of channels, and exchanged channels.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def scales(model: Model, used: Sequence[str], units: Mapping[str, str], settings
 
 
 def delays(model: Model, used: Sequence[str], settings: Settings) -> Iterator[Correction]:
-    """Channels that were stamped too late, or, if less than nothing of a delay helps, too early; see `scales`."""
+    """Corrections to try: channels stamped too late or too early; see `scales`."""
     si = {name: model.channel_unit(name) for name in used}
     for group in _groups(model, used, si):
         if len({name.rpartition(".")[2] for name in group}) == 1:
@@ -71,7 +71,7 @@ def delays(model: Model, used: Sequence[str], settings: Settings) -> Iterator[Co
 
 
 def of_two(model: Model, used: Sequence[str], units: Mapping[str, str], settings: Settings) -> Iterator[Pair]:
-    """Wrong units and signs of joints and of what drives them at once, which hide each other; see `scales`."""
+    """Corrections to try: wrong units and signs of joints and of their drives at once; see `scales`."""
     for positions, commands in _driven(model, used):
         sides = (list(_of_units(model, group, units, settings)) for group in (positions, commands))
         yield from (Pair(first, second) for first, second in product(*sides))
@@ -80,7 +80,7 @@ def of_two(model: Model, used: Sequence[str], units: Mapping[str, str], settings
 def _of_units(
     model: Model, group: tuple[str, ...], units: Mapping[str, str], settings: Settings
 ) -> Iterator[Correction]:
-    """Other units, and the opposite sign, of channels of one kind."""
+    """Corrections to try: other units, and the opposite sign, of channels of one kind."""
     yield Correction(group, -1.0)
     for factor, unit in _in_other_units(units[group[0]], model.channel_unit(group[0])):
         if max(factor, 1.0 / factor) >= settings.smallest:
@@ -88,7 +88,7 @@ def _of_units(
 
 
 def _driven(model: Model, used: Sequence[str]) -> list[tuple[tuple[str, ...], tuple[str, ...]]]:
-    """Positions of joints with the commands that drive them: drive by drive, and all of the same units."""
+    """Positions to correct with the commands that drive them: drive by drive, and all of one unit."""
     found: list[tuple[tuple[str, ...], tuple[str, ...]]] = []
     kinds: dict[tuple[str, str], tuple[list[str], list[str]]] = defaultdict(lambda: ([], []))
     for command in (name for name in used if name.endswith(".command")):
@@ -103,7 +103,7 @@ def _driven(model: Model, used: Sequence[str]) -> list[tuple[tuple[str, ...], tu
 
 
 def _groups(model: Model, used: Sequence[str], si: Mapping[str, str]) -> list[tuple[str, ...]]:
-    """Channels that may have one mistake: each alone, all of a kind, all of a joint with its drives."""
+    """Channels to correct by one mistake: each alone, all of a kind, all of a joint with its drives."""
     kinds: dict[tuple[str, str], list[str]] = defaultdict(list)
     joints: dict[str, list[str]] = defaultdict(list)
     for name in used:
@@ -118,7 +118,7 @@ def _groups(model: Model, used: Sequence[str], si: Mapping[str, str]) -> list[tu
 
 
 def _factors(model: Model, group: Sequence[str], stated: str, si: str) -> Iterator[tuple[float, str]]:
-    """Factors by which channels of this stated unit may be wrong, each with the unit that they are in, or ""."""
+    """Factors to try as corrections of a stated unit, each with the unit that they are in, or ""."""
     found: list[float] = []
     ratios = [factor for ratio in _gear_ratios(model, group) for factor in (ratio, 1.0 / ratio)]
     tried = [*_in_other_units(stated, si), *((factor, "") for factor in (*ratios, *(10.0**n for n in DECADES)))]
@@ -129,14 +129,14 @@ def _factors(model: Model, group: Sequence[str], stated: str, si: str) -> Iterat
 
 
 def _in_other_units(stated: str, si: str) -> Iterator[tuple[float, str]]:
-    """Factors for values that are in another unit than is stated, or were converted twice, or the wrong way round."""
+    """Correction factors for values in another unit than stated, or converted wrongly."""
     others = [unit for unit in (si, *CUSTOMARY.get(si, ())) if unit != stated]
     yield from ((factor_between(unit, stated), unit) for unit in others)
     yield from ((factor_between(stated, unit), "") for unit in others)
 
 
 def _gear_ratios(model: Model, group: Sequence[str]) -> Iterator[float]:
-    """Ratios of the drives of joints: a log may show the motor in the place of the joint, or the other way."""
+    """Gear ratios to try as corrections: a log may show the motor in the place of the joint."""
     owners = {name.rpartition(".")[0] for name in group}
     for actuator in model.actuators:
         name = f"{actuator}.gear_ratio"

@@ -55,7 +55,7 @@ def inertia_described(body: str, index: Index) -> Described:
 
 
 def inertia_problems(body: str, _: Document, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:
-    """Conditions on the inertia about the centre of mass: no negative principal moment, and the triangle inequality.
+    """Problems of a body's inertia about the centre of mass: negative moment, triangle inequality.
 
     Principal moments are integrals of squared distances, for example of y^2 + z^2, so none exceeds the sum of the other
     two. (J. Wittenburg, "Dynamics of Multibody Systems", 2008, section 3.1.)

@@ -48,7 +48,7 @@ class BushingEnd(Entry):
 
 
 def _kind(value: object) -> str:
-    """Whether an entry of a matrix is a row of it or a number of its diagonal."""
+    """Whether an entry of a bushing's matrix is a row of it or a number of its diagonal."""
     return "row" if isinstance(value, list | tuple) else "entry"
 
 
@@ -66,7 +66,7 @@ def _square(matrix: tuple[Quantity | Row, ...]) -> tuple[Quantity | Row, ...]:
 
 
 def _symmetric(matrix: tuple[Quantity | Row, ...]) -> tuple[Quantity | Row, ...]:
-    """The diagonal, or the rows from the diagonal on: of two entries that have to be equal, one is kept."""
+    """Diagonal, or upper rows, of a bushing's symmetric matrix: of two equal entries one is kept."""
     rows = [row for row in matrix if isinstance(row, tuple)]
     if [len(row) for row in rows] == [6, 5, 4, 3, 2, 1]:
         return matrix
@@ -116,7 +116,7 @@ class Bushing(Component):
     preload: Annotated[tuple[ParameterValue, ...], _Six] | None = None
 
     def problems(self, name: str, structure: Structure) -> Iterator[Problem]:
-        """Ends that are on the same."""
+        """Problem of a bushing whose ends are on the same part."""
         if self.a.frame(structure).mount == self.b.frame(structure).mount:
             rest = f"has both ends on {self.a.told}, so it never deforms; put one end on another body or beam"
             yield Problem(place("bushings", name), rest)
@@ -134,7 +134,7 @@ class Bushing(Component):
             yield Slot((*keys, "preload", i), quantity, unit, ANY, "", "linear", named)
 
     def value_problems(self, name: str, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:
-        """Springs and dampers that give energy away."""
+        """Problems of a bushing's springs and dampers that give energy away."""
         for key, symmetric in (("stiffness", True), ("damping", False)):
             matrix = np.zeros((6, 6))
             for row, column, _, _ in entries(getattr(self, key)):
@@ -178,7 +178,7 @@ class Bushing(Component):
 
 
 def entries(matrix: tuple[Quantity | Row, ...]) -> list[tuple[int, int, tuple[int, ...], Quantity]]:
-    """Entries of a matrix that are written down: row, column, way to it in the list, and what stands there."""
+    """Entries of a bushing's matrix that are written down: row, column, way to it in the list, value."""
     found: list[tuple[int, int, tuple[int, ...], Quantity]] = []
     for i, part in enumerate(matrix):
         if isinstance(part, tuple):
@@ -190,11 +190,11 @@ def entries(matrix: tuple[Quantity | Row, ...]) -> list[tuple[int, int, tuple[in
 
 
 def entry_name(row: int, column: int) -> str:
-    """Dotted name of an entry: ``x`` on the diagonal, ``x.y`` beside it."""
+    """Dotted name of an entry in a bushing's matrix: ``x`` on the diagonal, ``x.y`` beside it."""
     return DIRECTIONS[row] if row == column else f"{DIRECTIONS[row]}.{DIRECTIONS[column]}"
 
 
 def _entry_unit(row: int, column: int, time: str) -> str:
-    """Moment or force per angle or way, or per the rate of it."""
+    """Unit of an entry in a bushing's matrix: moment or force per angle or way, or per rate."""
     moment, angle = ("N m" if row < 3 else "N"), column < 3
     return f"{moment}{time}/{'rad' if angle else 'm'}"

@@ -93,7 +93,7 @@ class ChannelEntry(BaseModel):
 
     @model_validator(mode="after")
     def _is_one(self) -> Self:
-        """Check that it is a column, or a value over columns that it names all."""
+        """Check that a channel is a column, or a value over columns that it names all."""
         if bool(self.column) == bool(self.value):
             raise ValueError("needs either a column, or a value over columns; give one of them")
         named = set(read_expression(self.value).names) if self.value else set()
@@ -105,12 +105,12 @@ class ChannelEntry(BaseModel):
 
     @property
     def parts(self) -> dict[str, ColumnPart]:
-        """Columns by the names that the value has for them; a column alone has the name ``""``."""
+        """Columns of a channel by the names that its value has for them; one column alone is ``""``."""
         return self.columns or {"": ColumnPart(column=self.column, unit=self.unit)}
 
     @property
     def told(self) -> str:
-        """What it is read from, in words."""
+        """Sentence on what a channel is read from."""
         return f'value "{self.value}"' if self.value else f'column "{self.column}"'
 
 

@@ -114,7 +114,7 @@ def check_effect(checked: Checked, content: Mapping[str, object]) -> Checked | N
 
 
 def _slots(document: Document, structure: Structure) -> Iterator[Slot]:
-    """Every parameter of a document whose references are right and whose effects are complete, in index order."""
+    """Parameters of a document whose references and effects passed the check, in index order."""
     for name in structure.bodies:
         yield from document.bodies[name].slots(("bodies", name), structure)
     for name, joint in document.joints.items():
@@ -129,12 +129,12 @@ def _slots(document: Document, structure: Structure) -> Iterator[Slot]:
 
 
 def _table(slots: Iterable[Slot]) -> Mapping[str, Parameter]:
-    """Parameters by name, in index order."""
+    """Checked parameters by name, in index order."""
     return {slot.name: slot.parameter() for slot in slots}
 
 
 def _rules(structure: Structure) -> Iterator[Rule]:
-    """Conditions between parameters of a model file, in the order in which their problems are told."""
+    """Rules to check between parameters of a model file, in the order of their problems."""
     yield from (Rule(partial(inertia_problems, body)) for body in structure.bodies)
     yield Rule(_size_problems)
     for sections in (("supplies", "actuators"), ("contacts", "bushings")):
@@ -160,7 +160,7 @@ def _stop_at(problems: list[Problem], path: str | None) -> None:
 
 
 def _empty_problems(document: Document) -> Iterator[Problem]:
-    """A machine of nothing, bodies that nothing carries, joints that do not move."""
+    """Check for a machine of nothing, bodies that nothing carries, joints that do not move."""
 
     def missing(section: str, example: str) -> Problem:
         verb = "is empty; add" if section in document.model_fields_set else "is missing; add it, for example"
@@ -180,7 +180,7 @@ def _beam_problems(document: Document) -> Iterator[Problem]:
 
 
 def _place_problems(document: Document) -> Iterator[Problem]:
-    """Joints that move in no way, gauges where nothing strains them."""
+    """Check for joints that move in no way, gauges where nothing strains them."""
     for name, joint in document.joints.items():
         yield from joint.form_problems(name)
     for name, gauge in document.gauges.items():
@@ -188,7 +188,7 @@ def _place_problems(document: Document) -> Iterator[Problem]:
 
 
 def _reference_problems(document: Document, structure: Structure) -> Iterator[Problem]:
-    """Components that name what is not there, or cannot be where they are."""
+    """Check for components that name what is not there, or cannot be where they are."""
     for name, actuator in document.actuators.items():
         yield from actuator.target_problems(name, structure)
     yield from sensor_problems(document, structure)

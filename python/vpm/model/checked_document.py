@@ -62,7 +62,7 @@ class Rule:
     names: frozenset[str] = frozenset()
 
     def judge(self, document: Document, parameters: Parameters) -> tuple[Rule, list[Problem]]:
-        """The rule with what it read, and what breaks it."""
+        """Judge a rule on a checked document: what it read, and what breaks it."""
         read = _Read(parameters)
         found = list(self.problems(document, read))
         return replace(self, names=frozenset(read.names)), found
@@ -130,7 +130,7 @@ class Checked:
         return Document.model_validate(self.content()) if self.changed else self.base
 
     def content(self) -> dict[str, Any]:
-        """Complete content of a file with the values of now, those that were changed in SI units."""
+        """Complete content of a checked document with present values; changed ones in SI units."""
         content = content_of(self.base, complete=True)
         for name in self.changed:
             slot = self.slots_by_name[name]
@@ -147,7 +147,7 @@ def _moved(quantity: Quantity, value: float) -> Quantity:
 
 
 def _reshapes(slot: Slot, value: float) -> bool:
-    """Whether a value of a parameter may change what a machine is made of, or the unit of another parameter.
+    """Whether a value in a checked document changes the machine's structure, or another parameter's unit.
 
     A zero may take away the inertia before a spring or the joint of a shaft; an exponent of a contact is in the unit of
     its stiffness.

@@ -36,7 +36,7 @@ _lock = Lock()
 
 
 def described(structure: str, theta: NDArray[np.float64]) -> str:
-    """Description of a model for the core, as JSON text, from that of its structure and the values of its parameters.
+    """Compiled description of a model for the core, as JSON text, from structure and parameter values.
 
     Minus zeros are zeros there: two models are equal when their descriptions are.
     """
@@ -44,7 +44,7 @@ def described(structure: str, theta: NDArray[np.float64]) -> str:
 
 
 def structure_text(checked: Checked) -> str:
-    """Description of a model for the core without the values of its parameters, as JSON text.
+    """Compiled description of a model without parameter values, as JSON text.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def structure_text(checked: Checked) -> str:
 
 
 def _unsigned(value: object) -> object:
-    """Content without minus zeros, which mean the same as zeros: two models are equal when their descriptions are."""
+    """Content without minus zeros before it is compiled: equal models have equal descriptions."""
     match value:
         case float():
             return value + 0.0
@@ -110,7 +110,7 @@ def _unsigned(value: object) -> object:
 
 
 def _body(axis: Axis, index: Index) -> Described:
-    """A joint with one coordinate, and what it carries."""
+    """Compiled joint with one coordinate, and what it carries."""
     coordinate, frame = axis.coordinate, axis.frame
     kind = {"helical": {"pitch": coordinate.pitch}} if coordinate.kind == "helical" else coordinate.kind
     return {

@@ -39,7 +39,7 @@ class Component(Entry):
         return self
 
     def units(self, name: str, structure: Structure) -> Mapping[str, str]:  # noqa: ARG002
-        """SI units of those of its parameters where it depends on the model, by key."""
+        """SI units of a component's parameters that depend on the model, by key."""
         return {}
 
     def slots(self, keys: Keys, structure: Structure) -> Iterator[Slot]:
@@ -47,5 +47,5 @@ class Component(Entry):
         yield from slots_of(keys, self, self.units(str(keys[1]), structure))
 
     def value_problems(self, name: str, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:  # noqa: ARG002
-        """Values that contradict each other."""
+        """Problems of a component's values that contradict each other."""
         yield from ()

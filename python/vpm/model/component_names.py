@@ -33,7 +33,7 @@ class Components(DriveComponents):
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """Joints with one coordinate each; joint k is coordinate k.
+        """Names of joints with one coordinate each; joint k is coordinate k.
 
         A joint of the file with several coordinates stands here with each of them, ``wrist_x``, ``wrist_y``,
         ``wrist_z``; a fixed one does not.
@@ -42,21 +42,21 @@ class Components(DriveComponents):
 
     @property
     def added_joints(self) -> tuple[str, ...]:
-        """Joints that effects have split off others, ``axis_deflection``: nobody drives and nobody measures them."""
+        """Names of joints that effects split off, ``axis_deflection``: neither driven nor measured."""
         return self._checked.structure.added
 
     @property
     def deflections(self) -> tuple[str, ...]:
-        """Channels that a log may hold and this model takes for zero, such as ``arm_bending.position``."""
+        """Names of channels that a log may hold and this model takes for zero, such as ``arm_bending.position``."""
         return tuple(self._checked.structure.deflections)
 
     def joint_behind(self, joint: str) -> str | None:
-        """Joint that carries the link where an effect has split ``joint``; None where it is whole."""
+        """Name of the joint that carries the link where an effect has split ``joint``; None where it is whole."""
         name = name_behind(joint)
         return name if name in self.added_joints else None
 
     def joint_before(self, site: str) -> str:
-        """Joint with one coordinate that moves a body or a beam, or a joint itself.
+        """Name of the joint with one coordinate that moves a body or a beam, or a joint itself.
 
         Raises
         ------
@@ -88,11 +88,11 @@ class Components(DriveComponents):
 
     @property
     def transmissions(self) -> tuple[str, ...]:
-        """Transmissions, shafts that turn with a combination of joints."""
+        """Names of transmissions, shafts that turn with a combination of joints."""
         return tuple(self._checked.document.transmissions)
 
     def ratios(self, transmission: str) -> Mapping[str, str]:
-        """Parameter that is the ratio of each joint with which a transmission turns, by joint.
+        """Names of the ratio parameters with which a transmission turns, by joint.
 
         Raises
         ------
@@ -114,12 +114,12 @@ class Components(DriveComponents):
 
     @cached_property
     def coordinates(self) -> tuple[str, ...]:
-        """Every coordinate: `joints`, then those of each beam, ``upper.bending_x.0``."""
+        """Names of all coordinates: `joints`, then those of each beam, ``upper.bending_x.0``."""
         return self._checked.structure.coordinates
 
     @cached_property
     def state_names(self) -> tuple[str, ...]:
-        """State of a simulation: position and velocity of every coordinate, then what drives and supplies hold.
+        """Names of the states: position and velocity of coordinates, then states of drives and supplies.
 
         Per actuator its lag, then of a motor ``current``, of a Maxwell element ``stretch``, of a cylinder ``spool``,
         ``spool_rate``, ``chamber_a`` and ``chamber_b``; then the pressure of supplies that sag,
@@ -131,7 +131,7 @@ class Components(DriveComponents):
 
     @cached_property
     def levels(self) -> Mapping[str, str]:
-        """Level of detail of each beam, as `at` takes it; a rigid one that an effect bends has a level that bends."""
+        """Levels of detail by beam name, as `at` takes them; a rigid beam that an effect bends has a bending level."""
         beams = self._checked.structure.document.beams
         return MappingProxyType({name: str(beams[name].detail) for name in self.beams})
 
@@ -153,7 +153,7 @@ class Components(DriveComponents):
 
     @property
     def first_order_beams(self) -> frozenset[str]:
-        """Beams whose deflection is linear in their coordinates."""
+        """Names of beams whose deflection is linear in their coordinates."""
         beams = self._checked.document.beams.items()
         return frozenset(name for name, beam in beams if not beam.second_order)
 
@@ -169,30 +169,30 @@ class Components(DriveComponents):
 
     @property
     def contacts(self) -> tuple[str, ...]:
-        """Contacts of points with planes."""
+        """Names of contacts of points with planes."""
         return tuple(self._checked.document.contacts)
 
     @property
     def bushings(self) -> tuple[str, ...]:
-        """Elastic connections of two frames."""
+        """Names of bushings, elastic connections of two frames."""
         return tuple(self._checked.document.bushings)
 
     @property
     def loop_entries(self) -> Mapping[str, Loop]:
-        """Closed loops as the model file has them."""
+        """Closed loops by name, as the model file has them."""
         return self._checked.document.loops
 
     @property
     def load_cells(self) -> tuple[str, ...]:
-        """Readings of reaction wrenches at joints."""
+        """Names of load cells, readings of reaction wrenches at joints."""
         return tuple(self._checked.document.load_cells)
 
     def joint_kind(self, joint: str) -> JointKind:
-        """Kind of a joint: "prismatic", "revolute" or "helical"."""
+        """Kind of a joint by its name: "prismatic", "revolute" or "helical"."""
         return self._checked.structure.joint_kind(self._known(joint, self.joints, "joint"))
 
     def joint_of_actuator(self, actuator: str) -> str:
-        """Joint that an actuator drives.
+        """Name of the joint that an actuator drives.
 
         Raises
         ------
@@ -206,19 +206,19 @@ class Components(DriveComponents):
         return entry.joint
 
     def joint_of_body(self, body: str) -> str:
-        """Joint that carries a body; "" if no joint does."""
+        """Name of the joint that carries a body; "" if no joint does."""
         return next((name for name, joint in self._checked.document.joints.items() if joint.child == body), "")
 
     def line_of_actuator(self, actuator: str) -> str | None:
-        """Line that an actuator drives; None if it drives a joint or a transmission."""
+        """Name of the line that an actuator drives; None if it drives a joint or a transmission."""
         return self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")].line
 
     def transmission_of_actuator(self, actuator: str) -> str | None:
-        """Transmission that an actuator drives; None if it drives a joint or a line."""
+        """Name of the transmission that an actuator drives; None for a joint or a line."""
         return self._checked.document.actuators[self._known(actuator, self.actuators, "actuator")].transmission
 
     def held_channel(self, actuator: str) -> str:
-        """Channel that the controller of an actuator holds at its reference.
+        """Name of the channel that an actuator's controller holds at its reference.
 
         Raises
         ------
@@ -230,29 +230,29 @@ class Components(DriveComponents):
 
     @cached_property
     def controlled_actuators(self) -> tuple[str, ...]:
-        """Actuators that a controller commands, in the order of `actuators`."""
+        """Names of actuators that a controller commands, in the order of `actuators`."""
         return tuple(name for name in self.actuators if name in self.held_channels)
 
     @property
     def held_channels(self) -> Mapping[str, str]:
-        """Channel that is held for each actuator with a controller."""
+        """Names of the held channels of all actuators with a controller."""
         return dict(pair for controller in self._checked.document.controllers.values() for pair in controller.pairs)
 
     # ---- channels ----------------------------------------------------------------------------------------------------
 
     @cached_property
     def channel_table(self) -> Mapping[str, ChannelEntry]:
-        """How the columns of logs map on channels, and on ``"time"``; empty if the model does not say."""
+        """Names of log columns by channel and ``"time"``; empty if the model does not say."""
         return MappingProxyType(dict(self._checked.document.channels or {}))
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
-        """Every channel that a log may hold."""
+        """Names of all channels that a log may hold."""
         return self._checked.structure.channels
 
     @cached_property
     def output_channels(self) -> tuple[str, ...]:
-        """What a simulation gives, in the order of the core.
+        """Names of the channels that a simulation gives, in the order of the core.
 
         Per joint position, velocity, acceleration, effort; per actuator command, force; per line length, rate, tension;
         per transmission position, velocity, effort; per gauge strain; per marker its origin x, y, z and its rotation
@@ -266,7 +266,7 @@ class Components(DriveComponents):
         return self._checked.structure.outputs
 
     def channel_unit(self, channel: str) -> str:
-        """SI unit of a channel.
+        """SI unit of a channel by its name.
 
         Raises
         ------
@@ -277,11 +277,11 @@ class Components(DriveComponents):
 
     @cached_property
     def sensor_noise(self) -> dict[str, float]:
-        """Standard deviation (SI) by channel of what the model file says of its sensors: noise, and rounding."""
+        """Sensor noise by channel name: standard deviation (SI) from noise and rounding in the model file."""
         return stated_noise(self._checked.document, self._checked.structure)
 
     def sensor_of(self, channel: str) -> str | None:
-        """Sensor that reads a channel, if there is one."""
+        """Name of the sensor that reads a channel, if there is one."""
         for name, sensor in self._checked.document.sensors.items():
             if sensor.measures == channel:
                 return name

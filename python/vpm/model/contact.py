@@ -63,7 +63,7 @@ class Contact(Component):
 
     @property
     def stiffness_unit(self) -> str:
-        """SI unit of its stiffness: ``N/m^1.1``."""
+        """SI unit of a contact's stiffness: ``N/m^1.1``."""
         return f"N/m^{self.exponent.value:.6g}"
 
     def problems(self, name: str, structure: Structure) -> Iterator[Problem]:
@@ -89,7 +89,7 @@ class Contact(Component):
             yield Problem(place("contacts", name, "stiffness"), rest)
 
     def complete(self) -> Self:
-        """The same with its stiffness in SI: its unit holds an exponent that may be another parameter's next value."""
+        """Contact with its stiffness in SI; its unit holds an exponent that may be a parameter."""
         given, wanted = self.stiffness.unit, self.stiffness_unit
         if given is None:
             return self
@@ -97,11 +97,11 @@ class Contact(Component):
         return self.model_copy(update={"stiffness": quantity})
 
     def units(self, name: str, structure: Structure) -> Mapping[str, str]:  # noqa: ARG002
-        """SI unit of its stiffness."""
+        """SI units of a contact's stiffness."""
         return {"stiffness": self.stiffness_unit}
 
     def value_problems(self, name: str, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:
-        """Friction that does not fall."""
+        """Problem of a contact's friction that does not fall."""
         if self.friction is None:
             return
         static, dynamic = (parameters[f"{name}.friction.{key}_velocity"].value for key in ("static", "dynamic"))

@@ -47,7 +47,7 @@ class Sampled(Component):
 
         @property
         def type(self) -> str:
-            """Its law."""
+            """Type of a controller's law."""
 
     sample_time: Annotated[Number, AfterValidator(_period)] | None = None
     delay: Annotated[Number, AfterValidator(_lateness)] = 0.0
@@ -58,7 +58,7 @@ class Sampled(Component):
         """Each actuator that a controller commands, with the channel that it measures there."""
 
     def commands(self, structure: Structure) -> list[str]:
-        """Units of what it commands."""
+        """Units of a controller's commands."""
         return [structure.document.actuators[actuator].command_unit for actuator, _ in self.pairs]
 
     def _common(self, name: str) -> Described:
@@ -77,7 +77,7 @@ class OneAxis(Sampled):
         return ((self.actuator, self.measures),)
 
     def units(self, name: str, structure: Structure) -> Mapping[str, str]:  # noqa: ARG002
-        """SI units of its gains and of its limit."""
+        """SI units of a one-axis controller's gains and limit."""
         (command,) = self.commands(structure)
         return {key: si_unit(unit) for key, unit in self._units(command, structure).items()}
 
@@ -177,7 +177,7 @@ class ComputedTorque(Sampled):
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """The joints that it measures."""
+        """Joints that a computed-torque controller measures."""
         return tuple(channel.partition(".")[0] for channel in self.measures)
 
     def slots(self, keys: Keys, structure: Structure) -> Iterator[Slot]:
@@ -249,7 +249,7 @@ def _channel_problems(where: str, channel: str, controller: Controller, structur
 def _pair_problems(
     where: str, actuator: str, channel: str, controller: Controller, document: Document
 ) -> Iterator[Problem]:
-    """Laws that go from a joint to its actuator, with an actuator that is elsewhere."""
+    """Problems of controllers from a joint to an actuator that is elsewhere."""
     entry, joint = document.actuators[actuator], channel.partition(".")[0]
     elsewhere = entry.joint not in {None, joint}
     drives = entry.acted_on

@@ -61,7 +61,7 @@ def starting_values(
 
 
 def _motor_side(model: Model, effect: EffectType, joint: str) -> float:
-    """Inertia before a spring or play: a share of what the joint moves at zero, none where a rotor is known."""
+    """Start value of the inertia before a spring or backlash: a share of what the joint moves at zero."""
     driving = [name for name in model.actuators if _drives(model, name, joint)]
     if joint not in model.joints or (effect.has_play and not driving):
         return 0.0

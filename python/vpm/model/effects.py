@@ -58,12 +58,12 @@ class EffectEntry(BaseModel):
 
     @property
     def values(self) -> dict[str, Quantity]:
-        """Parameters by short name, as far as they are given."""
+        """Parameters of an effect by short name, as far as they are given."""
         return dict(self.__pydantic_extra__)
 
     @property
     def parameters(self) -> tuple[EffectParameter, ...]:
-        """Parameters that it has when it is complete: all but optional ones that are not given."""
+        """Parameters of a complete effect: all but optional ones that are not given."""
         return tuple(p for p in EFFECTS[self.type].parameters if not p.optional or p.name in self.values)
 
     def slots(self, position: int, structure: Structure) -> Iterator[Slot]:
@@ -109,7 +109,7 @@ class Effect:
 
     @property
     def place(self) -> str:
-        """Component and side in words."""
+        """Place of an effect in words: component and side."""
         return in_words(self.at, self.side)
 
     @property
@@ -282,7 +282,7 @@ def _on_joint(effect: Effect, structure: Structure, numbers: dict[str, int], ind
 
 
 def _carrier(site: str, structure: Structure) -> dict[str, int]:
-    """Number of the body, weld or beam on which the core puts a payload."""
+    """Number of the body, weld or beam on which the core puts a payload effect."""
     if site in structure.beams:
         return {"beam": structure.beams.index(site)}
     if site in structure.welds:

@@ -33,14 +33,14 @@ class Quantity(Entry):
     maximum: WideNumber | None = Field(default=None, alias="max")
 
     def mapped(self, change: Callable[[float], float], unit: str | None) -> Quantity:
-        """The quantity in another unit, with value, uncertainty and limits changed by a function."""
+        """Entry in another unit, with value, uncertainty and limits changed by a function."""
         value, *others = (self.value, self.uncertainty, self.minimum, self.maximum)
         spread, low, high = (None if number is None else change(number) for number in others)
         return Quantity(value=change(value), unit=unit, uncertainty=spread, minimum=low, maximum=high)
 
 
 def _as_table(value: object) -> object:
-    """Turn a bare number into a table with nothing but the value."""
+    """Turn a bare number into a table entry with nothing but the value."""
     if isinstance(value, Mapping | Quantity):
         return value
     if isinstance(value, int | float) and not isinstance(value, bool):

@@ -23,13 +23,13 @@ class Evaluations(Motions):
 
     @property
     def loops(self) -> Loops:
-        """Closed loops: assemblies, independent coordinates, efforts, rest, singular configurations."""
+        """Closed loops to evaluate: assemblies, independent coordinates, efforts, rest, singularities."""
         return Loops(self)
 
     # ---- rest --------------------------------------------------------------------------------------------------------
 
     def equilibrium(self, q: ArrayLike) -> tuple[Array, Array]:
-        """Rest under gravity with the joints held: how far flexible links sag, and what holds the joints.
+        """Evaluate rest under gravity with the joints held: sag of flexible links, and holding efforts.
 
         Parameters
         ----------
@@ -53,7 +53,7 @@ class Evaluations(Motions):
         return self.core.equilibrium(self.theta, q)
 
     def natural_frequencies(self, q: ArrayLike) -> Array:
-        """Frequencies of free vibration about rest with the joints locked, without damping.
+        """Evaluate frequencies of free vibration about rest with the joints locked, without damping.
 
         Parameters
         ----------
@@ -81,7 +81,7 @@ class Evaluations(Motions):
 
     @property
     def slope_limits(self) -> Array:
-        """Slope (rad) of each flexible link up to which its kinematics are right within 1 %, where they are not exact.
+        """Evaluate the slope (rad) of each flexible link up to which its kinematics are right within 1 %.
 
         To first order a link under a force across its tip does not get shorter by 0.4 times its slope, measured in
         its deflection: ``int v'^2 / 2`` over ``v`` of ``v' = slope (1 - (1 - z/L)^2)``.
@@ -91,7 +91,7 @@ class Evaluations(Motions):
 
     @property
     def beam_summary(self) -> tuple[str, ...]:
-        """Flexible links in sentences: levels and coordinates, frequencies and sag with all joints held at zero."""
+        """Flexible links in sentences: levels, coordinates, frequencies and sag, evaluated with joints at zero."""
         sentences = []
         for beam in self.beams:
             own = [name for name in self.coordinates if name.startswith(f"{beam}.")]
@@ -134,7 +134,7 @@ class Evaluations(Motions):
     # ---- linear models -----------------------------------------------------------------------------------------------
 
     def state(self, values: Mapping[str, float] | ArrayLike | None = None) -> Array:
-        """State of a simulation from names.
+        """Evaluate the state of a simulation from names.
 
         Parameters
         ----------
@@ -160,18 +160,18 @@ class Evaluations(Motions):
         return filled
 
     def _keep_named(self, state: Array, internal: Array, named: Mapping[str, float]) -> None:
-        """Put in what drives and supplies hold, but for what is named."""
+        """Put in what drives and supplies hold for an evaluation, but for what is named."""
         for place, name in enumerate(self.internal_names):
             if name not in named:
                 state[2 * len(self.coordinates) + place] = internal[place]
 
     @property
     def state_units(self) -> tuple[str, ...]:
-        """SI units of the states, in the order of ``state_names``."""
+        """SI units of the states to evaluate at, in the order of ``state_names``."""
         return tuple(self._state_units())
 
     def command(self, values: Mapping[str, float] | ArrayLike | None = None) -> Array:
-        """Commands of actuators, ``{"drive": 1.0}``, and pressures of logged supplies, ``{"pump.pressure": 1.6e7}``.
+        """Evaluate commands from names, ``{"drive": 1.0}``, and supply pressures, ``{"pump.pressure": 1.6e7}``.
 
         A command that is not named is zero, a pressure the nominal one of its supply.
 
@@ -201,7 +201,7 @@ class Evaluations(Motions):
         state: Mapping[str, float] | ArrayLike | None = None,
         inputs: Mapping[str, float] | ArrayLike | None = None,
     ) -> LinearModel:
-        """Linear model of small deviations from a state, by exact derivatives.
+        """Evaluate the linear model of small deviations from a state, by exact derivatives.
 
         Of a machine with closed loops its states are positions and velocities of independent coordinates.
 
@@ -250,7 +250,7 @@ class Evaluations(Motions):
         )
 
     def _settled(self, values: Mapping[str, float] | ArrayLike | None, command: Array) -> Array:
-        """State in which flexible links that are not named rest and drives that are not named follow their command."""
+        """State for an evaluation in which unnamed flexible links rest and unnamed drives follow their command."""
         place = self.state(values)
         if values is None or isinstance(values, Mapping):
             named = values or {}

@@ -60,7 +60,7 @@ _KINDS: Mapping[str, str] = {
 
 
 def schema_problems(error: ValidationError, *, within: tuple[str, ...] = ()) -> list[Problem]:
-    """Rewrite what the schema found.
+    """Problems of a model file's form that the schema found, rewritten as sentences.
 
     Parameters
     ----------
@@ -85,7 +85,7 @@ def schema_problems(error: ValidationError, *, within: tuple[str, ...] = ()) -> 
 
 
 def _other_types(key: str, tables: Tables) -> tuple[tuple[str, ...], str]:
-    """Types of actuators that have a key which the type at hand has not, and that type."""
+    """Other actuator types that have a key which the form of the given type lacks, and that type."""
     own = next((name for name, entry in ACTUATOR_TYPES.items() if entry in tables), "")
     return tuple(name for name, entry in ACTUATOR_TYPES.items() if own and key in keys_of(entry)), own
 
@@ -98,7 +98,7 @@ def _sentence(
     context: Mapping[str, Any],
     fallback: str,
 ) -> str:
-    """Rest of the sentence for one error of the schema in one of some tables."""
+    """Rest of the sentence for one error of form in one of some tables."""
     if kind == "extra_forbidden":
         other, own = _other_types(str(keys[-1]), tables)
         if other:
@@ -119,7 +119,7 @@ def _sentence(
 
 
 def _example(section: str, key: str) -> str | None:
-    """Example of a key of a model file as a person writes it, for messages; None where there is none."""
+    """Example of a key's form in a model file, for messages; None where there is none."""
     kinds = SECTIONS.get(section, ())
     own = next((kind.EXAMPLES[key] for kind in kinds if issubclass(kind, Component) and key in kind.EXAMPLES), None)
     return own or _EXAMPLES.get(f"{section}.{key}", _EXAMPLES.get(key))
@@ -128,7 +128,7 @@ def _example(section: str, key: str) -> str | None:
 def _choice_sentence(
     kind: str, keys: tuple[str | int, ...], found: object, context: Mapping[str, Any], fallback: str
 ) -> str:
-    """Rest of the sentence where one of several things, or something more special, was expected."""
+    """Rest of the sentence where the form allows one of several things, or something more special."""
     if kind == "string_too_short":
         return "is empty text; give it a content"
     if kind in {"literal_error", "union_tag_invalid"}:

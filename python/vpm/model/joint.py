@@ -139,7 +139,7 @@ class Joint(Component):
         return tuple(f"{name}{suffix}" for suffix in SUFFIXES[self.type])
 
     def coordinates(self, name: str) -> tuple[Coordinate, ...]:
-        """Its coordinates, if it was checked, in the order in which they follow each other from the parent on."""
+        """Coordinates of a checked joint, in their order from the parent on."""
         axis = unit(self.axis) if self.axis is not None else Z
         names = self.coordinate_names(name)
         match self.type:
@@ -163,11 +163,11 @@ class Joint(Component):
                 return ()
 
     def poses(self) -> tuple[Pose, Pose]:
-        """Constant places before and after its motion."""
+        """Constant poses before and after a joint's motion."""
         return (pose(self.translation, self.rotation), Pose()) if self.dh is None else self.dh.poses()
 
     def form_problems(self, name: str) -> Iterator[Problem]:
-        """Axes and pitches that are missing, wrong, or of no use; two ways at once to say where it is."""
+        """Problems of a joint's form: axes and pitches missing, wrong or useless; its place said twice."""
         for key in ("axis", "translation", "rotation"):
             if self.dh is not None and key in self.model_fields_set and getattr(self, key) not in (None, (0.0,) * 3):
                 rest = f"says with dh where the joint is, and with {key} as well; remove one (with dh, the axis is z)"
@@ -207,13 +207,13 @@ class Joint(Component):
             )
 
     def units(self, name: str, structure: Structure) -> Mapping[str, str]:
-        """SI unit of the inertia that a drive's rotor adds to it, ratio squared times its own."""
+        """SI unit of the inertia that a drive's rotor adds to a joint, ratio squared times its own."""
         kind = "" if self.rotor_inertia is None else structure.joint_kind(name)
         return {"rotor_inertia": "kg" if kind == "prismatic" else "kg m^2"}
 
 
 def unit(vector: tuple[float, ...]) -> Direction:
-    """Unit vector in the direction of a vector that is not zero."""
+    """Unit vector of a joint's axis in the direction of a vector that is not zero."""
     x, y, z = (component / math.hypot(*vector) for component in vector)
     return (x, y, z)
 

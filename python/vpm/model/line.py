@@ -53,7 +53,7 @@ class Line(Component):
     rod: Part | None = None
 
     def problems(self, name: str, structure: Structure) -> Iterator[Problem]:
-        """Ends between which the length cannot change."""
+        """Problem of a line whose length cannot change between its ends."""
         start, end = self.start, self.end
         if start.parent == end.parent and (start.at == end.at or start.parent not in structure.document.beams):
             rest = f'has both ends on "{start.parent}", so its length cannot change; give one end another parent'

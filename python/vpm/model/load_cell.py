@@ -23,7 +23,7 @@ class LoadCell(Component):
     joint: Text
 
     def problems(self, name: str, structure: Structure) -> Iterator[Problem]:
-        """A joint that is not there, or that makes one piece of its bodies."""
+        """Problem of a load cell whose joint is not there, or makes one piece of its bodies."""
         where, joints = place("load_cells", name, "joint"), structure.document.joints
         if self.joint in joints and joints[self.joint].type == "fixed":
             rest = (

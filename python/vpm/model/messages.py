@@ -30,7 +30,7 @@ class Problem:
 
 
 def raise_first(problems: Sequence[Problem], path: str | None) -> NoReturn:
-    """Report the first problem and say how many more there are.
+    """Raise the message of the first problem and say how many more there are.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def raise_first(problems: Sequence[Problem], path: str | None) -> NoReturn:
 
 
 def place(*keys: str | int) -> str:
-    """Path in a file: ``effects[0].viscous``, ``bodies.carriage.mass``, ``channels."axis.position".unit``."""
+    """Place in a file for messages: ``effects[0].viscous``, ``channels."axis.position".unit``."""
     text = ""
     for key in keys:
         if isinstance(key, int):
@@ -56,7 +56,7 @@ def place(*keys: str | int) -> str:
 
 
 def shown(value: object) -> str:
-    """What stands in a file, in a sentence: ``"text"``, ``true``, ``a table``, ``a list of 3``."""
+    """Content of a file in a message: ``"text"``, ``true``, ``a table``, ``a list of 3``."""
     if isinstance(value, str):
         return f'"{value}"'
     if isinstance(value, bool):

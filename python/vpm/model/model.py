@@ -102,7 +102,7 @@ class Model(Evaluations, Storable):
         return cls(content)
 
     def to_dict(self) -> dict[str, Any]:
-        """Content that `from_dict` reads back; a copy."""
+        """Content of the model that `from_dict` reads back; a copy."""
         return content_of(self._checked.document)
 
     def to_toml(self, remarks: Mapping[tuple[str, ...], str] = MappingProxyType({}), head: Sequence[str] = ()) -> str:
@@ -134,7 +134,7 @@ class Model(Evaluations, Storable):
 
     @property
     def gravity(self) -> tuple[float, float, float]:
-        """Gravity in the world frame (m/s^2)."""
+        """Gravity of the model in the world frame (m/s^2)."""
         x, y, z = self._checked.document.gravity
         return (x, y, z)
 
@@ -142,28 +142,28 @@ class Model(Evaluations, Storable):
 
     @cached_property
     def parameters(self) -> Mapping[str, Parameter]:
-        """Parameters by dotted name, in index order."""
+        """Parameters of the model by dotted name, in index order."""
         return MappingProxyType(self._checked.parameters)
 
     @cached_property
     def parameter_names(self) -> tuple[str, ...]:
-        """Dotted names, in index order."""
+        """Dotted names of the model's parameters, in index order."""
         return tuple(self.parameters)
 
     @cached_property
     def adjustable(self) -> tuple[str, ...]:
-        """Names of the parameters that a fit may change where nobody says which, in index order."""
+        """Names of the model's parameters that a fit may change by default, in index order."""
         return tuple(name for name, parameter in self.parameters.items() if parameter.adjustable)
 
     @cached_property
     def theta(self) -> NDArray[np.float64]:
-        """Values of all parameters (SI), shape (P,); read-only."""
+        """Values of all parameters of the model (SI), shape (P,); read-only."""
         values = np.array([parameter.value for parameter in self.parameters.values()], dtype=np.float64)
         values.flags.writeable = False
         return values
 
     def index(self, name: str) -> int:
-        """Index of a parameter in `theta`.
+        """Index of a parameter in the model's `theta`.
 
         Raises
         ------
@@ -209,11 +209,11 @@ class Model(Evaluations, Storable):
 
     @cached_property
     def effects(self) -> tuple[Effect, ...]:
-        """Effects in the order of the file."""
+        """Effects of the model in the order of the file."""
         return effects_of(self._checked.document)
 
     def effect(self, name: str, at: str, side: Side = "motor") -> Effect:
-        """The effect of one name at one site, on one side of a compliance or backlash there.
+        """Effect of the model of one name at one site, on one side of a compliance or backlash there.
 
         Raises
         ------
@@ -281,7 +281,7 @@ class Model(Evaluations, Storable):
         return type(self)(content)
 
     def sites(self, kind: str) -> tuple[str, ...]:
-        """Names of the components of a kind, in the order of the core.
+        """Names of the model's components of a kind, in the order of the core.
 
         Parameters
         ----------
@@ -324,7 +324,7 @@ class Model(Evaluations, Storable):
     # ---- core --------------------------------------------------------------------------------------------------------
 
     def description(self) -> str:
-        """Description for the core, as JSON text."""
+        """Description of the model for the core, as JSON text."""
         return described(self.structure, self.theta)
 
     @cached_property
@@ -393,7 +393,7 @@ class Model(Evaluations, Storable):
         return _rebuild, (type(self), self.to_dict(), self.path)
 
     def to_stored(self) -> Mapping[str, object]:
-        """Content as text, for the files of results."""
+        """Content of the model as text, for the files of results."""
         return {"toml": self.to_toml()}
 
     @classmethod

@@ -66,21 +66,21 @@ class Motions(Components):
     @property
     @abstractmethod
     def parameters(self) -> Mapping[str, Parameter]:
-        """Parameters of a model by dotted name."""
+        """Parameters by dotted name of the model whose motions are computed."""
 
     @property
     @abstractmethod
     def theta(self) -> Array:
-        """Values of all parameters of a model, in index order."""
+        """Values of all parameters for motions, in index order."""
 
     @abstractmethod
     def index(self, name: str) -> int:
-        """Index of a parameter."""
+        """Index of a parameter for motions."""
 
     @property
     @abstractmethod
     def core(self) -> System:
-        """Compiled system of a model."""
+        """Compiled system that computes motions."""
 
     @cached_property
     def dynamics(self) -> Dynamics:
@@ -95,7 +95,7 @@ class Motions(Components):
     # ---- dynamics ----------------------------------------------------------------------------------------------------
 
     def mass_matrix(self, q: ArrayLike) -> Array:
-        """Mass matrix M(q), payloads included.
+        """Mass matrix M(q) at one or many motions, payloads included.
 
         Parameters
         ----------
@@ -118,11 +118,11 @@ class Motions(Components):
 
     @property
     def masses_at_zero(self) -> Array:
-        """What each coordinate moves where all are zero, shape (n,), kg or kg m^2: the diagonal of the mass matrix."""
+        """Mass matrix diagonal for motions about zero, shape (n,), kg or kg m^2."""
         return np.diag(self.mass_matrix(np.zeros(len(self.coordinates))))
 
     def inverse_dynamics(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
-        """Efforts that the actuators have to give for accelerations ``a``: ``M(q) a + h(q, v) - effects(q, v)``.
+        """Efforts of actuators for motions with accelerations ``a``: ``M(q) a + h(q, v) - effects(q, v)``.
 
         Weight, Coriolis and centrifugal efforts are in h; frictions, springs and loads of the model are carried too.
         Of a machine with closed loops they are those on all coordinates of the open tree; `Loops.efforts` puts them on
@@ -178,7 +178,7 @@ class Motions(Components):
         return EffortDerivatives(effort, by_q, by_v, by_a, rest, names)
 
     def forward_dynamics(self, q: ArrayLike, v: ArrayLike, effort: ArrayLike) -> Array:
-        """Accelerations that efforts of the actuators give, with all effects: the inverse of `inverse_dynamics`.
+        """Accelerations at motions under actuator efforts, with all effects.
 
         Parameters
         ----------
@@ -199,7 +199,7 @@ class Motions(Components):
         return self._answers("forward_dynamics", (q, v, effort), (len(self.coordinates),))
 
     def energy(self, q: ArrayLike, v: ArrayLike) -> tuple[Any, Any]:
-        """Kinetic and potential energy, J.
+        """Kinetic and potential energy at motions, J.
 
         The potential is that of the bodies in gravity and of the effects, flexible links, contacts and bushings that
         store energy.
@@ -225,7 +225,7 @@ class Motions(Components):
     # ---- kinematics --------------------------------------------------------------------------------------------------
 
     def forward_kinematics(self, marker: str, q: ArrayLike) -> Array:
-        """Pose of a marker in the world.
+        """Pose of a marker in the world at motions.
 
         Parameters
         ----------
@@ -247,7 +247,7 @@ class Motions(Components):
         return self._answers("marker_pose", (q,), (4, 4), self._marker(marker))
 
     def jacobian(self, marker: str, q: ArrayLike) -> Array:
-        """Jacobian of a marker: what the rates of the coordinates do to it.
+        """Jacobian of a marker at motions: what the rates of the coordinates do to it.
 
         Parameters
         ----------
@@ -290,7 +290,7 @@ class Motions(Components):
         return np.concatenate([np.zeros(0), *(standard_parameters(float(row[0]), row[1:4], row[4:]) for row in tens)])
 
     def regressor(self, q: ArrayLike, v: ArrayLike, a: ArrayLike) -> Array:
-        """Regressor Y of the inertial parameters: `inverse_dynamics` is ``Y @ model.standard_parameters`` and a rest.
+        """Regressor Y at motions: `inverse_dynamics` is ``Y @ model.standard_parameters`` and a rest.
 
         The rest is what frictions, springs, payloads, rotors and flexible links need, whatever the bodies are.
 

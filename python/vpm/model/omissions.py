@@ -10,7 +10,7 @@ from vpm.model.structure import Structure
 
 
 def omissions(structure: Structure) -> Mapping[str, list[int]]:
-    """Terms that a model leaves out, by the numbers of bodies, joints and beams of the core.
+    """Omissions of a model, by the numbers of bodies, joints and beams of the core.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def omissions(structure: Structure) -> Mapping[str, list[int]]:
 
 
 def omission_problems(document: Document, structure: Structure) -> Iterator[Problem]:
-    """Terms that a part does not have by itself.
+    """Problems of omissions: terms that a part does not have by itself.
 
     Parameters
     ----------

@@ -65,18 +65,18 @@ def owners(structure: Structure) -> Iterator[Owners]:
 
 
 def outputs_of(structure: Structure) -> tuple[str, ...]:
-    """Channels that a simulation gives, in the order of the core."""
+    """Output channels that a simulation of a model gives, in the order of the core."""
     return tuple(f"{name}.{channel}" for group in owners(structure) for name in group.names for channel in group.units)
 
 
 def channels_of(structure: Structure) -> tuple[str, ...]:
-    """Every channel that a log may hold: the same, and more of actuators."""
+    """Channels that a log may hold: all outputs, and more of actuators."""
     groups = (g._replace(units=_DRIVEN | _LOGGED) if g.units is _DRIVEN else g for g in owners(structure))
     return tuple(f"{name}.{channel}" for group in groups for name in group.names for channel in group.units)
 
 
 def unit_of(channel: str, structure: Structure) -> str:
-    """SI unit of a channel, or a ModelError that names near ones."""
+    """SI unit of an output channel, or a ModelError that names near ones."""
     owner, _, name = channel.partition(".")
     if channel in structure.deflections:
         return COORDINATE_UNIT[structure.joint_kind(structure.deflections[channel])]
@@ -106,7 +106,7 @@ def _actuator_unit(actuator: str, channel: str, structure: Structure) -> str:
 
 
 def described_channel(channel: str, structure: Structure) -> Described:
-    """What the core reads of a channel."""
+    """Output channel as the core reads it."""
     owner, _, kind = channel.partition(".")
     group = next(group for group in owners(structure) if owner in group.names and kind in group.units)
     if owner in structure.wires:  # the core calls the channels of a shaft as those of a line

@@ -83,7 +83,7 @@ class Parameter:
 
     @property
     def adjustable(self) -> bool:
-        """Whether a calibration may move the value."""
+        """Whether a calibration may change the parameter."""
         return self.uncertainty is not None
 
 
@@ -122,7 +122,7 @@ class Slot:
         return self.named or ".".join(map(str, self.keys[1:]))
 
     def problems(self) -> Iterator[Problem]:
-        """Wrong unit, bounds that leave no room, a value outside of them, an uncertainty that is none."""
+        """Problems of a parameter: wrong unit, bounds without room, value outside, no valid uncertainty."""
         quantity, where = self.quantity, place(*self.keys)
         unit = quantity.unit or self.unit
         try:
@@ -171,7 +171,7 @@ class Slot:
         return Parameter(self.name, quantity.value, self.unit, quantity.uncertainty, low, high, self.kind)
 
     def si_quantity(self) -> Quantity:
-        """What stands there, in the SI unit."""
+        """Parameter's value, uncertainty and bounds in the SI unit."""
         given = self.quantity
         if given.unit is None:
             return given
@@ -189,7 +189,7 @@ class Slot:
 
 
 def _range_text(low: float, high: float, unit: str, value: float) -> str:
-    """Physical range in words; the catalogue and this module know ranges with a lower end only."""
+    """Physical range of a parameter in words; all known ranges have a lower end only."""
     shown = "" if unit == "1" else f" {unit}"
     if low in {ABOVE_ZERO[0], TINY[0]}:
         # A value above zero is below the least that is taken for a number with a meaning, or above the most.

@@ -27,7 +27,7 @@ class Pose:
     rotation: tuple[float, ...] = _IDENTITY
 
     def __matmul__(self, other: Pose) -> Pose:
-        """Composition ``X_AC = X_AB X_BC``; exact where one of the two is the identity."""
+        """Composition of poses ``X_AC = X_AB X_BC``; exact where one of the two is the identity."""
         if self == Pose():
             return other
         if other == Pose():
@@ -60,7 +60,7 @@ class Mount:
     at: float = 0.0
 
     def described(self) -> str | dict[str, Any]:
-        """What the core reads of a mount."""
+        """Mount of a pose as the core reads it."""
         if self.kind == "world":
             return "world"
         return {"body": self.index} if self.kind == "body" else {"section": {"beam": self.index, "at": self.at}}
@@ -74,17 +74,17 @@ class Frame:
     pose: Pose
 
     def described(self) -> dict[str, Any]:
-        """What the core reads of a frame that is fixed to a mount."""
+        """Frame with its pose on a mount, as the core reads it."""
         return {"on": self.mount.described(), **self.pose.described()}
 
 
 def pose(translation: tuple[float, ...], angles: tuple[float, ...]) -> Pose:
-    """Place from a translation (m) and roll, pitch, yaw (rad)."""
+    """Pose from a translation (m) and roll, pitch, yaw (rad)."""
     return Pose(translation, rotation_matrix(*angles))
 
 
 def rotation_matrix(roll: float, pitch: float, yaw: float) -> tuple[float, ...]:
-    """Rotation matrix R = Rz(yaw) Ry(pitch) Rx(roll), nine numbers row by row.
+    """Rotation matrix of a pose, R = Rz(yaw) Ry(pitch) Rx(roll), nine numbers row by row.
 
     Turns about the fixed axes x, y, z in this order (J. Craig, "Introduction to Robotics", 3rd edition, equation 2.64).
 

@@ -23,7 +23,7 @@ DEEPEST = 32
 
 
 def read_toml(path: str | PathLike[str]) -> dict[str, Any]:
-    """Content of a TOML file.
+    """Read the content of a TOML file.
 
     Raises
     ------
@@ -46,13 +46,13 @@ def read_toml(path: str | PathLike[str]) -> dict[str, Any]:
 
 
 def importer_of(path: str | PathLike[str]) -> Plugin | None:
-    """Who imports a file that is no TOML, by its ending."""
+    """Importer that reads a file which is no TOML, by its ending."""
     ending = Path(path).suffix.lower()[1:]
     return None if ending in OWN else usable("importers", OWN).get(ending)
 
 
 def _imported(plugin: Plugin, path: str | PathLike[str]) -> dict[str, Any]:
-    """Content by an importer of another package: what it names is called with the path."""
+    """Content read by an importer of another package: what it names is called with the path."""
     importer = plugin.load()
     try:
         found = importer(path)  # type: ignore[operator]  # an error says so
@@ -66,7 +66,7 @@ def _imported(plugin: Plugin, path: str | PathLike[str]) -> dict[str, Any]:
 
 
 def check_plain(content: Mapping[str, object], path: str | None = None) -> None:
-    """Refuse what every later step would stumble over: tables of tables without end, and numbers that nothing has.
+    """Refuse tables of tables without end and impossible numbers when reading a model file.
 
     Raises
     ------
@@ -92,7 +92,7 @@ def check_plain(content: Mapping[str, object], path: str | None = None) -> None:
 
 
 def parse_toml(text: str, path: str | None = None) -> dict[str, Any]:
-    """Content of a TOML text.
+    """Read the content of a TOML text.
 
     Raises
     ------

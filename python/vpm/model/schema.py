@@ -62,7 +62,7 @@ class Document(Entry):
     channels: dict[str, ChannelEntry] | None = None
 
     def components(self, *sections: str) -> Iterator[tuple[str, str, Component]]:
-        """Components of some sections, in their order, each with its section and its name."""
+        """Components of some sections of the schema, in their order, each with its section and its name."""
         for section in sections:
             named: dict[str, Component] = getattr(self, section)
             yield from ((section, name, component) for name, component in named.items())
@@ -90,7 +90,7 @@ SECTIONS: Mapping[str, tuple[type[BaseModel], ...]] = {
 
 
 def keys_of(*entries: type[BaseModel]) -> tuple[str, ...]:
-    """Keys that a table takes, as they are written in a file."""
+    """Keys of the schema that a table takes, as they are written in a file."""
     return tuple(field.alias or name for entry in entries for name, field in entry.model_fields.items())
 
 
@@ -127,7 +127,7 @@ def _members(kind: object, tags: tuple[object, ...] = ()) -> Iterator[tuple[obje
 
 
 def _inside(kind: object, key: str | int) -> Iterator[tuple[object, tuple[object, ...]]]:
-    """Types that a key of a model file leads to from a table, a list, or a table of names."""
+    """Types of the schema inside a key: of a table, a list, or a table of names."""
     if isinstance(kind, type) and issubclass(kind, BaseModel):
         fields = [field for name, field in kind.model_fields.items() if key == (field.alias or name)]
         for field in fields:

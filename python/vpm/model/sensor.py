@@ -40,7 +40,7 @@ class Sensor(Component):
     resolution: ParameterValue | None = None
 
     def stated(self, name: str, structure: Structure) -> Iterator[Slot]:
-        """What it states, which is no parameter."""
+        """Values that a sensor states and that are no parameters."""
         for key in ("noise", "resolution"):
             quantity = getattr(self, key)
             if quantity is not None:
@@ -57,7 +57,7 @@ _EFFECTS = {"gain": "value", "offset": "value", "delay": "time"}
 
 
 def sensor_problems(document: Document, structure: Structure) -> Iterator[Problem]:
-    """Readings of what is not there, or of what is read already."""
+    """Problems of sensors: readings of what is not there, or of what is read already."""
     seen: dict[str, str] = {}
     for name, sensor in document.sensors.items():
         where, read = place("sensors", name, "measures"), sensor.measures
@@ -70,7 +70,7 @@ def sensor_problems(document: Document, structure: Structure) -> Iterator[Proble
 
 
 def noise_problems(document: Document, structure: Structure) -> Iterator[Problem]:
-    """Units that are none of the channel, sizes that are not positive, uncertainties of what is no parameter."""
+    """Problems of sensor noise: wrong units, sizes that are not positive, useless uncertainties."""
     for name, sensor in document.sensors.items():
         for slot in sensor.stated(name, structure):
             given = slot.quantity

@@ -40,7 +40,7 @@ def splits_joint(entry: EffectEntry, document: Document) -> bool:
 
 
 def reshapes(entry: EffectEntry, document: Document) -> bool:
-    """Whether the machine with this effect more has other joints or beams."""
+    """Whether one effect more splits the machine into other joints or beams."""
     return entry.traits.motion == "bending" or splits_joint(entry, document)
 
 
@@ -50,13 +50,13 @@ def deflections(document: Document) -> Mapping[str, str]:
 
 
 def bendings(document: Document) -> Mapping[str, str]:
-    """Bodies that bend, each with the name of the joint at its root."""
+    """Bodies that an effect splits into bending links, each with the name of the joint at its root."""
     bent = (entry.at for entry in document.effects if entry.traits.motion == "bending" and entry.at in document.bodies)
     return {at: f"{at}_bending" for at in bent}
 
 
 def flexed(document: Document) -> Document:
-    """The document with the levels of detail that its effects ask for."""
+    """Document with the levels of detail that splitting effects ask for."""
     bent = {entry.at for entry in document.effects if entry.traits.motion == "bending"}
     rigid = [name for name, beam in document.beams.items() if name in bent and beam.detail.name == "rigid"]
     if not rigid:
@@ -101,7 +101,7 @@ def splitting_problems(document: Document, names: Mapping[str, str]) -> Iterator
 
 
 def _stiffness_problems(position: int, entry: EffectEntry, document: Document) -> Iterator[Problem]:
-    """A stiffness of the tip for a link whose sections have no modulus in common that it could stand for."""
+    """Problem of splitting by a tip stiffness: the link's sections have no modulus in common."""
     beam = document.beams.get(entry.at)
     if entry.traits.motion == "bending" and beam is not None and not beam.is_of_one_material:
         rest = f"sets the modulus of {entry.at}, whose sections are not all of its material"
@@ -109,7 +109,7 @@ def _stiffness_problems(position: int, entry: EffectEntry, document: Document) -
 
 
 def stop_problems(document: Document, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:
-    """End stops that leave no way between them."""
+    """Problem of end stops, after splitting, that leave no way between them."""
     for position, entry in enumerate(document.effects):
         if entry.traits.stops:
             group = effect_type(entry.type).group
@@ -120,7 +120,7 @@ def stop_problems(document: Document, parameters: Mapping[str, Parameter]) -> It
 
 
 def _has_rotor(document: Document, joint: str) -> bool:
-    """Whether the motor side of a joint has an inertia of its own."""
+    """Whether the motor side of a split joint has an inertia of its own."""
     described = document.joints.get(joint)
     if described is not None and described.rotor_inertia is not None and described.rotor_inertia.value > 0.0:
         return True

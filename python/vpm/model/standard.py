@@ -27,7 +27,7 @@ PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 
 
 def standard_parameters(mass: float, center: Array, inertia: Array) -> Array:
-    """Mass, first moment and moments of inertia about the frame's origin, (10,).
+    """Standard parameters (10,): mass, first moment, moments of inertia about the frame's origin.
 
     Parameters
     ----------

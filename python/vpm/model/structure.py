@@ -40,17 +40,17 @@ class Axis:
 
     @property
     def name(self) -> str:
-        """Name of the joint."""
+        """Name of the joint of an axis in the structure."""
         return self.coordinate.name
 
     @property
     def turns(self) -> bool:
-        """Whether it turns and does nothing else."""
+        """Whether an axis in the structure turns and does nothing else."""
         return self.coordinate.kind == "revolute"
 
     @property
     def carrier(self) -> str:
-        """Name of the body of the core; carriers have a dot, so no body of a file is called like one."""
+        """Name of an axis' body in the structure; it has a dot, so no body of a file is called like one."""
         return self.body or f"{self.name}.carrier"
 
 
@@ -79,24 +79,24 @@ class Structure:
 
     @cached_property
     def joints(self) -> tuple[str, ...]:
-        """Joints with one coordinate each; joint k is coordinate k."""
+        """Joints of the structure with one coordinate each; joint k is coordinate k."""
         return tuple(axis.name for axis in self.axes)
 
     @cached_property
     def added(self) -> tuple[str, ...]:
-        """Joints that effects have split off; they have neither actuator nor sensor."""
+        """Joints of the structure that effects have split off; they have neither actuator nor sensor."""
         return tuple(axis.name for axis in self.axes if axis.added)
 
     @cached_property
     def turned(self) -> Mapping[str, str]:
-        """Bodies that the last coordinate of their joint turns, with the name of that."""
+        """Bodies of the structure that the last coordinate of their joint turns, with its name."""
         own = {axis.joint: axis for axis in self.axes if not axis.added}
         joints = ((joint.child, own[name]) for name, joint in self.document.joints.items() if name in own)
         return {body: axis.name for body, axis in joints if axis.coordinate.kind == "revolute"}
 
     @cached_property
     def deflections(self) -> Mapping[str, str]:
-        """Positions of joints that effects would split off, each with the joint it is split from.
+        """Positions of joints that effects would split off the structure, each with its joint.
 
         A log may hold one, from a strain gauge or a second encoder; the machine as it is takes it for zero.
         """
@@ -106,19 +106,19 @@ class Structure:
 
     @cached_property
     def horizontal(self) -> tuple[Direction, Direction]:
-        """Axes of the world about which gravity can be tilted; it must not be zero."""
+        """World axes about which the structure's gravity can be tilted; it must not be zero."""
         x, y, z = self.document.gravity
         return plane(unit((-x, -y, -z)))
 
     @cached_property
     def welds(self) -> tuple[str, ...]:
-        """Bodies whose inertia is fixed to something else, at a constant place."""
+        """Bodies of the structure whose inertia is fixed to something else, at a constant place."""
         carried = {axis.body for axis in self.axes}
         return tuple(body for body in self.bodies if body not in carried)
 
     @cached_property
     def coordinates(self) -> tuple[str, ...]:
-        """Every coordinate: those of the joints, then ``beam.component.number`` of each beam."""
+        """Coordinates of the structure: those of the joints, then ``beam.component.number``."""
         beams = ((name, self.document.beams[name]) for name in self.beams)
         elastic = [f"{name}.{own}" for name, beam in beams for own in beam.detail.coordinates(beam.deforms)]
         return (*self.joints, *elastic)
@@ -130,11 +130,11 @@ class Structure:
         return other
 
     def mounted(self, parent: str, at: float | None, placed: Pose) -> Frame:
-        """Frame that is fixed to a body, a beam or the world."""
+        """Frame of the structure that is fixed to a body, a beam or the world."""
         return _mounted(parent, at, placed, self.frames, self.beams, self.document)
 
     def sites(self, kind: SiteKind) -> tuple[str, ...]:
-        """Names of the components at which an effect of this kind can sit."""
+        """Components of the structure at which an effect of this kind can sit."""
         sites: dict[SiteKind, tuple[str, ...]] = {
             "joint": tuple(axis.name for axis in self.axes if not axis.added),
             "body": (*self.bodies, *self.beams),
@@ -149,7 +149,7 @@ class Structure:
         return sites[kind]
 
     def joint_kind(self, joint: str) -> JointKind:
-        """Kind of a joint with one coordinate."""
+        """Kind of a joint of the structure with one coordinate."""
         return self._kinds[joint]
 
     @cached_property
@@ -157,21 +157,21 @@ class Structure:
         return {axis.name: axis.coordinate.kind for axis in self.axes}
 
     def kind_at(self, kind: SiteKind, site: str) -> JointKind | None:
-        """Kind of the joint that a site belongs to, or that a transmission is like; None for what belongs to none."""
+        """Kind of the joint in the structure that a site belongs to, or None."""
         if kind == "joint" and site in self.document.transmissions:
             return TURNING
         joint = self.joint_at(kind, site)
         return None if joint is None else self.joint_kind(joint)
 
     def driven_kind(self, actuator: str) -> JointKind | None:
-        """Kind of the joint that an actuator acts on, or that its transmission is like; None for one on a line."""
+        """Kind of the joint in the structure that an actuator drives; None for one on a line."""
         entry = self.document.actuators[actuator]
         if entry.transmission is not None:
             return TURNING
         return None if entry.joint is None else self.joint_kind(entry.joint)
 
     def joint_at(self, kind: SiteKind, site: str) -> str | None:
-        """Joint that a site belongs to; None for what belongs to none, such as a sensor of an actuator's channel."""
+        """Joint of the structure that a site belongs to, or None."""
         if kind == "joint":
             return site if site in self.joints else None
         if kind == "body":
@@ -190,7 +190,7 @@ class Structure:
         return link.solid is None and any(component.startswith("bending") for component in link.deforms)
 
     def _mover(self, site: str) -> str | None:
-        """Last joint on the way from the world to a body or a beam."""
+        """Last joint of the structure on the way from the world to a body or a beam."""
         mount = self.frames[site].mount
         while mount.kind == "section":
             mount = self.frames[self.beams[mount.index]].mount
@@ -198,7 +198,7 @@ class Structure:
 
     @cached_property
     def balls(self) -> Mapping[str, tuple[tuple[int, ...], ...]]:
-        """Joints that turn anyhow, with the numbers of the coordinates of their three angles.
+        """Ball joints of the structure, with the numbers of their three angles among the coordinates.
 
         An angle has more than one where effects split it.
         """
@@ -210,25 +210,25 @@ class Structure:
 
     @cached_property
     def wires(self) -> tuple[str, ...]:
-        """Lines, then transmissions: along what of the core forces act, by their numbers there."""
+        """Lines, then transmissions of the structure by their numbers in the core."""
         return (*self.document.lines, *self.document.transmissions)
 
     @cached_property
     def channels(self) -> tuple[str, ...]:
-        """Every channel that a log may hold."""
+        """Channels that a log of the structure may hold."""
         return channels_of(self)
 
     @cached_property
     def outputs(self) -> tuple[str, ...]:
-        """Channels that a simulation gives, in the order of the core."""
+        """Channels that a simulation of the structure gives, in the order of the core."""
         return outputs_of(self)
 
     def driven_by(self, kind: str) -> tuple[str, ...]:
-        """Actuators of a type, in the order of the file."""
+        """Actuators of a type in the structure, in the order of the file."""
         return tuple(name for name, actuator in self.document.actuators.items() if actuator.type == kind)
 
     def unit(self, channel: str) -> str:
-        """SI unit of a channel.
+        """SI unit of a channel of the structure.
 
         Raises
         ------
@@ -241,22 +241,22 @@ class Structure:
 
     @cached_property
     def _units(self) -> dict[str, str]:
-        """Units that were asked for; not of all channels at once, since one may be wrong while a file is checked."""
+        """Units of the structure's channels that were asked for so far."""
         return {}
 
     @cached_property
     def known_channels(self) -> frozenset[str]:
-        """Every channel that a log may hold, as a set to look one up."""
+        """Set of channels that a log of the structure may hold."""
         return frozenset(self.channels)
 
     def effort_unit(self, actuator: str) -> str:
-        """SI unit of the effort of an actuator: what its joint or shaft takes, or a force along its line."""
+        """SI unit of an actuator's effort in the structure."""
         kind = self.driven_kind(actuator)
         return "N" if kind is None else EFFORT_UNIT[kind]
 
 
 def build_structure(document: Document) -> Structure:
-    """Order the tree, parents first, else in the order of the file; the tree has to be free of problems."""
+    """Build the structure: the tree, parents first, else in the order of the file."""
     document = flexed(document)
     axes: list[Axis] = []
     bodies: list[str] = []
@@ -282,7 +282,7 @@ def build_structure(document: Document) -> Structure:
 
 
 def _sorted(document: Document) -> Iterator[str]:
-    """Names of joints and beams, each after what it hangs on."""
+    """Joints and beams of the structure, each after what it hangs on."""
     hangs: dict[str, tuple[str, str]] = {name: (joint.parent, joint.child) for name, joint in document.joints.items()}
     hangs |= {name: (beam.parent, name) for name, beam in document.beams.items()}
     placed = {WORLD}
@@ -293,7 +293,7 @@ def _sorted(document: Document) -> Iterator[str]:
 
 
 def _parts(name: str, joint: Joint, document: Document) -> list[tuple[Coordinate, bool]]:
-    """Coordinates of a joint, with those that effects split off, and whether each is such a one."""
+    """Coordinates of a joint in the structure, with those that effects split off."""
     split, bent = deflections(document), bendings(document)
     parts: list[tuple[Coordinate, bool]] = []
     for part in joint.coordinates(name):
@@ -308,7 +308,7 @@ def _parts(name: str, joint: Joint, document: Document) -> list[tuple[Coordinate
 def _chain(
     name: str, joint: Joint, parts: list[tuple[Coordinate, bool]], start: Frame, first: int, *, carries: bool
 ) -> Iterator[Axis]:
-    """Axes of a joint; the last one carries the child, unless that sits at a constant place away from it."""
+    """Axes of a joint in the structure; the last one carries the child."""
     for i, (part, added) in enumerate(parts):
         frame = start if i == 0 else Frame(Mount("body", first + i - 1), Pose())
         yield Axis(part, frame, name, joint.child if carries and i == len(parts) - 1 else None, added)

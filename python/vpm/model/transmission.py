@@ -28,7 +28,7 @@ class Transmission(Component):
     inertia: ParameterValue | None = None
 
     def problems(self, name: str, structure: Structure) -> Iterator[Problem]:
-        """Joints that are not there or do not turn it."""
+        """Problems of a transmission: joints that are not there or do not turn it."""
         for joint, ratio in self.ratios.items():
             where = place("transmissions", name, "ratios", joint)
             yield from coordinate_problems(where, joint, structure)

@@ -15,7 +15,7 @@ _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
 
 def name_problems(document: Document) -> Iterator[Problem]:
-    """Names that cannot be written in a dotted name, that are reserved, or that two components share."""
+    """Problems of names in the tree: unwritable, reserved, or shared by two components."""
     owner: dict[str, str] = {}
     for section, name, _ in document.components(*(section for section in SECTIONS if section != "channels")):
         where = place(section, name)
@@ -35,7 +35,7 @@ def name_problems(document: Document) -> Iterator[Problem]:
 
 
 def tree_problems(document: Document) -> Iterator[Problem]:
-    """Unknown parents, bodies with no joint or several, places outside of a beam, loops."""
+    """Problems of the tree: unknown parents, bodies with no joint or several, wrong places, loops."""
     for keys, parent, at in _attachments(document):
         yield from _attachment_problems(keys, parent, at, document)
     yield from _child_problems(document)
@@ -43,7 +43,7 @@ def tree_problems(document: Document) -> Iterator[Problem]:
 
 
 def _attachments(document: Document) -> Iterator[tuple[tuple[str, ...], str, float | None]]:
-    """Everything that sits somewhere: its place in the file, its parent, and how far along that."""
+    """Attachments in the tree: their place in the file, their parent, and how far along that."""
     for section in ("joints", "beams", "markers"):
         for name, entry in getattr(document, section).items():
             yield (section, name), entry.parent, entry.at

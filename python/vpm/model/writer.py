@@ -15,7 +15,7 @@ from vpm.model.schema import Document
 
 
 def content_of(document: Document, *, complete: bool = False) -> dict[str, Any]:
-    """Plain content that reads back as the same document.
+    """Content to write that reads back as the same document.
 
     Parameters
     ----------
@@ -27,7 +27,7 @@ def content_of(document: Document, *, complete: bool = False) -> dict[str, Any]:
 
 
 def plain(value: object, complete: bool = False) -> object:
-    """Value as a TOML parser would give it; a quantity that is nothing but a number is a number."""
+    """Value to write as a TOML parser would give it; a quantity with nothing but a number is a number."""
     match value:
         case Quantity():
             table = _table(value, complete)
@@ -61,7 +61,7 @@ WIDEST = 120
 
 
 def toml_of(document: Document, remarks: Remarks = MappingProxyType({}), head: Iterable[str] = ()) -> str:
-    """Text of a model file: one table per component, one line per key, as a person would write it.
+    """Write the text of a model file: one table per component, one line per key.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def _pair(key: str, value: object, remark: str | None = None) -> str:
 
 
 def _value(value: object) -> str:
-    """Value on one line; escapes of text and forms of numbers are left to the TOML library."""
+    """Write a value on one line by the TOML library."""
     if isinstance(value, Mapping):
         return "{ " + ", ".join(_pair(key, item) for key, item in value.items()) + " }"
     if isinstance(value, list):

@@ -122,7 +122,7 @@ def _frozen(terms: Sequence[Sequence[tuple[int, int]]]) -> tuple[tuple[tuple[int
 def _pool(
     signals: Sequence[str], output_lags: Lags, input_lags: Lags | Mapping[str, Lags], degree: int, *, constant: bool
 ) -> list[list[tuple[int, int]]]:
-    """All candidate terms of a polynomial NARX, as products of lagged signals."""
+    """Candidate terms for the identification of a polynomial NARX, as products of lagged signals."""
     if isinstance(input_lags, Mapping):
         unknown = sorted(set(input_lags) - set(signals[1:]))
         if unknown:

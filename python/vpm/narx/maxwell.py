@@ -50,7 +50,7 @@ class MaxwellNarx(Result):
     scheme: Literal["trapezoidal", "printed", "central_mean"] = "trapezoidal"
 
     def __post_init__(self) -> None:
-        """Fill both maps up to ten coefficients and check the numbers."""
+        """Fill both maps of the Maxwell element up to ten coefficients and check the numbers."""
         for name in ("k0", "s0"):
             given = np.atleast_1d(np.asarray(getattr(self, name), dtype=np.float64))
             if given.ndim != 1 or not 1 <= given.size <= 10:
@@ -69,13 +69,13 @@ class MaxwellNarx(Result):
 
     @property
     def relaxation_time(self) -> float:
-        """``tau = c1 / k1`` in s."""
+        """Relaxation time of the Maxwell element, ``tau = c1 / k1`` in s."""
         return self.c1 / self.k1
 
     def simulate_free_run(
         self, length: ArrayLike, start: tuple[float, float], drive: ArrayLike | None = None, *, limit: float = np.inf
     ) -> Array:
-        """Force over a record, from the element's own past.
+        """Free run of the Maxwell element: force over a record from its own past.
 
         Parameters
         ----------

@@ -102,7 +102,7 @@ def identify_maxwell(
 def refine_maxwell(
     element: MaxwellNarx, records: Records, signals: MaxwellSignals | None = None, *, degree: int | None = None
 ) -> MaxwellFit:
-    """All coefficients of an element together, by least squares of its free runs over records.
+    """Fit all coefficients of a Maxwell element together, by least squares of its free runs over records.
 
     Parameters
     ----------

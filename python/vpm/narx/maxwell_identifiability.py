@@ -22,14 +22,14 @@ HARDLY = 0.2
 
 
 def basis_around(samples: list[Samples]) -> Basis:
-    """Basis over the range of all records."""
+    """Basis over the range of all records, for identifiability."""
     return Basis.around(np.concatenate([one.drive for one in samples]), np.concatenate([one.length for one in samples]))
 
 
 def widened(
     samples: list[Samples], bases: tuple[Basis, Basis], signals: MaxwellSignals, degree: int | None
 ) -> tuple[tuple[Basis, Basis], list[str]]:
-    """Bases of the refinement over the range of all training records, and terms that these cannot tell."""
+    """Widened bases over all training records, and terms that are not identifiable in them."""
     whole = basis_around(samples)
     drive, length = (np.concatenate([getattr(one, name) for one in samples]) for name in ("drive", "length"))
     made, notes = [], []
@@ -54,12 +54,12 @@ def widened(
 
 
 def start_vector(e: MaxwellNarx, bases: tuple[Basis, Basis]) -> Array:
-    """Coefficients of an element over these bases, k1 and the logarithm of tau."""
+    """Coefficients of a Maxwell element over identifiable bases, k1 and the logarithm of tau."""
     return Parameters(bases[0].from_plain(e.k0), bases[1].from_plain(e.s0), e.k1, e.relaxation_time).to_vector()
 
 
 def coefficient_names(bases: tuple[Basis, Basis]) -> list[str]:
-    """Names of the same, for example ``"k0[u^2]"``."""
+    """Names of identifiable coefficients, for example ``"k0[u^2]"``."""
     maps = zip(("k0", "s0"), bases, strict=True)
     return [f"{of}[{POWER_NAMES[term]}]" for of, basis in maps for term in basis.terms] + ["k1", "tau"]
 
@@ -94,7 +94,7 @@ def identifiable_bases(
 def standard_errors(
     problem: OutputErrors, x: Array, bases: tuple[Basis, Basis]
 ) -> tuple[tuple[Array, Array, float, float], list[str]]:
-    """Standard errors of the plain coefficients, and what the records do not tell."""
+    """Standard errors of identifiable plain coefficients, and what the records do not tell."""
     jacobian, rest = problem.jacobian(x), problem.residual(x)
     sizes = np.linalg.norm(jacobian, axis=0)
     sizes[sizes == 0.0] = 1.0

@@ -45,7 +45,7 @@ class Basis:
 
     @classmethod
     def around(cls, drive: Array, length: Array) -> Basis:
-        """Basis of all ten over the range of the samples."""
+        """Basis of a Maxwell map with all ten terms over the range of the samples."""
         ranges = [(float(x.min()), float(x.max())) for x in (drive, length)]
         (u0, u1), (s0, s1) = ranges
         centre = (0.5 * (u0 + u1), 0.5 * (s0 + s1))
@@ -57,7 +57,7 @@ class Basis:
         return surface_columns(u, s)[:, list(self.terms)]
 
     def to_plain(self) -> Array:
-        """Matrix that makes the ten coefficients over plain u and s of those over this basis, shape (10, terms)."""
+        """Matrix (10, terms) from a map's coefficients over this basis to those of plain u and s."""
         (cu, cs), (du, ds) = self.centre, self.scale
         matrix = np.zeros((10, 10))
         for column, (i, j) in enumerate(POWERS):
@@ -68,12 +68,12 @@ class Basis:
         return np.asarray(matrix[:, list(self.terms)])
 
     def from_plain(self, coefficients: Array) -> Array:
-        """Coefficients over this basis of a polynomial that lies in it, shape (terms,)."""
+        """Coefficients (terms,) of a map's polynomial over this basis."""
         full = Basis(self.centre, self.scale, tuple(range(10))).to_plain()
         return np.asarray(np.linalg.solve(full, coefficients)[list(self.terms)])
 
     def independent(self, drive: Array, length: Array, weights: Array) -> tuple[Basis, tuple[int, ...]]:
-        """The terms that samples can tell from those before them, and the others."""
+        """Terms of a map that samples discriminate from those before them, and the others."""
         columns = weights[:, None] * self.columns(drive, length)
         kept: list[int] = []
         dropped: list[int] = []
@@ -126,17 +126,17 @@ class MaxwellMap(Result):
     notes: tuple[str, ...] = ()
 
     def __call__(self, drive: Array, length: Array) -> Array:
-        """Value at drive signals and lengths, shape (N,)."""
+        """Value of a map at drive signals and lengths, shape (N,)."""
         return np.asarray(surface_columns(np.atleast_1d(drive), np.atleast_1d(length)) @ self.coefficients)
 
     @property
     def basis(self) -> Basis:
-        """The basis it was fitted in."""
+        """Basis in which a map was fitted."""
         return Basis(self.centre, self.scale, self.terms)
 
     @property
     def std(self) -> Array:
-        """Standard errors of the coefficients, shape (10,); zero where a term was not fitted."""
+        """Standard errors of a map's coefficients, shape (10,); zero where a term was not fitted."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     def _headline(self) -> Mapping[str, object]:

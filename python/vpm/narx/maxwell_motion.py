@@ -108,7 +108,7 @@ def _cut(records: list[Samples], width: float | None) -> list[Samples]:
 
 
 def _window(problem: OutputErrors, k0: MaxwellMap, s0: MaxwellMap, method: Method) -> tuple[Array, Array]:
-    """Values of k1 and c1, and their covariance."""
+    """Maxwell k1 and c1 from one window in motion, and their covariance."""
     one = problem.records[0]
     if np.ptp(one.length) == 0.0:
         return np.full(2, np.nan), np.full((2, 2), np.nan)
@@ -122,7 +122,7 @@ def _window(problem: OutputErrors, k0: MaxwellMap, s0: MaxwellMap, method: Metho
 
 
 def descend_motion(problem: OutputErrors, x: Array) -> Array:
-    """k1 and tau of least output error with the maps as they are."""
+    """Maxwell k1 and tau of least output error in motion, with the maps as they are."""
     from scipy.optimize import least_squares
 
     size = min(one.force.size for one in problem.records)
@@ -153,14 +153,14 @@ def descend_motion(problem: OutputErrors, x: Array) -> Array:
 
 
 def element_values(x: Array) -> Array:
-    """k1 and c1 of a vector of parameters."""
+    """Maxwell k1 and c1 in motion from a vector of parameters."""
     return np.array([x[-2], x[-2] * np.exp(x[-1])])
 
 
 def motion_covariance(
     problem: OutputErrors, x: Array, jacobian: Array, maps: tuple[MaxwellMap, MaxwellMap] | None
 ) -> Array:
-    """Covariance of k1 and c1: from the noise of the force, and from that of the maps."""
+    """Covariance of Maxwell k1 and c1 in motion: from the noise of force and maps."""
     own, rest = jacobian[:, -2:], problem.residual(x)
     sigma2 = float(rest @ rest) / max(problem.freedom - 2, 1)
     sizes = np.linalg.norm(own, axis=0)
@@ -183,7 +183,7 @@ def motion_covariance(
 
 
 def _regression(problem: OutputErrors, x: Array, instruments: bool) -> tuple[Array, Array]:
-    """The equation as a regression for ``r`` and ``r k1``: ``alpha F - gamma F_lag - E = r (K ds - ...) + r k1 ds``."""
+    """Regression of Maxwell motion for ``r`` and ``r k1``: ``alpha F - gamma F_lag - E = r (K ds - ...) + r k1 ds``."""
     one, scheme = problem.records[0], problem.scheme
     w = WEIGHTS[scheme]
     p = Parameters.from_vector(x, problem.terms)

@@ -11,7 +11,7 @@ Array = NDArray[np.float64]
 
 
 def static_regressors(force: ArrayLike, length: ArrayLike, step: float) -> tuple[Array, Array]:
-    """Columns ``s[k], F[k-1] / (2 h), 1`` and the forces ``F[k+1]`` of D'Imperio (2016), eq 5.56.
+    """Printed regressors ``s[k], F[k-1] / (2 h), 1`` and forces ``F[k+1]`` of D'Imperio (2016), eq 5.56.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def static_regressors(force: ArrayLike, length: ArrayLike, step: float) -> tuple
 
 
 def static_rank(force: ArrayLike, length: ArrayLike, step: float) -> int:
-    """Rank of the static regression; 3 is needed for k0, s0 and tau, and one pose has 2 at most.
+    """Rank of the printed static regression; 3 is needed for k0, s0 and tau, one pose has 2 at most.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def static_rank(force: ArrayLike, length: ArrayLike, step: float) -> int:
 
 
 def minimum_norm_static(force: ArrayLike, length: ArrayLike, step: float) -> tuple[float, float, float]:
-    """What the "right pseudo-inverse" of D'Imperio (2016), eq 5.57 and 5.58, gives: an artefact, for reproduction only.
+    """Printed "right pseudo-inverse" of D'Imperio (2016), eq 5.57 and 5.58: an artefact, for reproduction.
 
     With constant length, the minimum-norm solution shares the force among linearly dependent columns, in
     proportion to their size: ``s0 = -1/s`` and, at rest, ``k0 = F s / (s^2 + 1)``, whatever the element is. Use

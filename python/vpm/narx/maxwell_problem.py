@@ -30,11 +30,11 @@ class Parameters:
 
     @classmethod
     def from_vector(cls, x: Array, terms: int) -> Parameters:
-        """From k0, s0, k1 and the logarithm of tau in one array; k0 has `terms` coefficients."""
+        """Parameters of a Maxwell problem from one array; k0 has `terms` coefficients."""
         return cls(x[:terms], x[terms:-2], float(x[-2]), float(np.exp(x[-1])))
 
     def to_vector(self) -> Array:
-        """Array of k0, s0, k1 and the logarithm of tau."""
+        """Array of a Maxwell problem's k0, s0, k1 and the logarithm of tau."""
         return np.concatenate([self.k0, self.s0, [self.k1, np.log(self.tau)]])
 
 
@@ -64,29 +64,29 @@ class OutputErrors:
 
     @property
     def limits(self) -> tuple[float, float]:
-        """Logarithms of the relaxation times that the records can show."""
+        """Logarithms of the relaxation times that the records of a Maxwell problem can show."""
         longest = max(one.force.size * one.step for one in self.records)
         return float(np.log(SHORTEST * self.records[0].step)), float(np.log(LONGEST * longest))
 
     @property
     def freedom(self) -> int:
-        """Degrees of freedom of the output errors: samples less starting forces."""
+        """Degrees of freedom of a Maxwell problem: samples less starting forces."""
         return sum(one.force.size - Recursion(self.scheme, 1.0).weights.lag for one in self.records)
 
     def columns(self, at: int) -> tuple[Array, Array]:
-        """Monomials of k0 and of s0 in one record."""
+        """Monomials of k0 and of s0 in one record of a Maxwell problem."""
         return self._columns[at]
 
     def residual(self, x: Array) -> Array:
-        """Computed less measured forces, N, shape (all samples,)."""
+        """Residual of a Maxwell problem: computed less measured forces, N, shape (all samples,)."""
         return np.concatenate([self.record(at, x)[0] for at in range(len(self.records))])
 
     def jacobian(self, x: Array) -> Array:
-        """Derivatives of the residual, shape (all samples, parameters)."""
+        """Derivatives of a Maxwell problem's residual, shape (all samples, parameters)."""
         return np.concatenate([self._derivatives(at, x) for at in range(len(self.records))])
 
     def record(self, at: int, x: Array) -> tuple[Array, Array]:
-        """Residual of one record, and its computed force."""
+        """Residual of one record in a Maxwell problem, and its computed force."""
         p, one = Parameters.from_vector(x, self.terms), self.records[at]
         recursion = Recursion(self.scheme, p.tau / one.step)
         elastic, rate = self._parts(at, p)
@@ -119,7 +119,7 @@ class OutputErrors:
         return np.asarray(whole - directions @ (directions.T @ whole))
 
     def search(self, x: Array, ratios: Array) -> Array:
-        """Best relaxation time of a grid, with the k1 that suits each; the maps stay. A start for the descent.
+        """Search of a Maxwell problem over relaxation times, with the best k1 of each; the maps stay.
 
         Parameters
         ----------

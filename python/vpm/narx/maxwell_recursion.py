@@ -34,7 +34,7 @@ WEIGHTS: dict[Scheme, Weights] = {
 
 
 def seen(scheme: Scheme, values: Array) -> Array:
-    """What the equation of sample k sees of a quantity, shape of the argument; nothing in the samples of the start."""
+    """Part of a quantity that the recursion of sample k sees; nothing in the samples of the start."""
     out = np.zeros_like(values)
     if scheme == "trapezoidal":
         out[1:] = 0.5 * (values[1:] + values[:-1])
@@ -44,7 +44,7 @@ def seen(scheme: Scheme, values: Array) -> Array:
 
 
 def stretch(scheme: Scheme, length: Array) -> Array:
-    """Change of length over one step that the equation of sample k sees, m, shape (N,)."""
+    """Stretch over one step that the recursion of sample k sees, m, shape (N,)."""
     out = np.zeros_like(length)
     if scheme == "trapezoidal":
         out[1:] = np.diff(length)
@@ -71,11 +71,11 @@ class Recursion:
 
     @property
     def weights(self) -> Weights:
-        """Weights of the scheme."""
+        """Weights of the recursion's scheme."""
         return WEIGHTS[self.scheme]
 
     def filtered(self, right: Array) -> Array:
-        """Solution of ``(alpha + beta r) y[k] = right[k] + (gamma + delta r) y[k - lag]``, along the first axis."""
+        """Solution of the recursion ``(alpha + beta r) y[k] = right[k] + (gamma + delta r) y[k - lag]``."""
         from scipy.signal import lfilter
 
         w, r = self.weights, self.ratio
@@ -84,20 +84,20 @@ class Recursion:
         return np.asarray(lfilter([1.0], denominator, right, axis=0), dtype=np.float64)
 
     def start_responses(self, samples: int) -> Array:
-        """Response to each starting force of 1 N, shape (N, lag)."""
+        """Response of the recursion to each starting force of 1 N, shape (N, lag)."""
         w = self.weights
         right = np.zeros((samples, w.lag))
         right[np.arange(w.lag), np.arange(w.lag)] = w.alpha + w.beta * self.ratio
         return self.filtered(right)
 
     def lagged(self, values: Array) -> Array:
-        """Values one lag ago, zero at the start."""
+        """Values of the recursion one lag ago, zero at the start."""
         out = np.zeros_like(values)
         out[self.weights.lag :] = values[: -self.weights.lag]
         return out
 
     def by_ratio(self, force: Array, rate: Array) -> Array:
-        """Derivative of the force by ``r``, where ``rate = (K + k1) ds``."""
+        """Derivative of the recursion's force by ``r``, where ``rate = (K + k1) ds``."""
         w = self.weights
         right = rate + w.delta * self.lagged(force) - w.beta * force
         right[: w.lag] = 0.0
@@ -105,7 +105,7 @@ class Recursion:
 
 
 def surface_columns(drive: Array, length: Array) -> Array:
-    """Monomials ``1, u, s, u^2, u s, s^2, u^3, u^2 s, u s^2, s^3``, shape (N, 10)."""
+    """Monomials of the recursion ``1, u, s, u^2, u s, s^2, u^3, u^2 s, u s^2, s^3``, shape (N, 10)."""
     return np.column_stack([drive**i * length**j for i, j in POWERS])
 
 
@@ -116,7 +116,7 @@ POWER_NAMES = ("1", "u", "s", "u^2", "u*s", "s^2", "u^3", "u^2*s", "u*s^2", "s^3
 
 
 def one_step(element: MaxwellNarx, force: Array, length: Array, drive: Array) -> Array:
-    """Force of each sample from the **measured** force a lag before, N, shape (N,); the first two are as given."""
+    """One step of the recursion from the **measured** force a lag before, N, shape (N,)."""
     recursion = Recursion(element.scheme, element.relaxation_time / element.step)
     w, r = recursion.weights, recursion.ratio
     columns = surface_columns(drive, length)

@@ -82,7 +82,7 @@ class MaxwellFit(Result):
 
 
 def training_rmse(element: MaxwellNarx, samples: list[Samples]) -> float:
-    """Root mean square force error of free runs over all records, N; infinite where one diverges."""
+    """Training result: root mean square force error of free runs, N; infinite where one diverges."""
     total, count = 0.0, 0
     # Of all records: at some pose the force may be zero.
     bound = FAR * max(float(np.abs(one.force).max()) for one in samples) or np.inf
@@ -99,7 +99,7 @@ def training_rmse(element: MaxwellNarx, samples: list[Samples]) -> float:
 def unrefined(
     element: MaxwellNarx, samples: list[Samples], std: tuple[Array, Array, float, float], notes: tuple[str, ...]
 ) -> MaxwellFit:
-    """Fit of an element as it is, with standard errors of k0, s0, k1 and c1."""
+    """Result of a Maxwell fit as it is, with standard errors of k0, s0, k1 and c1."""
     drive, length = (np.concatenate([getattr(one, name) for one in samples]) for name in ("drive", "length"))
     ranges = [(float(x.min()), float(x.max())) for x in (drive, length)]
     rmse = training_rmse(element, samples)

@@ -23,7 +23,7 @@ FAR = 1e3
 
 
 def maxwell_one_step(element: MaxwellNarx, record: RecordLike, signals: MaxwellSignals | None = None) -> NarxRun:
-    """Force of each sample from the **measured** force before it.
+    """One-step run of a Maxwell element: each force from the **measured** force before it.
 
     Parameters
     ----------
@@ -49,7 +49,7 @@ def maxwell_one_step(element: MaxwellNarx, record: RecordLike, signals: MaxwellS
 def maxwell_free_run(
     element: MaxwellNarx, record: RecordLike, signals: MaxwellSignals | None = None, *, limit: float | None = None
 ) -> NarxRun:
-    """Force of each sample from the **simulated** force before it; the first two samples are the record's.
+    """Free run of a Maxwell element: each force from the **simulated** one; two samples are the record's.
 
     Parameters
     ----------

@@ -56,7 +56,7 @@ class MaxwellWindows(Result):
 
     @property
     def std(self) -> Array:
-        """Standard errors, shape (n, 2)."""
+        """Standard errors of the windows, shape (n, 2)."""
         return np.sqrt(np.maximum(np.diagonal(self.covariance, axis1=1, axis2=2), 0.0))
 
     def _headline(self) -> Mapping[str, object]:
@@ -180,7 +180,7 @@ def _pose(one: Samples, signals: MaxwellSignals, settle: float, scales: tuple[fl
 
 
 def _rows(poses: list[_Pose], tolerance: float) -> list[list[_Pose]]:
-    """Poses of the same drive signal, by length."""
+    """Windows at rest in rows: poses of the same drive signal, by length."""
     ordered = sorted(poses, key=lambda p: p.drive)
     gap = tolerance * (ordered[-1].drive - ordered[0].drive)
     rows = [[ordered[0]]]
@@ -192,7 +192,7 @@ def _rows(poses: list[_Pose], tolerance: float) -> list[list[_Pose]]:
 
 
 def _tangent(poses: list[_Pose]) -> tuple[str, float, float, list[float], Array, int]:
-    """Straight line through neighbouring poses, weighted by the errors of force and length (effective variance)."""
+    """Straight line through neighbouring windows at rest, weighted by effective variance."""
     s, f = np.array([p.length for p in poses]), np.array([p.force for p in poses])
     errors = np.array([(p.force_error, p.length_error) for p in poses])
     slope = float(np.polyfit(s - s.mean(), f, 1)[0])

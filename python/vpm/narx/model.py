@@ -56,7 +56,7 @@ class Narx(Result):
     criterion: Array = field(default_factory=lambda: np.empty(0))
 
     def __post_init__(self) -> None:
-        """Check the terms, once."""
+        """Check the terms of the NARX model, once."""
         _ = self._compiled
 
     @classmethod
@@ -100,12 +100,12 @@ class Narx(Result):
 
     @property
     def longest_lag(self) -> int:
-        """Samples that a run needs before its first."""
+        """Samples that a run of the NARX model needs before its first."""
         return self._compiled.longest_lag
 
     @property
     def term_names(self) -> tuple[str, ...]:
-        """Terms as they are written, for example ``"force[k-1]*valve[k-2]"``."""
+        """Terms of the NARX model as written, for example ``"force[k-1]*valve[k-2]"``."""
         return tuple(self._compiled.texts())
 
     @property
@@ -115,7 +115,7 @@ class Narx(Result):
         return f"{self.output}[k] = " + " ".join(summands).removeprefix("+")
 
     def predict_one_step(self, record: RecordLike) -> NarxRun:
-        """Each sample from the **measured** outputs before it.
+        """One-step prediction of the NARX model: each sample from the **measured** outputs before it.
 
         Parameters
         ----------
@@ -138,7 +138,7 @@ class Narx(Result):
         return self._run("one-step prediction", given, values, record)
 
     def simulate_free_run(self, record: RecordLike, *, limit: float | None = None) -> NarxRun:
-        """Each sample from the **simulated** outputs before it; the first samples, the longest lag, are the record's.
+        """Free run of the NARX model: each sample from the **simulated** outputs before it.
 
         Parameters
         ----------
@@ -171,7 +171,7 @@ class Narx(Result):
         return self._run("free run", given, values, record)
 
     def stepper(self) -> NarxStepper:
-        """Simulation that is fed sample by sample: ``start(output, inputs)``, then ``step(inputs)``.
+        """Stepper of the NARX model: ``start(output, inputs)``, then ``step(inputs)``.
 
         Returns
         -------
@@ -180,7 +180,7 @@ class Narx(Result):
         return self._compiled.stepper()
 
     def plot(self) -> Figure:
-        """Draw what each term explains.
+        """Draw what each term of the NARX model explains.
 
         Returns
         -------

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 
 
 def inside(correlation: Correlation) -> bool:
-    """Whether a correlation of a residual is what chance gives.
+    """Whether a run's residual correlation is what chance gives.
 
     At most one lag in ten lies outside the band, where one in twenty is expected; and no single lag is larger than the
     largest of all lags would be in 19 of 20 independent signals (Bonferroni's inequality).
@@ -57,12 +57,12 @@ class ResidualTests(Result):
 
     @property
     def white(self) -> bool:
-        """Whether the residual does not remember its own past: see `inside`."""
+        """Whether a run's residual does not remember its own past: see `inside`."""
         return inside(self.own)
 
     @property
     def independent_of_inputs(self) -> bool:
-        """Whether the residual owes nothing to any input: see `inside`."""
+        """Whether a run's residual owes nothing to any input: see `inside`."""
         return all(inside(correlation) for correlation in self.inputs)
 
     def _headline(self) -> Mapping[str, object]:
@@ -82,7 +82,7 @@ class ResidualTests(Result):
         }
 
     def plot(self) -> Figure:
-        """Draw the residual's autocorrelation with its band.
+        """Draw the autocorrelation of a run's residual with its band.
 
         Returns
         -------
@@ -129,29 +129,29 @@ class NarxRun(Result):
 
     @property
     def residual(self) -> Array:
-        """Measured less computed output after the start, shape (N - start,)."""
+        """Residual of a run: measured less computed output after the start, shape (N - start,)."""
         return (self.measured - self.values)[self.start :]
 
     @property
     def rmse(self) -> float:
-        """Root of the mean squared residual."""
+        """Root of the mean squared residual of a run."""
         return float(np.sqrt(np.mean(self.residual**2))) if self.residual.size else 0.0
 
     @property
     def max_error(self) -> float:
-        """Largest magnitude of the residual."""
+        """Largest magnitude of a run's residual."""
         return float(np.abs(self.residual).max(initial=0.0))
 
     @property
     def fit(self) -> float:
-        """``100 (1 - |y - yhat| / |y - mean y|)`` in %: 100 is perfect, 0 is no better than the mean."""
+        """Fit of a run, ``100 (1 - |y - yhat| / |y - mean y|)`` in %: 100 is perfect, 0 is the mean."""
         y = self.measured[self.start :]
         spread = float(np.linalg.norm(y - y.mean()))
         off = float(np.linalg.norm(self.residual))
         return 100.0 * (1.0 - off / spread) if spread > 0.0 else (100.0 if off == 0.0 else float("-inf"))
 
     def residual_tests(self) -> ResidualTests:
-        """Correlations of the residual with its own past and with each input.
+        """Correlations of a run's residual with its own past and with each input.
 
         Returns
         -------
@@ -165,7 +165,7 @@ class NarxRun(Result):
         )
 
     def plot(self) -> Figure:
-        """Draw the computed over the measured output.
+        """Draw the computed over the measured output of a run.
 
         Returns
         -------

@@ -58,7 +58,7 @@ class NarxValidation(Result):
 
 
 def validate(model: Narx, records: RecordLike | Sequence[RecordLike]) -> NarxValidation:
-    """One-step prediction and free run of a model on each record, apart from each other.
+    """Validate a model by one-step prediction and free run on each record.
 
     Parameters
     ----------

@@ -54,7 +54,7 @@ class Record:
 
     @classmethod
     def of(cls, model: Model, experiment: Experiment, channels: Sequence[str] | None = None) -> Record:
-        """The record of a log.
+        """Record of a log for filtering.
 
         Raises
         ------
@@ -80,7 +80,7 @@ class Record:
         return cls(experiment.name, experiment.time, experiment.dt, names, readings, inputs, first)
 
     def stretch(self, samples: int) -> Record:
-        """The first so many samples alone."""
+        """First so many samples of a record for filtering."""
         kept = {name: getattr(self, name)[:samples] for name in ("time", "readings", "inputs")}
         return Record(self.name, kept["time"], self.dt, self.channels, kept["readings"], kept["inputs"], self.first)
 
@@ -104,11 +104,11 @@ class Pass:
     deviations: Array
 
     def whitened(self) -> Array:
-        """Innovations in units of what they are said to be (N, m), without correlation among channels."""
+        """Whitened innovations of a filter pass (N, m), without correlation among channels."""
         return whitened(self.covariances, self.innovations)
 
     def log_likelihood(self, whitened: Array | None = None) -> float:
-        """Logarithm of the probability density of the readings, one sample after the other.
+        """Log-likelihood of the readings in a filter pass, one sample after the other.
 
         ``whitened`` innovations, of any shape, may be those of other parameters under the same gains.
         """
@@ -116,12 +116,12 @@ class Pass:
         return -0.5 * float(np.sum(values**2) + self.log_volume() + values.size * np.log(2.0 * np.pi))
 
     def log_volume(self) -> float:
-        """Sum of the logarithms of the determinants of the covariances."""
+        """Log-determinants of a filter pass' covariances, summed."""
         return float(np.sum(np.linalg.slogdet(self.covariances)[1]))
 
 
 def whitened(covariances: Array, values: Array) -> Array:
-    """``L^-1 e`` with ``L L' = S``, for innovations (N, m) or their derivatives (N, m, k)."""
+    """Whitened filter innovations ``L^-1 e`` with ``L L' = S``, (N, m), or derivatives (N, m, k)."""
     if covariances.shape[1] == 1:
         deviation = np.sqrt(covariances[:, 0, 0])
         return np.asarray(values / deviation.reshape(-1, *[1] * (values.ndim - 1)))
@@ -164,7 +164,7 @@ def filtered(model: Model, record: Record, noise: Noise, *, setup: Setup | None 
 
 
 def first_deviations(model: Model, first: Array) -> Array:
-    """How far each state may be from the first one (nx,)."""
+    """Deviation of each state from the filter's first one (nx,)."""
     n = len(model.coordinates)
     spread = np.full(len(first), RATES)
     spread[:n] = COORDINATES
@@ -173,7 +173,7 @@ def first_deviations(model: Model, first: Array) -> Array:
 
 
 def measured_outputs(model: Model, experiment: Experiment) -> tuple[str, ...]:
-    """Outputs that the log holds, without commands, which are inputs, and accelerations, which are mostly derived."""
+    """Outputs in the log for filtering, without commands and accelerations."""
     inputs = set(model.input_channels)
     return tuple(
         name

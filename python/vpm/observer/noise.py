@@ -43,7 +43,7 @@ class Noise(Storable):
     states: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Check the numbers."""
+        """Check the noise's numbers."""
         for kind, values, least in (
             ("readings", self.readings, True),
             ("forces", self.forces, False),
@@ -55,7 +55,7 @@ class Noise(Storable):
                     raise SimulationError(f'noise of {kind}: "{name}" is {value:g}; give {condition}')
 
     def spreads(self, model: Model, record: Record) -> tuple[Array, Array, Array, Array]:
-        """Deviations of readings, forces, states and of the first state, as the core takes them.
+        """Noise deviations of readings, forces, states and the first state, as the core takes them.
 
         Raises
         ------
@@ -65,7 +65,7 @@ class Noise(Storable):
         return *self.placed(model, record.channels), first_deviations(model, record.first)
 
     def placed(self, model: Model, channels: Sequence[str]) -> tuple[Array, Array, Array]:
-        """Deviations of readings of these channels, of forces and of states, as the core takes them.
+        """Noise deviations of readings of these channels, of forces and of states, as the core takes them.
 
         Raises
         ------
@@ -80,7 +80,7 @@ class Noise(Storable):
         return readings, forces, _placed("states", self.states, model.state_names)
 
     def scaled(self, factor: float) -> Noise:
-        """All of it by a factor."""
+        """Noise scaled by a factor."""
         return Noise(
             *(
                 {name: factor * value for name, value in part.items()}
@@ -119,7 +119,7 @@ def likely_noise(
     noise = replace(noise, readings={**noise.readings, **known})
 
     def likelihood(candidate: Noise) -> tuple[float, float]:
-        """Log likelihood at the best common scale, and its square."""
+        """Log-likelihood of noise at the best common scale, and its square."""
         power, logarithms, count = 0.0, 0.0, 0
         for piece in pieces:
             try:

@@ -64,7 +64,7 @@ class Observation(Result):
 
     @property
     def whiteness(self) -> dict[str, float]:
-        """Probability, by channel, that white innovations are as correlated as these over 20 samples.
+        """Probability by channel that white innovations are as correlated as in an observation.
 
         G. Ljung and G. Box, *Biometrika* 65, 1978.
         """
@@ -81,7 +81,7 @@ class Observation(Result):
         return found
 
     def state(self, name: str) -> Array:
-        """One state over time (N,), SI."""
+        """State of an observation over time (N,), SI."""
         from vpm.errors import SimulationError, near_match
 
         if name not in self.state_names:
@@ -100,7 +100,7 @@ class Observation(Result):
         return columns
 
     def plot(self) -> Figure:
-        """Innovations between the bounds that should hold 95 % of them. Needs the extra ``plot``."""
+        """Plot an observation: innovations between their 95 % bounds. Needs the extra ``plot``."""
         from vpm.plot import plot_innovations
 
         return plot_innovations(self.time, self.innovations, self.expected, self.channels, self.units)
@@ -114,7 +114,7 @@ def observe(
     noise: Noise | None = None,
     setup: Setup | None = None,
 ) -> Observation:
-    """Follow ``experiment`` with ``model`` by an extended Kalman filter, and tell what it cannot explain.
+    """Observation of ``experiment`` by ``model`` with an extended Kalman filter.
 
     Nothing is differentiated or inverted, and no controller, reference or start at rest is needed: any of the measured
     outputs will do. Where the machine does what the model says, innovations are white and as large as expected.

@@ -116,7 +116,7 @@ class Observer:
             self.keep(self.settled(first, model.command(inputs)))
 
     def step(self, measurements: ArrayLike, inputs: ArrayLike | Mapping[str, float] = ()) -> Array:
-        """State at this sample, corrected by what was measured; the inputs are held until the next.
+        """Step of the online observer: state at this sample, corrected by readings; inputs are held.
 
         Parameters
         ----------
@@ -151,31 +151,31 @@ class Observer:
 
     @property
     def state(self) -> Array:
-        """Last state that the observer estimated, shape (nx,)."""
+        """Last state that the online observer estimated, shape (nx,)."""
         return self._estimate
 
     @property
     def covariance(self) -> Array:
-        """Covariance of the last estimate, shape (nx, nx)."""
+        """Covariance of the online observer's last estimate, shape (nx, nx)."""
         return self._core.covariances()[0]
 
     @property
     def innovation(self) -> Array:
-        """Measurements less what was expected, shape (m,)."""
+        """Innovation of the online observer: measurements less what was expected, shape (m,)."""
         return self._innovation
 
     @property
     def innovation_covariance(self) -> Array:
-        """Covariance that the innovations should have, shape (m, m)."""
+        """Covariance of the online observer's innovations, shape (m, m)."""
         return self._core.covariances()[1]
 
     @property
     def predicted(self) -> Array:
-        """State that is expected at the coming sample, shape (nx,)."""
+        """State that the online observer expects at the coming sample, shape (nx,)."""
         return self._core.expected()
 
     def reset(self, state: Mapping[str, float] | ArrayLike | None = None, covariance: ArrayLike | None = None) -> None:
-        """Begin again, by default in the first state with the deviations that the observer was made with.
+        """Reset the online observer, by default to its own first state and deviations.
 
         Parameters
         ----------
@@ -191,7 +191,7 @@ class Observer:
         self._estimate, self._innovation = first.copy(), np.zeros(len(self.channels))
 
     def settled(self, state: Mapping[str, float] | ArrayLike, inputs: Mapping[str, float] | ArrayLike) -> SteadyGain:
-        """The gain that the filter settles to near a state under standing inputs; the observer begins again there.
+        """Steady-state gain of the online observer near a state under standing inputs; it begins again.
 
         Law: the algebraic Riccati equation (R. Kalman, *J. Basic Engineering* 82, 1960).
 
@@ -221,7 +221,7 @@ class Observer:
         return SteadyGain(gain, left_over, spread.astype(np.float64))
 
     def keep(self, steady: SteadyGain) -> None:
-        """Correct by this gain from now on, until another is kept."""
+        """Keep a gain of the online observer from now on, until another is kept."""
         self._core.hold_gain(*steady)
 
     def __repr__(self) -> str:

@@ -44,17 +44,17 @@ class Channels:
 
     @cached_property
     def evaluated(self) -> tuple[Expression, Expression]:
-        """Functions of state and commands: rates, outputs."""
+        """Functions of state and commands for optimised channels: rates, outputs."""
         ca, own = casadi(), self.own
         inputs = [own.x, own.u]
         return ca.Function("rates", inputs, [own.rates]), ca.Function("outputs", inputs, [own.outputs])
 
     def rates(self, states: Array, commands: Array) -> Array:
-        """Rates of many states, shape (N, nx)."""
+        """Rates of many states by the channels' functions, shape (N, nx)."""
         return np.array(self.evaluated[0].map(len(states))(states.T, commands.T).full()).T
 
     def outputs(self, states: Array, commands: Array) -> Array:
-        """Outputs of many states, shape (N, ny)."""
+        """Output channels of many states, shape (N, ny)."""
         return np.array(self.evaluated[1].map(len(states))(states.T, commands.T).full()).T
 
     def size(self, limit: Limit, states: Array) -> float:

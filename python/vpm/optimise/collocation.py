@@ -17,7 +17,7 @@ STAGES = 3
 
 
 def _points() -> Array:
-    """Roots of ``P_(s-1) - P_s`` on [0, 1], of which the last is 1."""
+    """Collocation points: roots of ``P_(s-1) - P_s`` on [0, 1], of which the last is 1."""
     coefficients = np.zeros(STAGES + 1)
     coefficients[STAGES - 1 :] = 1.0, -1.0
     return np.sort(0.5 * (legendre.legroots(coefficients).real + 1.0))
@@ -31,12 +31,12 @@ _POWERS = np.linalg.inv(np.vander(NODES, increasing=True))
 
 
 def values(at: Array) -> Array:
-    """Matrix (at, STAGES + 1) from a polynomial's values at the nodes to those at ``at``."""
+    """Collocation matrix (at, STAGES + 1) from a polynomial's node values to those at ``at``."""
     return np.asarray(np.vander(at, STAGES + 1, increasing=True) @ _POWERS)
 
 
 def slopes(at: Array) -> Array:
-    """Matrix (at, STAGES + 1) from a polynomial's values at the nodes to its slopes at ``at``, by share of interval."""
+    """Collocation matrix (at, STAGES + 1) from a polynomial's node values to slopes at ``at``."""
     powers = np.vander(at, STAGES + 1, increasing=True)
     grown = np.zeros_like(powers)
     grown[:, 1:] = powers[:, :-1] * np.arange(1, STAGES + 1)
@@ -50,13 +50,13 @@ WEIGHTS = np.linalg.solve(np.vander(POINTS, increasing=True).T, 1.0 / np.arange(
 
 
 def spread(mesh: Array) -> Array:
-    """Times of the nodes and points of a mesh, each once, shape (STAGES * intervals + 1,)."""
+    """Collocation times of a mesh, each once, shape (STAGES * intervals + 1,)."""
     inner = mesh[:-1, None] + np.diff(mesh)[:, None] * POINTS
     return np.concatenate([mesh[:1], inner.ravel()])
 
 
 def at_times(mesh: Array, states: Array, times: Array) -> tuple[Array, Array]:
-    """States and their rates by the polynomials of each interval.
+    """States and rates at some times by the collocation polynomials of each interval.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ _IGNORED = re.compile(r"\s+\(void\)\w+;|\s*")
 
 
 def casadi() -> ModuleType:
-    """The library CasADi.
+    """CasADi library, for equations.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def equations(model: Model) -> Equations:
 def _read(
     model: Model, source: str, function: str, result: str, inputs: tuple[Expression, Expression], size: int
 ) -> Expression:
-    """CasADi expression of a function of the generated C, over all its pieces, which hand numbers on in ``w``."""
+    """Equations of a generated C function as a CasADi expression, over all its pieces."""
     ca = casadi()
     arrays: dict[str, Any] = {"x": inputs[0].elements(), "u": inputs[1].elements(), "w": {}, result: {}}
     pieces = re.finditer(rf"static void {_NAME}_run_{function}(?:_\d+)?\([^)]*\)\n\{{\n(.*?)^\}}", source, re.S | re.M)
@@ -140,7 +140,7 @@ class _Terms:
         }
 
     def expression(self, text: str) -> Expression | None:
-        """Value of ``a < b ? c : d``, ``a + b``, ``f(a)``, ``-a`` or ``a``; None for other functions."""
+        """Expression in the equations: ``a < b ? c : d``, ``a + b``, ``f(a)``, ``-a`` or ``a``; None for others."""
         if found := _CHOICE.fullmatch(text):
             a, b, yes, no = map(self._term, found.groups())
             return self.ca.if_else(a < b, yes, no)

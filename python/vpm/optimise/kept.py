@@ -19,12 +19,12 @@ LOOKS, HAIR = 1001, 1e-3
 
 
 def binding(channels: Channels, task: Fitted, motion: MeshMotion) -> tuple[str, ...]:
-    """Limits that hold the motion back, with the share of their phase, and those that a rest needs in full."""
+    """Kept limits that hold the motion back, with the share of their phase."""
     return tuple(_held(channels, task, motion))
 
 
 def passed(channels: Channels, task: Fitted, motion: MeshMotion) -> tuple[str, ...]:
-    """Limits that the motion passes between points, with by how much."""
+    """Limits that the motion has not kept between points, with by how much."""
     found = []
     for phase, limit, course in _courses(channels, task, motion):
         for word, end, over in (
@@ -59,7 +59,7 @@ def _held(channels: Channels, task: Fitted, motion: MeshMotion) -> Iterator[str]
 
 
 def _courses(channels: Channels, task: Fitted, motion: MeshMotion) -> Iterator[tuple[str, Limit, Array]]:
-    """Every limited channel over its phase."""
+    """Every channel whose limit has to be kept, over its phase."""
     for number, phase in enumerate(task.phases):
         if phase.limits:
             values = _values(channels, [one.channel for one in phase.limits], motion, number)
@@ -67,7 +67,7 @@ def _courses(channels: Channels, task: Fitted, motion: MeshMotion) -> Iterator[t
 
 
 def _values(channels: Channels, names: Sequence[str], motion: MeshMotion, phase: int) -> Array:
-    """Channels at many instants inside of a phase, shape (channels, LOOKS)."""
+    """Channels at many instants of a phase where limits are kept, shape (channels, LOOKS)."""
     ca, mesh, commands = casadi(), motion.meshes[phase], motion.commands[phase]
     share = (np.arange(LOOKS) + 0.5) / LOOKS
     states, _, held = motion.at(motion.starts[phase] + motion.durations[phase] * share)

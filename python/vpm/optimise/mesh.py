@@ -27,7 +27,7 @@ CHECKED = _AT + 0.5
 
 
 def errors(channels: Channels, motion: MeshMotion, scales: Scales) -> tuple[Array, ...]:
-    """Error of each interval of each phase, in sizes of the states: of the program, or what the motion reaches."""
+    """Mesh error of each interval of each phase, in sizes of the states."""
     found, sizes = [], np.maximum(scales.states, np.abs(motion.states).max(axis=0))
     for phase in range(len(motion.meshes)):
         nodes, _ = motion.of_phase(phase)
@@ -65,7 +65,7 @@ def bends(task: Fitted, names: Sequence[str], motion: MeshMotion, scales: Scales
 
 
 def _rate(task: Fitted, phase: int, name: str) -> float:
-    """Limit of the rate of a command, or zero."""
+    """Limit of a command's rate on the mesh, or zero."""
     return max((one.size for one in task.phases[phase].limits if one.channel == f"{name}{RATE}"), default=0.0)
 
 

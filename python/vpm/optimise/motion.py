@@ -38,11 +38,11 @@ class MeshMotion:
 
     @cached_property
     def starts(self) -> Array:
-        """When each phase begins, and when the last ends, s."""
+        """Start times of a motion's phases, and the end of the last, s."""
         return np.concatenate([[0.0], np.cumsum(self.durations)])
 
     def of_phase(self, phase: int) -> tuple[Array, Array]:
-        """Nodes in s and states of a phase."""
+        """Nodes in s and states of a motion's phase."""
         before = STAGES * sum(mesh.size - 1 for mesh in self.meshes[:phase])
         count = STAGES * (self.meshes[phase].size - 1) + 1
         nodes = self.starts[phase] + self.durations[phase] * self.meshes[phase]
@@ -50,12 +50,12 @@ class MeshMotion:
 
     @property
     def times(self) -> Array:
-        """Times of the states, s."""
+        """Times of a motion's states, s."""
         parts = [spread(self.of_phase(phase)[0])[1:] for phase in range(len(self.meshes))]
         return np.concatenate([[0.0], *parts])
 
     def at(self, times: Array) -> tuple[Array, Array, Array]:
-        """States, their rates and commands at some times, of the phases that they fall into."""
+        """States, rates and commands of a motion at some times."""
         nx, nu = self.states.shape[1], self.commands[0].shape[1]
         states, rates, commands = np.empty((times.size, nx)), np.empty((times.size, nx)), np.empty((times.size, nu))
         own = np.clip(np.searchsorted(self.starts, times, side="right") - 1, 0, len(self.meshes) - 1)

@@ -43,7 +43,7 @@ def optimise(
     start: Optimum | None = None,
     progress: Progress | None = None,
 ) -> Optimum:
-    """Motion of a machine that makes a goal least within limits, elasticity included.
+    """Optimise a machine's motion: a goal becomes least within limits, elasticity included.
 
     Direct collocation on Radau's points with IPOPT, first and second derivatives exact and sparse. The mesh is made
     finer where the motion misses the equations of motion between points, and the log is played by vpm in the end.
@@ -99,7 +99,7 @@ def _begun(task: Fitted, start: Optimum | None) -> MeshMotion | None:
 
 
 def _optimum(models: tuple[Model, Model], name: str, found: Search) -> Optimum:
-    """The result; ``models`` are that of the search and that of the file, which may be more detailed."""
+    """Result of the optimisation; ``models`` are that of the search and the file's, maybe more detailed."""
     motion, channels = found.motion, found.channels
     time, data = samples(channels, motion, found.task)
     node_times = [motion.of_phase(phase)[0] for phase in range(len(motion.meshes))]
@@ -135,7 +135,7 @@ def _optimum(models: tuple[Model, Model], name: str, found: Search) -> Optimum:
 
 
 def samples(channels: Channels, motion: MeshMotion, task: Fitted) -> tuple[Array, Array]:
-    """Times and outputs of a log; a command is held at its mean until the next sample.
+    """Times and outputs of an optimised log; a command is held at its mean until the next sample.
 
     Held means give the machine the impulse that the commands between nodes give it, so that a jump between two samples
     is not lost. Before time zero the machine stands, behind the end the command of its rest goes on, or the last one.
@@ -155,7 +155,7 @@ def samples(channels: Channels, motion: MeshMotion, task: Fitted) -> tuple[Array
 
 
 def _impulse(motion: MeshMotion, times: Array, last: Array) -> Array:
-    """Integral of the commands from zero to each time, shape (N, nu)."""
+    """Integral of the optimised commands from zero to each time, shape (N, nu)."""
     total, before = np.zeros((times.size, last.size)), np.zeros(last.size)
     if motion.rests[0] is not None:
         total[times < 0.0] = times[times < 0.0, None] * motion.rests[0]

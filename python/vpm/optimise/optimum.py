@@ -98,22 +98,22 @@ class Optimum(Result):
 
     @property
     def strayed(self) -> float:
-        """The largest of `played`."""
+        """Largest error of an optimum when `played`."""
         return max(self.played.values(), default=float("nan"))
 
     def __getitem__(self, channel: str) -> Array:
-        """Samples of a channel in the log, shape (N,)."""
+        """Samples of a channel in the optimum's log, shape (N,)."""
         if channel not in self.channels:
             raise OptimisationError(f'{self.name} has no channel "{channel}"; {near_match(channel, self.channels)}')
         return self.data[:, self.channels.index(channel)]
 
     def experiment(self) -> Experiment:
-        """The motion as a log, whose commands `vpm.simulate` takes."""
+        """Optimum as a log, whose commands `vpm.simulate` takes."""
         history = (f"Optimum of {self.name}: {self.status}, {self.duration:.6g} s.", *self.binding, *self.notes)
         return Experiment(self.name, self.time, self.data, self.channels, self.units, history)
 
     def play(self, model: Model) -> Run:
-        """Simulate the commands of the log on a model, from the state in which the motion begins.
+        """Play the optimum: simulate its commands on a model, from its first state.
 
         Parameters
         ----------
@@ -126,11 +126,11 @@ class Optimum(Result):
         return simulate(model, self.experiment(), "free_run", initial_state=self.initial_state if own else None)
 
     def to_csv(self, path: str | PathLike[str]) -> Path:
-        """Write the log, which `vpm simulate MODEL LOG` plays."""
+        """Write the optimum's log, which `vpm simulate MODEL LOG` plays."""
         return self.experiment().to_csv(path)
 
     def plot(self) -> Figure:
-        """Commands, and all channels that the task or the machine moves. Needs the extra ``plot``."""
+        """Plot an optimum: commands, and all channels that move. Needs the extra ``plot``."""
         from vpm.plot import plot_channels
 
         shown = [at for at, channel in enumerate(self.channels) if self._is_shown(channel)]

@@ -62,7 +62,7 @@ class Program:
     _solvers: dict[str, Any] = field(default_factory=dict)
 
     def functions(self) -> tuple[Any, dict[str, Any]]:
-        """Symbols and expressions for ``nlpsol``, and its derivatives as options."""
+        """Symbols and expressions of the program for ``nlpsol``, and its derivatives as options."""
         ca = casadi()
         ng, nz = self.A.shape
         z, p = ca.MX.sym("z", nz), ca.MX.sym("p")
@@ -159,7 +159,7 @@ class _Entries:
 
 
 def _dm(matrix: Any) -> Any:  # noqa: ANN401
-    """A constant matrix of CasADi."""
+    """Constant matrix of CasADi for the program."""
     ca = casadi()
     columns = csc_array(matrix)
     columns.sort_indices()
@@ -195,7 +195,7 @@ def _products(
     *,
     upper: bool = False,
 ) -> tuple[Indices, Indices, Indices, Array]:
-    """Entries of ``left D right``, where D holds ``count`` blocks of one pattern: row, column, entry of D, factor."""
+    """Entries of ``left D right`` in the program, where D holds ``count`` blocks of one pattern."""
     left, right = csc_array(left), csr_array(right)
     blocks = np.arange(count)[:, None]
     inner = (blocks * size[0] + places[0]).ravel()
@@ -215,7 +215,7 @@ def _products(
 def _row(
     d: csc_array, group: Group, places: tuple[Indices, Indices], size: tuple[int, int], entries: Expression, nz: int
 ) -> Expression:
-    """Gradient of the share of a group in the objective, a row."""
+    """Gradient row of a group's share in the program's objective."""
     ca = casadi()
     _, columns, of, factors = _products(d, group.V, places, size, group.count)
     put = csc_array((factors, (columns, of)), shape=(nz, max(1, entries.numel())))

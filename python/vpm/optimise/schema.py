@@ -52,7 +52,7 @@ class Boundary(Entry):
 
 
 def _as_boundary(given: object) -> object:
-    """Channels stand beside the word in the file, and in a table of their own here."""
+    """Boundary in the task's schema: channels beside the word come into a table of their own."""
     if not isinstance(given, Mapping):
         return given
     words = {key: value for key, value in given.items() if key == "rest"}

@@ -59,7 +59,7 @@ class SearchInterruptedError(KeyboardInterrupt):
 
 
 def search(model: Model, given: Fitted, progress: Progress, start: MeshMotion | None = None) -> Search:
-    """The best motion on a mesh that is fine enough, from another motion if there is one.
+    """Solve for the best motion on a mesh that is fine enough, from another motion if there is one.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def _prefixed(progress: Progress, what: str) -> Progress:
 
 
 def _calm(found: Search, progress: Progress) -> _Run | None:
-    """Run that begins with the motion of least energy in a fixed time, which is found more easily; or None."""
+    """Solve first for the motion of least energy in a fixed time, which is found more easily; or None."""
     task, start = found.task, found.motion
     for share in (1.0, 0.5):
         times = tuple(part.longest**share * part.shortest ** (1.0 - share) for part in task.phases)
@@ -186,14 +186,14 @@ class _Run:
         self.motion = self.form.unpack(self.z)
 
     def _keep(self) -> None:
-        """Hand the last iterate to the search, unless the optimum on a coarser mesh is there."""
+        """Keep the solver's last iterate, unless the optimum on a coarser mesh is there."""
         if self.found.rounds:
             self.found.notes.append("Ctrl-C ended the search before the mesh was fine enough.")
         else:
             self.found.motion, self.found.objective = self.form.unpack(self.z), self.objective
 
     def seen(self, z: Array, cost: float, violation: float) -> None:
-        """An iterate of IPOPT."""
+        """Iterate of the solver IPOPT."""
         self.found.iterations += 1
         self.z, self.objective = z, cost
         self._progress(f"iteration {self.found.iterations}: {cost:.6g}, misses {violation:.1e}")
@@ -201,7 +201,7 @@ class _Run:
 
 @contextmanager
 def _listening(watch: Any) -> Iterator[None]:  # noqa: ANN401
-    """Ctrl-C ends the search after the iteration: inside of one the library would take it for an error."""
+    """End the solver by Ctrl-C after the iteration: inside of one it would be an error."""
     before = signal.getsignal(signal.SIGINT)
     if threading.current_thread() is not threading.main_thread() or before in {signal.SIG_IGN, None}:
         yield
@@ -218,7 +218,7 @@ def _listening(watch: Any) -> Iterator[None]:  # noqa: ANN401
 
 
 def _watch(run: _Run) -> Any:  # noqa: ANN401
-    """Callback that IPOPT calls after every iteration."""
+    """Callback that the solver IPOPT calls after every iteration."""
     ca = casadi()
     nx, ng = run.form.size, len(run.form.rows)
     limits = run.form.bounds(soft=False)
@@ -256,7 +256,7 @@ def _watch(run: _Run) -> Any:  # noqa: ANN401
 
 
 def _why(found: Search, run: _Run) -> str:
-    """Why there is no motion: the nearest one with all limits kept, what it misses and which limits bind."""
+    """Why there is no solution: the nearest motion, what it misses and which limits bind."""
     soft = _Run(found, found.motion, lambda _: None, warm=False)
     soft.solve(soft=True)
     missed = soft.form.missed(soft.z)
@@ -275,7 +275,7 @@ def _why(found: Search, run: _Run) -> str:
 
 
 def _worst(run: _Run) -> str:
-    """The constraint that the last iterate misses most."""
+    """Constraint that the solver's last iterate misses most."""
     bounds, (problem, _) = run.form.bounds(soft=True), run.program.functions()
     function = casadi().Function("g", [problem["x"], problem["p"]], [problem["g"]])
     g = np.array(function(run.z, 1.0).full()).ravel()
@@ -285,7 +285,7 @@ def _worst(run: _Run) -> str:
 
 
 def _stiff(model: Model, task: Fitted, progress: Progress) -> MeshMotion | None:
-    """The optimum of the machine with rigid links, on a coarse mesh, where it has flexible ones."""
+    """Solution for the machine with rigid links, on a coarse mesh, where it has flexible ones."""
     if not model.beams or all(not name.startswith(tuple(model.beams)) for name in model.coordinates):
         return None
     rigid = model.at("rigid")
@@ -307,7 +307,7 @@ def _stiff(model: Model, task: Fitted, progress: Progress) -> MeshMotion | None:
 
 
 def _bent(channels: Channels, motion: MeshMotion, stiff: MeshMotion) -> MeshMotion:
-    """The motion of rigid links, with links that bend from their rest at the beginning to that at the end."""
+    """Start of the solver: the motion of rigid links, with links that bend as at rest at both ends."""
     states, names = motion.states.copy(), channels.own.states
     elastic = states.shape[1] - stiff.states.shape[1]
     half = sum(name.endswith(".velocity") for name in names)

@@ -29,7 +29,7 @@ SAMPLES = 2000
 
 
 def complete(model: Model, task: Fitted) -> Fitted:
-    """The task with a beginning that leaves nothing to chance: what it does not name is at zero, at rest or as in rest.
+    """Start of the task completed: what it does not name is at zero, at rest or as in rest.
 
     Periodic motions begin where it costs least; a state with a range begins within it.
     """
@@ -44,7 +44,7 @@ def complete(model: Model, task: Fitted) -> Fitted:
 
 
 def standing(model: Model, task: Fitted) -> Array:
-    """State at rest at the joints' positions that the beginning names; the others are at zero."""
+    """Start state at rest at the joints' named positions; the others are at zero."""
     state = np.zeros(len(model.state_names))
     for one in task.begin.conditions:
         if one.channel in model.state_names[: len(model.coordinates)]:
@@ -58,7 +58,7 @@ def standing(model: Model, task: Fitted) -> Array:
 
 
 def ends(model: Model, task: Fitted, channels: Channels) -> list[tuple[Array, Array]]:
-    """States and commands at the beginning and at the end of each phase, each as near to the one before as can be."""
+    """Start and end of each phase: states and commands, each as near to the one before as can be."""
     state, command = standing(model, task), np.zeros(len(channels.own.commands))
     found = []
     for end, limits in zip(
@@ -74,7 +74,7 @@ def ends(model: Model, task: Fitted, channels: Channels) -> list[tuple[Array, Ar
 def _nearest(
     channels: Channels, end: End, limits: Sequence[Limit], state: Array, command: Array
 ) -> tuple[Array, Array]:
-    """The state nearest to another that fulfils conditions; what comes nearest to them if there is none."""
+    """State nearest to a start state that fulfils conditions, or comes nearest to them."""
     ca, own = casadi(), channels.own
     if not end.conditions and not end.rest:
         return state, command
@@ -108,7 +108,7 @@ def _nearest(
 
 
 def _towards(names: Sequence[str], end: End, state: Array) -> Array:
-    """A state with those that an end names where it wants them."""
+    """Start state with those that an end names where it wants them."""
     found = state.copy()
     for one in end.conditions:
         if one.channel in names:
@@ -125,7 +125,7 @@ def _bounds(names: Sequence[str], limits: Sequence[Limit], size: int) -> tuple[A
 
 
 def scales(task: Fitted, channels: Channels, points: Sequence[tuple[Array, Array]]) -> Scales:
-    """Sizes of the variables: limits where there are some, else what the ends and the commands make of them."""
+    """Sizes of the variables at the start: limits, else what the ends and the commands make of them."""
     own, durations = channels.own, np.array([_duration(phase.shortest, phase.longest) for phase in task.phases])
     limits = [one for phase in task.phases for one in phase.limits]
 
@@ -147,7 +147,7 @@ def scales(task: Fitted, channels: Channels, points: Sequence[tuple[Array, Array
 
 
 def _response(channels: Channels, point: tuple[Array, Array], commands: Array, duration: float) -> Array:
-    """How far bounded commands move each state of the linear model, shape (nx,): integral of ``|exp(A t) B|``."""
+    """How far bounded commands move each state from the start, shape (nx,): integral of ``|exp(A t) B|``."""
     ca, own = casadi(), channels.own
     jacobians = ca.Function("AB", [own.x, own.u], [ca.jacobian(own.rates, own.x), ca.jacobian(own.rates, own.u)])
     A, B = (np.array(one.full()) for one in jacobians(*point))
@@ -167,7 +167,7 @@ def _response(channels: Channels, point: tuple[Array, Array], commands: Array, d
 def way(
     task: Fitted, channels: Channels, points: Sequence[tuple[Array, Array]], durations: Array, meshes: tuple[Array, ...]
 ) -> MeshMotion:
-    """A smooth motion from end to end: a polynomial of degree five between positions, at rest at each end."""
+    """Start motion from end to end: a polynomial of degree five between positions, at rest at each end."""
     states, commands, half = [points[0][0][None]], [], sum(name.endswith(".velocity") for name in channels.own.states)
     for phase, mesh in enumerate(meshes):
         (begin, held), (end, then) = points[phase], points[phase + 1]
@@ -182,7 +182,7 @@ def way(
 
 
 def simulated(model: Model, task: Fitted, channels: Channels, motion: MeshMotion) -> MeshMotion:
-    """The motion that the commands of the guess make from the beginning of another, simulated by vpm."""
+    """Start motion that the guess's commands make, simulated by vpm."""
     held = np.zeros((len(motion.meshes), len(channels.own.commands)))
     for row, phase in zip(held, task.phases, strict=True):
         for one in phase.guess:
@@ -197,5 +197,5 @@ def simulated(model: Model, task: Fitted, channels: Channels, motion: MeshMotion
 
 
 def _duration(shortest: float, longest: float) -> float:
-    """Middle of a range of durations, as a factor of both."""
+    """Start duration: the middle of a range, as a factor of both."""
     return math.sqrt(shortest * longest)

@@ -42,14 +42,14 @@ class Limit:
     most: float
 
     def near(self, value: float) -> float:
-        """Where a search may begin: the middle of both ends, or the value between them that is nearest to another."""
+        """Value of a task's limit where a search may begin: its middle, or the nearest to another."""
         if math.isfinite(self.least) and math.isfinite(self.most):
             return 0.5 * (self.least + self.most)
         return min(max(value, self.least), self.most)
 
     @property
     def size(self) -> float:
-        """The largest finite end, or zero."""
+        """Largest finite end of a task's limit, or zero."""
         return max((abs(end) for end in (self.least, self.most) if math.isfinite(end)), default=0.0)
 
 
@@ -164,7 +164,7 @@ class Task:
 
     @property
     def name(self) -> str:
-        """What the file calls it."""
+        """Name of the task in its file."""
         return self._document.task
 
     @property
@@ -307,7 +307,7 @@ class Task:
             self._refuse("time_step", f"{rest}; make it longer")
 
     def _unit(self, model: Model, name: str, keys: Keys) -> str:
-        """Unit of a channel, a state, or the rate of one of them."""
+        """Unit of a task's channel, state, or rate of one of them."""
         known = {channel: str(model.channel_unit(channel)) for channel in model.output_channels}
         known |= dict(zip(model.state_names, model.state_units, strict=True))
         base = name
@@ -326,7 +326,7 @@ class Task:
                 self._refuse(place("obstacles", at, "marker"), rest)
 
     def _check_commands(self, model: Model, fitted: Fitted) -> None:
-        """Nothing can be chosen without commands, and nothing is least where one may grow without end."""
+        """Refuse a task without commands, or with a goal that grows without end."""
         if not model.input_channels:
             raise OptimisationError(f"{model.name} has no actuator, so there is no command to find; add one")
         if fitted.weights.get("energy", 0.0) > 0.0:

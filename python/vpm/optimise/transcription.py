@@ -73,19 +73,19 @@ class Transcription:
     # ---- places of variables -----------------------------------------------------------------------------------------
 
     def x(self, point: int) -> int:
-        """Number of the variable at which the state of a point begins."""
+        """Index in the transcription at which the state of a point begins."""
         return point * self.nx
 
     def u(self, phase: int, node: int) -> int:
-        """Number of the variable at which the commands of a node begin."""
+        """Index in the transcription at which the commands of a node begin."""
         return int(self._u[phase]) + node * self.nu
 
     def t(self, phase: int, interval: int) -> int:
-        """Number of the variable of the duration of a phase, as an interval sees it."""
+        """Index in the transcription of a phase's duration, as an interval sees it."""
         return int(self._t[phase]) + interval
 
     def r(self, end: int) -> int:
-        """Number of the variable at which the commands of the rest at an end begin."""
+        """Index in the transcription at which the commands of the rest at an end begin."""
         return self._r + self.nu * sum(self.rests[:end])
 
     # ---- building ----------------------------------------------------------------------------------------------------
@@ -128,7 +128,7 @@ class Transcription:
         self._path(phase, where)
 
     def _path(self, phase: int, where: list[tuple[int, int, float]]) -> None:
-        """Limits of what is neither a state nor a command, at points (interval, point, share)."""
+        """Transcribed limits of what is neither a state nor a command, at points (interval, point, share)."""
         ca = casadi()
         limits = [one for one in self.task.phases[phase].limits if not self._is_bound(one.channel)]
         rows = [(self._scaled(one), self.channels[one.channel]) for one in limits]
@@ -164,7 +164,7 @@ class Transcription:
                         ]
 
     def _end(self, end: End, number: int, point: int, phase: int, node: int) -> None:
-        """Conditions of an instant, each with slacks that are zero unless the task cannot be done."""
+        """Transcribed conditions of an instant, each with slacks that are zero for a possible task."""
         ca = casadi()
         last = number == len(self.meshes)
         goals = {name: weight for name, weight in self.task.weights.items() if name in self.channels} if last else {}
@@ -194,7 +194,7 @@ class Transcription:
             self._groups.append((self.own.rates / sizes, [place], rows))
 
     def _joined(self) -> None:
-        """Intervals share the duration of their phase, commands with limited rates do not jump, periods close."""
+        """Transcribed joints of intervals: common durations, continuous commands, closed periods."""
         for phase, mesh in enumerate(self.meshes):
             for k in range(mesh.size - 2):
                 row = self._row(Row("the duration", "1", 0.0, 0.0, 1.0))
@@ -224,7 +224,7 @@ class Transcription:
     # ---- parts -------------------------------------------------------------------------------------------------------
 
     def _place(self, phase: int, interval: int, share: float, point: int) -> list[tuple[int, int, float]]:
-        """Which variables make those of a point: its row among them, the variable, the factor."""
+        """Variables of the transcription that make those of a point: row, variable, factor."""
         width = self.meshes[phase][interval + 1] - self.meshes[phase][interval]
         found = [(s, self.x(point) + s, self.scales.states[s]) for s in range(self.nx)]
         for c in range(self.nu):
@@ -255,11 +255,11 @@ class Transcription:
 
     @property
     def size(self) -> int:
-        """Number of variables of the nonlinear program."""
+        """Number of variables of the transcription."""
         return self._s + self._slacks
 
     def program(self) -> Program:
-        """Nonlinear program of a task on a mesh."""
+        """Transcribed nonlinear program of a task on a mesh."""
         ng, nz = len(self.rows), self.size
         groups = []
         for results, places, puts in self._groups:
@@ -281,7 +281,7 @@ class Transcription:
         return Program(csr_array(_sparse(self._linear, (ng, nz))), groups, slack, c)
 
     def bounds(self, *, soft: bool) -> dict[str, Array]:
-        """Bounds of variables and constraints; ``soft`` lets conditions be missed."""
+        """Bounds of the transcription's variables and constraints; ``soft`` lets conditions be missed."""
         low, high = np.full(self.size, -LARGE), np.full(self.size, LARGE)
         sizes = {name: ("x", at, self.scales.states[at]) for at, name in enumerate(self.own.states)}
         sizes |= {name: ("u", at, self.scales.commands[at]) for at, name in enumerate(self.own.commands)}
@@ -310,7 +310,7 @@ class Transcription:
         return {"lbx": low, "ubx": high, "lbg": np.maximum(least, -LARGE), "ubg": np.minimum(most, LARGE)}
 
     def pack(self, motion: MeshMotion) -> Array:
-        """Variables of the nonlinear program from a motion on a mesh."""
+        """Variables of the transcription from a motion on a mesh."""
         z = np.zeros(self.size)
         z[: self.points * self.nx] = (motion.states / self.scales.states).ravel()
         z[self.points * self.nx : self._t[0]] = np.concatenate(
@@ -324,7 +324,7 @@ class Transcription:
         return z
 
     def unpack(self, z: Array) -> MeshMotion:
-        """Motion on a mesh from variables of the nonlinear program."""
+        """Motion on a mesh from variables of the transcription."""
         states = z[: self.points * self.nx].reshape(-1, self.nx) * self.scales.states
         commands = tuple(
             z[self._u[at] : self._u[at + 1]].reshape(-1, self.nu) * self.scales.commands
@@ -337,7 +337,7 @@ class Transcription:
         return MeshMotion(self.meshes, z[self._t[:-1]] * self.scales.durations, states, commands, rests)
 
     def missed(self, z: Array) -> list[tuple[str, str, float, float]]:
-        """Conditions that a soft solution misses: name, unit, what it has and what was asked for; worst first."""
+        """Conditions that a soft solution of the transcription misses: name, unit, value, demand; worst first."""
         slack = z[self._s :].reshape(-1, 2)
         soft = sorted({row for row, column, _ in self._linear if column >= self._s})
         found = []

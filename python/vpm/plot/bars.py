@@ -45,7 +45,7 @@ class GapLike(Protocol):
 
     @property
     def signal(self) -> float:
-        """Root mean square of the measured signal."""
+        """Root mean square of the measured signal beside plotted errors."""
 
 
 class CandidateLike(Protocol):
@@ -65,11 +65,11 @@ class CandidateLike(Protocol):
 
     @property
     def screened(self) -> float:
-        """Share of the training mean square that it would take."""
+        """Share of the training mean square that a plotted candidate would take."""
 
     @property
     def unseen(self) -> float:
-        """Share of the validation mean square that it took; may be NaN."""
+        """Share of the validation mean square that a plotted candidate took; may be NaN."""
 
     @property
     def accepted(self) -> bool:
@@ -80,7 +80,7 @@ class CandidateLike(Protocol):
 def plot_parameters(
     names: Sequence[str], values: ArrayLike, std: ArrayLike, start: ArrayLike, units: Sequence[str]
 ) -> Figure:
-    """Draw parameters relative to where they started, with 95 % intervals and the numbers beside them.
+    """Draw bars of parameters relative to their start, with 95 % intervals and numbers.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def plot_parameters(
 
 @styled
 def plot_gap(gaps: Mapping[str, GapLike]) -> Figure:
-    """Draw the gap of each channel at each stage as a share of the measured signal, with the noise floor.
+    """Draw bars of each channel's error at each stage as a share of the signal, with the noise floor.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def plot_gap(gaps: Mapping[str, GapLike]) -> Figure:
 
 @styled
 def plot_candidates(candidates: Sequence[CandidateLike]) -> Figure:
-    """Draw what each candidate of the first round would explain, and what those that were refitted did explain.
+    """Draw bars of what candidates of the first round would explain, and did after a refit.
 
     Parameters
     ----------
@@ -180,7 +180,7 @@ def plot_candidates(candidates: Sequence[CandidateLike]) -> Figure:
 
 
 def drawn_candidates(candidates: Sequence[Candidate]) -> list[Candidate]:
-    """Those that `plot_candidates` draws, from above: accepted ones, then those that promised most."""
+    """Candidates among the bars of `plot_candidates`, accepted ones above."""
     first = min((c.round for c in candidates), default=1)
     chosen = [c for c in candidates if c.round == first or c.accepted]
     chosen.sort(key=lambda c: (not c.accepted, c.round if c.accepted else 0, -np.nan_to_num(c.screened)))
@@ -196,7 +196,7 @@ def plot_ladder(
     allowed: float = np.inf,
     limit: float = np.inf,
 ) -> Figure:
-    """Draw error against step time of the rungs of a simplification, the chosen one marked, both axes logarithmic.
+    """Draw errors over step times of a simplification, the chosen model marked, logarithmically.
 
     Parameters
     ----------
@@ -235,7 +235,7 @@ def plot_ladder(
 
 @styled
 def plot_step_cost(quantiles: Mapping[str, float], period: float) -> Figure:
-    """Draw the quantiles of the step time against the period, on a logarithmic axis.
+    """Draw bars of step-time quantiles against the period, on a logarithmic axis.
 
     Parameters
     ----------
@@ -299,7 +299,7 @@ class Climbed(Protocol):
 
 @styled
 def plot_climb(levels: Sequence[Climbed], top: str) -> Figure:
-    """Draw the error on validation data against the level of detail, and below it how each parameter moved.
+    """Draw bars of validation errors over the level of detail, and below how each parameter moved.
 
     Parameters
     ----------

@@ -91,7 +91,7 @@ class EvidenceLike(Protocol):
 
 @styled
 def plot_evidence(evidence: EvidenceLike) -> Figure:
-    """Draw the residual without an effect, the fitted law over it, and beside it the residual with the effect.
+    """Draw the evidence of an effect: the residual without it, the fitted law, and the residual with it.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def plot_evidence(evidence: EvidenceLike) -> Figure:
 
 
 def draw_partial(axis: Axes, evidence: EvidenceLike, *, most: int = MOST_DOTS, color: str = ORANGE) -> None:
-    """Residual without the effect as a cloud, and the law: a line, or its samples where it is no function."""
+    """Draw evidence: the residual without the effect as a cloud, and the law over it."""
     _cloud(axis, evidence.values, evidence.without, color, "residual without it", most)
     order = np.argsort(evidence.law_values, kind="stable")
     values, law = evidence.law_values[order], evidence.law[order]
@@ -136,7 +136,7 @@ def draw_partial(axis: Axes, evidence: EvidenceLike, *, most: int = MOST_DOTS, c
 
 
 def draw_remaining(axis: Axes, evidence: EvidenceLike) -> None:
-    """Residual with the effect as a cloud over the band of the noise floor."""
+    """Draw evidence: the residual with the effect as a cloud over the noise floor."""
     floor = evidence.noise_floor
     if np.isfinite(floor):
         axis.axhspan(-BAND * floor, BAND * floor, color=LINE, alpha=0.8, linewidth=0, label="noise floor, 95 %")
@@ -145,7 +145,7 @@ def draw_remaining(axis: Axes, evidence: EvidenceLike) -> None:
 
 
 def law_line(values: Array, law: Array) -> tuple[Array, Array, float]:
-    """Means of a law in bins with equally many samples, and the share of its square that they explain.
+    """Line of a law for plotted evidence: means in bins of equal size, and their share.
 
     No bin reaches over zero, where friction steps: its mean would be a level that the law never has.
 
@@ -171,7 +171,7 @@ def law_line(values: Array, law: Array) -> tuple[Array, Array, float]:
 
 
 def _spectra(evidence: EvidenceLike) -> Figure:
-    """Amplitude densities (Welch's method) of both residuals and of the law."""
+    """Amplitude densities of plotted evidence (Welch's method): both residuals and the law."""
     from scipy.signal import welch
 
     figure, axes = panels(1, height=3.0)
@@ -216,7 +216,7 @@ def _cloud(axis: Axes, values: Array, residual: Array, color: str, name: str, mo
 
 
 def _limits(values: Array, left_out: float = 0.5) -> tuple[float, float]:
-    """Range without the last few percent, so that one peak does not flatten all the rest, and with zero."""
+    """Axis limits of plotted evidence: without the last few percent, and with zero."""
     low, high = (float(each) for each in np.percentile(values, [0.5 * left_out, 100.0 - 0.5 * left_out]))
     room = 0.08 * (high - low) or 1.0
     return min(low, 0.0) - room, max(high, 0.0) + room

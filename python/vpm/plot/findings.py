@@ -67,7 +67,7 @@ class MeasuredLike(PictureLike, Protocol):
 
 @styled
 def plot_traces(traces: Sequence[TraceLike]) -> Figure:
-    """Draw channels over time: measured pale and broad, simulated before and after on it.
+    """Draw the findings' channels over time: measured pale and broad, simulated before and after.
 
     Parameters
     ----------
@@ -89,7 +89,7 @@ def plot_traces(traces: Sequence[TraceLike]) -> Figure:
 
 @styled
 def plot_joint_over_time(picture: MeasuredLike, stages: Mapping[str, Array]) -> Figure:
-    """Draw the effort of a joint, measured and as each stage needs it, and below it the residual of each stage.
+    """Draw findings at a joint over time: efforts, measured and needed, and residuals below.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def plot_joint_over_time(picture: MeasuredLike, stages: Mapping[str, Array]) -> 
 
 @styled
 def plot_joint_over_state(picture: PictureLike, stages: Mapping[str, Array]) -> Figure:
-    """Draw the residual of a joint against velocity and position; forward and backward have means of their own.
+    """Draw findings at a joint: the residual against velocity and position.
 
     Parameters
     ----------
@@ -139,7 +139,7 @@ def plot_joint_over_state(picture: PictureLike, stages: Mapping[str, Array]) -> 
 def plot_joint_noise(
     stages: Mapping[str, Array], correlation: tuple[Array, Array, Array], rate: float, unit: str
 ) -> Figure:
-    """Draw what is left: correlation of the last stage with its own past and its 95 % band, and spectra of all stages.
+    """Draw the findings' remaining noise: correlation with its 95 % band, and spectra of all stages.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def plot_joint_noise(
 
 @styled
 def plot_parameter_correlation(names: Sequence[str], correlation: Array) -> Figure:
-    """Draw the correlation matrix of fitted parameters, with its numbers where there is room.
+    """Draw the correlation matrix of fitted parameters among findings.
 
     Parameters
     ----------

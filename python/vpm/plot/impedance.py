@@ -90,7 +90,7 @@ class RowLike(Protocol):
 
 @styled
 def plot_loops(loops: Sequence[LoopLike]) -> Figure:
-    """Draw measured loops and those of the fitted spring and damper: the loop, and the loop less its slope."""
+    """Draw impedance loops, measured and of the fitted spring and damper, with and without slope."""
     figure, axes = panels(len(loops), 2, height=2.6)
     angle = np.linspace(0.0, 2.0 * np.pi, 721)
     for (whole, bare), loop in zip(axes, loops, strict=True):

@@ -19,7 +19,7 @@ Complex = NDArray[np.complex128]
 
 @styled
 def plot_poles(poles: Complex) -> Figure:
-    """Poles in the complex plane; those that grow stand out.
+    """Draw poles of a linear model in the complex plane; those that grow stand out.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def plot_poles(poles: Complex) -> Figure:
 
 @styled
 def plot_bode(frequencies: Array, response: Complex, inputs: Sequence[str], outputs: Sequence[str]) -> Figure:
-    """Gain and phase over frequency, a line per pair of input and output.
+    """Draw gain and phase of a linear model over frequency, a line per pair of input and output.
 
     Parameters
     ----------

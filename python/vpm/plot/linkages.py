@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 
 @styled
 def plot_limbs(elbows: Array, tips: Array, names: Sequence[str]) -> Figure:
-    """Draw limbs of two bodies as lines from the origin.
+    """Draw linkages with two bodies as lines from the origin.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def plot_limbs(elbows: Array, tips: Array, names: Sequence[str]) -> Figure:
 def plot_stroke_workspace(
     strokes: tuple[Array, Array], angles: Array, tips: Array, transmission: Array, singular: Sequence[Array]
 ) -> Figure:
-    """Draw the reach of a limb of two strokes, and its angles and transmission up to the singular strokes.
+    """Draw a linkage's reach by two strokes, and its angles and transmission to the singular strokes.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ def _filled(table: Array) -> int:
 
 @styled
 def plot_strokes(angles: Array, strokes: Array, levers: Array, names: Sequence[str]) -> Figure:
-    """Draw lengths and lever arms of cylinders over the angles of their joints.
+    """Draw lengths and lever arms of a linkage's cylinders over joint angles.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def plot_strokes(angles: Array, strokes: Array, levers: Array, names: Sequence[s
 
 @styled
 def plot_shares(first: Array, second: Array, maps: Mapping[str, Array], title: str) -> Figure:
-    """Draw shares of the effort over two joint angles.
+    """Draw shares of the effort in a linkage over two joint angles.
 
     Parameters
     ----------

@@ -22,7 +22,7 @@ class NarxRunLike(Protocol):
 
     @property
     def kind(self) -> str:
-        """Free run or one-step prediction."""
+        """Kind of a plotted NARX run: free run or one-step prediction."""
 
     @property
     def record(self) -> str:
@@ -51,7 +51,7 @@ class NarxRunLike(Protocol):
 
 @styled
 def plot_narx_run(run: NarxRunLike) -> Figure:
-    """Draw the computed over the measured output, and their difference below."""
+    """Draw a NARX run: the computed over the measured output, and their difference below."""
     figure, axes = panels(2, height=1.9, share_x=True)
     draw_overlay(axes[0][0], run.time, run.measured, run.values, [0])
     axes[0][0].set_ylabel(label(run.output, run.unit))
@@ -65,7 +65,7 @@ def plot_narx_run(run: NarxRunLike) -> Figure:
 
 @styled
 def plot_narx_terms(names: Sequence[str], error_reduction: Array) -> Figure:
-    """Draw the share of the output's energy that is still unexplained after each term, in the order of choice."""
+    """Draw the energy share still unexplained after each NARX term, in the order of choice."""
     figure, axes = panels(1, height=0.8 + 0.22 * len(names))
     axis = axes[0][0]
     rest = np.maximum(1.0 - np.cumsum(np.nan_to_num(error_reduction)), np.finfo(np.float64).eps)

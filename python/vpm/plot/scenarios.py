@@ -84,7 +84,7 @@ class _Row:
 
 @styled
 def plot_scenario(result: ScenarioLike) -> Figure:
-    """Draw all runs over time: a colour for each run, a style of line for each channel of a panel.
+    """Draw all runs of a scenario: a colour for each run, a line style for each channel.
 
     Columns of the scenario stand side by side with common axes.
 
@@ -111,7 +111,7 @@ def plot_scenario(result: ScenarioLike) -> Figure:
 
 
 def _finish(figure: Figure, result: ScenarioLike, colors: Mapping[str, str], columns: Sequence[Sequence[str]]) -> None:
-    """Title, names of the runs, and what failed."""
+    """Finish a scenario's picture: title, names of the runs, and what failed."""
     from matplotlib.lines import Line2D
 
     figure.suptitle(result.name, fontsize=11, x=0.02, ha="left")
@@ -141,7 +141,7 @@ def _row(result: ScenarioLike, channels: Sequence[str]) -> _Row:
 
 
 def _draw_row(axes: Sequence[Axes], row: _Row, columns: Sequence[Sequence[str]], colors: Mapping[str, str]) -> None:
-    """A panel for each column of runs, all of one scale."""
+    """Draw a row of a scenario's picture: a panel for each column of runs, all of one scale."""
     for axis, names in zip(axes, columns, strict=True):
         if axis is not axes[0]:
             axis.sharey(axes[0])
@@ -178,7 +178,7 @@ def _name_channels(axis: Axes, row: _Row) -> None:
 
 
 def readable_unit(unit: str, largest: float) -> str:
-    """Unit in which values up to ``largest`` (SI) are read best.
+    """Unit in which a scenario's values up to ``largest`` (SI) are read best.
 
     Examples
     --------
@@ -189,5 +189,5 @@ def readable_unit(unit: str, largest: float) -> str:
 
 
 def _alike(traces: Sequence[Array]) -> bool:
-    """Whether all runs show the same, as with a common reference: then one line stands for all."""
+    """Whether all runs of a scenario show the same: then one line stands for all."""
     return all(np.array_equal(traces[0], trace) for trace in traces[1:])

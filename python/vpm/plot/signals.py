@@ -74,7 +74,7 @@ class RunLike(Protocol):
 def plot_channels(
     time: Array, data: Array, channels: Sequence[str], units: Sequence[str], *, title: str = ""
 ) -> Figure:
-    """Draw each channel over time in a panel of its own.
+    """Draw signals: each channel over time in a panel of its own.
 
     Parameters
     ----------
@@ -98,7 +98,7 @@ def plot_channels(
 def plot_innovations(
     time: Array, innovations: Array, expected: Array, channels: Sequence[str], units: Sequence[str]
 ) -> Figure:
-    """Draw what each reading says beyond those before it, between the bounds that should hold 95 % of it.
+    """Draw innovation signals between the bounds that should hold 95 % of them.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def plot_innovations(
 
 @styled
 def plot_run(run: RunLike) -> Figure:
-    """Draw simulated over measured, a panel per channel that was measured.
+    """Draw simulated over measured signals, a panel per channel.
 
     Commands that were only copied do not count as measured. Where nothing was, all channels are drawn but what never
     moves: places and turns of markers out of a machine's plane. Notes of the run stand below.
@@ -148,7 +148,7 @@ def plot_run(run: RunLike) -> Figure:
 
 @styled
 def plot_residual_time(time: Array, stages: Mapping[str, Array], unit: str) -> Figure:
-    """Draw residuals over time, later stages on top.
+    """Draw residual signals over time, later stages on top.
 
     Parameters
     ----------
@@ -169,7 +169,7 @@ def plot_residual_time(time: Array, stages: Mapping[str, Array], unit: str) -> F
 def plot_residual_against(
     values: Array, stages: Mapping[str, Array], axis_label: str, unit: str, velocity: Array | None = None
 ) -> Figure:
-    """Draw residuals over a state with their running mean: a line that is not zero is physics that is missing.
+    """Draw residual signals over a state with their running mean.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def plot_residual_against(
 
 @styled
 def plot_spectrum(signals: Mapping[str, Array], rate: float, unit: str) -> Figure:
-    """Draw amplitude spectral densities (Welch's method).
+    """Draw spectra of signals: amplitude spectral densities (Welch's method).
 
     Parameters
     ----------
@@ -208,7 +208,7 @@ def plot_spectrum(signals: Mapping[str, Array], rate: float, unit: str) -> Figur
 
 
 def draw_spectrum(axis: Axes, signals: Mapping[str, Array], rate: float, unit: str) -> None:
-    """Amplitude spectral densities, see `plot_spectrum`."""
+    """Draw spectra of signals into axes, see `plot_spectrum`."""
     for (name, values), color in zip(signals.items(), STAGES[2:] + STAGES[:2], strict=False):
         frequency, density = amplitude_density(values, rate)
         axis.loglog(frequency, density, color=color, label=name)
@@ -218,7 +218,7 @@ def draw_spectrum(axis: Axes, signals: Mapping[str, Array], rate: float, unit: s
 
 
 def amplitude_density(values: Array, rate: float, most: int | None = None) -> tuple[Array, Array]:
-    """Frequencies (Hz) above zero and amplitude density, by Welch's method over stretches without NaN.
+    """Frequencies (Hz) above zero and amplitude density of a signal, by Welch's method.
 
     Segments are an eighth of the longest stretch, but at least 256 samples where it has as many, and ``most`` at most.
     """
@@ -240,7 +240,7 @@ def amplitude_density(values: Array, rate: float, most: int | None = None) -> tu
 
 @styled
 def plot_correlation(lags: Array, values: Array, band: float, name: str) -> Figure:
-    """Draw a correlation over lags with its 95 % band.
+    """Draw a signal's correlation over lags with its 95 % band.
 
     Parameters
     ----------
@@ -257,7 +257,7 @@ def plot_correlation(lags: Array, values: Array, band: float, name: str) -> Figu
 
 
 def draw_correlation(axis: Axes, lags: Array, values: Array, band: float | Array, name: str) -> None:
-    """Correlation over lags with its 95 % band, see `plot_correlation`."""
+    """Draw a signal's correlation into axes, see `plot_correlation`."""
     wide = np.broadcast_to(band, lags.shape)
     axis.fill_between(lags, -wide, wide, color=SOFT, alpha=0.18, linewidth=0, label="95 % if independent")
     # One line with gaps: as many small ones would be most of a page.
@@ -274,7 +274,7 @@ def draw_correlation(axis: Axes, lags: Array, values: Array, band: float | Array
 
 
 def draw_overlay(axis: Axes, time: Array, measured: Array | None, simulated: Array, starts: Iterable[int]) -> None:
-    """Measured as a pale broad line, simulated as a thin one on it; pieces are not joined."""
+    """Draw measured signals pale and broad with simulated ones thin on them; pieces are not joined."""
     edges = [*starts, time.size]
     for number, (first, last) in enumerate(pairwise(edges)):
         piece = slice(first, last)
@@ -288,7 +288,7 @@ def draw_overlay(axis: Axes, time: Array, measured: Array | None, simulated: Arr
 
 
 def draw_residual_time(axis: Axes, time: Array, stages: Mapping[str, Array], unit: str) -> None:
-    """Residuals over time, later stages on top."""
+    """Draw residual signals over time into axes, later stages on top."""
     for (name, residual), color in zip(stages.items(), _colors(len(stages)), strict=True):
         axis.plot(*thinned(time, residual), color=color, linewidth=0.9, label=name)
     axis.axhline(0.0, color=INK, linewidth=0.7)
@@ -306,7 +306,7 @@ def draw_residual_against(
     unit: str,
     velocity: Array | None = None,
 ) -> None:
-    """Residuals as pale points over a state, their running means as lines: forward (>) and backward (<) apart."""
+    """Draw residual signals as pale points over a state, with running means forward and backward."""
     ways = {"o": np.ones(values.shape, np.bool_)} if velocity is None else {">": velocity > 0.0, "<": velocity < 0.0}
     step = -(-values.size // MOST_DOTS)
     bottom, top = 0.0, 0.0
@@ -344,7 +344,7 @@ MOST_ENDS = 60
 
 
 def running_mean(values: Array, residual: Array) -> tuple[Array, Array]:
-    """Mean residual in up to 40 bins of a state, where there are enough samples; those that are NaN do not count.
+    """Running mean of a residual signal in up to 40 bins of a state.
 
     Returns
     -------
@@ -373,7 +373,7 @@ def _colors(count: int) -> tuple[str, ...]:
 
 
 def legend_above(axis: Axes, columns: int, *, right: bool = False) -> None:
-    """Legend above the axes, where it hides nothing."""
+    """Legend above the axes of a signal, where it hides nothing."""
     axis.legend(
         loc="lower right" if right else "lower left",
         bbox_to_anchor=(1.0 if right else 0.0, 1.0),

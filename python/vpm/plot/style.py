@@ -137,7 +137,7 @@ def plain_power(formula: str) -> str:
 def panels(
     rows: int, columns: int = 1, *, height: float = 2.2, width: float = 8.0, share_x: bool = False
 ) -> tuple[Figure, list[list[Axes]]]:
-    """Figure with a grid of axes; no window opens, and nothing has to be closed.
+    """Figure in the common style with a grid of axes; no window opens.
 
     Parameters
     ----------
@@ -158,7 +158,7 @@ def panels(
 
 @styled
 def figure_to_svg(figure: Figure, words: str = "") -> str:
-    """SVG of a figure, as an element to put into an HTML page.
+    """SVG of a figure in the common style, as an element to put into an HTML page.
 
     Figures that are made alike give the same text. Letters are drawn as shapes, so that they look alike everywhere; on
     a page, where there are words beside them, they are letters, which takes a third of the room.
@@ -191,7 +191,7 @@ def figure_to_svg(figure: Figure, words: str = "") -> str:
 
 
 def thinned(time: Array, *columns: Array) -> tuple[Array, ...]:
-    """Fewer points that still show every peak: the least and the largest of each stretch of the first column.
+    """Thinned points in the common style: the least and the largest of each stretch.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def _extremes(column: Array, stretch: int, first: int) -> Iterator[NDArray[np.in
 
 
 def label(quantity: str, unit: str) -> str:
-    """``position [m]``; no brackets for a pure number."""
+    """Label in the common style: ``position [m]``; no brackets for a pure number."""
     return f"{quantity} [{unit}]" if unit not in {"", "1"} else quantity
 
 

@@ -119,7 +119,7 @@ class PictureLike(Protocol):
 
 @styled
 def plot_comparison(comparison: ComparisonLike) -> Figure:
-    """Draw each channel in a row: measured and simulated, residual over time, residual over velocity.
+    """Draw a summary of a comparison: measured and simulated channels, residuals over time and velocity.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def plot_comparison(comparison: ComparisonLike) -> Figure:
 
 @styled
 def plot_pictures(pictures: Sequence[PictureLike]) -> Figure:
-    """Draw the residual of each joint at each stage: over time, velocity and position.
+    """Draw a summary of stages: the residual of each joint over time, velocity and position.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""What could be missing from a model, in the order of its evidence."""
+"""Ranking of effects that could be missing from a model, by observers and evidence."""
 
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.rank import rank

@@ -1,4 +1,4 @@
-"""Diagnoses of machines whose efforts nobody can balance: a ranking names, and its tracker measures."""
+"""Diagnosis by tracker, for machines without inverse dynamics: a ranking names effects, its tracker measures them."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.ambiguity import listed
-from vpm.discrepancy.assembled import classes, of_search, step
-from vpm.discrepancy.by_ranking import fitted_in, staged, tracker_gaps
-from vpm.discrepancy.candidates import Candidate, asked_for, candidates
-from vpm.discrepancy.confirmation import Judged, Trial, is_clear
+from vpm.discrepancy.confirmation.confirmation import Judged, Trial, is_clear
 from vpm.discrepancy.diagnosis import Diagnosis, Trace
+from vpm.discrepancy.diagnosis_fields import classes, of_search, step
 from vpm.discrepancy.preparation import Records
 from vpm.discrepancy.prior_departure import moved_far
-from vpm.discrepancy.screening import Probe
-from vpm.discrepancy.search import ambiguities
+from vpm.discrepancy.ranked_effects import fitted_in, staged, tracker_gaps
+from vpm.discrepancy.rivals.ambiguity import listed
+from vpm.discrepancy.screening.candidates import Candidate, asked_for, candidates
+from vpm.discrepancy.screening.probe import Probe
+from vpm.discrepancy.search.search import ambiguities
 from vpm.discrepancy.verdict import verdict
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
@@ -26,11 +26,11 @@ from vpm.identify import Estimate, InverseDynamicsProblem, estimate, gain, gaps,
 from vpm.identify.estimation import standing
 from vpm.initial import invertible
 from vpm.model import Model
-from vpm.ranking.residual import TrackerResidual
 from vpm.ranking.result import Ranked, Ranking
 from vpm.ranking.settings import Settings
-from vpm.ranking.stand_in import shown
+from vpm.ranking.substitute_records import shown
 from vpm.ranking.tracked_records import TrackedRecords
+from vpm.ranking.tracker_residual import TrackerResidual
 from vpm.simulate import Setup
 
 Array = NDArray[np.float64]
@@ -44,7 +44,7 @@ BY_TRACKER = (
 
 @dataclass(frozen=True)
 class _Followed:
-    """What a tracker leaves of the records that are fitted and of those that are not, and a stand-in of efforts."""
+    """Residual problems by tracker of training and validation records, and substitute efforts."""
 
     training: TrackerResidual
     validation: TrackerResidual
@@ -59,7 +59,7 @@ def diagnosed_by_tracker(
     setup: Setup,
     reason: str,
 ) -> Diagnosis:
-    """What a ranking says of the records, with the verdict of its gaps.
+    """Diagnosis by tracker from a ranking of the records, with the verdict on its errors.
 
     Parameters
     ----------
@@ -118,7 +118,7 @@ def _followed(
     settings: Settings,
     setup: Setup,
 ) -> tuple[_Followed, float]:
-    """Residuals of the slowest tracker that keeps the model on the records, and its bandwidth, Hz.
+    """Residual problems by the slowest tracker that keeps the model on the records, and its bandwidth, Hz.
 
     Raises
     ------
@@ -142,13 +142,13 @@ def _followed(
 
 
 def _judged(model: Model, free: tuple[str, ...], data: _Followed) -> Judged:
-    """A model at its values, and how sure these are."""
+    """Model judged by tracker at its values, with their standard deviations."""
     validation, _ = data.validation.evaluate(model, model.theta)
     return Judged(model, free, _standing(model, free, data.training), validation, None)
 
 
 def _standing(model: Model, free: tuple[str, ...], training: TrackerResidual) -> Estimate:
-    """How sure values are; deviations are unknown where derivatives leave all bounds, as behind a backlash they may."""
+    """Standard deviations of values by tracker; unknown where derivatives diverge, as behind a backlash."""
     try:
         with np.errstate(over="ignore", invalid="ignore"):
             return standing(model, training, free)
@@ -160,7 +160,7 @@ def _standing(model: Model, free: tuple[str, ...], training: TrackerResidual) ->
 
 
 def _beside(current: Judged, model: Model, one: Ranked, data: _Followed, *, refit: bool) -> Trial:
-    """An effect in a model at the values of a ranking, measured on validation records.
+    """Model with a ranked effect, measured by tracker on validation records.
 
     Values of the ranking are those beside all that it found. Where a part of that is left out, one linear step fits the
     rest to it, if that leaves less of the training records.
@@ -193,14 +193,14 @@ def _beside(current: Judged, model: Model, one: Ranked, data: _Followed, *, refi
 
 
 def _offered(final: Judged, data: _Followed, effects: Sequence[str] | None) -> tuple[Candidate, ...]:
-    """All that could still be missing of a model."""
+    """All candidate effects that could still be missing in a diagnosis by tracker."""
     bare = invertible(final.model, data.stand_in.joints)
     residual, _ = data.stand_in.evaluate(bare, bare.theta)
     return candidates(final.model, data.stand_in, residual, asked_for(effects), simulated=True)
 
 
 def _traces(problem: TrackerResidual, nominal: Judged, final: Judged) -> tuple[Trace, ...]:
-    """Channels of the first validation record beside what the tracker makes of the model."""
+    """Channels of the first validation record beside the tracker's outputs."""
     record = problem.tracked.experiments[0]
     found = []
     for block in problem.blocks[: len(problem.blocks) // len(problem.tracked.experiments)]:

@@ -1,4 +1,4 @@
-"""How evidence becomes probability: two numbers, fitted to cases of which the truth is known."""
+"""Calibration of probabilities: two numbers of the evidence, fitted to cases with known truth."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ BINS = (0.5, 0.7, 0.8, 0.9, 0.95, 0.98)
 
 @dataclass(frozen=True)
 class Calibration:
-    """What makes probabilities true.
+    """Calibration numbers that turn evidence into true probabilities.
 
     Attributes
     ----------
@@ -49,24 +49,24 @@ class Calibration:
     seeds: str = ""
 
     def save(self, path: Path) -> Path:
-        """Write them as JSON."""
+        """Write a calibration as JSON."""
         return write_text(path, json.dumps(asdict(self), indent=2) + "\n")
 
     @classmethod
     def load(cls, path: Path) -> Calibration:
-        """Read them back."""
+        """Read a calibration from JSON."""
         return cls(**json.loads(path.read_text(encoding="utf-8")))
 
 
 @cache
 def shipped() -> Calibration:
-    """The numbers that `Settings` begins with."""
+    """Shipped calibration, with which `Settings` begin."""
     return Calibration.load(SHIPPED)
 
 
 @dataclass(frozen=True)
 class Round:
-    """Effects that were weighed against each other in a case of which the truth is known.
+    """Round for the calibration: effects that were weighed against each other in a case with known truth.
 
     Attributes
     ----------
@@ -83,17 +83,17 @@ class Round:
     missing: bool
 
     def likelihood(self, tempering: float, astray: float) -> float:
-        """Probability that was given to what was true."""
+        """Probability that a calibration gives to the true effect of a round."""
         *shares, none, other = robust_probabilities(self.gains, tempering, astray)
         told = [share for share, right in zip(shares, self.right, strict=True) if right]
         return float((sum(told) if told else other) if self.missing else none)
 
 
 def calibrated(rounds: Sequence[Round], seeds: str, cases: int) -> Calibration:
-    """The numbers under which what was true was most probable.
+    """Calibration under which the true effects are most probable.
 
-    Law: the logarithm of the probability that was given to the truth is a proper score: it is largest in the mean for
-    probabilities that are true (I. Good, *J. Royal Statistical Society B* 14, 1952).
+    Law: the logarithm of the probability given to the truth is a proper score. Its mean is largest for true
+    probabilities (I. Good, *J. Royal Statistical Society B* 14, 1952).
 
     Raises
     ------
@@ -115,7 +115,7 @@ def calibrated(rounds: Sequence[Round], seeds: str, cases: int) -> Calibration:
 
 @dataclass(frozen=True)
 class Reliability:
-    """Probabilities of one bin, and how often they were right.
+    """Reliability of a calibration in one bin: stated probabilities, and how often they were right.
 
     Attributes
     ----------
@@ -130,7 +130,7 @@ class Reliability:
 
 
 def reliability(stated: Sequence[float], right: Sequence[bool]) -> list[Reliability]:
-    """Probabilities in bins, those without any left out."""
+    """Reliability of a calibration by bins of probability; empty bins are left out."""
     numbers, outcomes = np.asarray(stated, dtype=np.float64), np.asarray(right, dtype=np.bool_)
     places = np.searchsorted(BINS, numbers, side="right")
     chosen = [places == place for place in range(len(BINS) + 1) if np.any(places == place)]
@@ -138,7 +138,7 @@ def reliability(stated: Sequence[float], right: Sequence[bool]) -> list[Reliabil
 
 
 def calibration_error(bins: Sequence[Reliability]) -> float:
-    """Mean distance between what was stated and how often it was right; NaN of no bins.
+    """Calibration error: mean distance of stated probability and frequency; NaN without bins.
 
     Law: the expected calibration error (M. Naeini, G. Cooper and M. Hauskrecht, *AAAI* 29, 2015).
     """

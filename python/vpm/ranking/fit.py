@@ -1,4 +1,4 @@
-"""Structures fitted to what a tracker leaves of the records, and their evidence."""
+"""Fits of structures to the residual that a tracker leaves, and their evidence."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from vpm.errors import VpmError
+from vpm.ranking.model_structure import Structure
 from vpm.ranking.noise_model import NoiseModel, Parts, white_noise
 from vpm.ranking.posterior import log_volume
 from vpm.ranking.settings import FAINT, SHARES, Settings
-from vpm.ranking.structure import Structure
 from vpm.ranking.tracked_records import NOTHING, By, TrackedRecords, Tracker
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ ASTRAY = (ValueError, ArithmeticError)
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """What a tracker leaves of the records under a structure.
+    """Residual that a tracker leaves under a structure, with derivatives for a fit.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Followed:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A structure at its most probable values under a tracker.
+    """Fit of a structure under a tracker: its most probable values.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class Fitted:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """A way to look at residuals: their noise model, and derivatives that are taken as known under it.
+    """View for a fit: the noise model of residuals, and derivatives that are taken as known.
 
     Attributes
     ----------
@@ -83,7 +83,7 @@ class View:
     known: Mapping[str, Array] = field(default_factory=dict)
 
     def errors(self, followed: Followed, parts: Parts) -> tuple[Array, Array]:
-        """Prediction errors (n,), and their change by deviations of the priors (n, k)."""
+        """Prediction errors (n,) for a fit, and their change by deviations of the priors (n, k)."""
         errors = self.noise.whitened(followed.residual, parts)
         fresh = dict(zip(followed.names, self.noise.whitened(followed.jacobian, parts).T, strict=True))
         slopes = np.empty((len(errors), len(followed.structure.priors)))
@@ -92,12 +92,12 @@ class View:
         return errors, slopes
 
     def weighted(self, errors: Array, slopes: Array) -> tuple[Array, Array]:
-        """The same in roots of the weights of the errors."""
+        """Weighted prediction errors for a fit, by square roots of their weights."""
         return in_roots(errors, slopes, self.noise.roots(errors))
 
 
 class Fitter:
-    """Fits structures to what a tracker leaves of the stretches that are fitted.
+    """Fits structures to the residual of a tracker on the stretches for training.
 
     Derivatives come from as few steps of the integrator as will do: they only show the way, and cost most.
     """
@@ -113,7 +113,7 @@ class Fitter:
         goal: float = math.inf,
         residual: Array | None = None,
     ) -> Fitted:
-        """Most probable values under a view, by bounded Gauss-Newton steps; the first ``residual`` may be known.
+        """Fit by bounded Gauss-Newton steps under a view; the first ``residual`` may be known.
 
         It gives up where several times the gain that a step predicts would not bring the `cost` below a goal.
         Derivatives cost many times what residuals do, so that secants correct them from step to step. Where a step by
@@ -129,7 +129,7 @@ class Fitter:
         return self._descended(now, view, goal)[0]
 
     def moved(self, start: Followed, view: View, anew: bool = False) -> tuple[Fitted, Array]:
-        """The same from where all derivatives are known, as near the end of another fit: secants will do.
+        """Fit from a start with known derivatives, near the end of another fit: secants update them.
 
         With ``anew`` they are worked out again where these lead nowhere.
 
@@ -144,7 +144,7 @@ class Fitter:
     def _descended(
         self, now: Followed, view: View, goal: float = math.inf, fresh: bool = True, anew: bool = True
     ) -> tuple[Fitted, Array]:
-        """The descent from known derivatives: ``fresh`` ones, or those of elsewhere, worked out ``anew`` or not."""
+        """Gauss-Newton descent of a fit from known derivatives, updated by secants or computed ``anew``."""
         before = self.cost(now.structure, now.residual, view.noise)
         errors, slopes = view.errors(now, self.tracked.parts)
         ended = False
@@ -169,7 +169,7 @@ class Fitter:
         return Fitted(now.structure, now.tracker, now.residual, before, ended), slopes
 
     def finished(self, found: Fitted, view: View) -> Fitted:
-        """Fitted on, by all derivatives, until nothing is gained any more, which a fit may know of itself."""
+        """Fit continued with all derivatives until nothing is gained."""
         for _ in range(self.settings.turns):
             if found.ended:
                 break
@@ -182,7 +182,7 @@ class Fitter:
     def followed(
         self, structure: Structure, tracker: Tracker, names: Sequence[str], residual: Array | None = None
     ) -> Followed:
-        """What the tracker leaves of the records, with derivatives by some parameters.
+        """Residual of a tracker with derivatives by some parameters, for a fit.
 
         Raises
         ------
@@ -199,7 +199,7 @@ class Fitter:
         return Followed(structure, tracker, tuple(names), *self._pass(structure, tracker, by))
 
     def noise_of(self, structure: Structure, tracker: Tracker) -> NoiseModel:
-        """Channels in the root mean squares of what the tracker leaves where a fit begins.
+        """White noise model for the start of a fit: root mean square residual of each channel.
 
         Raises
         ------
@@ -210,11 +210,11 @@ class Fitter:
         return white_noise(residual, self.tracked.parts)
 
     def log_density(self, fitted: Fitted, noise: NoiseModel) -> Array:
-        """Logarithm of the density of each sample that is fitted (n,)."""
+        """Log-density of each fitted sample under a noise model (n,)."""
         return noise.log_density(noise.whitened(fitted.residual, self.tracked.parts))
 
     def evidence(self, fitted: Fitted, noise: NoiseModel) -> float:
-        """Logarithm of the probability density of the records under a structure and a noise model, nats.
+        """Evidence of a fit: log-density of the records under a structure and a noise model, nats.
 
         Law: Laplace's method about the most probable values (D. MacKay, *Neural Computation* 4, 1992).
         """
@@ -228,12 +228,12 @@ class Fitter:
         return likely - 0.5 * float(z @ z) - 0.5 * log_volume(known)
 
     def cost(self, structure: Structure, residual: Array, noise: NoiseModel) -> float:
-        """Negative logarithm of the posterior density but for a constant."""
+        """Cost of a fit: negative log-posterior density but for a constant."""
         errors = noise.whitened(residual, self.tracked.parts)
         return noise.cost(errors) + 0.5 * float(structure.standard @ structure.standard)
 
     def _step(self, structure: Structure, view: View, errors: Array, slopes: Array) -> tuple[Array, float]:
-        """A bounded Gauss-Newton step, and the gain that it predicts if all is linear, nats."""
+        """Bounded Gauss-Newton step of a fit, and its predicted gain in nats."""
         move = bounded_step(structure, *view.weighted(errors, slopes), self.settings.reach)
         gain, z = view.noise.cost(errors) - view.noise.cost(errors + slopes @ move), structure.standard
         return move, gain + 0.5 * (float(z @ z) - float((z + move) @ (z + move)))
@@ -241,7 +241,7 @@ class Fitter:
     def _better(
         self, now: Followed, noise: NoiseModel, move: Array, before: float
     ) -> tuple[Structure, Array, float] | None:
-        """The first of the shares of a step that is better, its residual and cost; no derivatives are asked for."""
+        """First shortened step that improves the fit, with residual and cost; it needs no derivatives."""
         for share in SHARES:
             tried = now.structure.moved(share * move)
             try:
@@ -261,12 +261,12 @@ class Fitter:
 
 
 def in_roots(errors: Array, slopes: Array, roots: Array) -> tuple[Array, Array]:
-    """Errors (n,) and their slopes (n, k) in roots of the weights of the errors (n,)."""
+    """Errors (n,) and derivatives (n, k) of a fit, weighted by square roots."""
     return errors * roots, slopes * roots[:, None]
 
 
 def by_secant(slopes: Array, change: Array, move: Array) -> Array:
-    """Slopes (n, k) that give the change of the errors (n,) by a move (k,), as near to those before as can be.
+    """Secant update of a fit's derivatives (n, k) from a move (k,) and the change of the errors (n,).
 
     Law: C. Broyden, *Mathematics of Computation* 19, 1965.
     """
@@ -277,7 +277,7 @@ def by_secant(slopes: Array, change: Array, move: Array) -> Array:
 def bounded_step(
     structure: Structure, errors: Array, slopes: Array, reach: float, variance: float | None = None
 ) -> Array:
-    """Gauss-Newton step in deviations of the priors, within what is possible (bounded least squares).
+    """Gauss-Newton step of a fit in deviations of the priors, within bounds (bounded least squares).
 
     Errors have the ``variance`` that is given, or else their own.
     """

@@ -1,4 +1,4 @@
-"""How much of the error an effect removes, and whether that counts."""
+"""Judgement of an effect: the share of the error that it removes, and whether that counts."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from vpm.results import Storable
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Judgement(Storable):
-    """What an effect removes of the error that a tracker leaves.
+    """Judgement of an effect by the error that it removes under a tracker.
 
     Attributes
     ----------
@@ -48,22 +48,22 @@ class Judgement(Storable):
 
     @property
     def words(self) -> str:
-        """``removes 3 % of the error power``, or adds it where the share is negative."""
+        """Text of a judgement: ``removes 3 % of the error power``, or adds it where the share is negative."""
         if self.least < 0.0:
             return f"adds {_percent(-self.least)} to the error power"
         return f"removes {_percent(self.least)} of the error power"
 
     def counts(self, settings: Settings) -> bool:
-        """Whether that is more than chance, and more than what laws are wrong by."""
+        """Whether a judgement counts: more than chance, and more than errors of laws."""
         return not self.lacks(settings)
 
     def is_faint(self, settings: Settings, parts: int) -> bool:
-        """Whether it counts but for its score, and would if it did as well in so many parts of the record."""
+        """Whether a judgement fails only by its score, and would count with more parts of the record."""
         enough = replace(self, score=math.sqrt(parts) * self.score)
         return not self.counts(settings) and enough.counts(settings)
 
     def lacks(self, settings: Settings) -> str:
-        """What is missing to that, in words; "" where it counts."""
+        """Text on what a judgement lacks to count; "" where it counts."""
         if self.least <= settings.worth:
             return f"it {self.words}; {_percent(settings.worth)} have to go"
         if self.score <= settings.score:

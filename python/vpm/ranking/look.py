@@ -1,4 +1,4 @@
-"""What a tracker leaves of the records, and how much of that another effect removes."""
+"""Look at a structure under one tracker: the error that is left, and the share that another effect removes."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.candidates import Key
+from vpm.discrepancy.screening.candidates import Key
 from vpm.model import Effect
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.judgement import Judgement
+from vpm.ranking.model_structure import Structure, approximate
 from vpm.ranking.noise_model import white_noise
 from vpm.ranking.settings import PARTS, SURE
-from vpm.ranking.structure import Structure, approximate
 
 Array = NDArray[np.float64]
 
 
 class Look:
-    """What was found, under one tracker.
+    """Look at a fitted structure under one tracker.
 
     Attributes
     ----------
@@ -58,21 +58,21 @@ class Look:
         self._curves: dict[tuple[str, ...], Array] = {}
 
     def _followed(self, fitted: Fitted) -> Followed:
-        """With all derivatives if few steps give them; contacts may be too stiff for that."""
+        """Residual of a look with all derivatives, by few integration steps where contacts allow it."""
         names = tuple(fitted.structure.priors)
         with contextlib.suppress(*ASTRAY):
             return self._fitter.followed(fitted.structure, fitted.tracker.coarse, names)
         return self._fitter.followed(fitted.structure, fitted.tracker, names, fitted.residual)
 
     def predicted_gain(self, other: Followed) -> float:
-        """What another structure gains by a step of a fit, or as it stands, with cheap steps of the integrator, nats.
+        """Gain that a look predicts for another structure by one step of a fit, nats.
 
         None where it does most in a channel in which no effect could count any more.
         """
         return self._gain(self._after_a_step(other.structure, *self.view.errors(other, self._fitter.tracked.parts)))
 
     def gain_along(self, residual: Array) -> float:
-        """What another structure, which leaves this with few steps, promises if more or less of it changes the same.
+        """Gain that a look predicts for another structure if its change is scaled, nats.
 
         All that is unknown without it gives way, and stays within what is known of it.
         """
@@ -94,12 +94,12 @@ class Look:
 
     @cached_property
     def _errors(self) -> tuple[Array, Array]:
-        """Of what was found alone, with cheap steps, and their slopes; all trials ask for them."""
+        """Errors and derivatives of the look's structure alone, by coarse steps, for all trials."""
         return self.view.errors(self.coarse, self._fitter.tracked.parts)
 
     @cached_property
     def _alone(self) -> Array:
-        """Errors after such a step of what was found alone: few steps of the integrator ask for other values."""
+        """Errors of the look's structure alone after a step of a fit, by coarse steps."""
         return self._after_a_step(self.coarse.structure, *self._errors)
 
     def _after_a_step(self, structure: Structure, errors: Array, slopes: Array) -> Array:
@@ -108,46 +108,46 @@ class Look:
 
     @property
     def promising(self) -> float:
-        """What a step has to promise for a fit, nats."""
+        """Least predicted gain for which a look starts a fit, nats."""
         return self.needed / self.settings.patience
 
     @property
     def follows(self) -> bool:
-        """Whether it leaves less of the records than a machine at rest would, in the mean of the channels."""
+        """Whether a look leaves less error than a machine at rest, in the mean of the channels."""
         still = self._squares(self._fitter.tracked.motion)
         return float(np.sum(np.log(self._ratio(still, self.left)))) < 0.0
 
     @property
     def needed(self) -> float:
-        """What an effect has to gain to be worth it, nats."""
+        """Least gain for which an effect is worth it in a look, nats."""
         samples = len(self.left[0])
         least = min((1.0 - quiet for quiet, room in zip(self._quiet, self._rooms(), strict=True) if room), default=1.0)
         return float(-0.5 * samples * np.log1p(-self.settings.worth * least))
 
     def has_room(self, beside: Fitted | None = None) -> bool:
-        """Whether any effect could still count, or could if another structure had removed before what it does."""
+        """Whether a look has room for any effect that counts, alone or beside another structure."""
         if beside is None:
             return any(self._rooms())
         return any(self._rooms(self._ratio(self.left, self._squares(beside.residual))))
 
     def _rooms(self, left: Array | float = 1.0) -> list[bool]:
-        """Whether effects could count that do most in each of the channels, of which so much is left."""
+        """Channels in which a look has room for an effect that counts."""
         size, beside = (np.sqrt(left / (power + 1.0)) for power in (self.explained, self.added))
         told = zip(self._clear.astype(float).tolist(), size.tolist(), beside.tolist(), strict=True)
         return [Judgement(c, c, np.inf, a, b, 1.0).counts(self.settings) for c, a, b in told]
 
     def _above_noise(self, squares: Sequence[Array]) -> tuple[Array, Array]:
-        """Error power of each channel (m,) above white noise, no less than chance may make of none, and that."""
+        """Error power of a look above white noise by channel (m,), and its deviation by chance."""
         samples = sum(len(part) for part in squares)
         chance = np.sqrt(2.0 * samples) * self._quiet + 1e-300
         return np.maximum(sum(np.sum(part, axis=0) for part in squares) - samples * self._quiet, chance), chance
 
     def _ratio(self, before: Sequence[Array], after: Sequence[Array]) -> Array:
-        """Error power above noise after, as shares of that before, channel by channel (m,)."""
+        """Ratio of error power after to that before in a look, by channel (m,)."""
         return np.asarray(self._above_noise(after)[0] / self._above_noise(before)[0])
 
     def judged(self, fitted: Fitted, key: Key | None = None, *, ended: bool = True) -> Judgement:
-        """What another structure removes by one of its effects, or by what is none.
+        """Judgement in a look: the share of the error that another structure removes by one effect.
 
         All parts of the record are asked where one leaves it open, of fits that have ``ended``.
 
@@ -172,7 +172,7 @@ class Look:
         return replace(judgement, score=max(score, self._score_of_all(fitted, left[1])))
 
     def _score_of_all(self, fitted: Fitted, left: Array) -> float:
-        """How surely squares are smaller in pieces of all parts of the record, each fitted to the others.
+        """Score in a look by cross-validation over all parts of the record.
 
         Law: cross-validation (M. Stone, *J. Royal Statistical Society B* 36, 1974): what is held back for a judgement
         can be fitted for another one, so that no part of a record goes unheard.
@@ -187,19 +187,19 @@ class Look:
 
     @cached_property
     def _of_others(self) -> list[Array]:
-        """Squares of the other parts of the record, each held back from a fit of what was found."""
+        """Squares in a look of parts of the record that are held back from a fit in turn."""
         start = replace(self.coarse, tracker=self.fitted.tracker, residual=self.fitted.residual)
         return [self._held_back(start, part) for part in range(PARTS - 1)]
 
     def _held_back(self, start: Followed, part: int) -> Array:
-        """Squares of a part of the record that is held back, fitted to the others from where a fit ended."""
+        """Squares in a look of one held-back part of the record, from a fit to the others."""
         other = Fitter(self._fitter.tracked.holding_back(part), self.settings)
         moved, _ = other.moved(start, View(self.view.noise))
         return other.tracked.squares(moved.residual, self.view.noise)[1]
 
     @cached_property
     def _drawn(self) -> tuple[Array, Array]:
-        """Of masses on which nothing acts; what is left now in channels that are no positions of joints."""
+        """Squares in a look of free masses that the tracker draws; other channels as they are."""
         drawn = self._squares(self._fitter.tracked.drawn(self.fitted.tracker.band))
         fitted, held = (
             np.where(np.any(new > 0.0, axis=0), new, now) for new, now in zip(drawn, self.left, strict=True)
@@ -207,7 +207,7 @@ class Look:
         return fitted, held
 
     def _curve(self, key: Key) -> Array:
-        """What those effects of the model remove that show over the same states at the same place as another one."""
+        """Error power in a look that effects over the same states at the same place remove."""
         present = self.fitted.structure.model.effects
         alike = [one for one in present if same_curve(key, (one.name, one.at))]
         several = (key[1], *(f"{one.name} {one.side}" for one in alike))
@@ -216,7 +216,7 @@ class Look:
         return self._curves[several]
 
     def _added(self, before: Array) -> Array:
-        """Error power that effects remove that were added and are not exact, of what was left ``before`` them."""
+        """Error power in a look that added inexact effects remove of the error ``before`` them."""
         structure = self.fitted.structure
         added = [structure.model.effect(*key, structure.side(key)) for key in structure.effects]
         approximate = [one for one in added if not one.type.exact]
@@ -224,7 +224,7 @@ class Look:
         return power if len(approximate) == len(added) else np.minimum(power, self._removed(approximate))
 
     def _explained(self, effects: Collection[Effect]) -> Array:
-        """Error power that these effects of the model remove, those that were added no more than all of these did.
+        """Error power in a look that some effects of the model remove.
 
         What is left without a play or a spring that holds a load, and is not fitted anew, may be anything.
         """
@@ -234,7 +234,7 @@ class Look:
         return power if len(given) == len(effects) else np.minimum(power, self._removed(given) + self.added)
 
     def _removed(self, effects: Collection[Effect]) -> Array:
-        """Error power that these effects of the model remove; none where the rest runs away from the records.
+        """Error power in a look that effects remove; none where the rest diverges.
 
         No more than that of the motion itself: a rod without mass and friction is carried off by any force.
         """
@@ -246,7 +246,7 @@ class Look:
         return np.zeros(len(self.view.noise.tails))
 
     def _beside(self, residual: Array) -> Array:
-        """By how many times what is left of each channel the power of another residual is more (m,)."""
+        """Ratio of the power of another residual to that of the look, less one, by channel (m,)."""
         return np.maximum(1.0 / self._ratio(self._squares(residual), self.left) - 1.0, 0.0)
 
     def _squares(self, residual: Array) -> tuple[Array, Array]:
@@ -254,19 +254,19 @@ class Look:
 
 
 def same_curve(one: Key, other: Key) -> bool:
-    """Whether two effects show over the same states at the same place."""
+    """Whether two effects look alike: they depend on the same states at the same place."""
     states = (set(EFFECTS[name].signature.lives_in) for name, _ in (one, other))
     return one[1] == other[1] and bool(set.intersection(*states))
 
 
 def _shares(before: Sequence[Array], after: Sequence[Array]) -> Array:
-    """Squares after, noise among them, as shares of those before, channel by channel (m,)."""
+    """Ratio of squares after to those before, with noise, by channel of a look (m,)."""
     sums = [np.maximum(sum(np.sum(part, axis=0) for part in several), 1e-300) for several in (before, after)]
     return np.asarray(sums[1] / sums[0])
 
 
 def _repeated(parts: Sequence[tuple[Array, Array]], pieces: int) -> float:
-    """How surely squares before are smaller after, or their logarithms are, in standard deviations of the mean.
+    """Score of the decrease of squares in a look, piece by piece, in standard deviations of the mean.
 
     Parts of the record are cut into pieces each.
     """

@@ -1,4 +1,4 @@
-"""What a residual is like where nothing is missing: the spectrum of each channel, and its likelihood."""
+"""Noise model of a residual without missing effects: spectrum of each channel, and likelihood."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FLOOR = 1e-9
 
 @dataclass(frozen=True)
 class Colour:
-    """Amplitude of a signal by frequency, the same within a band, its geometric mean over all frequencies being one.
+    """Noise spectrum in bands: amplitude by frequency with geometric mean one.
 
     Law: P. Whittle, *Arkiv for Matematik* 2, 1953: lines of the spectrum are independent, whatever the spectrum is. A
     short autoregression does not see what is slow beside its length, but goes first, so that no line leaks into others
@@ -46,7 +46,7 @@ class Colour:
 
     @classmethod
     def of(cls, pieces: Sequence[Array]) -> Colour:
-        """That of a signal in pieces (n,)."""
+        """Noise spectrum of a signal in pieces (n,)."""
         places = np.concatenate([np.fft.rfftfreq(len(piece)) for piece in pieces])
         powers = np.concatenate([np.abs(np.fft.rfft(piece)) ** 2 / len(piece) for piece in pieces])
         edges, bands = _banded(places, powers)
@@ -55,7 +55,7 @@ class Colour:
         return cls(edges, sizes / np.exp(mean))
 
     def removed(self, piece: Array) -> Array:
-        """A piece of a signal (n,), or of derivatives of it (n, k), with all frequencies in one size."""
+        """Whitened piece of a signal (n,) or of derivatives (n, k): its noise spectrum is removed."""
         if len(self.sizes) == 1:
             return piece
         sizes = self.sizes[np.searchsorted(self.edges, np.fft.rfftfreq(len(piece)), side="right")]
@@ -64,7 +64,7 @@ class Colour:
 
 
 def _begins(places: Array) -> list[int]:
-    """Where bands of sorted frequencies begin, but for the first: a share of an octave each, and some lines."""
+    """First lines of the frequency bands of a noise spectrum: a share of an octave each."""
     begins, last = [], 0
     for place in range(LINES, len(places) - LINES + 1):
         wide = places[place] >= places[last] * 2.0 ** (1.0 / PER_OCTAVE) and places[place] > places[place - 1]
@@ -76,7 +76,7 @@ def _begins(places: Array) -> list[int]:
 
 @dataclass(frozen=True)
 class Structured:
-    """The part of a signal that stands out of white noise: what a sensor adds is not what a model lacks.
+    """Spectrum of a signal above white noise, since sensor noise is no missing effect.
 
     Law: N. Wiener, *Extrapolation, Interpolation, and Smoothing of Stationary Time Series*, MIT Press 1949, the filter
     that leaves least of noise and takes least of a signal. The quietest band of the spectrum says how strong that is.
@@ -99,7 +99,7 @@ class Structured:
 
     @classmethod
     def of(cls, pieces: Sequence[Array], passed: Sequence[Array] | None = None) -> Structured:
-        """That of a signal in pieces (n,).
+        """Spectrum of a signal in pieces (n,) above white noise.
 
         Parameters
         ----------
@@ -118,18 +118,18 @@ class Structured:
         return cls(edges, 1.0 - level * white / most, float(np.sqrt(level * np.mean(shares))))
 
     def part_of(self, piece: Array) -> Array:
-        """That part of a piece of a signal (n,)."""
+        """Part of a signal's piece (n,) above white noise."""
         kept = self.kept[np.searchsorted(self.edges, frequencies(len(piece)), side="right")]
         return np.asarray(idct(dct(piece, norm="ortho") * kept, norm="ortho"))
 
 
 def frequencies(count: int) -> Array:
-    """Those of the lines of a cosine transform, cycles per sample."""
+    """Frequencies of the cosine transform for noise spectra, cycles per sample."""
     return np.arange(count) / (2.0 * count)
 
 
 def _banded(places: Array, powers: Array) -> tuple[Array, list[Array]]:
-    """Where bands of frequencies begin, but for the first, and the lines of each."""
+    """Frequency bands of a noise spectrum: their first lines, and the lines of each."""
     order = np.argsort(places, kind="stable")
     places = places[order]
     begins = _begins(places)
@@ -138,7 +138,7 @@ def _banded(places: Array, powers: Array) -> tuple[Array, list[Array]]:
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """How the residual of each channel follows from its own past.
+    """Noise model: an autoregression of each channel with Student errors.
 
     Attributes
     ----------
@@ -159,7 +159,7 @@ class NoiseModel:
     tails: tuple[float, ...]
 
     def whitened(self, values: Array, parts: Parts) -> Array:
-        """Prediction errors of residuals (N, m), or of their derivatives (N, m, k), channel after channel.
+        """Prediction errors under the noise model of residuals (N, m) or derivatives (N, m, k), by channel.
 
         Returns
         -------
@@ -176,44 +176,44 @@ class NoiseModel:
 
     @property
     def freedom(self) -> Array:
-        """Degrees of freedom of the errors of each channel (m, 1)."""
+        """Degrees of freedom of the noise model's errors by channel (m, 1)."""
         return np.array(self.tails)[:, None]
 
     def log_density(self, errors: Array) -> Array:
-        """Logarithm of the density of each sample (n,), the errors being in their scales."""
+        """Log-density of each sample (n,) under the noise model."""
         channels = self.by_channel(errors)
         return np.asarray(log_student(channels, self.freedom) - np.log(self.deviations)[:, None]).ravel()
 
     def cost(self, errors: Array) -> float:
-        """Negative logarithm of the density but for a constant, the scale of each channel being the most likely one."""
+        """Negative log-density under the noise model but for a constant, at the most likely scales."""
         channels = self.by_channel(errors)
         sizes = self._scales(channels)
         likely = float(np.sum(log_student(channels / sizes, self.freedom)))
         return float(channels.shape[1] * np.sum(np.log(sizes))) - likely
 
     def roots(self, errors: Array) -> Array:
-        """Square roots of the weights (n,) under which squares of the errors stand for that density about them."""
+        """Square roots of the weights (n,) that the noise model gives to squared errors."""
         channels = self.by_channel(errors)
         sizes = self._scales(channels)
         return np.asarray(np.sqrt(_weights(channels / sizes, self.freedom)) / sizes).ravel()
 
     def _scales(self, channels: Array) -> Array:
-        """The most likely scale of the errors of each channel (m, 1)."""
+        """Most likely scale of the noise model's errors by channel (m, 1)."""
         pairs = zip(channels, self.freedom, strict=True)
         return np.array([[scale_of(channel[None, :], freedom[None, :])] for channel, freedom in pairs])
 
     def by_channel(self, errors: Array) -> Array:
-        """Errors (n,) of all channels as rows (m, n / m)."""
+        """Errors (n,) of the noise model by channel (m, n / m)."""
         return errors.reshape(len(self.tails), -1)
 
     def information(self) -> Array:
-        """Information in a sample of each channel (m,), as a share of that of a normal one with the same scale."""
+        """Information in a sample under the noise model (m,), relative to a normal one of that scale."""
         tails = np.array(self.tails)
         return 1.0 - 2.0 / (tails + 3.0)
 
 
 def log_student(errors: Array, freedom: Array) -> Array:
-    """Logarithm of Student's density of unit scale of errors (m, n) with degrees of freedom (m, 1)."""
+    """Log-density of Student noise with unit scale, of errors (m, n) with degrees of freedom (m, 1)."""
     normal = ~np.isfinite(freedom)
     nu = np.where(normal, 1.0, freedom)
     top = gammaln(0.5 * (nu + 1.0)) - gammaln(0.5 * nu) - 0.5 * np.log(np.pi * nu)
@@ -223,7 +223,7 @@ def log_student(errors: Array, freedom: Array) -> Array:
 
 
 def scale_of(errors: Array, freedom: Array, near: float | None = None) -> float:
-    """The most likely scale of errors (m, n) with degrees of freedom (m, 1); it is searched from ``near``.
+    """Most likely scale of Student noise in errors (m, n) with degrees of freedom (m, 1), near ``near``.
 
     Law: the fixed point in which weights are shares of their sum is the same, and sooner found (J. Kent, D. Tyler and
     Y. Vardi, *Communications in Statistics: Simulation* 23, 1994).
@@ -247,7 +247,7 @@ def _weights(errors: Array, freedom: Array) -> Array:
 
 
 def white_noise(residual: Array, parts: Parts) -> NoiseModel:
-    """Channels as they are, in their root mean squares."""
+    """White noise model: channels in their root mean squares."""
     one = np.ones(1)
     sizes = [_deviation(_joined(residual[:, place], parts, one, Colour())) for place in range(residual.shape[1])]
     return NoiseModel(
@@ -256,7 +256,7 @@ def white_noise(residual: Array, parts: Parts) -> NoiseModel:
 
 
 def fitted_noise(residual: Array, parts: Parts, order: int) -> NoiseModel:
-    """The autoregression that predicts each channel best (Yule 1927, Walker 1931), and the colour of its errors."""
+    """Fitted noise model: the best autoregression of each channel (Yule 1927, Walker 1931), and its spectrum."""
     taps, colours, deviations, tails = [], [], [], []
     for place in range(residual.shape[1]):
         products = np.zeros(order + 1)
@@ -274,7 +274,7 @@ def fitted_noise(residual: Array, parts: Parts, order: int) -> NoiseModel:
 
 
 def _bell(errors: Array) -> tuple[float, float]:
-    """The most likely scale and degrees of freedom."""
+    """Most likely scale and degrees of freedom of Student noise."""
     best, size = (-np.inf, 1.0, np.inf), None
     channel = errors[None, :]
     for freedom in TAILS:
@@ -286,12 +286,12 @@ def _bell(errors: Array) -> tuple[float, float]:
 
 
 def _joined(values: Array, parts: Parts, taps: Array, colour: Colour) -> Array:
-    """Prediction errors of all parts, one after the other, without their colour."""
+    """Prediction errors of all parts under a noise model, joined, without their spectrum."""
     return np.concatenate([colour.removed(piece) for piece in _filtered(values, parts, taps)])
 
 
 def _filtered(values: Array, parts: Parts, taps: Array) -> list[Array]:
-    """Prediction errors of each part, without its first samples, of which the past is unknown."""
+    """Prediction errors of each part by the noise model's autoregression, without its first samples."""
     past = len(taps) - 1
     pieces = []
     for part in parts:

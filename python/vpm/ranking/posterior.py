@@ -1,4 +1,4 @@
-"""Probabilities of what is missing next, and effects that the records cannot tell apart."""
+"""Posterior probabilities of the next missing effect, and effects that records do not discriminate."""
 
 from __future__ import annotations
 
@@ -11,10 +11,10 @@ Array = NDArray[np.float64]
 
 
 def probabilities(gains: Sequence[float], tempering: float) -> Array:
-    """Probabilities of each of several effects, and last that none of them is missing (k + 1,).
+    """Posterior probabilities of each of several effects, and last that none is missing (k + 1,).
 
-    Law: the posterior of models in proportion to their prior odds and a power of their evidence, which is below one
-    where no model is exact (P. Grunwald, *Algorithmic Learning Theory*, 2012).
+    Law: the posterior of models is proportional to their prior odds and a power of their evidence. The power is below
+    one where no model is exact (P. Grunwald, *Algorithmic Learning Theory*, 2012).
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def probabilities(gains: Sequence[float], tempering: float) -> Array:
 
 
 def robust_probabilities(gains: Sequence[float], tempering: float, astray: float) -> Array:
-    """Probabilities of each of several effects, of none, and that what is missing was not among them (k + 2,).
+    """Posterior probabilities of each effect, of none, and of an effect outside of the list (k + 2,).
 
     Law: a mixture with what knows nothing, as in robust statistics (J. Tukey, *Contributions to Probability and
     Statistics*, 1960), so that evidence that leads astray is no surprise without end.
@@ -46,7 +46,7 @@ def robust_probabilities(gains: Sequence[float], tempering: float, astray: float
 
 
 def log_volume(slopes: Array) -> float:
-    """Logarithm of the determinant of ``1 + K' K`` of derivatives K (n, k): by what records shrink what is unknown.
+    """Log-determinant of ``1 + K' K`` for derivatives K (n, k): posterior volume relative to the prior.
 
     It is never below zero, however large derivatives are and however alike. Products of them would lose the one.
     """
@@ -55,7 +55,7 @@ def log_volume(slopes: Array) -> float:
 
 
 def apart(one: Array, other: Array) -> float:
-    """By how many nats, in the mean, records decide between two models, of logarithms of the density of each sample.
+    """Discrimination beside posteriors: mean difference of two log-densities in nats.
 
     Law: where one of two models is exact, the logarithm of the ratio of their densities has half of its variance as
     mean (Q. Vuong, *Econometrica* 57, 1989, for the variance). Below a nat or so nobody can choose.

@@ -1,4 +1,4 @@
-"""What could be missing from a structure, and which of it is worth a fit."""
+"""Proposals for a ranking: effects that could be missing from a structure and are worth a fit."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue.kinds import Side
-from vpm.discrepancy.candidates import Candidate, Key, candidates
-from vpm.discrepancy.side_by_side import Failure, SideBySide
+from vpm.discrepancy.parallel_candidates import Failure, SideBySide
+from vpm.discrepancy.screening.candidates import Candidate, Key, candidates
 from vpm.identify import InverseDynamicsProblem
 from vpm.initial import invertible
-from vpm.ranking.extensions import Extensions, sides_of
 from vpm.ranking.fit import ASTRAY, Fitter, Followed, View
 from vpm.ranking.look import Look
+from vpm.ranking.model_structure import Structure
 from vpm.ranking.settings import Settings
-from vpm.ranking.starts import started
-from vpm.ranking.structure import Structure
+from vpm.ranking.start_values import started
+from vpm.ranking.structure_extensions import Extensions, sides_of
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ AT_ONCE = 16
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """An effect at start values, as a tracker sees it.
+    """Proposal of an effect at start values, as screened under a tracker.
 
     Attributes
     ----------
@@ -48,11 +48,11 @@ class Proposal:
 
     @property
     def key(self) -> Key:
-        """Effect and site."""
+        """Effect and site of a proposal."""
         return self.structure.effects[-1]
 
     def seen_in(self, look: Look) -> tuple[View, Array | None]:
-        """How it is looked at, and what is left where its fit begins, if that is known.
+        """View and first residual for the fit of a proposal.
 
         An effect that does nothing leaves all as it was, and so are the derivatives by all others.
         """
@@ -67,7 +67,7 @@ def proposals(
     each: SideBySide,
     effects: Sequence[str],
 ) -> list[Proposal]:
-    """The best few of these effects beside what was found, that are worth a fit under its tracker."""
+    """Best few proposals of effects beside a structure that are worth a fit under its tracker."""
     found = look.fitted.structure.repaired
     bare = invertible(found, data.joints)
     residual = data.evaluate(bare, bare.theta)[0]
@@ -90,7 +90,7 @@ def proposals(
 
 @dataclass(frozen=True, eq=False)
 class _Extended:
-    """A structure with an effect more, and what it was made of."""
+    """Possible proposal: a structure with one more effect, and its start values."""
 
     structure: Structure
     candidate: Candidate
@@ -98,11 +98,11 @@ class _Extended:
     side: Side
 
     def fresh(self, look: Look) -> list[str]:
-        """What is unknown in it beside what was."""
+        """Unknown parameters that a proposal adds."""
         return [name for name in self.structure.priors if name not in look.coarse.names]
 
     def felt(self, look: Look) -> list[str]:
-        """What of that changes anything where it begins: an effect without size does not feel its shapes."""
+        """Added parameters of a proposal with influence at its start: shapes of zero size have none."""
         effect, model = self.candidate.effect, self.structure.model
         own = model.effect(*self.candidate.key, self.structure.side(self.candidate.key)).parameter_names
         shapes = {name for short, name in own.items() if effect.parameter(short).shape}
@@ -111,14 +111,14 @@ class _Extended:
 
 @dataclass(frozen=True, eq=False)
 class _Pass:
-    """Effects that are present in a pass, and those of them that are asked for."""
+    """Pass of the screening for proposals: the effects that are present, and those screened."""
 
     present: Sequence[_Extended]
     asked: Sequence[_Extended]
 
 
 def _extended(structure: Structure, listed: Sequence[Candidate], extensions: Extensions) -> list[_Extended]:
-    """Structures with one effect more each, without those that cannot be."""
+    """Possible proposals: structures with one more effect each, if these can be built."""
     found = []
     for candidate in listed:
         for start, side in product(candidate.starts, sides_of(candidate, structure.model)):
@@ -129,7 +129,7 @@ def _extended(structure: Structure, listed: Sequence[Candidate], extensions: Ext
 
 
 def _hopeful(several: Sequence[_Extended], look: Look, fitter: Fitter, each: SideBySide) -> list[_Extended]:
-    """The few best starts of each effect that does something where it begins, if more of it or less promises a gain.
+    """Best few starts of each proposal that does something at its start, by predicted gain.
 
     This asks for no derivatives, which cost many times what a pass does where a joint is split.
     """
@@ -148,7 +148,7 @@ def _hopeful(several: Sequence[_Extended], look: Look, fitter: Fitter, each: Sid
 
 
 def _side_by_side(neutral: Sequence[_Extended], look: Look) -> list[_Pass]:
-    """Effects that do nothing where they begin, by so many as a pass has derivatives for; no effect is there twice.
+    """Groups of neutral proposals that share one pass, each effect once in a group.
 
     The same effects stay together at all their start values, for which one model does: its code is made once.
     """
@@ -178,7 +178,7 @@ def _side_by_side(neutral: Sequence[_Extended], look: Look) -> list[_Pass]:
 
 
 def _screened(look: Look, one_pass: _Pass, fitter: Fitter, extensions: Extensions) -> list[Proposal]:
-    """Effects at start values under one tracker; several in one pass where none of them does anything there.
+    """Screened proposals of one pass under a tracker.
 
     Derivatives by what was unknown without them are taken as they were: a prediction of a gain can do with these.
     """
@@ -196,7 +196,7 @@ def _screened(look: Look, one_pass: _Pass, fitter: Fitter, extensions: Extension
 
 
 def _gain(look: Look, followed: Followed, one: _Extended) -> float:
-    """What a step of a fit of an effect is predicted to gain, of a pass that has its derivatives among others, nats."""
+    """Predicted gain of a proposal by one step of a fit, from the derivatives of its pass, nats."""
     names, felt = one.fresh(look), one.felt(look)
     jacobian = np.zeros((*followed.residual.shape, len(names)))
     for name in felt:
@@ -205,7 +205,7 @@ def _gain(look: Look, followed: Followed, one: _Extended) -> float:
 
 
 def _seated(ordered: Sequence[Proposal], promising: float, settings: Settings) -> list[Proposal]:
-    """The few best starts of each effect that promise a gain; of those that do nothing there so many as have seats."""
+    """Best few starts of each proposal with a gain; neutral ones as many as the settings allow."""
     seated: dict[Key, list[Proposal]] = defaultdict(list)
     for proposal in ordered:
         several = seated[proposal.key]

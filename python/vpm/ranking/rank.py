@@ -1,18 +1,18 @@
-"""What a model is most probably missing, by one criterion."""
+"""Rank the effects that a model is most probably missing, by one criterion."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from vpm.discrepancy.candidates import asked_for
-from vpm.discrepancy.moving import check_moving
-from vpm.discrepancy.side_by_side import Progress, SideBySide
+from vpm.discrepancy.parallel_candidates import Progress, SideBySide
+from vpm.discrepancy.screening.candidates import asked_for
+from vpm.discrepancy.stuck_channels import check_moving
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
 from vpm.model import Model
 from vpm.one_thread import in_one_thread
+from vpm.ranking.ranking_search import Search
 from vpm.ranking.result import Ranking
-from vpm.ranking.search import Search
 from vpm.ranking.settings import Settings
 from vpm.ranking.tracked_records import TrackedRecords
 from vpm.simulate import Setup
@@ -31,12 +31,12 @@ def rank(
     tell: Callable[[str], None] | None = None,
     progress: Progress | None = None,
 ) -> Ranking:
-    """Order what ``model`` could be missing by what it removes of the error, and add the best for as long as it counts.
+    """Rank what ``model`` could be missing by the error that it removes; add the best effect as long as it counts.
 
-    Every structure, the model with some effects, is kept on the records by a slow tracker, and fitted to what that
-    leaves of two thirds of each record. What decides is the error power that an effect removes, there and from the
-    third that is held back. Nothing is inverted or differentiated, and neither the controller nor a start at rest is
-    asked for.
+    A slow tracker keeps every structure, the model with some effects, on the records. The structure is fitted to the
+    error that this leaves of two thirds of each record. What decides is the error power that an effect removes, there
+    and from the third that is held back. Nothing is inverted or differentiated, and neither the controller nor a start
+    at rest is asked for.
 
     Parameters
     ----------
@@ -51,9 +51,8 @@ def rank(
     settings : Settings, optional
         The numbers that decide.
     setup : Setup, optional
-        Integrator and hold. Where the hold is ``auto``, commands run on from sample to sample, straight or as a cubic,
-        as readings of a drive do, where that counts as an effect would; else they are held, as those of a digital
-        controller are.
+        Integrator and hold. Where the hold is ``auto``, commands are held, as those of a digital controller are. They
+        run on between samples, straight or as a cubic, if that counts as an effect would.
     workers : int, optional
         Structures that are fitted at a time; one per core if not given. The result does not depend on it.
     tell, progress : callable, optional

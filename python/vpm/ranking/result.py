@@ -1,4 +1,4 @@
-"""What a ranking gives back."""
+"""Result of a ranking."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from vpm.simulate.setup import HOLDS
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Ranked(Storable):
-    """An effect that was tried.
+    """Ranked effect in the result: it was tried, and judged.
 
     Attributes
     ----------
@@ -53,18 +53,18 @@ class Ranked(Storable):
 
     @property
     def key(self) -> tuple[str, str]:
-        """Effect and site."""
+        """Effect and site of a ranked effect in the result."""
         return self.effect, self.site
 
     @property
     def place(self) -> str:
-        """Site and side in words."""
+        """Site and side of a ranked effect in words, for the result."""
         return in_words(self.site, self.side)
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Gap(Storable):
-    """Root mean square of what a slow tracker leaves of a channel of validation records, at each stage.
+    """Error in the result of a ranking: root mean square of a tracked validation channel at each stage.
 
     Attributes
     ----------
@@ -72,15 +72,15 @@ class Gap(Storable):
         Of the model as it was, with fitted parameters, and with what was found, in ``unit``; NaN where it runs away.
     unit : str
     left : float
-        Share of the error power above the noise that is still there with what was found, of what the recalibrated model
-        leaves or, if that is less, masses on which nothing acts; NaN if not known.
+        Share of the error power above the noise that effects leave; NaN if not known. It refers to the error of the
+        recalibrated model or, if that is less, of masses on which nothing acts.
     noise : float
         What noise alone leaves, as far as it is white; NaN if not known.
     signal : float
         Root mean square of the channel about its mean.
     explained : float
-        What is left without the effects of the model whose laws are not exact, those that were found among them; no
-        more than the motion itself, and as much as with them where there are none.
+        Error without the effects of the model whose laws are not exact, found ones included. It is no more than the
+        motion itself, and the same as with them where there are none.
     """
 
     before: float
@@ -93,13 +93,13 @@ class Gap(Storable):
     explained: float = float("nan")
 
     def is_within_laws(self, settings: Settings) -> bool:
-        """Whether what is left is less than what the laws of the model may be wrong by: no effect could count there."""
+        """Whether a channel error in a ranking result is within the errors of the model's laws."""
         return self.after <= settings.slight * self.explained
 
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Ranking(Result):
-    """What a model is missing, in the order in which it was found.
+    """Ranking result: the effects that a model is missing, in the order in which they were found.
 
     Attributes
     ----------
@@ -129,7 +129,7 @@ class Ranking(Result):
 
     @property
     def left(self) -> dict[str, float]:
-        """By joint, or what else has a channel, the share of the error power of validation records that effects leave.
+        """Result by joint or other channel owner: share of validation error power that effects leave.
 
         Of its channel that they explain best.
         """
@@ -141,7 +141,7 @@ class Ranking(Result):
         return found
 
     def is_within_laws(self, settings: Settings) -> bool:
-        """Whether nothing more could be told to be missing of validation records, in none of their channels."""
+        """Whether all channel errors of a ranking result are within the errors of laws."""
         return bool(self.gaps) and all(gap.is_within_laws(settings) for gap in self.gaps.values())
 
     def _headline(self) -> Mapping[str, object]:

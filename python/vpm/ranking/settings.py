@@ -1,4 +1,4 @@
-"""Every number that decides in a ranking."""
+"""Settings of a ranking: every number that decides."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ OVERTONE = 0.02
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Numbers that decide.
+    """Settings that decide in a ranking.
 
     Attributes
     ----------
@@ -74,17 +74,17 @@ class Settings:
     pieces : int
         Pieces of the held-back stretches between which an effect has to repeat.
     inexact : float
-        By how much a law differs from the machine, as a share of the amplitude that it explains. Another effect that
-        shows over the same states at the same place has to do more than that, and a richer one has to do better by it
-        than a plainer one; between effects over other states evidence decides.
+        By how much a law differs from the machine, as a share of the amplitude that it explains. Another effect over
+        the same states at the same place has to do more than that. A richer one has to do better by it than a plainer
+        one. Between effects over other states evidence decides.
     slight : float
         An effect that does less than this share of the amplitude of all effects of the model is none. Those whose law
         is exact do not count here, see `EffectType.exact`.
     second : float
         The same of the amplitude of effects that were added, of whose laws less is known.
     clear : float
-        Share of the error power above which an effect counts beside those all the same: what laws are wrong by has no
-        shape that another law happens to have.
+        Share of the error power above which an effect counts beside those all the same. Errors of laws do not have the
+        shape of another law by chance.
     worth : float
         Share of the error power that another effect has to remove, of fitted and of held-back stretches.
     score : float

@@ -1,4 +1,4 @@
-"""Trackers, observers of fixed bandwidth without a noise model, and what a model that they keep on records leaves."""
+"""Tracked records: observers of fixed bandwidth keep a model on records, and leave an error."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from vpm.experiment import Experiment
 from vpm.initial import initial_state
 from vpm.model import Model
 from vpm.observer import Record
-from vpm.ranking.firsts import STEP, Firsts, hidden_states
+from vpm.ranking.hidden_first_states import STEP, Firsts, hidden_states
 from vpm.ranking.noise_model import NoiseModel, Parts, Structured, frequencies
 from vpm.ranking.settings import (
     CONTROLLED,
@@ -41,7 +41,7 @@ NOTHING: By = ((), None)
 
 @dataclass(frozen=True)
 class Tracker:
-    """An observer of fixed bandwidth that keeps a model on its records; `vpm.observer` has that of least variance.
+    """Tracker: an observer of fixed bandwidth; `vpm.observer` has that of least variance.
 
     Attributes
     ----------
@@ -56,24 +56,24 @@ class Tracker:
 
     @property
     def coarse(self) -> Tracker:
-        """The tracker of this bandwidth with the cheapest steps that it can do with."""
+        """Tracker of this bandwidth with the coarsest integration steps that it works with."""
         return Tracker(self.band, fine=False)
 
     @property
     def label(self) -> str:
-        """The bandwidth of the tracker, for people."""
+        """Label of a tracker: its bandwidth."""
         return f"{self.band:g} Hz"
 
 
 class TrackedRecords:
-    """Records, and what a model leaves of them under a tracker.
+    """Tracked records, and the error that a model leaves of them under a tracker.
 
-    The tracker knows no noise: each measured joint is drawn to its encoder with the bandwidth, as by a soft spring
-    with a damper between the machine and its log. All structures are compared under the same one. Where a joint is
-    split, what hangs behind its spring or backlash is drawn along with the motor: else both would answer to noise, and
-    to what is missing elsewhere, otherwise than a rigid joint does. A deflection that the logs hold is compared and not
-    drawn: a structure without the joint behind predicts zero. Of joints that closed loops tie, as many are drawn as
-    there are degrees of freedom: more of them would have to be weighed against each other.
+    The tracker knows no noise. It draws each measured joint to its encoder with the bandwidth, as by a soft spring with
+    a damper between the machine and its log. All structures are compared under the same one. Where a joint is split,
+    the load behind its spring or backlash is drawn along with the motor. Else both would answer to noise, and to
+    missing effects elsewhere, otherwise than a rigid joint does. A deflection that the logs hold is compared and not
+    drawn: a structure without the joint behind predicts zero. Of joints in closed loops, as many are drawn as there are
+    degrees of freedom. More of them would have to be weighed against each other.
 
     Parameters
     ----------
@@ -102,26 +102,26 @@ class TrackedRecords:
         self.parts, self.held_back = _divided(self._stretches, PARTS - 1)
 
     def with_hold(self, hold: str) -> TrackedRecords:
-        """The same with commands that do this between samples."""
+        """Tracked records with another hold of commands between samples."""
         if hold == self.setup.course:
             return self
         return TrackedRecords(self.model, self.experiments, self.settings, replace(self.setup, hold=hold))
 
     def holding_back(self, part: int) -> TrackedRecords:
-        """The same with another part of each stretch held back, counted from 0."""
+        """Tracked records with another part of each stretch held back, counted from 0."""
         other = copy.copy(self)
         other.parts, other.held_back = _divided(self._stretches, part)
         return other
 
     def whole(self) -> TrackedRecords:
-        """The same with nothing held back."""
+        """Tracked records with nothing held back."""
         other = copy.copy(self)
         other.parts, other.held_back = [slice(int(ends[0]), int(ends[-1])) for ends in self._stretches], []
         return other
 
     @cached_property
     def firsts(self) -> Firsts:
-        """First states that nobody measures, as far as the model moves them; none where it runs away."""
+        """Unmeasured first states of tracked records, as far as the model moves them; none if it diverges."""
         states = hidden_states(self.model, self.records[0].channels)
         if not states:
             return Firsts()
@@ -135,11 +135,11 @@ class TrackedRecords:
 
     @cached_property
     def motion(self) -> Array:
-        """What a model that never moves leaves of the records (N, m): readings less their means."""
+        """Residual of tracked records under a model at rest (N, m): readings minus their means."""
         return np.concatenate([record.readings - np.mean(record.readings, axis=0) for record in self.records])
 
     def drawn(self, band: float) -> Array:
-        """What a tracker leaves of masses on which nothing acts (N, m); zero of channels that are no positions.
+        """Residual of tracked records under free masses (N, m); zero for channels without position.
 
         Of a machine that is far too heavy it leaves the same, for no force of its model does anything any more.
         """
@@ -155,14 +155,14 @@ class TrackedRecords:
         return left
 
     def structured(self, residual: Array, band: float, parts: Parts) -> list[Structured]:
-        """What stands out of the noise of each channel of a residual (N, m) that a tracker leaves in these parts."""
+        """Part of a tracked residual (N, m) above the noise of each channel."""
         return [
             Structured.of([values[part] for part in parts], self._passed(band, parts, channel))
             for values, channel in zip(residual.T, self.records[0].channels, strict=True)
         ]
 
     def _passed(self, band: float, parts: Parts, channel: str) -> list[Array]:
-        """Share of the power of white noise of a sensor that a tracker leaves, at the lines of each part.
+        """Share of white sensor noise that a tracker passes to the residual, by frequency.
 
         It draws the model to what is slow, noise among that: less than all of it is left there.
         """
@@ -178,7 +178,7 @@ class TrackedRecords:
         return found
 
     def states(self, model: Model, tracker: Tracker) -> list[Array]:
-        """States (N, nx) along each record."""
+        """States (N, nx) of the tracked model along each record."""
         begun = zip(self.records, self._begun(model), strict=True)
         return [self._run(model, model.theta, tracker, NOTHING, *one)[1] for one in begun]
 
@@ -190,10 +190,10 @@ class TrackedRecords:
         columns: Sequence[int] = (),
         moves: Array | None = None,
     ) -> tuple[Array, Array]:
-        """Readings less outputs (N, m) of all records, one after the other, and derivatives (N, m, len(columns)).
+        """Readings minus outputs (N, m) of the tracked model on all records, with derivatives (N, m, len(columns)).
 
-        ``theta`` are the parameters, then, if they are not those of balance, by how much the first states are others:
-        all of the first record, all of the second, and so on. Derivatives are exact, or approximate where ``moves``
+        ``theta`` are the parameters. Differences of the first states from equilibrium follow, if there are any: all of
+        the first record, all of the second, and so on. Derivatives are exact, or approximate where ``moves``
         (len(columns),) tell by how much each of these numbers may be moved for a difference.
         """
         own = len(model.theta)
@@ -218,12 +218,12 @@ class TrackedRecords:
         return np.concatenate(residuals), np.concatenate(slopes)
 
     def squares(self, residual: Array, noise: NoiseModel) -> tuple[Array, Array]:
-        """Squares of a residual (N, m) as a noise model sees it: of fitted (n, m) and of held-back samples."""
+        """Squares of a tracked residual (N, m) under a noise model: of fitted (n, m) and held-back samples."""
         fitted, held = (noise.by_channel(noise.whitened(residual, part)) ** 2 for part in (self.parts, self.held_back))
         return fitted.T, held.T
 
     def stepping(self, model: Model, tracker: Tracker, dt: float) -> tuple[str, int]:
-        """Integrator, and its steps within a sample of ``dt`` seconds.
+        """Integrator of a tracker, and its steps within a sample of ``dt`` seconds.
 
         Structures are compared by short steps, or by steps of controlled error where that takes fewer. These need the
         exact Jacobian, which flexible links make large. Derivatives and proposals only show the way.
@@ -238,7 +238,7 @@ class TrackedRecords:
         return own, max(fewest, short)
 
     def _begun(self, model: Model) -> list[Array]:
-        """First states, by a model's own values: a tracker soon forgets them.
+        """First states of tracked records by the model's own values; a tracker soon forgets them.
 
         Raises
         ------
@@ -262,7 +262,7 @@ class TrackedRecords:
         record: Record,
         start: Array,
     ) -> tuple[Array, Array, Array]:
-        """Outputs of the channels of a record (N, m), states (N, nx), derivatives ``by`` some numbers (N, m, k)."""
+        """Outputs of a tracked record (N, m), states (N, nx) and derivatives ``by`` some numbers (N, m, k)."""
         known = [column for column, name in enumerate(record.channels) if name in model.output_channels]
         channels = [record.channels[column] for column in known]
         gain = tracker_gain(model, channels, tracker.band, record.dt, theta)
@@ -289,13 +289,13 @@ class TrackedRecords:
 
 
 def among_parameters(own: int, columns: Sequence[int], moves: Array | None) -> tuple[list[int], By]:
-    """Places of the columns that are among the ``own`` parameters of a model, and these columns with their moves."""
+    """Indices of columns among the ``own`` parameters of a tracked model, with their steps."""
     places = [place for place, column in enumerate(columns) if column < own]
     return places, ([columns[place] for place in places], None if moves is None else moves[places])
 
 
 def _records(model: Model, experiments: Sequence[Experiment]) -> Iterator[Record]:
-    """Records with the outputs of a model that each holds, and what all hold of deflections that it takes for zero."""
+    """Tracked records with the outputs of a model, and deflections that all of them hold."""
     held = [channel for channel in model.deflections if all(channel in experiment for experiment in experiments)]
     for experiment in experiments:
         record = Record.of(model, experiment)
@@ -304,7 +304,7 @@ def _records(model: Model, experiments: Sequence[Experiment]) -> Iterator[Record
 
 
 def _drawn(model: Model, channels: Sequence[str]) -> tuple[str, ...]:
-    """Positions of joints among these channels that do not follow from one another; those of driven ones first."""
+    """Position channels that a tracker draws independently, those of driven joints first."""
     positions = [name for name in channels if is_position(model, name)]
     if not model.loops:
         return tuple(positions)
@@ -315,14 +315,14 @@ def _drawn(model: Model, channels: Sequence[str]) -> tuple[str, ...]:
 
 
 def _among(columns: Sequence[int], count: int, values: Array) -> Array:
-    """Channels (N, ...) in their columns among so many, the others zero."""
+    """Channels (N, ...) of tracked records in their columns among more, the others zero."""
     whole = np.zeros((len(values), count, *values.shape[2:]))
     whole[:, columns] = values
     return whole
 
 
 def _divided(stretches: Sequence[NDArray[np.int_]], held: int) -> tuple[Parts, Parts]:
-    """Samples that are fitted, and those that are held back: the part with this number of each of the stretches."""
+    """Division of tracked records into fitted samples and one held-back part of each stretch."""
     fitted: list[slice] = []
     for ends in stretches:
         sides = (slice(int(ends[0]), int(ends[held])), slice(int(ends[held + 1]), int(ends[-1])))
@@ -331,7 +331,7 @@ def _divided(stretches: Sequence[NDArray[np.int_]], held: int) -> tuple[Parts, P
 
 
 def tracker_gain(model: Model, channels: Sequence[str], band: float, dt: float, theta: Array) -> Array:
-    """By how much the reading of each channel moves each state at a sample (nx, m).
+    """Gain of a tracker: by how much each channel's error moves each state at a sample (nx, m).
 
     The gain of a mass without friction whose error dies away with the bandwidth (Hz) and `DAMPING`. A sensor that shows
     a multiple of what it measures is corrected for it: else it would change the bandwidth, and pass for a better model.
@@ -348,7 +348,7 @@ def tracker_gain(model: Model, channels: Sequence[str], band: float, dt: float, 
 
 
 def is_position(model: Model, channel: str) -> bool:
-    """Whether a channel is the position of a joint, to which a tracker draws the model.
+    """Whether a channel is a joint position, to which a tracker draws the model.
 
     None that an effect has split off: another structure does not have it, and all have to be under the same tracker.
     """
@@ -357,19 +357,19 @@ def is_position(model: Model, channel: str) -> bool:
 
 
 def _gains(band: float, dt: float) -> tuple[float, float]:
-    """By how much an error of a position moves it, and its rate."""
+    """Gains of a tracker from a position error to the position and its rate."""
     turn = 2.0 * np.pi * band * dt
     return float(-np.expm1(-2.0 * DAMPING * turn)), turn**2 / dt
 
 
 def _free_mass(band: float, dt: float) -> tuple[list[float], list[float]]:
-    """What a tracker leaves of the position of a mass on which nothing acts: zeros and poles as polynomials."""
+    """Error of a tracked free mass: numerator and denominator polynomials of the transfer function."""
     place, rate = _gains(band, dt)
     return [1.0, -2.0, 1.0], [1.0, place + dt * rate - 2.0, 1.0 - place]
 
 
 def _factor(model: Model, channel: str, theta: Array) -> float:
-    """By what a sensor multiplies what it measures: its parameters that do nothing at one."""
+    """Sensor gain by which a tracked channel is multiplied."""
     sensor = model.sensor_of(channel)
     factors = [
         float(theta[model.index(name)])

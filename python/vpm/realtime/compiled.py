@@ -38,7 +38,7 @@ class CompiledModel:
     outputs: tuple[str, ...]
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write the file that ``vpm_open`` reads."""
+        """Save a compiled model to the file that ``vpm_open`` reads."""
         return write_text(path, self.text)
 
 

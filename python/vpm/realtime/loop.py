@@ -56,7 +56,7 @@ class LoopReport(Result):
     priority_raised: str
 
     def __str__(self) -> str:
-        """A few lines for the terminal."""
+        """Text of a loop's report, a few lines for the terminal."""
 
         def times(values: Mapping[str, float]) -> str:
             return "  ".join(f"{name} {1e6 * value:.3g} us" for name, value in values.items())
@@ -122,7 +122,7 @@ class Loop:
         return self._rate
 
     def wait(self) -> Tick:
-        """Sleep until the next deadline; the first call returns at once and begins the clock.
+        """Wait in the loop until the next deadline; the first call returns at once and begins the clock.
 
         Raises
         ------
@@ -145,7 +145,7 @@ class Loop:
             yield tick
 
     def report(self) -> LoopReport:
-        """Latency, work and missed deadlines until now."""
+        """Report of the loop: latency, work and missed deadlines until now."""
         names, values = list(QUANTILES), list(QUANTILES.values())
         memory, priority = (_told(right) for right in self._rights)
         return LoopReport(
@@ -159,7 +159,7 @@ class Loop:
         )
 
     def close(self) -> None:
-        """Give memory and priority back. The report stays."""
+        """Close the loop: give memory and priority back. The report stays."""
         self._core.close()
 
     def __enter__(self) -> Self:
@@ -169,7 +169,7 @@ class Loop:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Give memory and priority back."""
+        """Close the loop: give memory and priority back."""
         self.close()
 
     def __repr__(self) -> str:

@@ -34,7 +34,7 @@ class CSource:
     parameters: tuple[str, ...]
 
     def entries(self, what: str, by: str) -> list[tuple[int, int]]:
-        """Rows and columns of the entries of a derivative that are not zero, column by column.
+        """Nonzero entries of a derivative in the C source, column by column.
 
         Parameters
         ----------
@@ -49,7 +49,7 @@ class CSource:
         return [(row, column) for column in range(columns) for row in rows[first[column] : first[column + 1]]]
 
     def save(self, folder: str | PathLike[str]) -> tuple[Path, Path]:
-        """Write ``NAME.h`` and ``NAME.c`` into a folder, which is made if it is not there."""
+        """Save the C source: ``NAME.h`` and ``NAME.c`` in a folder, which is made if it is not there."""
         target = make_folder(folder)
         return write_text(target / f"{self.name}.h", self.header), write_text(target / f"{self.name}.c", self.source)
 

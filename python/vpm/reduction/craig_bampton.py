@@ -54,7 +54,7 @@ class Reduction:
 
     @property
     def errors(self) -> Array:
-        """Relative errors of the frequencies."""
+        """Relative frequency errors of a Craig-Bampton reduction."""
         return np.asarray(self.frequencies / self.full - 1.0)
 
     def __str__(self) -> str:
@@ -79,7 +79,7 @@ class Reduction:
 
 
 def reduce_structure(structure: Structure, modes: int = 8) -> Reduction:
-    """Reduce a solid to its slowest modes.
+    """Craig-Bampton reduction of a solid to its slowest modes.
 
     All constraint modes of the interfaces and as many fixed-interface modes as are asked for make the basis; of its own
     modes, with the root held, the slowest are kept.
@@ -119,7 +119,7 @@ def reduce_structure(structure: Structure, modes: int = 8) -> Reduction:
 
 
 def _own_modes(solid: Tied, basis: Array, count: int) -> tuple[Array, Array]:
-    """Slowest modes within a basis, of unit modal mass; the largest entry of each is positive."""
+    """Slowest Craig-Bampton modes within a basis, of unit modal mass."""
     basis = basis / np.sqrt(np.einsum("ij,ij->j", basis, solid.mass @ basis))
     stiffness, mass = basis.T @ (solid.stiffness @ basis), basis.T @ (solid.mass @ basis)
     values, shapes = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
@@ -129,7 +129,7 @@ def _own_modes(solid: Tied, basis: Array, count: int) -> tuple[Array, Array]:
 
 
 def _second(solid: Tied, fields: Array, frames: Array) -> tuple[Array, Array] | None:
-    """Second derivatives by each pair of modes, of all displacements and of the frames; None where unknown.
+    """Second derivatives by each pair of Craig-Bampton modes, of displacements and frames; or None.
 
     A deflection of second order is what undoes the stress of the second-order strain: ``K gamma = -int B^T C sym(A_i^T
     A_j)``. Its work with any load is the geometric stiffness of that load. Rigid frames turn their nodes to second
@@ -160,14 +160,14 @@ def _pairs(n: int) -> Iterator[tuple[int, int]]:
 
 
 def _turned(one: Array, other: Array, arms: Array) -> Array:
-    """Second derivative of what a turn by both rotation vectors does to arms: ``sym(w_i x (w_j x r))``."""
+    """Second derivative of a turn for Craig-Bampton modes: ``sym(w_i x (w_j x r))``."""
     return 0.5 * (np.cross(one, np.cross(other, arms)) + np.cross(other, np.cross(one, arms)))
 
 
 def _link(
     structure: Structure, squares: Array, fields: Array, frames: Array, second: tuple[Array, Array] | None
 ) -> ReducedLink:
-    """Point masses with the Gram matrix of the solid's fields: same mass, same inertia, same coupling in every motion.
+    """Point masses of a Craig-Bampton link with the Gram matrix of the solid's fields.
 
     With ``G = L L^T`` the columns of L are as good as the solid; a turn of them makes the masses equal. What is
     quadratic goes to them by its products with all other fields.
@@ -208,7 +208,7 @@ def _link(
 
 
 def _levelled(row: Array) -> Array:
-    """Orthogonal matrix that makes all entries of a row equal: a reflection (Householder)."""
+    """Orthogonal matrix for Craig-Bampton masses that makes all entries of a row equal (Householder)."""
     normal = row / np.linalg.norm(row) - np.full(row.size, row.size**-0.5)
     square = normal @ normal
     return np.eye(row.size) - (2.0 / square * np.outer(normal, normal) if square > 0.0 else 0.0)

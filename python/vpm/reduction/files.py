@@ -185,7 +185,7 @@ def _chosen(entry: _Interface, nodes: Array) -> NDArray[np.intp]:
 
 
 def _from_archive(path: Path) -> Structure:
-    """Everything in one ``.npz``; sparse matrices as ``stiffness_data``, ``_indices`` and ``_indptr`` (CSR)."""
+    """Files of a solid in one ``.npz``; sparse matrices in CSR."""
     import scipy.sparse as sp
 
     def matrix(stored: Mapping[str, Matrix], name: str) -> Matrix:

@@ -9,7 +9,7 @@ from vpm.errors import needs
 
 
 def finite_elements(module: str = "skfem") -> ModuleType:
-    """scikit-fem, a module of it, or meshio.
+    """Library for finite elements: scikit-fem, a module of it, or meshio.
 
     Raises
     ------

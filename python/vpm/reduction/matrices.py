@@ -66,7 +66,7 @@ def _read(path: Path) -> Matrix:
 
 
 def read_nodes(path: Path) -> Array:
-    """Places of nodes from a text file, or an ``.npy``, of three numbers each; a fourth in front is the node's number.
+    """Node places beside the matrices from a text file, or an ``.npy``, of three numbers each.
 
     Raises
     ------

@@ -26,7 +26,7 @@ _LARGEST = 200_000
 
 
 def box_mesh(size: tuple[float, ...], elements: tuple[int, ...]) -> Mesh:
-    """Hexahedra of a box from x, y = -half to half its sizes, and from z = 0.
+    """Mesh of a box-shaped solid: hexahedra from x, y = -half to half its sizes, and from z = 0.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ def box_mesh(size: tuple[float, ...], elements: tuple[int, ...]) -> Mesh:
 
 
 def read_mesh(path: Path, scale: float) -> Mesh:
-    """Tetrahedra or hexahedra from a file that meshio reads: Abaqus and CalculiX, Nastran, Gmsh, VTK.
+    """Mesh of a solid from a file that meshio reads: Abaqus and CalculiX, Nastran, Gmsh, VTK.
 
     Parameters
     ----------

@@ -66,23 +66,23 @@ class Structure:
 
     @cached_property
     def scalar_mass(self) -> Matrix:
-        """Mass matrix of one displacement component."""
+        """Mass matrix of one displacement component of the structure."""
         return sp.csr_array((self._block(0, 0) + self._block(1, 1) + self._block(2, 2)) / 3.0)
 
     @property
     def total_mass(self) -> float:
-        """Mass of a solid of finite elements (kg)."""
+        """Mass of the structure (kg)."""
         return float(self.scalar_mass.sum())
 
     @cached_property
     def centre(self) -> Array:
-        """Centre of mass of a solid of finite elements (m)."""
+        """Centre of mass of the structure (m)."""
         ones = np.ones(len(self.nodes))
         return np.asarray(ones @ (self.scalar_mass @ self.nodes) / self.total_mass)
 
     @cached_property
     def places(self) -> Array:
-        """Places of the frames of the interfaces (m): the middle of their nodes."""
+        """Places of the structure's interface frames (m): the middle of their nodes."""
         return np.array([self.nodes[interface.nodes].mean(axis=0) for interface in self.interfaces])
 
     def _block(self, row: int, column: int) -> Matrix:
@@ -90,7 +90,7 @@ class Structure:
 
 
 def rigid_motions(places: Array) -> Array:
-    """Displacements of points by a small rigid motion, shape (3 N, 6): rotation vector, then translation."""
+    """Displacements of a structure's points by a small rigid motion, shape (3 N, 6)."""
     motions = np.zeros((len(places), 3, 6))
     x, y, z = places.T
     motions[:, 0, 1], motions[:, 0, 2] = z, -y
@@ -101,7 +101,7 @@ def rigid_motions(places: Array) -> Array:
 
 
 def check_structure(structure: Structure) -> None:
-    """Refuse matrices that are those of no solid.
+    """Refuse matrices that are those of no structure.
 
     Raises
     ------
@@ -139,7 +139,7 @@ def check_structure(structure: Structure) -> None:
 
 
 def _check_mass(structure: Structure) -> None:
-    """The mass is the same in all directions, and none couples two of them."""
+    """Refuse a structure whose mass differs by direction, or couples two of them."""
     scalar = structure.scalar_mass
     size = abs(scalar).max()
     worst = max(
@@ -183,7 +183,7 @@ def _check_interfaces(structure: Structure) -> None:
 
 
 def _check_rigid(structure: Structure) -> None:
-    """The six rigid motions cost no energy."""
+    """Refuse a structure in which rigid motions cost energy."""
     motions = rigid_motions(structure.nodes - structure.centre)
     names = (
         "rotation about x",
@@ -205,7 +205,7 @@ def _check_rigid(structure: Structure) -> None:
 
 
 def check_units(structure: Structure, slowest: float) -> None:
-    """Refuse frequencies that no solid of this size has.
+    """Refuse frequencies that no structure of this size has.
 
     A wave that runs along the solid in a quarter of its slowest period is slower than sound in it; bending waves of
     slender solids are slower by its slenderness.

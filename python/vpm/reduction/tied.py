@@ -38,7 +38,7 @@ class Tied:
         self.mass = sp.csr_array(self.tie.T @ structure.mass @ self.tie)
 
     def _ties(self) -> Matrix:
-        """Displacements of all nodes per unit of each unknown."""
+        """Displacements of all nodes of the tied solid per unit of each unknown."""
         interfaces, count = self.structure.interfaces, len(self.structure.nodes)
         rigid = [(i.nodes, arms) for i, arms in zip(interfaces, self.arms, strict=True) if i.tie == "rigid"]
         free = np.setdiff1d(np.arange(count), np.concatenate([np.array([], dtype=np.intp), *(own for own, _ in rigid)]))
@@ -55,39 +55,39 @@ class Tied:
 
     @cached_property
     def free(self) -> Held:
-        """Factorised stiffness of a solid that is held at the root alone."""
+        """Factorised stiffness of the tied solid held at the root alone."""
         return Held(self.stiffness, self.rows[:1])
 
     @cached_property
     def fixed(self) -> Held:
-        """Factorised stiffness of a solid that is held at all interfaces."""
+        """Factorised stiffness of the tied solid held at all interfaces."""
         return Held(self.stiffness, self.rows)
 
     def constraint_modes(self) -> Array:
-        """Deflections by a unit motion of each interface but the root, the others held."""
+        """Constraint modes of the tied solid: unit motion of each interface but the root."""
         motions = 6 * len(self.rows)
         return self.fixed.solve(np.zeros((self.size, motions - 6)), np.eye(motions)[:, 6:])
 
     def fixed_modes(self, count: int) -> Array:
-        """Slowest modes with all interfaces held."""
+        """Slowest modes of the tied solid with all interfaces held."""
         return slowest(self.fixed, self.mass, count)[1]
 
     def free_frequencies(self, count: int) -> Array:
-        """Slowest frequencies with the root held (Hz)."""
+        """Slowest frequencies of the tied solid with the root held (Hz)."""
         return np.sqrt(slowest(self.free, self.mass, count)[0]) / (2.0 * np.pi)
 
     def compliance(self) -> Array:
-        """Motions of the interfaces but the root under unit loads on them."""
+        """Compliance of the tied solid: motions of interfaces under unit loads on them."""
         rows = sp.csr_array(sp.vstack(self.rows[1:]))
         loads = rows.T.toarray()
         return np.asarray(rows @ self.free.solve(loads, np.zeros((6, loads.shape[1]))))
 
     def nodal(self, shapes: Array) -> Array:
-        """Displacements of all nodes, shape (3 N, n)."""
+        """Displacements of all nodes of the tied solid, shape (3 N, n)."""
         return np.asarray(self.tie @ shapes)
 
     def frames(self, shapes: Array) -> Array:
-        """Motions of the interfaces but the root, shape (m, 6, n)."""
+        """Motions of the tied solid's interfaces but the root, shape (m, 6, n)."""
         return np.array([row @ shapes for row in self.rows[1:]])
 
 
@@ -107,18 +107,18 @@ class Held:
             ) from None
 
     def solve(self, loads: Array, motions: Array) -> Array:
-        """Deflections under loads (columns) at given motions of what is held."""
+        """Deflections of the tied solid under loads (columns) at given motions of what is held."""
         return np.asarray(self.factors.solve(np.vstack([loads, self.scale * motions]))[: self.n])
 
     def under(self, load: Array) -> Array:
-        """Deflection under one load, what is held at rest."""
+        """Deflection of the tied solid under one load, what is held at rest."""
         padded = np.zeros(self.factors.shape[0])
         padded[: self.n] = load
         return np.asarray(self.factors.solve(padded)[: self.n])
 
 
 def slowest(held: Held, mass: Matrix, count: int) -> tuple[Array, Array]:
-    """Squared angular frequencies and modes of unit modal mass, slowest first, by shift and invert (Lanczos)."""
+    """Slowest modes of a tied solid by shift and invert (Lanczos), with squared angular frequencies."""
     if count >= held.n - 1:
         raise ReductionError(f"{count} modes are asked for, but the solid has {held.n} displacements; take fewer modes")
     inverse = spla.LinearOperator((held.n, held.n), matvec=held.under, dtype=np.float64)
@@ -135,12 +135,12 @@ def slowest(held: Held, mass: Matrix, count: int) -> tuple[Array, Array]:
 
 
 def _numbers(nodes: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Numbers of the displacements of nodes."""
+    """Numbers of node displacements in the tied solid."""
     return (3 * nodes[:, None] + np.arange(3)).ravel()
 
 
 def _at(block: Array, nodes: NDArray[np.intp], rows: int) -> Matrix:
-    """Sparse matrix of so many rows with a block in those of some nodes."""
+    """Sparse matrix for the tied solid with a block in the rows of some nodes."""
     own, width = _numbers(nodes), block.shape[1]
     places = np.repeat(own, width), np.tile(np.arange(width), own.size)
     return sp.csr_array((block.ravel(), places), shape=(rows, width))

@@ -44,7 +44,7 @@ class Report:
 
 
 def report(diagnosis: Diagnosis, ladder: Ladder | None = None) -> Report:
-    """Put a diagnosis, and the simplification that followed it, on one page.
+    """HTML page of a diagnosis, and of the simplification that followed it.
 
     Parameters
     ----------

@@ -16,7 +16,7 @@ VERDICT_WORDS = {
 
 
 def estimate(value: float, std: float, unit: str, stated: float | None = None) -> str:
-    """``0.55 ± 0.01 N m``, and whether it differs from zero and from the model file.
+    """Message on an estimate, ``0.55 ± 0.01 N m``, and whether it differs from zero and the model file.
 
     Parameters
     ----------
@@ -34,7 +34,7 @@ def estimate(value: float, std: float, unit: str, stated: float | None = None) -
 
 
 def undetermined(value: float, std: float, stated: float | None = None) -> str:
-    """``, undetermined: ...`` where a value is within its own deviation of zero or of the model file's, or ""."""
+    """Message ``, undetermined: ...`` for a value within its deviation of zero or the file's, or ""."""
     if not std > 0.0:
         return ""
     if abs(value) <= std:
@@ -45,14 +45,14 @@ def undetermined(value: float, std: float, stated: float | None = None) -> str:
 
 
 def took(effect: AcceptedEffect) -> str:
-    """What an effect did to the validation error when it came in."""
+    """Message on what an effect did to the validation error when it came in."""
     did = "took" if effect.gain >= 0.0 else "added"
     ending = "of the validation mean square" if effect.gain >= 0.0 else "to the validation mean square"
     return f"{did} {percent(abs(effect.gain))} {ending} ({effect.score:.1f} standard deviations)"
 
 
 def probability(effect: AcceptedEffect) -> str:
-    """Evidence and probability by a ranking, or ""."""
+    """Message on evidence and probability by a ranking, or ""."""
     if isnan(effect.evidence_nats):
         return ""
     own, whole = effect.probability, effect.class_probability
@@ -61,7 +61,7 @@ def probability(effect: AcceptedEffect) -> str:
 
 
 def last_stage(d: Diagnosis) -> str:
-    """What the last model has that the recalibrated one has not, or "" where they are the same."""
+    """Message on what the last model has that the recalibrated one has not, or ""."""
     formula = d.empirical is not None and bool(d.empirical.formula)
     if d.effects:
         return "with the effects and a formula" if formula else "with the effects"
@@ -69,13 +69,13 @@ def last_stage(d: Diagnosis) -> str:
 
 
 def step_name(step: Step) -> str:
-    """Name of a step of a diagnosis, such as ``+ coulomb_friction at axis``."""
+    """Message for a step of a diagnosis, such as ``+ coulomb_friction at axis``."""
     signs = {"recalibrated": "recalibrated parameters", "added": "+ ", "removed": "− "}
     return signs[step.change] + (f"{step.effect} at {step.site}" if step.effect else "")
 
 
 def refitted(d: Diagnosis) -> list[tuple[str, str, str]]:
-    """Name, stated value and estimate of each parameter of the model file that the last fit moved."""
+    """Messages on parameters of the model file that the last fit moved: name, stated value, estimate."""
     rows = []
     for name, value, std, unit in zip(d.fit.names, d.fit.values, d.fit.std, d.fit.units, strict=True):
         if name in d.stated:

@@ -184,7 +184,7 @@ def _joint(p: Picture, number: int, last: str) -> Iterator[Drawn]:
 
 
 def _noise(p: Picture, stages: Mapping[str, Array], number: int, name: str) -> Iterator[Drawn]:
-    """Correlation and spectrum, where there is a stretch of samples to have one."""
+    """Picture of noise, correlation and spectrum, where there is a stretch of samples to have one."""
     step = float(np.median(np.diff(p.time))) if p.time.size > 1 else 0.0
     lags, values, band = gapped_autocorrelation(p.after, step)
     if lags.size < 2 or step <= 0.0:
@@ -248,7 +248,7 @@ def _parameters(d: Diagnosis) -> Iterator[Drawn]:
 
 
 def _pairs(names: Sequence[str], correlation: Array) -> str:
-    """The most correlated pairs, in words."""
+    """Words for a picture: the most correlated pairs."""
     first, second = np.triu_indices(len(names), 1)
     values = correlation[first, second]
     order = [k for k in np.argsort(-np.abs(np.nan_to_num(values))) if np.isfinite(values[k])][:5]
@@ -257,7 +257,7 @@ def _pairs(names: Sequence[str], correlation: Array) -> str:
 
 
 def _rms(values: Array) -> float:
-    """Root mean square of what counts; NaN without."""
+    """Root mean square of what counts in a picture; NaN without."""
     counted = values[np.isfinite(values)]
     return float(np.sqrt(np.mean(counted**2))) if counted.size else float("nan")
 

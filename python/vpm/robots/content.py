@@ -13,11 +13,11 @@ from vpm.catalogue import POSITIVE
 from vpm.catalogue.traits import Plain
 from vpm.model.joint import SUFFIXES
 from vpm.model.pose import Pose
+from vpm.robots.joint_effects import plain_effect
 from vpm.robots.lumping import WORLD, Lump, Tree
 from vpm.robots.markup import clean
-from vpm.robots.naming import Names
 from vpm.robots.parts import SINGLE, Drive, Inertial, Joint, Mimic, Robot, angles_of, rounded
-from vpm.robots.plain import plain_effect
+from vpm.robots.robot_names import Names
 from vpm.robots.transmissions import drives_of
 from vpm.robots.uncertain import Spread
 
@@ -55,7 +55,7 @@ class Draft:
             self.remarks[section, name] = remark
 
     def plain(self, what: Plain, at: str, value: Content, **values: object) -> None:
-        """Add an effect that is a number of a joint."""
+        """Add an effect to the content that is a number of a joint."""
         kind, parameter = plain_effect(what)
         self.content.setdefault("effects", []).append({"type": kind, "at": at, parameter: value, **values})
 
@@ -105,7 +105,7 @@ def _put_body(draft: Draft, robot: Robot, link: str, lump: Lump, spread: Spread)
 
 
 def _body(inertial: Inertial, spread: Spread) -> Content:
-    """Table of a body of an imported robot."""
+    """Content table of an imported robot's body."""
     table: Content = {"mass": spread.scaled(inertial.mass, "kg")}
     if any(inertial.center) or spread.share:
         table["center_of_mass"] = spread.center(inertial)
@@ -133,12 +133,12 @@ def _put_joint(draft: Draft, lump: Lump, spread: Spread) -> None:
 
 
 def rounded_place(place: Pose) -> tuple[float, ...]:
-    """Translation of a place that was composed."""
+    """Translation of a composed place, rounded for the content."""
     return rounded(np.asarray(place.translation))
 
 
 def _limits(joint: Joint) -> str:
-    """Limits of a joint as a remark: they are what its controller keeps, and no part of the model."""
+    """Limits of a joint as a remark in the content: its controller keeps them."""
     unit = "rad" if joint.kind == "revolute" else "m"
     words = []
     if joint.lower is not None and joint.upper is not None:
@@ -151,7 +151,7 @@ def _limits(joint: Joint) -> str:
 
 
 def effort_unit(joint: Joint) -> str:
-    """Unit of the effort of a joint with one coordinate."""
+    """Unit in the content of the effort of a joint with one coordinate."""
     return "N m" if joint.kind == "revolute" else "N"
 
 
@@ -162,7 +162,7 @@ def _put_shafts(draft: Draft, robot: Robot) -> None:
 
 
 def _put_frames(draft: Draft, robot: Robot, tree: Tree) -> None:
-    """Frames as markers; so are links without mass at the end of what moves, such as that of a tool."""
+    """Put frames into the content as markers, and massless links at the end of what moves."""
     carries = {joint.parent for joint in robot.joints.values()}
     ends = [(link, link, Pose()) for link, inertial in robot.links.items() if inertial is None and link not in carries]
     for name, link, place in (*ends, *((frame.name, frame.link, frame.place) for frame in robot.frames)):
@@ -179,7 +179,7 @@ def _put_frames(draft: Draft, robot: Robot, tree: Tree) -> None:
 
 
 def _put_drives(draft: Draft, robot: Robot, tree: Tree) -> None:
-    """One drive for each joint that is driven, and what is logged of each joint that moves."""
+    """Put one drive for each driven joint into the content, and logged channels of moving joints."""
     given: Mapping[str, Joint] = {lump.joint.name: lump.joint for lump in tree.lumps.values()}
     driven = drives_of(robot, given)
     for drive in driven:
@@ -227,14 +227,14 @@ def _short(value: float) -> float:
 
 
 def followers(tree: Tree) -> Iterator[tuple[Joint, Mimic]]:
-    """Joints that move and follow others, and how."""
+    """Joints in the content that follow others, and how."""
     for lump in tree.lumps.values():
         if lump.joint.mimic is not None:
             yield lump.joint, lump.joint.mimic
 
 
 def put_ties(draft: Draft, tree: Tree, moved_by: Mapping[str, float], frequency: float) -> Iterator[str]:
-    """Tie each joint that follows another to it by a stiff shaft, critically damped; sentences that tell of it.
+    """Put ties into the content: stiff, critically damped shafts for joints that follow; and sentences on them.
 
     The shaft turns by multiplier times leader - follower, which is - offset where the follower is in its place. A
     spring k and a damper d let an inertia m swing at w = sqrt(k/m), with the damping ratio d/(2 m w): 1 here
@@ -261,7 +261,7 @@ def put_ties(draft: Draft, tree: Tree, moved_by: Mapping[str, float], frequency:
 
 
 def put_tie_shafts(draft: Draft, tree: Tree) -> None:
-    """Shafts of the ties, still without spring and damper."""
+    """Put shafts of the ties into the content, still without spring and damper."""
     for joint, mimic in followers(tree):
         name = draft.names.made(f"{draft.joints[joint.name]}_tie")
         draft.joints[f"{joint.name} tie"] = name

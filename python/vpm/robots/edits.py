@@ -25,7 +25,7 @@ class Edits:
     changes: list[tuple[int, int, bytes]] = field(default_factory=list)
 
     def numbers(self, element: Element, key: str, new: Numbers, old: Numbers, size: float = 0.0) -> bool:
-        """Write an attribute where its numbers differ, beyond rounding of their size; whether it was written."""
+        """Edit an attribute where its numbers differ beyond rounding; whether it was written."""
         size = max(size, *(abs(value) for value in (*new, *old)))
         if all(abs(one - other) <= ROUNDING * size for one, other in zip(new, old, strict=True)):
             return False
@@ -50,7 +50,7 @@ class Edits:
         values: Changes,
         size: float = 0.0,
     ) -> None:
-        """Write attributes of a child, by key their new and their old numbers; make the child where it is not there."""
+        """Edit attributes of a child, by key new and old numbers; make the child where it is not there."""
         if element is not None:
             for key, (new, old) in values.items():
                 self.numbers(element, key, new, old, size)
@@ -69,7 +69,7 @@ class Edits:
         return self.markup.content[start:stop].endswith(b"/>")
 
     def _insert(self, parent: Element, written: bytes) -> None:
-        """Add a child behind the last one, with the blanks that stand before that."""
+        """Edit in a child behind the last one, with the blanks that stand before that."""
         if not parent.children:
             start, stop = self._tag(parent)
             if self._empty(parent):  # it gets a last tag
@@ -87,7 +87,7 @@ class Edits:
         self.changes.append((stop, stop, blanks + written))
 
     def content(self) -> bytes:
-        """The file with its changes."""
+        """Content of the file with its edits."""
         content = self.markup.content
         for start, stop, written in sorted(self.changes, key=lambda change: change[0], reverse=True):
             content = content[:start] + written + content[stop:]
@@ -95,5 +95,5 @@ class Edits:
 
 
 def _written(value: float) -> str:
-    """Shortest digits that read back as the same number; -0 is 0."""
+    """Shortest digits of an edited number that read back as the same; -0 is 0."""
     return repr(float(value) + 0.0)

@@ -17,10 +17,10 @@ from vpm.model.pose import Pose, pose
 from vpm.robots.content import Draft
 from vpm.robots.edits import Changes, Edits
 from vpm.robots.importing import FLOATING, drafted, robot_of
+from vpm.robots.joint_effects import plain_effect
 from vpm.robots.lumping import Lump
 from vpm.robots.markup import Element, Markup, clean, read_markup
 from vpm.robots.parts import SINGLE, Inertial, Joint, Robot, moved, without
-from vpm.robots.plain import plain_effect
 from vpm.robots.uncertain import Spread
 from vpm.robots.urdf import inertia_of, origin_of
 from vpm.robots.xacro import is_xacro
@@ -108,7 +108,7 @@ def export_robot(model: Model, urdf: str | PathLike[str]) -> ExportedRobot:
 
 
 def _without_place(model: Model, known: Model, draft: Draft, lumps: dict[str, Lump]) -> Iterator[str]:
-    """Effects and values of a model that no attribute of a URDF takes."""
+    """Effects and values of an exported model that no attribute of a URDF takes."""
     single = {draft.joints[lump.joint.name] for lump in lumps.values() if lump.joint.kind in SINGLE}
     had = {(effect.name, effect.at) for effect in known.effects}
     for effect in model.effects:
@@ -151,7 +151,7 @@ class _Writer:
     # ---- links -------------------------------------------------------------------------------------------------------
 
     def body(self, link: str, lump: Lump) -> None:
-        """Write a moved link, where it differs from what the file has."""
+        """Export a moved link, where it differs from what the file has."""
         name = self.draft.bodies[link]
         new, old = self._inertial(self.model, name), self._inertial(self.known, name)
         if new == old:
@@ -166,7 +166,7 @@ class _Writer:
         self._write_inertial(taker, moved(left, inverse(heavy[taker][1])))
 
     def _left(self, taker: str, whole: Inertial, others: list[Inertial]) -> Inertial:
-        """What is left for one link of a lump, which has to be a body."""
+        """Body for one link of an exported lump: what is left for it."""
         rest = whole.mass - sum(other.mass for other in others)
         if rest > 0.0:
             left = without(whole, others)
@@ -201,7 +201,7 @@ class _Writer:
     # ---- joints ------------------------------------------------------------------------------------------------------
 
     def joint(self, joint: Joint) -> None:
-        """Write damping, friction and armature of a joint."""
+        """Export damping, friction and armature of a joint."""
         if joint.kind not in SINGLE:
             return
         name, whose = self.draft.joints[joint.name], f'joint "{clean(joint.name)}"'
@@ -220,7 +220,7 @@ class _Writer:
             self.changed.append(f"{whose}: {', '.join(words)}")
 
     def _armature(self, joint: Joint, dynamics: Element | None, name: str, whose: str) -> Changes:
-        """Inertia of a rotor: an attribute that some programs read, and that is written only where it stands."""
+        """Export the inertia of a rotor only where the file has its attribute."""
         parameter = self.model.parameters.get(f"{name}.rotor_inertia")
         new = 0.0 if parameter is None else float(parameter.value)
         if new == joint.rotor:
@@ -236,7 +236,7 @@ class _Writer:
 
 
 def inverse(place: Pose) -> Pose:
-    """Place of the outer frame in the inner one."""
+    """Inverse pose for export: the outer frame in the inner one."""
     if place == Pose():
         return place
     turn = np.reshape(place.rotation, (3, 3)).T

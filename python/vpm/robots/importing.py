@@ -45,7 +45,7 @@ class ImportedRobot:
     notes: tuple[str, ...]
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write the model file with its comments.
+        """Write the model file of an imported robot with its comments.
 
         Raises
         ------
@@ -118,7 +118,7 @@ def import_robot(
 
 
 def robot_of(markup: Markup, *, floating: bool) -> Robot:
-    """Parts of a robot, by the format of its file.
+    """Parts of an imported robot, by the format of its file.
 
     Raises
     ------
@@ -149,7 +149,7 @@ def _afloat(robot: Robot) -> Robot:
 
 
 def drafted(robot: Robot, spread: Spread) -> tuple[Tree, Draft]:
-    """Moving links of a robot, and the content of its model but for the ties.
+    """Moving links of an imported robot, and the content of its model but for the ties.
 
     Raises
     ------
@@ -166,7 +166,7 @@ def drafted(robot: Robot, spread: Spread) -> tuple[Tree, Draft]:
 
 
 def _tied(draft: Draft, tree: Tree, frequency: float) -> list[str]:
-    """Put ties in, each as stiff as what it moves asks for."""
+    """Imported content with ties, each as stiff as what it moves needs."""
     put_tie_shafts(draft, tree)
     model = Model.from_dict(draft.content)
     inverse = np.linalg.inv(model.mass_matrix(np.zeros(len(model.coordinates))))

@@ -40,7 +40,7 @@ class Lump:
 
     @property
     def kept(self) -> bool:
-        """Whether the joint stands as in the file, on the frame of the link that the file names."""
+        """Whether a lump keeps the joint as in the file, on the frame of the named link."""
         return self.place == pose(self.joint.translation, self.joint.angles)
 
 
@@ -64,7 +64,7 @@ class Tree:
 
 
 def gather(robot: Robot) -> Tree:
-    """Links that move, with what is fixed to them.
+    """Lumps of moving links, with what is fixed to them.
 
     Raises
     ------
@@ -101,7 +101,7 @@ def gather(robot: Robot) -> Tree:
 
 
 def _ordered(robot: Robot) -> tuple[str, list[Joint]]:
-    """The link that nothing carries, and joints with parents before children."""
+    """Root link for lumping, and joints with parents before children."""
     if not robot.links:
         raise ModelError(f"{robot.path}: there is no link; add one", path=robot.path)
     carried: dict[str, Joint] = {}
@@ -133,7 +133,7 @@ def _ordered(robot: Robot) -> tuple[str, list[Joint]]:
 
 
 def _check_masses(robot: Robot, lumps: Mapping[str, Lump]) -> None:
-    """A joint that moves no mass has no acceleration."""
+    """Refuse lumps whose joint moves no mass."""
     heavy: set[str] = set()
     for link, lump in lumps.items():
         if lump.inertial is not None:

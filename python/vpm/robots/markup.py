@@ -49,11 +49,11 @@ class Element:
     children: list[Element] = field(default_factory=list)
 
     def all(self, tag: str) -> Iterator[Element]:
-        """Its children of one tag."""
+        """Children of a markup element with one tag."""
         return (child for child in self.children if child.tag == tag)
 
     def first(self, tag: str) -> Element | None:
-        """Its first child of one tag."""
+        """First child of a markup element with one tag."""
         return next(self.all(tag), None)
 
 
@@ -73,7 +73,7 @@ class Markup:
     root: Element
 
     def fail(self, element: Element, text: str) -> NoReturn:
-        """Raise an error about an element of an XML file.
+        """Raise an error about an element of the markup.
 
         Raises
         ------
@@ -83,19 +83,19 @@ class Markup:
         raise ModelError(f"{self.path}, line {element.line}: {text}", path=self.path, line=element.line)
 
     def need(self, element: Element, tag: str, whose: str) -> Element:
-        """Child that has to be there."""
+        """Child of a markup element that has to be there."""
         if (child := element.first(tag)) is None:
             self.fail(element, f"{whose} has an element <{element.tag}> without <{tag}>; add it")
         return child
 
     def text(self, element: Element, key: str, whose: str) -> str:
-        """Attribute that has to be there."""
+        """Attribute of a markup element that has to be there."""
         if not (value := element.attributes.get(key, "").strip()):
             self.fail(element, f"{whose} has a <{element.tag}> without {key}; add {key}=...")
         return value
 
     def numbers(self, element: Element, key: str, count: int, default: float | None, whose: str) -> tuple[float, ...]:
-        """Numbers of an attribute; each is the default where it is not given, which is refused without a default."""
+        """Numbers of a markup attribute; each is the default where it is missing."""
         if (written := element.attributes.get(key)) is None:
             if default is None:
                 self.fail(element, f"{whose} has a <{element.tag}> without {key}; add {key}=...")
@@ -110,18 +110,18 @@ class Markup:
         return values
 
     def number(self, element: Element, key: str, default: float | None, whose: str) -> float:
-        """The one number of an attribute."""
+        """Single number of a markup attribute."""
         return self.numbers(element, key, 1, default, whose)[0]
 
 
 def clean(text: str) -> str:
-    """A word of a file as it may stand in a sentence or a comment: on one line, without control characters, short."""
+    """Word of the markup for a sentence or a comment: one line, no control characters, short."""
     shown = "".join(letter if letter.isprintable() else " " for letter in text)
     return shown if len(shown) <= 80 else f"{shown[:77]}..."
 
 
 def read_markup(path: str | PathLike[str]) -> Markup:
-    """Read a file of XML.
+    """Read the markup of an XML file.
 
     Raises
     ------
@@ -145,7 +145,7 @@ def read_markup(path: str | PathLike[str]) -> Markup:
 
 
 def parse_markup(content: bytes, path: str) -> Markup:
-    """Read the bytes of a file of XML.
+    """Parse the markup of an XML file's bytes.
 
     Raises
     ------

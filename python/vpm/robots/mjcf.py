@@ -52,7 +52,7 @@ def read_mjcf(markup: Markup) -> Robot:
 
 
 def turn_of(quaternion: Any) -> Pose:  # noqa: ANN401 - an array of MuJoCo
-    """Rotation of a unit quaternion w, x, y, z."""
+    """Rotation of a unit quaternion w, x, y, z in MJCF."""
     w, x, y, z = (float(value) for value in quaternion)
     if (x, y, z) == (0.0, 0.0, 0.0):
         return Pose()
@@ -126,7 +126,7 @@ class _Reader:
         robot.links[name] = self._inertial(body, frame)
 
     def _joint(self, index: int, frame: Pose, carrier: str, link: str) -> Pose:
-        """Add a joint; place of the body's frame in that of the link behind it."""
+        """Add an MJCF joint; place of the body's frame in that of the link behind it."""
         m = self._m
         name, kind = self._name("JOINT", index, "joint"), _KINDS[int(m.jnt_type[index])]
         if kind == "free":

@@ -34,7 +34,7 @@ def drives_and_shafts(m: Any, mujoco: Any, joints: list[str], robot: Robot) -> t
 
 
 def _ratios(m: Any, mujoco: Any, tendon: int, joints: list[str]) -> dict[str, float]:  # noqa: ANN401
-    """Of a fixed tendon, whose length is the sum of coefficient times coordinate; none of another one."""
+    """Ratios of a fixed MJCF tendon, a sum of coefficient times coordinate; none of another one."""
     first, count = int(m.tendon_adr[tendon]), int(m.tendon_num[tendon])
     wraps = range(first, first + count)
     if any(int(m.wrap_type[wrap]) != int(mujoco.mjtWrap.mjWRAP_JOINT) for wrap in wraps):
@@ -51,7 +51,7 @@ def _drive(
     joint: str | None = None,
     shaft: str | None = None,
 ) -> Drive:
-    """A motor has the effort gear times gain times command; a servo is one in units of effort, and told."""
+    """Drive of an MJCF actuator: a motor is gear times gain times command; a servo takes efforts."""
     gear = float(m.actuator_gear[index][0])
     plain = (
         int(m.actuator_gaintype[index]) == int(mujoco.mjtGain.mjGAIN_FIXED)
@@ -70,7 +70,7 @@ def _drive(
 
 
 def equalities(m: Any, mujoco: Any, joints: list[str], robot: Robot) -> None:  # noqa: ANN401
-    """Joints that others lead by a straight line, y - y0 = a0 + a1 (x - x0); others are told."""
+    """MJCF equalities: joints that others lead by a straight line, y - y0 = a0 + a1 (x - x0)."""
     for index in range(m.neq):
         follower, leader = int(m.eq_obj1id[index]), int(m.eq_obj2id[index])
         data = m.eq_data[index][:5]
@@ -88,7 +88,7 @@ def equalities(m: Any, mujoco: Any, joints: list[str], robot: Robot) -> None:  #
 
 
 def _leads(robot: Robot, joint: str) -> str:
-    """Joint that leads another one in the end, which is itself where it follows none."""
+    """Joint that leads another MJCF joint in the end; itself where it follows none."""
     while (mimic := robot.joints[joint].mimic) is not None:
         joint = mimic.joint
     return joint

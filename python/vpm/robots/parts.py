@@ -29,13 +29,13 @@ class Inertial:
 
     @property
     def matrix(self) -> Array:
-        """Inertia about the centre of mass as a matrix, shape (3, 3)."""
+        """Inertia of a robot's part about the centre of mass as a matrix, shape (3, 3)."""
         xx, yy, zz, xy, xz, yz = self.inertia
         return np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
 
     @property
     def spread(self) -> float:
-        """Root of the mean square of the distance of its mass from its centre (m): of that, tr I is twice."""
+        """Root mean square distance of a part's mass from its centre (m)."""
         return float(np.sqrt(max(sum(self.inertia[:3]), 0.0) / (2.0 * self.mass)))
 
 
@@ -123,7 +123,7 @@ class Robot:
 
 
 def moved(inertial: Inertial, place: Pose) -> Inertial:
-    """Mass and inertia in another frame, in which the frame of the link has this place."""
+    """Mass and inertia of a robot's part in another frame."""
     if place == Pose():
         return inertial
     turn = np.reshape(place.rotation, (3, 3))
@@ -164,12 +164,12 @@ def offset(part: Inertial, center: Array) -> Array:
 
 
 def entries(matrix: Array) -> Vector:
-    """Xx yy zz xy xz yz of an inertia."""
+    """Entries xx yy zz xy xz yz of a part's inertia."""
     return rounded(matrix[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]])
 
 
 def rounded(values: Array) -> Vector:
-    """Numbers without what rounding left in their last digits: to 15 digits of the largest of them."""
+    """Numbers of a robot's part without rounding errors: 15 digits of the largest."""
     size = float(np.abs(values).max(initial=0.0))
     if size == 0.0 or not np.isfinite(size):
         return tuple(values.tolist())
@@ -178,7 +178,7 @@ def rounded(values: Array) -> Vector:
 
 
 def angles_of(place: Pose) -> Vector:
-    """Roll, pitch, yaw of a rotation, R = Rz(yaw) Ry(pitch) Rx(roll), right also where two of them share an axis.
+    """Roll, pitch, yaw of a part's rotation, R = Rz(yaw) Ry(pitch) Rx(roll), right also at singular angles.
 
     The yaw is taken of what the roll leaves, so that an error of the one is made good by the other (G. Slabaugh,
     "Computing Euler angles from a rotation matrix", 1999, has the case of the shared axis apart).

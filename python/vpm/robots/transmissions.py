@@ -38,14 +38,14 @@ def read_transmissions(markup: Markup, robot: Robot) -> None:
 
 
 def _text(markup: Markup, element: Element) -> str:
-    """Text between the tags of an element that holds nothing else."""
+    """Text between the tags of a transmission's element that holds nothing else."""
     written = markup.content[element.start : max(element.start, element.close)]
     first = written.find(b">")
     return "" if first < 0 else written[first + 1 :].decode("utf-8", "replace").strip()
 
 
 def _number_below(markup: Markup, element: Element, tags: tuple[str, ...], whose: str) -> float | None:
-    """Number in the first element of one of the tags, between its tags or as its ``value``."""
+    """Number of a transmission in the first element of one of the tags, or as its ``value``."""
     for child in element.children:
         if child.tag in tags:
             written = child.attributes.get("value", _text(markup, child))
@@ -54,7 +54,7 @@ def _number_below(markup: Markup, element: Element, tags: tuple[str, ...], whose
 
 
 def _by_role(elements: list[Element], markup: Markup, name: str) -> list[tuple[str, float]]:
-    """Names and reductions in the order of their roles, joint1 before joint2."""
+    """Names and reductions of a transmission in the order of their roles, joint1 before joint2."""
     whose = f'transmission "{name}"'
     found = []
     for element in elements:
@@ -95,7 +95,7 @@ def _couple(robot: Robot, name: str, law: Law, actuators: Pair, joints: Pair) ->
 
 
 def _single(markup: Markup, robot: Robot, name: str, joint: str, element: Element) -> None:
-    """A reduction is told, because commands are efforts of the joint; a rotor becomes inertia of the joint."""
+    """Drive of a transmission with one joint: its reduction is told, its rotor becomes joint inertia."""
     whose = f'transmission "{name}"'
     reduction = rotor = None
     for below in (element, *element.all("actuator"), *element.all("joint")):
@@ -113,7 +113,7 @@ def _single(markup: Markup, robot: Robot, name: str, joint: str, element: Elemen
 
 
 def drives_of(robot: Robot, joints: Mapping[str, Joint]) -> list[Drive]:
-    """Drives: those that the file names, else one for each shaft and for each joint with one coordinate that is free.
+    """Drives by transmission: those that the file names, else one for each shaft and free joint.
 
     A joint that turns with a shaft, or that follows another one, has none of its own.
     """

@@ -30,12 +30,12 @@ class Spread:
             )
 
     def scaled(self, value: float, unit: str) -> dict[str, Any]:
-        """Parameter that is above 0: its bounds are as many times smaller as larger."""
+        """Uncertain parameter above 0: its bounds are as many times smaller as larger."""
         factor = 1.0 + REACH * self.share
         return self._table(value, unit, self.share * value, value / factor, value * factor)
 
     def friction(self, value: float, unit: str) -> dict[str, Any]:
-        """Parameter that may be 0."""
+        """Uncertain parameter that may be 0."""
         return self._table(value, unit, self.share * value, 0.0, value * (1.0 + REACH * self.share))
 
     def center(self, inertial: Inertial) -> list[Any]:
@@ -44,7 +44,7 @@ class Spread:
         return [self._about(value, "m", self.share * size) for value in inertial.center]
 
     def inertia(self, inertial: Inertial) -> list[Any]:
-        """Inertia about the centre of mass."""
+        """Uncertain inertia about the centre of mass."""
         size = self.share * sum(inertial.inertia[:3]) / 3.0
         lowest = [-math.inf if place > 2 else 0.0 for place in range(6)]
         pairs = zip(inertial.inertia, lowest, strict=True)

@@ -81,14 +81,14 @@ def _inertial(markup: Markup, link: Element, whose: str, notes: list[str]) -> In
 
 
 def origin_of(markup: Markup, element: Element, whose: str) -> tuple[Vector, Vector]:
-    """Translation (m) and roll, pitch, yaw (rad) of an element; zero where it does not say."""
+    """Origin in URDF: translation (m) and roll, pitch, yaw (rad) of an element; zero by default."""
     if (origin := element.first("origin")) is None:
         return ORIGIN, ORIGIN
     return markup.numbers(origin, "xyz", 3, 0.0, whose), markup.numbers(origin, "rpy", 3, 0.0, whose)
 
 
 def inertia_of(markup: Markup, element: Element, whose: str) -> Vector:
-    """Xx yy zz xy xz yz as they stand in the file, of a body that can be."""
+    """Inertia xx yy zz xy xz yz in URDF of a possible body."""
     if (inertia := element.first("inertia")) is None:
         return (0.0,) * 6
     diagonal = [markup.number(inertia, key, None, whose) for key in ("ixx", "iyy", "izz")]
@@ -143,7 +143,7 @@ def _axis(markup: Markup, element: Element, whose: str) -> Vector:
 def _dynamics(
     markup: Markup, element: Element, whose: str, kind: JointType, notes: list[str]
 ) -> tuple[float, float, float]:
-    """Damping, friction and, as some programs write it, armature."""
+    """Damping, friction and, as some programs write it, armature of a URDF joint."""
     if (dynamics := element.first("dynamics")) is None:
         return 0.0, 0.0, 0.0
     values = tuple(markup.number(dynamics, key, 0.0, whose) for key in ("damping", "friction", "armature"))
@@ -185,7 +185,7 @@ def _mimic(markup: Markup, element: Element, whose: str, kind: JointType) -> Mim
 
 
 def _check_mimics(markup: Markup, robot: Robot) -> None:
-    """A joint that is followed has to be there, to have one coordinate, and to lead to one that follows none."""
+    """Refuse URDF joints that follow an absent joint, one with several coordinates, or a circle."""
     elements = {element.attributes["name"].strip(): element for element in markup.root.all("joint")}
     for name, joint in robot.joints.items():
         passed, mimic = {name}, joint.mimic

@@ -15,7 +15,7 @@ PATIENCE = 60.0
 
 
 def is_xacro(markup: Markup) -> bool:
-    """Whether a file has to be expanded."""
+    """Whether a robot file is xacro and has to be expanded."""
     return markup.path.endswith(".xacro") or any("xacro" in key for key in markup.root.attributes)
 
 

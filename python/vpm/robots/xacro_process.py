@@ -16,7 +16,7 @@ MEMORY, SECONDS = 1 << 31, 45
 
 
 def harmless(expression: str) -> bool:
-    """Whether an expression of Python reaches for no name with an underscore in front, and makes no function."""
+    """Whether a xacro expression reaches for no private name, and makes no function."""
     for node in ast.walk(ast.parse(expression.strip(), mode="eval")):
         name = getattr(node, "attr", None) or getattr(node, "id", None) or ""
         if name.startswith("_") or isinstance(node, ast.Lambda) or name in {"format", "format_map"}:

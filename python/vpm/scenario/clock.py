@@ -44,12 +44,12 @@ class Clock:
 
     @cached_property
     def time(self) -> NDArray[np.float64]:
-        """Shape (steps + 1,), s."""
+        """Time of a scenario's clock, shape (steps + 1,), s."""
         return np.arange(self.steps + 1, dtype=np.float64) * np.float64(self.time_step)
 
 
 def clock_of(document: Document) -> Clock:
-    """Time base of a scenario.
+    """Clock of a scenario.
 
     Raises
     ------
@@ -73,7 +73,7 @@ def clock_of(document: Document) -> Clock:
 
 
 def check_numbers(clock: Clock, models: Collection[Model]) -> None:
-    """Refuse runs that no memory holds.
+    """Refuse a clock with runs that no memory holds.
 
     Raises
     ------

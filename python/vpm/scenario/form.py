@@ -46,7 +46,7 @@ _KINDS: Mapping[str, str] = {
 
 
 def schema_problems(error: ValidationError) -> list[Problem]:
-    """Rewrite what the schema found; unknown keys come first, for what is missing is often what is misspelt."""
+    """Problems of a scenario file's form that the schema found; unknown keys come first."""
     problems = []
     for detail in sorted(error.errors(include_url=False), key=lambda found: found["type"] != "extra_forbidden"):
         keys = _without_type(detail["loc"])
@@ -59,7 +59,7 @@ def schema_problems(error: ValidationError) -> list[Problem]:
 
 
 def _without_type(keys: Place) -> Place:
-    """Place without what the schema puts into it: the type of a signal, the branch of a level."""
+    """Place in the form without what the schema puts into it."""
     if keys[0] in INPUTS and len(keys) > 2:
         place_of_number = keys[5:] if len(keys) == 6 and keys[4] == "value" else keys[4:]  # bare lists have no such key
         return (*keys[:2], *keys[3:4], *place_of_number)
@@ -69,12 +69,12 @@ def _without_type(keys: Place) -> Place:
 
 
 def _nested(keys: Place) -> bool:
-    """Whether ``value`` at the end is that of a quantity, not a signal's own."""
+    """Whether ``value`` at the end of a form's place is that of a quantity, not a signal's own."""
     return not (keys[0] in INPUTS and len(keys) == 3)
 
 
 def _sentence(kind: str, keys: Place, tables: Tables, found: object, context: Mapping[str, Any]) -> str:
-    """Rest of the sentence for one error of the schema."""
+    """Rest of the sentence for one error of a scenario's form."""
     if kind == "extra_forbidden":
         return f"is not a known key; {near_match(str(keys[-1]), keys_of(*tables))}"
     if kind == "missing":

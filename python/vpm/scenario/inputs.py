@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 def given_inputs(document: Document, owner: str, model: Model, clock: Clock) -> Mapping[str, Array]:
-    """Samples of every channel that the scenario drives, by channel of the model.
+    """Input samples of every channel that the scenario drives, by channel of the model.
 
     Raises
     ------
@@ -58,7 +58,7 @@ def _check_known(name: str, known: tuple[str, ...], what: str, owner: str, keys:
 
 
 def sampled(signal: Signal, keys: Keys, unit: str, clock: Clock) -> Array:
-    """Samples of a signal, shape (steps + 1,), SI.
+    """Input samples of a signal, shape (steps + 1,), SI.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def sampled(signal: Signal, keys: Keys, unit: str, clock: Clock) -> Array:
 
 
 def _frequency(given: Given, keys: Keys, clock: Clock) -> float:
-    """Frequency in Hz; angular velocities, ``rad/s`` or ``rpm``, are turned into it."""
+    """Frequency of an input in Hz, also from angular velocities, ``rad/s`` or ``rpm``."""
     value = si_value(given, "Hz", keys)
     if given.unit is not None and parse_unit(given.unit).si == "rad/s":
         value /= 2.0 * np.pi

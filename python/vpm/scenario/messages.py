@@ -13,7 +13,7 @@ Keys = tuple[str | int, ...]
 
 
 def refuse(where: Keys | str, rest: str) -> NoReturn:
-    """Report a problem at a place.
+    """Refuse a scenario with a message on a problem at a place.
 
     Raises
     ------
@@ -25,7 +25,7 @@ def refuse(where: Keys | str, rest: str) -> NoReturn:
 
 
 def raise_first(problems: Sequence[Problem]) -> NoReturn:
-    """Report the first problem and say how many more there are.
+    """Raise the message of the first problem and say how many more there are.
 
     Raises
     ------
@@ -39,7 +39,7 @@ def raise_first(problems: Sequence[Problem]) -> NoReturn:
 
 @contextmanager
 def in_file(path: str | None) -> Iterator[None]:
-    """Name the file in front of every problem."""
+    """Name the file in front of every message."""
     try:
         yield
     except ScenarioError as error:

@@ -63,14 +63,14 @@ class ScenarioRun(Result):
     columns: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
     def __getitem__(self, name: str) -> Run:
-        """A run by its name."""
+        """Outcome of a scenario's run by its name."""
         if name not in self.runs:
             reason = self.failures.get(name, near_match(name, self.runs, what="it has"))
             raise ScenarioError(f'{self.name} has no run "{name}": {reason}', where=name)
         return self.runs[name]
 
     def traces(self, channel: str) -> Mapping[str, tuple[Array, Array]]:
-        """Time (s) and values (SI) of a channel in each run that has it, by the name of the run."""
+        """Time (s) and values (SI) of a channel in each run of the outcome that has it."""
         found = {}
         for name, run in self.runs.items():
             if channel in run.channels:
@@ -80,7 +80,7 @@ class ScenarioRun(Result):
         return found
 
     def unit(self, channel: str) -> str:
-        """SI unit of a channel."""
+        """SI unit of a channel in the outcome."""
         for name, run in self.runs.items():
             if channel in run.channels:
                 return run.units[run.channels.index(channel)]
@@ -90,7 +90,7 @@ class ScenarioRun(Result):
         raise ScenarioError(f'{self.name} has no channel "{channel}"; {near_match(channel, known)}', where=channel)
 
     def experiment(self, name: str) -> Experiment:
-        """A run as a log: what drove it and what it gave, for `vpm.identify` and all that takes a log.
+        """Outcome of a run as a log: inputs and outputs, for `vpm.identify` and others.
 
         Parameters
         ----------
@@ -106,7 +106,7 @@ class ScenarioRun(Result):
         return Experiment(label, run.time, np.column_stack(columns), (*run.channels, *driven), units, history)
 
     def extremes(self, name: str) -> tuple[Extremes, ...]:
-        """Each channel of the picture in a run: smallest, largest and final value."""
+        """Outcome of each channel of the picture in a run: smallest, largest and final value."""
         rows = []
         for channel in dict.fromkeys(channel for panel in self.panels for channel in panel):
             _, values = self.traces(channel).get(name, (None, np.empty(0)))
@@ -117,11 +117,11 @@ class ScenarioRun(Result):
 
     @property
     def told(self) -> tuple[str, ...]:
-        """Failures as sentences that name the run."""
+        """Outcome's failures as sentences that name the run."""
         return tuple(f'run "{name}": {reason}' for name, reason in self.failures.items())
 
     def plot(self) -> Figure:
-        """All runs over time, a panel for each list of channels. Needs the extra ``plot``."""
+        """Plot the outcome of all runs over time, a panel for each list of channels. Needs the extra ``plot``."""
         from vpm.plot import plot_scenario
 
         return plot_scenario(self)
@@ -153,7 +153,7 @@ class ScenarioRun(Result):
         return html_table(self.name, ("run", "channel", "unit", "min", "max", "final"), rows)
 
     def _frame_columns(self) -> Mapping[str, object]:
-        """One row per run and sample; NaN where a run does not have a channel."""
+        """Outcome as one row per run and sample; NaN where a run does not have a channel."""
         runs = self.runs.values()
         columns: dict[str, object] = {
             "run": [name for name, run in self.runs.items() for _ in run.time],

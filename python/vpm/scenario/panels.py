@@ -13,7 +13,7 @@ Panels = tuple[tuple[str, ...], ...]
 
 
 def shown_channels(model: Model) -> Mapping[str, str]:
-    """Channels that a run of a machine can show, with their SI units: its outputs, and references it follows."""
+    """Channels that panels can show of a run, with SI units: outputs, and references it follows."""
     references = tuple(f"{name}.reference" for name in model.controlled_actuators)
     return {channel: model.channel_unit(channel) for channel in (*model.output_channels, *references)}
 
@@ -44,7 +44,7 @@ def checked_panels(document: Document, models: Mapping[str, Model]) -> Panels:
 
 
 def checked_columns(document: Document, models: Mapping[str, Model]) -> Mapping[str, tuple[str, ...]]:
-    """Runs of each column of the picture, by its heading; empty where all runs share one.
+    """Runs of each column of panels, by its heading; empty where all runs share one.
 
     Raises
     ------

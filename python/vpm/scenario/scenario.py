@@ -119,12 +119,12 @@ class Scenario:
 
     @property
     def path(self) -> str | None:
-        """File that it was read from."""
+        """File that the scenario was read from."""
         return self._path
 
     @property
     def duration(self) -> float:
-        """Time from the first to the last sample, s."""
+        """Time from the first to the last sample of the scenario, s."""
         return self._clock.duration
 
     @property
@@ -139,12 +139,12 @@ class Scenario:
 
     @cached_property
     def models(self) -> Mapping[str, Model]:
-        """Model of each run, as changed by it, by the name of the run."""
+        """Model of each run of the scenario, as changed by it, by the name of the run."""
         return MappingProxyType(dict(self._models))
 
     @property
     def panels(self) -> tuple[tuple[str, ...], ...]:
-        """Channels of each panel of the picture."""
+        """Channels of each panel of the scenario's picture."""
         return self._panels
 
     # ---- what it gives -----------------------------------------------------------------------------------------------
@@ -184,7 +184,7 @@ class Scenario:
         )
 
     def initial_state(self, model: Model | str) -> Array:
-        """State of a machine at time zero, shape (nx,), named by ``model.state_names``.
+        """State of a scenario's machine at time zero, shape (nx,), named by ``model.state_names``.
 
         Parameters
         ----------
@@ -203,11 +203,11 @@ class Scenario:
             return self._start(owner, machine)
 
     def mode(self, model: Model | str) -> str:
-        """Mode of `vpm.simulate`: ``closed_loop`` for a machine with controllers, ``free_run`` for others."""
+        """Mode of `vpm.simulate` for the scenario: ``closed_loop`` with controllers, else ``free_run``."""
         return "closed_loop" if self._named(model)[1].controlled_actuators else "free_run"
 
     def run(self, *, progress: Callable[[int, int], object] | bool = False, workers: int | None = None) -> ScenarioRun:
-        """Simulate all runs, side by side.
+        """Simulate all runs of the scenario, side by side.
 
         Parameters
         ----------
@@ -254,7 +254,7 @@ class Scenario:
         return start_state(self._document, owner, model, given_inputs(self._document, owner, model, self._clock))
 
     def _named(self, model: Model | str) -> tuple[str, Model]:
-        """What to call a machine in messages, and the machine."""
+        """Name of a scenario's machine in messages, and the machine."""
         if isinstance(model, Model):
             return f'"{model.name}"', model
         if model not in self._models:

@@ -17,7 +17,7 @@ SLACK = 1e-6
 
 
 def sine(time: Array, mean: float, amplitude: float, frequency: float, phase: float = 0.0, start: float = 0.0) -> Array:
-    """``mean + amplitude sin(2 pi frequency (t - start) + phase)``; before ``start`` as at ``start``.
+    """Signal ``mean + amplitude sin(2 pi frequency (t - start) + phase)``; before ``start`` as at ``start``.
 
     Parameters
     ----------
@@ -41,7 +41,7 @@ def sine(time: Array, mean: float, amplitude: float, frequency: float, phase: fl
 
 
 def chirp(time: Array, mean: float, amplitude: float, first: float, last: float, duration: float) -> Array:
-    """``mean + amplitude sin(2 pi (f0 t + (f1 - f0) t^2 / (2 T)))``: the frequency grows evenly from f0 to f1 over T.
+    """Chirp signal ``mean + amplitude sin(2 pi (f0 t + (f1 - f0) t^2 / (2 T)))`` from f0 to f1 over T.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def chirp(time: Array, mean: float, amplitude: float, first: float, last: float,
 
 
 def points(time: Array, at: Array, value: Array, time_step: float) -> Array:
-    """Straight lines between points, held before the first and after the last.
+    """Signal of straight lines between points, held before the first and after the last.
 
     Points at the same time are a jump; the value behind it holds from there on, also for a sample that misses the
     jump by rounding.

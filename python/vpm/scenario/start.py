@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 
 
 def start_state(document: Document, owner: str, model: Model, inputs: Mapping[str, Array]) -> Array:
-    """State at time zero, shape (nx,).
+    """Start state at time zero, shape (nx,).
 
     What the scenario names is as it says. Else joints are at zero and at rest, or close loops, flexible links are
     deflected as in their equilibrium there, and drives are as in a machine that has stood there without commands, its
@@ -68,7 +68,7 @@ def start_state(document: Document, owner: str, model: Model, inputs: Mapping[st
 
 
 def _deflect(state: Array, joints: int, coordinates: int, owner: str, model: Model) -> None:
-    """Put flexible links into the deflection of their equilibrium."""
+    """Deflect flexible links at the start as in equilibrium."""
     if coordinates == joints:
         return
     try:
@@ -81,7 +81,7 @@ def _deflect(state: Array, joints: int, coordinates: int, owner: str, model: Mod
 
 
 def held_inputs(model: Model, state: Array, given: Collection[str]) -> Mapping[str, tuple[float, str]]:
-    """Inputs that a scenario does not give and that are not zero: references and pressures of logged supplies.
+    """Inputs at the start that a scenario does not give and that are not zero.
 
     A reference holds what its controller measures at the beginning, a pressure is that of the model file.
 

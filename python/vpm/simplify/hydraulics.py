@@ -19,7 +19,7 @@ def hydraulic_drives(model: Model) -> tuple[str, ...]:
 
 
 def possible_changes(model: Model, drive: str) -> tuple[str, ...]:
-    """Changes that a servo-cylinder does not have yet."""
+    """Simplifications that a hydraulic servo-cylinder does not have yet."""
     entry = model.to_dict()["actuators"][drive]
     static = entry["valve"].get("spool") == "static"
     have = entry["cylinder"].get("pressures", "chambers")
@@ -30,7 +30,7 @@ def possible_changes(model: Model, drive: str) -> tuple[str, ...]:
 
 
 def simpler(model: Model, drive: str, change: str) -> Model:
-    """Model with a servo-cylinder that has fewer states.
+    """Model with a simpler hydraulic servo-cylinder that has fewer states.
 
     Parameters
     ----------

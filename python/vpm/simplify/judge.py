@@ -8,7 +8,7 @@ from dataclasses import replace
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, Problem, estimate, gaps
-from vpm.identify.along import SAMPLED_TYPES, has_own_drives
+from vpm.identify.response_along_motion import SAMPLED_TYPES, has_own_drives
 from vpm.model import Model
 from vpm.one_thread import in_one_thread
 from vpm.simplify.replacement import commanded
@@ -57,12 +57,12 @@ class Judge:
 
     @property
     def driven(self) -> Experiment:
-        """Record whose commands drive a model that is timed."""
+        """Record whose commands drive a timed model, for its judgement."""
         return self.validation[0]
 
     @in_one_thread
     def fitted(self, model: Model) -> Model:
-        """Model with its adjustable parameters fitted to the records it learns from.
+        """Fitted model to be judged, with adjustable parameters from its training records.
 
         By the inverse-dynamics residual where the machine has nothing that nobody measures, which is quick; by
         simulation in the mode it is judged in where it has.
@@ -108,7 +108,7 @@ class Judge:
 
 
 def steps_per_sample(records: Sequence[Experiment], rate: float) -> int:
-    """Steps of the controller between two samples of the records.
+    """Steps of the controller between two samples of the records that judge.
 
     Parameters
     ----------
@@ -133,7 +133,7 @@ def steps_per_sample(records: Sequence[Experiment], rate: float) -> int:
 
 
 def by_the_model(model: Model, experiment: Experiment, mode: str, rate: float, channels: Sequence[str]) -> Experiment:
-    """The record with what the full model does in the place of what was measured.
+    """Record to judge by, with what the full model does in the place of what was measured.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def by_the_model(model: Model, experiment: Experiment, mode: str, rate: float, c
 
 
 def shown(model: Model) -> tuple[str, ...]:
-    """What a user looks at: strains, places of markers and pressures, or the positions of the joints without those."""
+    """Channels to judge by: strains, marker places and pressures, or joint positions without those."""
     inner = tuple(
         n for n in model.output_channels if n.endswith((".strain", ".x", ".y", ".z", ".pressure_a", ".pressure_b"))
     )

@@ -47,7 +47,7 @@ FAILED = 1e2
 
 
 def maxwell_entry(records: Sequence[Record], step: float) -> Entry | None:
-    """Maxwell NARX element as an actuator; None where no degree gives one.
+    """Learnt Maxwell NARX element as an actuator; None where no degree gives one.
 
     Parameters
     ----------
@@ -63,7 +63,7 @@ def maxwell_entry(records: Sequence[Record], step: float) -> Entry | None:
 
 
 def narx_entry(records: Sequence[Record], step: float, channels: Mapping[str, str]) -> Entry | None:
-    """Polynomial NARX model as an actuator; None where no degree gives one.
+    """Learnt polynomial NARX model as an actuator; None where no degree gives one.
 
     Parameters
     ----------
@@ -92,7 +92,7 @@ def _chosen(
     fit: Callable[[Sequence[Record], int], Element | None],
     gap: Callable[[Element, Record], float],
 ) -> Element | None:
-    """Model of the degree that predicts records left out best, fitted to all of them."""
+    """Learnt model of the degree that predicts records left out best, fitted to all of them."""
     parts = records if len(records) > 1 else _halves(records[0])
     errors: dict[int, float] = {}
     for degree in degrees:
@@ -114,7 +114,7 @@ def _halves(record: Record) -> list[Record]:
 
 
 def _maxwell(records: Sequence[Record], step: float, degree: int) -> MaxwellNarx | None:
-    """Element fitted in free runs, from least squares of a spring and a damper; none that no file could hold."""
+    """Learnt Maxwell element, fitted in free runs; none that no file could hold."""
     joined = {name: np.concatenate([record[name] for record in records]) for name in records[0]}
     force, length, rate = joined["force"], joined["length"], joined["rate"]
     fixed = np.column_stack([np.ones_like(force), joined["drive"], rate])
@@ -134,7 +134,7 @@ def _maxwell(records: Sequence[Record], step: float, degree: int) -> MaxwellNarx
 
 
 def _maxwell_gap(element: MaxwellNarx, record: Record) -> float:
-    """Root mean square error of the force in a free run."""
+    """Root mean square force error of a learnt Maxwell element in a free run."""
     force = record["force"]
     try:
         found = element.simulate_free_run(record["length"], (force[0], force[1]), record["drive"])
@@ -174,7 +174,7 @@ def _narx_gap(model: Narx, record: Record) -> float:
 def trained(
     model: Model, element: Replacement, records: Sequence[Experiment], mode: str, channels: Sequence[str] | None
 ) -> Replacement:
-    """The element with the coefficients with which the machine moves most like the full one.
+    """Learnt element with coefficients with which the machine moves most like the full one.
 
     Parameters
     ----------

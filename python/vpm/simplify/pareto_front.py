@@ -57,11 +57,11 @@ class Rung(Storable):
 
     @property
     def stepping(self) -> str:
-        """Integrator with its number of steps in a period."""
+        """Integrator and steps in a period of a model on the Pareto front."""
         return self.integrator if self.substeps == 1 else f"{self.integrator} x {self.substeps}"
 
     def timed(self, seconds: float, slowest: float) -> Rung:
-        """The simplified model with other step times."""
+        """Model of the Pareto front with other step times."""
         return replace(self, seconds=seconds, slowest=slowest)
 
     def __str__(self) -> str:
@@ -115,23 +115,23 @@ class Ladder(Result):
 
     @property
     def front(self) -> tuple[Rung, ...]:
-        """The rungs that no other one beats in time and error at once, cheapest first."""
+        """Pareto front: models that no other one beats in time and error at once, cheapest first."""
         return tuple(self.rungs[place] for place in pareto([(r.seconds, r.error) for r in self.rungs]))
 
     @property
     def full(self) -> Rung:
-        """The best way to step the full model: the most accurate one."""
+        """Most accurate way to step the full model, beside the Pareto front."""
         return min((r for r in self.rungs if not r.removed), key=lambda r: (r.error, r.seconds))
 
     @property
     def compromise(self) -> Rung | None:
-        """The most accurate rung that fits the period; None where none does."""
+        """Most accurate model of the Pareto front that fits the period; None where none does."""
         fitting = [r for r in self.rungs if r.slowest * self.rate <= self.share]
         return min(fitting, key=lambda r: (r.error, r.seconds), default=None)
 
     @property
     def verdict(self) -> str:
-        """One sentence: whether the budget holds, or what breaks it and what is the best that does fit."""
+        """Sentence on the Pareto front: whether the budget holds, or what is the best that fits."""
         taken = f"{100 * self.chosen.slowest * self.rate:.3g} % of the period at p99.9, {100 * self.share:g} % allowed"
         if self.holds:
             gain = self.full.seconds / self.chosen.seconds
@@ -146,7 +146,7 @@ class Ladder(Result):
         )
 
     def __str__(self) -> str:
-        """The choice, the verdict, and the rungs that nothing beats."""
+        """Text of the Pareto front: the choice, the verdict, and its models."""
         chosen = self.chosen
         cut = f" ({self.cut} models were cut after coarse timing)" if self.cut else ""
         lines = [

@@ -116,7 +116,7 @@ VELOCITY_TERMS, COUPLING_TERMS = (Reduction("terms", name, MACHINE) for name in 
 
 
 def reductions(model: Model, learnt: Sequence[Reduction] = ()) -> dict[tuple[str, str], tuple[Reduction, ...]]:
-    """Changes that can be made to a model, by site.
+    """Reductions of a model that are possible, by site.
 
     Parameters
     ----------

@@ -37,11 +37,11 @@ class Replacement(Reduction):
     entry: str = ""
 
     def __str__(self) -> str:
-        """Label of a candidate."""
+        """Label of a replacement."""
         return f"{self.at} as {self.name}"
 
     def applied(self, model: Model) -> Model:
-        """Model with another drive in the place of its servo-cylinder.
+        """Model with a replacement in the place of its servo-cylinder.
 
         Parameters
         ----------
@@ -88,7 +88,7 @@ def replaced(model: Model, drive: str, entry: str) -> Model:
 
 
 def commanded(model: Model, full: Model, record: Experiment) -> Experiment:
-    """The record with the reference of each drive that lost its controller as its command."""
+    """Record for replaced drives: the reference of each that lost its controller is its command."""
     lost = [name for name in full.controlled_actuators if name not in model.controlled_actuators]
     if not lost:
         return record

@@ -149,7 +149,7 @@ def _descend(trials: Trials, sites: Sites) -> None:
 
 
 def _weigh_terms(trials: Trials, sites: Sites) -> None:
-    """Terms that are too much of efforts or deformations along the motion, or none, are no matter of a trial."""
+    """Terms of the search that are too large along the motion, or none, and are not tried."""
     judge, model, limit = trials.judge, trials.model, WEIGHTY * trials.tolerance
     terms = [site for site in sites if site[0].startswith("terms")]
     if not terms or judge.mode not in ("free_run", "closed_loop"):
@@ -173,7 +173,7 @@ def _weigh_terms(trials: Trials, sites: Sites) -> None:
 
 
 def _together(trials: Trials, sites: Sites, limit: float) -> Changes:
-    """Reductions of all links to one coarser level: the cheapest that loses next to nothing.
+    """Reductions in the search of all links to one coarser level: the cheapest with next to no loss.
 
     The coarsest come first, by the number of coordinates: they are quick to fit, and once one of them loses next to
     nothing, a coarse timing shows that the finer ones need no look.
@@ -192,7 +192,7 @@ def _together(trials: Trials, sites: Sites, limit: float) -> Changes:
 
 
 def _alone(trials: Trials, base: Changes, changes: Sequence[Reduction]) -> dict[Reduction, tuple[float, float]]:
-    """Seconds saved and error added by each change of one site on the common start; what is dearer there is not tried.
+    """Seconds saved and error added by each single change of the search on the common start.
 
     The common start loses next to nothing: what takes longer can win nothing, by itself or with others.
     """
@@ -207,13 +207,13 @@ def _alone(trials: Trials, base: Changes, changes: Sequence[Reduction]) -> dict[
 
 
 def _paying(found: dict[Reduction, tuple[float, float]]) -> dict[Reduction, tuple[float, float]]:
-    """Changes of one site that no other one beats."""
+    """Changes of one site in the search that no other one beats."""
     names = list(found)
     return {names[k]: found[names[k]] for k in pareto([(-saved, added) for saved, added in found.values()])}
 
 
 def _coarser(changes: Sequence[Reduction], base: Changes) -> Sequence[Reduction]:
-    """Changes of one site beyond that in the base: they come finest first, and what is finer costs more."""
+    """Changes of one site in the search beyond that in the base, finest first."""
     straight = _straight(base)
     changes = [each for each in changes if not _is_idle(each, straight)]
     taken = next((each for each in base if each in changes), None)
@@ -221,7 +221,7 @@ def _coarser(changes: Sequence[Reduction], base: Changes) -> Sequence[Reduction]
 
 
 def _straight(changes: Changes) -> set[str]:
-    """Links of hinges between rigid segments, or rigid ones: they have no terms of second order to leave out."""
+    """Links in the search of rigid segments, or rigid ones: no second-order terms to leave out."""
     return {each.at for each in changes if each.kind == "level" and not each.name.startswith(CURVED)}
 
 
@@ -230,13 +230,13 @@ def _is_idle(change: Reduction, straight: set[str]) -> bool:
 
 
 def _best(rungs: Sequence[Rung]) -> Rung:
-    """The cheapest rung among those whose error is near the least."""
+    """Cheapest model of the search among those whose error is near the least."""
     least = min(rung.error for rung in rungs)
     return min((rung for rung in rungs if rung.error <= NEAR * least), key=lambda rung: rung.seconds)
 
 
 def _with(base: Changes, change: Reduction) -> Changes:
-    """Changes with one more, in the place of that of the same site, and without those that do nothing beside it."""
+    """Changes of the search with one more, without those that do nothing beside it."""
     changes = (*(each for each in base if each.site != change.site), change)
     straight = _straight(changes)
     return tuple(each for each in changes if not _is_idle(each, straight))
@@ -245,7 +245,7 @@ def _with(base: Changes, change: Reduction) -> Changes:
 def _foreseen(
     trials: Trials, base: Changes, singles: dict[tuple[str, str], dict[Reduction, tuple[float, float]]], limit: float
 ) -> list[Changes]:
-    """Combinations that should be best: the front of summed savings and losses, and the cheapest within the limit."""
+    """Foreseen best combinations of the search: the front of summed savings and losses."""
     start = _best(trials.attempt(base))
     options = [[None, *found] for found in singles.values()]
     numbers = {change: pair for found in singles.values() for change, pair in found.items()}
@@ -266,7 +266,7 @@ def _foreseen(
 
 
 def _polish(trials: Trials, sites: Sites, limit: float, hopeless: set[Reduction]) -> None:
-    """Try single further reductions of the cheapest model within the limit, as long as one pays."""
+    """Polish at the end of the search: single further reductions, as long as one pays."""
     while True:
         best = _within(trials.rungs, limit)
         base = trials.changes_of(best)
@@ -283,7 +283,7 @@ def _within(rungs: Sequence[Rung], limit: float) -> Rung:
 
 
 def _concluded(trials: Trials, sites: Sites, share: float, against: str) -> Ladder:
-    """The choice, its steps timed once more as `vpm.budget` does."""
+    """Choice of the search, its steps timed once more as `vpm.budget` does."""
     rungs, judge = trials.rungs, trials.judge
     chosen = _simplest([rung for rung in rungs if rung.loss <= trials.tolerance])
     model = trials.fitted(trials.changes_of(chosen))
@@ -319,7 +319,7 @@ def _concluded(trials: Trials, sites: Sites, share: float, against: str) -> Ladd
 
 
 def _simplest(rungs: Sequence[Rung]) -> Rung:
-    """The cheapest, or what a clock does not tell from it and has more left out, or as much and errs less."""
+    """Simplest choice of the search: the cheapest, or as cheap with more left out or less error."""
     best = rungs[0]
     longest = ALIKE * best.seconds + CLOCK
     more = [rung for rung in rungs if set(rung.removed) >= set(best.removed) and rung.seconds <= longest]
@@ -333,7 +333,7 @@ def _simplest(rungs: Sequence[Rung]) -> Rung:
 
 
 def _dearest(trials: Trials, sites: Sites) -> tuple[tuple[str, float], ...]:
-    """Time of a step that the last reduction of each place saves alone (s), the largest first."""
+    """Step time that each place's last reduction in the search saves alone (s), the largest first."""
     full = min((r for r in trials.rungs if not r.removed), key=lambda r: r.seconds)
     setup = Setup(full.integrator, full.substeps)
     saved = ((str(changes[-1]), trials.saved(changes[-1], setup)) for changes in sites.values())

@@ -59,7 +59,7 @@ def surrogates(
 
 
 def _taught(model: Model, record: Experiment, mode: str, rate: float) -> Record:
-    """Channels of a simulation of the full model on a record, in samples of the controller."""
+    """Channels that teach surrogates: a simulation of the full model in the controller's samples."""
     fine = _held(record, round(record.dt * rate), model)
     run = simulate(model, fine, mode)
     inputs = {name: fine[name] for name in fine.channels if name.endswith((".reference", ".command"))}
@@ -67,7 +67,7 @@ def _taught(model: Model, record: Experiment, mode: str, rate: float) -> Record:
 
 
 def _held(record: Experiment, count: int, model: Model) -> Experiment:
-    """The record with its inputs held over ``count`` samples for each of its own."""
+    """Record for surrogates with its inputs held over ``count`` samples for each of its own."""
     if count == 1:
         return record
     time = record.time[0] + record.dt / count * np.arange(count * len(record))
@@ -76,7 +76,7 @@ def _held(record: Experiment, count: int, model: Model) -> Experiment:
 
 
 def _learnt(model: Model, drive: str, taught: Sequence[Record], step: float) -> Iterator[Replacement]:
-    """Elements learnt in the place of one drive: Maxwell and NARX, the one with fewer numbers last."""
+    """Surrogates learnt in the place of one drive: Maxwell and NARX, the one with fewer numbers last."""
     line = model.line_of_actuator(drive)
     moving = [f"{line}.length", f"{line}.rate"]
     if line is None:

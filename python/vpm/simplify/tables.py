@@ -88,7 +88,7 @@ def _with_clearance(
     taught: Sequence[Mapping[str, Array]],
     runs: Callable[[Model], Sequence[Run]],
 ) -> Model | None:
-    """Model whose drive is quasi-static, with the clearance that suits best; None where none can be simulated."""
+    """Quasi-static model for a table, with the clearance that suits best; None without a simulation."""
     content = model.to_dict()
     content["effects"] = [e for e in content.get("effects", ()) if not (e["at"] == drive and _is_of_spool(e["type"]))]
     reduced = simpler(type(model)(content), drive, NO_STATE)
@@ -114,7 +114,7 @@ def _axis(reach: float, count: int) -> Array:
 
 
 def force_map(model: Model, drive: str, commands: Array, velocities: Array) -> Array:
-    """Forces of a servo-cylinder with a static spool and quasi-static pressures at mid-stroke.
+    """Force table of a servo-cylinder with a static spool and quasi-static pressures at mid-stroke.
 
     Parameters
     ----------
@@ -152,7 +152,7 @@ def _is_of_oil(effect: str) -> bool:
 
 
 def _rig(model: Model, drive: str) -> Model:
-    """The drive alone, pushing a mass that nothing moves, its piston at mid-stroke at zero."""
+    """Rig for a table: the drive alone, pushing a mass that nothing moves, its piston at mid-stroke."""
     content = simpler(model, drive, NO_STATE).to_dict()
     entry = {key: value for key, value in content["actuators"][drive].items() if key not in ("line", "joint")}
     stroke = model.parameters[f"{drive}.cylinder.stroke"].value

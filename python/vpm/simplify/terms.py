@@ -94,7 +94,7 @@ def terms_site(name: str, at: str) -> str:
 
 
 def coupling_joints(content: Mapping[str, Any]) -> tuple[str, ...]:
-    """Joints that move with coordinates inward of them: across those the mass matrix has entries.
+    """Joints with coupling terms: they move with coordinates inward of them.
 
     Parameters
     ----------
@@ -105,7 +105,7 @@ def coupling_joints(content: Mapping[str, Any]) -> tuple[str, ...]:
     beams = content.get("beams", {})
 
     def moves(part: str) -> bool:
-        """Whether a body or beam, or anything that carries it, moves by coordinates."""
+        """Whether a body or beam, or anything that carries it, moves by coordinates, for coupling terms."""
         if part in beams:
             return size_of(beams[part]["level"], beams[part]) > 0 or moves(beams[part]["parent"])
         if part not in carriers:
@@ -125,7 +125,7 @@ def _moving(content: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def motions(model: Model, records: Sequence[Experiment], mode: str, setup: Setup) -> list[Motion]:
-    """Motions of a model along records: what shares are worked out on.
+    """Motions of a model along records, over which shares of terms are computed.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def motions(model: Model, records: Sequence[Experiment], mode: str, setup: Setup
 
 
 def effort_share(model: Model, reduced: Model, along: Sequence[Motion]) -> float:
-    """Share of the efforts at the joints that a reduced model leaves out, the largest of all motions.
+    """Share of joint efforts in left-out terms, the largest of all motions.
 
     ``X / (I + V + R)`` with root mean squares along the motion of the Euclidean norms over the joints: X what is left
     out, V the Coriolis and centrifugal terms, I inertia times acceleration, R weight, effects and what elastic links
@@ -255,7 +255,7 @@ def _efforts(model: Model, motion: Motion) -> Array:
 
 
 def _stiffness(model: Model, beam: str) -> Array:
-    """Elastic stiffness of a link, from what holds it deformed where it is clamped and weightless."""
+    """Elastic stiffness of a link as a term, from what holds it deformed where clamped and weightless."""
     content: dict[str, Any] = model.to_dict()
     alone = {key: value for key, value in content["beams"][beam].items() if key not in ("at", "second_order")}
     effects = [effect for effect in content.get("effects", []) if effect["at"] == beam]

@@ -93,12 +93,12 @@ class Trials:
 
     @property
     def cut(self) -> int:
-        """How many reduced models were not fitted because of a coarse timing."""
+        """Number of trials without a fit because of a coarse timing."""
         return len(self._cut - set(self._rungs))
 
     @property
     def rungs(self) -> list[Rung]:
-        """All rungs, cheapest first, with what they lose against the best way to step the full model."""
+        """Tried models, cheapest first, with what they lose against the best way to step the full model."""
         everything, least = self._everything(), self._least()
         return sorted((replace(r, loss=r.error - least) for r in everything), key=lambda rung: rung.seconds)
 
@@ -107,16 +107,16 @@ class Trials:
         return self._models[frozenset(changes)]
 
     def changes_of(self, rung: Rung) -> Changes:
-        """Changes that gave a rung."""
+        """Changes that gave a tried model."""
         return next(_in_order(key) for key in self._rungs if sorted(map(str, key)) == sorted(rung.removed))
 
     def cheapest(self, changes: Changes, limit: float) -> Rung | None:
-        """Cheapest rung of these changes whose error is within a limit."""
+        """Cheapest trial of these changes whose error is within a limit."""
         good = [rung for rung in self.attempt(changes) if rung.error <= limit]
         return min(good, key=lambda rung: rung.seconds, default=None)
 
     def attempt(self, changes: Changes, below: float = np.inf) -> Sequence[Rung]:
-        """Rungs of the model with these changes: one for each way to step it that works.
+        """Trials of the model with these changes: one for each way to step it that works.
 
         None where the changes contradict each other, where no fit can simulate the model, or where no way is quick
         enough to matter.
@@ -146,7 +146,7 @@ class Trials:
         return self._rungs[key]
 
     def ahead(self, tried: Iterable[Changes], below: float = np.inf) -> None:
-        """Let the executor fit models that are about to be tried, side by side; without one they are fitted in turn.
+        """Let the executor fit models of coming trials, side by side; without one they are fitted in turn.
 
         All end before anything is timed. A trial takes such a fit if its own would begin with the same values.
 
@@ -186,11 +186,11 @@ class Trials:
         return self.judge.fitted(begun) if known is None else known
 
     def as_quick_as(self, changes: Changes) -> float:
-        """Coarse time of a period (s) up to which a model is no dearer than one that was tried."""
+        """Coarse time of a period (s) up to which a model is no dearer than a tried one."""
         return REPEATED * self._coarsely_timed[frozenset(changes)] + CLOCK
 
     def _begun(self, model: Model, key: frozenset[Reduction]) -> Model:
-        """Model with the parameters of the fitted one that differs in the fewest changes: where its fit begins."""
+        """Start of a trial's fit: the parameters of the tried model that differs in the fewest changes."""
         nearest = min(self._models, key=lambda known: len(known ^ key), default=None)
         if nearest is None:
             return model
@@ -198,7 +198,7 @@ class Trials:
         return model.with_parameters({name: known[name].value for name in model.adjustable if name in known})
 
     def saved(self, change: Reduction, setup: Setup) -> float:
-        """Seconds of a period that one change of the full model saves, timed coarsely; none where it does not work."""
+        """Seconds of a period that one tried change of the full model saves; none where it fails."""
         try:
             return self._coarse_time(self.model, setup) - self._coarse_time(reduced(self.model, (change,)), setup)
         except VpmError:
@@ -208,21 +208,21 @@ class Trials:
         return [rung for rungs in self._rungs.values() for rung in rungs]
 
     def _least(self) -> float:
-        """Error of the full model stepped as well as it was."""
+        """Least error of trials: the full model stepped as well as it was."""
         return min((rung.error for rung in self._everything() if not rung.removed), default=0.0)
 
     def _enough(self) -> float:
-        """Error that is next to nothing: nothing more exact is looked for."""
+        """Negligible error of trials: nothing more exact is looked for."""
         return self._least() + NEGLIGIBLE * self.tolerance
 
     def _dear(self) -> float:
-        """Time of a period from which on a way is not worth a look."""
+        """Time of a period from which on a trial is not worth it."""
         enough = self._enough()
         least = min((rung.seconds for rung in self._everything() if rung.error <= enough), default=np.inf)
         return SPARE * least + CLOCK
 
     def _coarse_times(self, model: Model) -> Mapping[str, tuple[int, float]]:
-        """Fewest steps in a period with which each integrator works by a coarse timing, and seconds of one of them."""
+        """Fewest steps of each integrator in trials by a coarse timing, and seconds of one of them."""
         found = {}
         for integrator in FIXED_STEP:
             for substeps in SUBSTEPS:
@@ -238,7 +238,7 @@ class Trials:
         return float(np.min(step_times(model, self.judge.rate, setup, COARSE, inputs, start=start)))
 
     def _step(self, changes: Changes, coarse: Mapping[str, tuple[int, float]]) -> None:
-        """Every integrator with its fewest steps in a period, the quickest first; then more where they could pay."""
+        """Try every integrator with its fewest steps in a period, then more where they could pay."""
         for integrator, (fewest, seconds) in sorted(coarse.items(), key=lambda item: _period(item[1])):
             for substeps in SUBSTEPS[SUBSTEPS.index(fewest) :]:
                 if self._is_hopeless(changes, seconds * substeps):
@@ -253,7 +253,7 @@ class Trials:
             self._refine(changes, first)
 
     def _refine(self, changes: Changes, rung: Rung) -> None:
-        """More and more steps in a period, as long as they pay."""
+        """Try more and more steps in a period, as long as they pay."""
         for substeps in SUBSTEPS[SUBSTEPS.index(rung.substeps) + 1 :]:
             predicted = rung.seconds * substeps / rung.substeps
             if rung.error <= self._enough() or predicted > self._dear() or predicted * self.judge.rate > 1.0:
@@ -264,7 +264,7 @@ class Trials:
             rung = finer
 
     def _is_hopeless(self, changes: Changes, seconds: float) -> bool:
-        """Whether a way of stepping a reduced model is by a coarse timing too slow to be taken.
+        """Whether a trial is too slow by a coarse timing.
 
         All that is within reach of the period is tried with the full model: what it errs is the measure of the others.
         """
@@ -280,7 +280,7 @@ class Trials:
         return seconds > ALIKE * good or (seconds > fastest and _agree(known))
 
     def _add(self, changes: Changes, setup: Setup, demanded: float = np.inf) -> Rung | None:
-        """The rung of one way, if it works and its error is less than what is demanded."""
+        """Add the trial of one way of stepping, if it works and its error is small enough."""
         key = frozenset(changes)
         model = self._models[key]
         try:
@@ -300,7 +300,7 @@ class Trials:
         return rung
 
     def timed(self, model: Model, setup: Setup) -> tuple[float, float]:
-        """Median and 99.9 % quantile of a period, s."""
+        """Median and 99.9 % quantile of a trial's period, s."""
         rate, (inputs, start) = self.judge.rate, self.courses.of(model)
         times = step_times(model, rate, setup, TIMED_STEPS[0], inputs, PRIORITY, start)
         steps = int(np.clip(TIMED_SECONDS / np.median(times), *TIMED_STEPS))
@@ -310,18 +310,18 @@ class Trials:
 
 
 def _period(step: tuple[int, float]) -> float:
-    """Seconds of a period in so many steps of so many seconds."""
+    """Period of a trial in seconds, of so many steps of so many seconds."""
     substeps, seconds = step
     return substeps * seconds
 
 
 def _in_order(changes: Collection[Reduction]) -> Changes:
-    """Changes by their words, terms of the equations last."""
+    """Tried changes by their words, terms of the equations last."""
     return tuple(sorted(changes, key=lambda change: (change.kind == "terms", str(change))))
 
 
 def _agree(rungs: Sequence[Rung]) -> bool:
-    """Whether two integrators, each with its fewest steps that work, err alike: the error is then the model's own."""
+    """Whether two integrators agree in trials: the error is then the model's own."""
     first: dict[str, float] = {}
     for rung in rungs:
         first.setdefault(rung.integrator, rung.error)
@@ -344,11 +344,11 @@ class Courses:
         self._known: dict[tuple[str, ...], Array] = {}
 
     def record(self, model: Model) -> Experiment:
-        """Record that drives a model."""
+        """Record that drives a tried model."""
         return commanded(model, self._full, self._judge.driven)
 
     def of(self, model: Model) -> tuple[Array, Array | None]:
-        """Inputs (N, inputs) of a model, and the state that it starts from; see `vpm.budget.start_state`."""
+        """Inputs (N, inputs) of a tried model, and its start state; see `vpm.budget.start_state`."""
         record = self.record(model)
         kinds = tuple(model.actuator_type(name) for name in model.actuators) + model.controlled_actuators
         if kinds not in self._known:

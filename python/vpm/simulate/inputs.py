@@ -48,7 +48,7 @@ def references_of(model: Model, experiment: Experiment, mode: str) -> tuple[Arra
 
 
 def restart_grid(experiment: Experiment, horizon: float) -> tuple[NDArray[np.int64], int]:
-    """Rows at which pieces of a horizon (s) begin, and the samples of each, both ends among them.
+    """Rows of the inputs at which pieces of a horizon (s) begin, and the samples of each.
 
     Raises
     ------
@@ -65,12 +65,12 @@ def restart_grid(experiment: Experiment, horizon: float) -> tuple[NDArray[np.int
 
 
 def uncontrolled(model: Model) -> list[str]:
-    """Actuators that no controller commands; in a closed loop the log does."""
+    """Actuators without a controller, whose inputs the log gives."""
     return [name for name in model.actuators if name not in model.controlled_actuators]
 
 
 def check_controllers(model: Model) -> None:
-    """Complain, with the way on, about a model without a controller."""
+    """Refuse a model without a controller for inputs by references."""
     if not model.controlled_actuators:
         idle = f"for actuator '{model.actuators[0]}'" if model.actuators else "and an actuator"
         raise SimulationError(
@@ -80,7 +80,7 @@ def check_controllers(model: Model) -> None:
 
 
 def _require(experiment: Experiment, channels: Sequence[str], mode: str) -> None:
-    """Complain about the first channel that a mode needs and the log does not hold."""
+    """Refuse a log without an input channel that a mode needs."""
     missing = [channel for channel in channels if channel not in experiment]
     if missing:
         raise ExperimentError(
@@ -90,7 +90,7 @@ def _require(experiment: Experiment, channels: Sequence[str], mode: str) -> None
 
 
 def _optional(experiment: Experiment, channels: Sequence[str]) -> Array:
-    """Columns of a log, zero where it does not hold one."""
+    """Input columns of a log, zero where it does not hold one."""
     table = np.zeros((len(experiment), len(channels)))
     for column, channel in enumerate(channels):
         if channel in experiment:

@@ -50,7 +50,7 @@ def simulate(
     initial_state: Array | None = None,
     hold: str = HOLDS[0],
 ) -> Run:
-    """Simulate ``model`` on the inputs of ``experiment``.
+    """Simulate ``model`` on the inputs of ``experiment``, in one of the modes.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def simulate_arrays(
     initial_state: Array | None = None,
     followed: Motion | None = None,
 ) -> SimulatedArrays:
-    """Outputs of a simulation and their exact derivative by parameters ``columns``, as plain arrays.
+    """Outputs of a simulation in a mode and their exact derivative by ``columns``, as plain arrays.
 
     ``followed`` is what `joint_motion` gave, for callers that prescribe the same motion again and again.
     """
@@ -156,7 +156,7 @@ def judging_mode(model: Model, records: Sequence[Experiment]) -> str:
 def simulated_rows(
     experiment: Experiment, mode: str, setup: Setup, followed: Motion | None = None
 ) -> NDArray[np.int64]:
-    """Rows of a log that the outputs of a simulation stand for; ``followed`` is the motion of its joints, if given."""
+    """Rows of a log that a mode's outputs stand for; ``followed`` is the motion of its joints, if given."""
     if mode == "restarts":
         starts, length = restart_grid(experiment, setup.horizon)
         return (starts[:, None] + np.arange(length)).ravel()
@@ -198,7 +198,7 @@ def _dispatch(
 
 
 def _prescribed(model: Model, m: Motion, theta: Array, columns: list[int], setup: Setup) -> SimulatedArrays:
-    """Joints on the filtered motion, from behind the filter's settling to before it; those it lacks are passive."""
+    """Prescribed mode: joints on the filtered motion, without its ends; missing ones are passive."""
     followed = [place for place, joint in enumerate(model.joints) if joint in m.joints]
     passive = [place for place in range(len(model.joints)) if place not in followed]
     motion = np.zeros((3, len(m.time[m.kept]), len(model.joints)))
@@ -233,7 +233,7 @@ def _inverse_dynamics_run(model: Model, experiment: Experiment, cutoff: float | 
 
 
 def check_balance(model: Model) -> None:
-    """Complain, with the way on, if a balance of effort cannot be drawn up.
+    """Refuse the inverse-dynamics mode of a machine whose efforts cannot be computed.
 
     Nobody measures elastic coordinates, and the effort of a drive with a life of its own does not follow from its
     command.

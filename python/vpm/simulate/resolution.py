@@ -54,17 +54,17 @@ class Resolution(Storable):
 
     @property
     def integrator(self) -> str:
-        """Name of the integrator whose steps are judged."""
+        """Name of the integrator whose resolution is judged."""
         return self._integrator
 
     @property
     def step(self) -> float:
-        """Length of a step, s."""
+        """Length of a step whose resolution is judged, s."""
         return self._step
 
     @property
     def limit(self) -> float:
-        """Frequency above which an undamped vibration is off by a tenth, Hz; infinite if there is none.
+        """Resolution limit: frequency above which an undamped vibration is off by a tenth, Hz; or infinite.
 
         Off is its amplitude at the end of the run, or its frequency.
         """
@@ -77,17 +77,17 @@ class Resolution(Storable):
 
     @property
     def ratios(self) -> Array:
-        """Their own damping ratios, shape (m,)."""
+        """Own damping ratios of unresolved modes, shape (m,)."""
         return self._modes.ratios
 
     @property
     def times(self) -> Array:
-        """Over which each loss is counted, shape (m,), s: the run, or the time to 1/e by itself if that is shorter."""
+        """Times over which each unresolved loss is counted, shape (m,), s: the run, or to 1/e."""
         return self._modes.times
 
     @property
     def left(self) -> Array:
-        """Share of its amplitude that the method leaves of each over that time, shape (m,), beside its own damping.
+        """Share of amplitude that is left of each unresolved mode, shape (m,), beside its own damping.
 
         Above 1 where the method lets a mode grow.
         """
@@ -95,17 +95,17 @@ class Resolution(Storable):
 
     @property
     def shifts(self) -> Array:
-        """By which share of its frequency the method makes each mode faster, shape (m,)."""
+        """Share by which each unresolved mode becomes faster, shape (m,)."""
         return self._modes.shifts
 
     @property
     def sites(self) -> tuple[str, ...]:
-        """Where dry friction does not bring to rest what it brakes, k places in words."""
+        """Sites of dry friction that steps do not resolve, k places in words."""
         return self._modes.sites
 
     @property
     def turns(self) -> Array:
-        """Slope of that friction at rest times the step over the inertia that it moves, shape (k,).
+        """Slope of unresolved friction at rest times the step over the inertia, shape (k,).
 
         Of friction that bends before it slides, its stiffness times the square of the step over that inertia.
         """
@@ -121,12 +121,12 @@ class Resolution(Storable):
         return self._find()
 
     def to_stored(self) -> Mapping[str, object]:
-        """All of it, worked out."""
+        """Resolution to store, computed."""
         return {"integrator": self.integrator, "step": self.step, **self._modes._asdict()}
 
     @classmethod
     def from_stored(cls, content: Mapping[str, Any]) -> Self:
-        """As it was stored."""
+        """Resolution as it was stored."""
         modes = Modes(**{name: content[name] for name in Modes._fields})
         return cls(content["integrator"], content["step"], lambda: modes)
 
@@ -134,7 +134,7 @@ class Resolution(Storable):
         return type(self).from_stored, (self.to_stored(),)
 
     def __str__(self) -> str:
-        """One sentence."""
+        """Sentence on the resolution."""
         steps = f"{self.integrator}, {1e3 * self.step:.3g} ms"
         if self.is_complete:
             return steps
@@ -169,7 +169,7 @@ class Resolution(Storable):
 
 
 def outermost(places: Array) -> list[int]:
-    """Rows of numbers, shape (N, n), in which one of them is farthest out, ascending."""
+    """Rows of numbers, shape (N, n), in which one of them is farthest out, to judge the resolution there."""
     if not places.size:
         return []
     return sorted({*places.argmin(axis=0).tolist(), *places.argmax(axis=0).tolist()})

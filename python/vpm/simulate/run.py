@@ -70,14 +70,14 @@ class Run(Result):
     coordinates: Array | None = None
 
     def __getitem__(self, channel: str) -> Array:
-        """Simulated values of one channel, shape (N,)."""
+        """Simulated values of one channel of a run, shape (N,)."""
         if channel not in self.channels:
             raise SimulationError(f"the run has no channel '{channel}'; it has {', '.join(self.channels)}")
         return self.values[:, self.channels.index(channel)]
 
     @property
     def messages(self) -> tuple[str, ...]:
-        """What to know before the numbers are trusted: `notes`, and what the steps do not resolve."""
+        """Messages of a run: `notes`, and what the steps do not resolve."""
         steps = self.resolution
         return self.notes if steps is None or steps.is_complete else (*self.notes, str(steps))
 
@@ -98,7 +98,7 @@ class Run(Result):
         return {"time": self.time, **dict(zip(self.channels, self.values.T, strict=True))}
 
     def plot(self) -> Figure:
-        """Simulated over measured, a panel per channel. Needs the extra ``plot``."""
+        """Plot a run: simulated over measured, a panel per channel. Needs the extra ``plot``."""
         from vpm.plot import plot_run
 
         return plot_run(self)
@@ -119,7 +119,7 @@ class SimulatedArrays:
 
 
 def copied_channels(model: Model, mode: str, passive: Sequence[str] = ()) -> frozenset[str]:
-    """Outputs that a mode takes from the log, or does not work out: nothing to compare there.
+    """Channels of a run that a mode takes from the log, with nothing to compare.
 
     The motion of ``passive`` joints is worked out.
     """
@@ -136,7 +136,7 @@ def copied_channels(model: Model, mode: str, passive: Sequence[str] = ()) -> fro
 
 
 def run_of(model: Model, experiment: Experiment, mode: str, arrays: SimulatedArrays, setup: Setup) -> Run:
-    """The channels that a mode works out, beside the log's counterparts on the same rows."""
+    """Run from the channels that a mode computes, beside the log's on the same rows."""
     guided = mode == "prescribed_motion"
     passive = passive_joints(experiment, model) if guided else ()
     left_out = copied_channels(model, mode, passive) if guided else frozenset()

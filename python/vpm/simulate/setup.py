@@ -69,7 +69,7 @@ class Setup(Storable):
     hold: str = AUTOMATIC
 
     def __post_init__(self) -> None:
-        """Check the choices."""
+        """Check the setup of a simulation."""
         _check_integrator(self.integrator)
         if self.substeps % 1 or not 1 <= self.substeps <= MOST_SUBSTEPS:
             raise SimulationError(f"substeps is {self.substeps}; give a whole number from 1 to {MOST_SUBSTEPS}")
@@ -82,11 +82,11 @@ class Setup(Storable):
 
     @property
     def course(self) -> str:
-        """What commands do between samples, as the core names it."""
+        """Hold of commands between samples in the setup, as the core names it."""
         return HOLDS[0] if self.hold == AUTOMATIC else self.hold
 
     def method(self, model: Model, *, bounded: bool = False, guided: bool = False, drawn: bool = False) -> str:
-        """Integrator for a model, as the core names it.
+        """Integrator in the setup for a model, as the core names it.
 
         Parameters
         ----------
@@ -107,7 +107,7 @@ class Setup(Storable):
 
 
 def _check_integrator(name: str) -> None:
-    """Complain about a name that is none, or a tolerance that means nothing.
+    """Refuse a setup with an unknown integrator, or a meaningless tolerance.
 
     Raises
     ------

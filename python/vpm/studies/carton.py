@@ -47,7 +47,7 @@ ASSUMED = (
 
 
 def carton(changes: Mapping[str, float] | None = None, *, level: str | None = None) -> Model:
-    """The model file of the study, with other values of its parameters (SI)."""
+    """Model file of the carton study, with other values of its parameters (SI)."""
     from vpm.model import Model
 
     path = files("vpm.studies") / "carton.toml"
@@ -57,12 +57,12 @@ def carton(changes: Mapping[str, float] | None = None, *, level: str | None = No
 
 
 def crease_stiffness(reading: str = "per degree", length: float = CREASE) -> float:
-    """Stiffness of a crease whose length is in mm, N m/rad."""
+    """Stiffness of a carton's crease whose length is in mm, N m/rad."""
     return convert(PER_LENGTH * length, READINGS[reading], "N m/rad")
 
 
 def crease_torque(angle: float, reading: str = "per degree") -> float:
-    """Torque that holds the folded crease of the model file at rest, N m."""
+    """Torque that holds the carton's folded crease at rest, N m."""
     model = carton({"crease.spring.stiffness": crease_stiffness(reading)}, level="rigid")
     still = [0.0, 0.0]
     return -float(model.inverse_dynamics([angle, -angle], still, still)[1])
@@ -87,22 +87,22 @@ class Fold:
     crease: Array
 
     def at(self, angle: float) -> float:
-        """Force at an angle, N."""
+        """Force of a carton's fold at an angle, N."""
         return float(np.interp(angle, self.angle, self.force))
 
     @property
     def end(self) -> float:
-        """Force at the end, N."""
+        """Force at the end of a carton's fold, N."""
         return float(self.force[-1])
 
     @property
     def work(self) -> float:
-        """Work of the finger, J: its force times its lever over the angle."""
+        """Work of the finger that folds the carton, J: its force times its lever over the angle."""
         return float(np.trapezoid(self.force, self.angle) * LEVER)
 
 
 def motion() -> tuple[Array, Array]:
-    """Time (s) and angle of the finger (rad), smooth from 0 to 90 degrees."""
+    """Time (s) and angle (rad) of the finger that folds the carton, smooth from 0 to 90 degrees."""
     time = STEP * np.arange(round((FOLD + 2.0 * REST) / STEP))
     share = np.clip((time - REST) / FOLD, 0.0, 1.0)
     return np.asarray(time), np.asarray(0.5 * FULL * (1.0 - np.cos(np.pi * share)))
@@ -194,7 +194,7 @@ def _convergence(meshes: Mapping[int, float]) -> Table:
 
 
 def _panels(level: str) -> Table:
-    """Flexible panels with one assumption changed."""
+    """Flexible panels of the carton with one assumption changed."""
     changed: dict[str, Mapping[str, float]] = {
         "as assumed": {},
         "1 GPa": {"panel.young": 1e9},

@@ -43,11 +43,11 @@ class Damage:
             )
 
     def at(self, angle: float) -> float:
-        """Part that is lost after a fold to an angle (rad)."""
+        """Part of a crease's stiffness that is lost after a fold to an angle (rad)."""
         return float(-self.share * np.expm1(-angle / self.scale))
 
     def lost(self, stiffness: float, angle: float) -> float:
-        """Energy that the first fold to an angle takes, J: torque along it less what the damaged spring holds."""
+        """Energy that a crease's first fold to an angle takes, J."""
         x = angle / self.scale
         kept = 0.5 * (1.0 - self.share) * angle**2 + self.share * self.scale**2 * (1.0 - np.exp(-x) * (1.0 + x))
         return float(stiffness * (kept - 0.5 * (1.0 - self.at(angle)) * angle**2))
@@ -80,7 +80,7 @@ def damaged(
 
 
 def elastica(angle: float, stiffness: float, lever: float, model: Model) -> float:
-    """Force on a panel that bends far, N: Euler's elastica, solved by scipy alone.
+    """Force on a far bent panel at a crease, N: Euler's elastica, solved by scipy alone.
 
     The finger is a smooth plane through the crease, turned by `angle` against the rest of the carton, and touches the
     panel at the arc length `lever`. With the slope p of the panel against that plane and the force F normal to it:

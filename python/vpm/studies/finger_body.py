@@ -76,12 +76,12 @@ class Finger:
         return _quarter(depth, angle, np.array(cuts[1:-1]), materials, self.held)
 
     def with_(self, **changes: object) -> Finger:
-        """A copy with other values."""
+        """Copy of the finger with other values."""
         return replace(self, **changes)  # type: ignore[arg-type]
 
 
 def check_fineness(fineness: int) -> None:
-    """Refuse meshes without elements, and those that no machine holds."""
+    """Refuse meshes of the finger's body without elements, and those that no machine holds."""
     if not 1 <= fineness <= 12:
         raise VpmError(f"a mesh of fineness {fineness} cannot be made; take a whole number from 1 to 12")
 
@@ -103,7 +103,7 @@ def _quarter(depth: Array, angle: Array, cuts: Array, materials: Sequence[Materi
 
 
 def block(height: float, contact: float, material: Material, fineness: int) -> SoftBody:
-    """A flat layer on a rigid ground, elements small where it is touched.
+    """Flat layer to compare with the finger's body, elements small where it is touched.
 
     Parameters
     ----------
@@ -128,7 +128,7 @@ def block(height: float, contact: float, material: Material, fineness: int) -> S
 
 
 def _growing(begin: float, end: float, first: float) -> Array:
-    """Points from a place on, with steps that grow by about a quarter each."""
+    """Points in the finger's body from a place on, with steps that grow by about a quarter each."""
     count = max(1, int(np.ceil(np.log1p(0.25 * (end - begin) / first) / np.log(1.25))))
     steps = 1.25 ** np.arange(1, count + 1)
     return np.asarray(begin + (end - begin) * np.cumsum(steps) / steps.sum())
@@ -140,7 +140,7 @@ def _penalty(material: Material, length: float) -> float:
 
 
 def hertz(way: float | Array, radius: float, young: float) -> tuple[Array, Array]:
-    """Force (N) and radius of contact (m) at small indentation, constant volume (H. Hertz 1881, Poisson's ratio 1/2).
+    """Hertz' force (N) and contact radius (m) for the finger's body, constant volume (H. Hertz 1881).
 
     ``F = 4/3 E/(1 - 1/4) sqrt(R) d^(3/2)``, ``a = sqrt(R d)``.
     """
@@ -149,7 +149,7 @@ def hertz(way: float | Array, radius: float, young: float) -> tuple[Array, Array
 
 
 def layer_factor(share: float | Array) -> Array:
-    """Force on a bonded layer of constant volume over that of Hertz, ``share = sqrt(R d) / h`` up to 1.
+    """Force on a bonded layer as the finger's body over that of Hertz, ``share = sqrt(R d) / h`` up to 1.
 
     E. Dimitriadis et al., *Biophysical Journal* 82, 2002: 1 + 1.133 x + 1.283 x^2 + 0.769 x^3 + 0.0975 x^4.
     """

@@ -64,12 +64,12 @@ ASSUMED = (
 
 
 def averages() -> Array:
-    """Mean force of the five trials at 1, 2 and 3 mm, N."""
+    """Mean fingertip force of the five trials at 1, 2 and 3 mm, N."""
     return np.asarray(TRIALS.mean(axis=0))
 
 
 def deviations() -> Array:
-    """Force of the thesis' model less the measured mean, % of the measured mean."""
+    """Fingertip force of the thesis' model less the measured mean, % of the measured mean."""
     return 100.0 * (PRINTED_FORCE / averages() - 1.0)
 
 
@@ -89,19 +89,19 @@ class Curve:
 
     @property
     def way(self) -> Array:
-        """Indentation as the thesis counts it, mm."""
+        """Indentation of the fingertip as the thesis counts it, mm."""
         return 1e3 * (np.array([step.indentation for step in self.steps]) - self.touch)
 
     def force(self, depth: Array) -> Array:
-        """Force at indentations in mm, N."""
+        """Fingertip force at indentations in mm, N."""
         return self._at(depth, lambda step: step.force)
 
     def area(self, depth: Array) -> Array:
-        """Area of contact at indentations in mm, mm^2."""
+        """Contact area of the fingertip at indentations in mm, mm^2."""
         return 1e6 * self._at(depth, lambda step: step.area)
 
     def balance(self) -> float:
-        """Work of the plate less elastic energy, share of the energy: the error of the sum over load steps."""
+        """Work of the plate on the fingertip less elastic energy, share of the energy."""
         way = np.array([0.0, *(step.indentation for step in self.steps)])
         work = _integral(way, np.array([0.0, *(step.force for step in self.steps)]))
         return work / self.steps[-1].energy - 1.0
@@ -131,7 +131,7 @@ def indent(finger: Finger, fineness: int, depths: Array = STEPS) -> Curve:
 
 
 def classes(step: Pressed) -> Array:
-    """Area that bears each class of pressure, and what is beyond the last class, mm^2."""
+    """Fingertip area that bears each class of pressure, and what is beyond the last class, mm^2."""
     fine = np.linspace(0.0, step.contact_radius, 4001)
     pressure = 1e-3 * np.interp(fine, step.radius, step.pressure)
     rings = 1e6 * np.pi * np.diff(fine**2)
@@ -164,7 +164,7 @@ def fingertip(fineness: int = 3) -> Study:
 
 
 def mesh_words(fineness: int) -> str:
-    """What a mesh is, in words."""
+    """Fingertip mesh in words."""
     return f"{6 * fineness} x {12 * fineness} Q2/Q1"
 
 
@@ -260,7 +260,7 @@ def _beside(
 
 
 def penalties(fineness: int = 1, way: float = 1e-3) -> Table:
-    """Force and overlap by the contact stiffness alone, and with rounds of augmented Lagrange."""
+    """Fingertip force and overlap by the contact stiffness alone, and with augmented Lagrange."""
     rows = []
     ways = [0.5 * way, way]
     for factor in (0.01, 0.1, 1.0, 10.0):
@@ -299,7 +299,7 @@ def variations() -> dict[str, Finger]:
 
 
 def sensitivities(fineness: int = 1) -> Table:
-    """Forces with one assumption changed at a time."""
+    """Fingertip forces with one assumption changed at a time."""
     rows: list[tuple[Cell, ...]] = []
     for name, finger in variations().items():
         curve = indent(finger, fineness)

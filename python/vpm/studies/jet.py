@@ -44,7 +44,7 @@ class Jet:
         )
 
     def power(self, exponent: float) -> Jet:
-        """The function to a power; its values have to be above zero unless the exponent is a whole number."""
+        """Power of a jet; its values have to be above zero unless the exponent is a whole number."""
         x = self.value
         first = exponent * x ** (exponent - 1.0) if exponent else np.zeros_like(x)
         second = exponent * (exponent - 1.0)

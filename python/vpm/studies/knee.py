@@ -85,16 +85,16 @@ class Stressed:
 
     @property
     def equivalent(self) -> Array:
-        """Stress of von Mises at the corners, Pa."""
+        """Stress of von Mises at the corners of the knee's frame, Pa."""
         return von_mises(self.stress)
 
     @property
     def peak(self) -> float:
-        """Largest equivalent stress away from held ends and pad, Pa."""
+        """Largest equivalent stress of the knee away from held ends and pad, Pa."""
         return float(self.equivalent[self.clear].max())
 
     def line(self, yoke: Yoke) -> tuple[Array, Array]:
-        """Depth from the inner side (m) and stress of von Mises (Pa) across the middle of the right corner."""
+        """Depth (m) and stress of von Mises (Pa) across the middle of the knee's right corner."""
         inner, leg = 0.5 * yoke.spacing - yoke.turn, yoke.leg
         x, y, z = self.solid.corners
         out = np.hypot(x - inner, z - leg)
@@ -104,7 +104,7 @@ class Stressed:
 
 
 def loaded(yoke: Yoke, fineness: int, loads: dict[str, Load], young: float) -> dict[str, Stressed]:
-    """Solve a frame under all loads.
+    """Solve the knee's frame under all loads.
 
     Raises
     ------
@@ -156,7 +156,7 @@ def knee(fineness: int = 4) -> Study:
 
 
 def mesh_words(fineness: int) -> str:
-    """What a mesh is, in words."""
+    """Mesh of the knee in words."""
     return f"{22 * fineness} x {fineness} x {2 * fineness} bricks"
 
 
@@ -170,7 +170,7 @@ def _compared(finest: dict[str, Stressed], fineness: int) -> tuple[Compared, ...
 
 
 def _margins(finest: dict[str, Stressed]) -> Table:
-    """Yield over the largest stress: the stress of a loaded frame does not depend on Young's modulus."""
+    """Yield over the largest stress of the knee, which does not depend on Young's modulus."""
     steel = MATERIALS["AISI 304"][1]
     rows: list[tuple[Cell, ...]] = []
     for name, (printed, young, printed_yield, yields) in MATERIALS.items():

@@ -47,7 +47,7 @@ class Material:
 
     @property
     def shear(self) -> float:
-        """Shear modulus at small strain, Pa."""
+        """Shear modulus of a material at small strain, Pa."""
         return 2.0 * (self.constants.get((1, 0), 0.0) + self.constants.get((0, 1), 0.0))
 
     @property
@@ -57,15 +57,15 @@ class Material:
 
     @property
     def young(self) -> float:
-        """Young's modulus at small strain, Pa."""
+        """Young's modulus of a material at small strain, Pa."""
         return 9.0 / (3.0 / self.shear + self.compliance)
 
     def scaled(self, factor: float) -> Material:
-        """The same with all constants times a factor."""
+        """Material with all constants times a factor."""
         return Material({key: factor * value for key, value in self.constants.items()}, factor * self.bulk)
 
     def isochoric(self, strain: Array) -> Jet:
-        """Energy of shape, with derivatives.
+        """Energy of shape of a material, with derivatives.
 
         Parameters
         ----------
@@ -81,19 +81,19 @@ class Material:
         return total
 
     def uniaxial(self, stretch: float | Array) -> Array:
-        """Nominal stress at constant volume, Pa: ``2 (l - 1/l^2) (W_1 + W_2/l)``, R. S. Rivlin 1948."""
+        """Uniaxial stress of a material, Pa: ``2 (l - 1/l^2) (W_1 + W_2/l)``, R. S. Rivlin 1948."""
         stretch = np.asarray(stretch, dtype=float)
         w1, w2 = self.slopes(stretch**2 + 2.0 / stretch, 2.0 * stretch + stretch**-2)
         return 2.0 * (stretch - stretch**-2) * (w1 + w2 / stretch)
 
     def equibiaxial(self, stretch: float | Array) -> Array:
-        """Nominal stress in both directions, Pa: ``2 (l - 1/l^5) (W_1 + l^2 W_2)``."""
+        """Equibiaxial stress of a material, Pa: ``2 (l - 1/l^5) (W_1 + l^2 W_2)``."""
         stretch = np.asarray(stretch, dtype=float)
         w1, w2 = self.slopes(2.0 * stretch**2 + stretch**-4, stretch**4 + 2.0 * stretch**-2)
         return 2.0 * (stretch - stretch**-5) * (w1 + stretch**2 * w2)
 
     def slopes(self, first: Array, second: Array) -> tuple[Array, Array]:
-        """``dW/dI1`` and ``dW/dI2`` at constant volume, Pa."""
+        """Slopes ``dW/dI1`` and ``dW/dI2`` of a material at constant volume, Pa."""
         x, y = first - 3.0, second - 3.0
         w1, w2 = np.zeros_like(x), np.zeros_like(x)
         for (i, j), c in self.constants.items():
@@ -103,7 +103,7 @@ class Material:
 
 
 def invariants(strain: Array) -> tuple[Jet, Jet, Jet]:
-    """``I1``, ``I2`` and ``J`` of gradients, with derivatives."""
+    """Invariants ``I1``, ``I2`` and ``J`` of gradients for a material, with derivatives."""
     a, b, c, d, e = variables(strain)
     s, k, hoop = a * a + b * b + c * c + d * d, a * d - b * c, e * e
     return s + hoop, hoop * s + k * k, k * e

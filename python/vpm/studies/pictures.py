@@ -22,7 +22,7 @@ Curve = tuple[str, ArrayLike, ArrayLike, str]
 def curves(
     title: str, x: tuple[str, str], y: tuple[str, str], lines: Sequence[Curve], *, logarithmic: bool = False
 ) -> Figure:
-    """Curves over one axis.
+    """Picture of curves over one axis.
 
     Parameters
     ----------
@@ -47,7 +47,7 @@ def curves(
 def field(
     title: str, unit: str, corners: Array, faces: NDArray[np.int64], values: Array, axes: tuple[str, str]
 ) -> Figure:
-    """Values on the faces of a mesh in a plane.
+    """Picture of values on the faces of a mesh in a plane.
 
     Parameters
     ----------

@@ -169,7 +169,7 @@ def _newton(body: SoftBody, state: State, obstacle: Obstacle) -> tuple[State, in
 
 
 def _scale(body: SoftBody) -> tuple[int, float, float]:
-    """Number of displacements, and the force and volume that measure how far a balance is met."""
+    """Number of displacements, and scales of force and volume for the balance of a pressed body."""
     shear = max(material.shear for material in body.materials)
     extent = float(np.ptp(body.mesh.doflocs, axis=1).max())
     return body.basis.N - body.fixed.size, shear * extent**2, extent**3
@@ -183,7 +183,7 @@ def _size(residual: Array, scale: tuple[int, float, float]) -> float:
 def _searched(
     body: SoftBody, state: State, obstacle: Obstacle, change: Array, before: float, free: NDArray[np.int64]
 ) -> tuple[State, Array, tuple[Jet, Jet, Array]]:
-    """The longest of halved steps that lessens what is out of balance; contact may let it grow a little."""
+    """Line search of a pressed body: the longest of halved steps that lessens the imbalance."""
     count, share = body.basis.N, 1.0
     for _ in range(HALVINGS):
         trial = State(
@@ -200,7 +200,7 @@ def _searched(
 
 
 def _seen(body: SoftBody, state: State, way: float, obstacle: Obstacle, steps: int) -> Pressed:
-    """Force, energy, contact radius and pressure of a balance."""
+    """Force, energy, contact radius and pressure of a pressed body in balance."""
     touching = body.touch(state, obstacle) > 0.0
     now = body.gap(state, obstacle)[1]
     edge = float(now[touching].max()) if touching.any() else 0.0

@@ -108,7 +108,7 @@ class SoftBody:
         self._shape = self._strains_of_shapes()
 
     def _merged(self) -> csr_matrix:
-        """From pressures at the corners of each layer to those of each element."""
+        """Pressures of a soft body's elements from those at the corners of each layer."""
         corners = self.mesh.t[:4]
         keys = np.stack([corners, np.broadcast_to(self.layer, corners.shape)]).reshape(2, -1)
         _, place = np.unique(keys, axis=1, return_inverse=True)
@@ -117,7 +117,7 @@ class SoftBody:
         return csr_matrix((np.ones(rows.size), (rows, place)), shape=(self.inner.N, place.max() + 1))
 
     def _strains_of_shapes(self) -> Array:
-        """What each displacement of an element adds to the five numbers, shape (18, 5, elements, points)."""
+        """Strains of a soft body's elements per displacement, shape (18, 5, elements, points)."""
         radius = self.basis.global_coordinates()[0]
         parts = []
         for (shape,) in self.basis.basis:
@@ -126,18 +126,18 @@ class SoftBody:
         return np.stack(parts)
 
     def rest(self) -> State:
-        """State in which nothing moves and nothing touches."""
+        """Rest state of a soft body, in which nothing touches."""
         points = self.skin.global_coordinates()[0]
         return State(np.zeros(self.basis.N), np.zeros(self.merge.shape[1]), np.zeros(points.shape))
 
     def strain(self, state: State) -> Array:
-        """Five numbers of the gradient of the deformation, shape (5, elements, points)."""
+        """Strain of a soft body: five numbers of the deformation gradient, shape (5, elements, points)."""
         local = state.displacement[self.basis.element_dofs]
         one = np.array([1.0, 0.0, 0.0, 1.0, 1.0])[:, None, None]
         return np.asarray(one + np.einsum("aikq,ak->ikq", self._shape, local))
 
     def energy_density(self, strain: Array) -> Jet:
-        """Energy of shape at each point, Pa, with derivatives."""
+        """Energy density of a soft body at each point, Pa, with derivatives."""
         value = np.zeros(strain.shape[1:])
         gradient, hessian = np.zeros((5, *value.shape)), np.zeros((5, 5, *value.shape))
         for number, material in enumerate(self.materials):
@@ -151,7 +151,7 @@ class SoftBody:
         return np.asarray(2.0 * np.pi * np.asarray(self.basis.global_coordinates()[0]) * self.basis.dx)
 
     def pressures(self, state: State) -> Array:
-        """Multiplier p at each point, Pa; the pressure of a fluid is -p."""
+        """Pressure multiplier p of a soft body at each point, Pa; the pressure of a fluid is -p."""
         return np.asarray(self.inner.interpolate(self.merge @ state.pressure))
 
     def energy(self, state: State) -> float:
@@ -160,23 +160,23 @@ class SoftBody:
         return float(np.sum((density + 0.5 * self.compliance * self.pressures(state) ** 2) * self._measure))
 
     def gap(self, state: State, obstacle: Obstacle) -> tuple[Array, Array]:
-        """Clearance (m) and radius now (m) at the points of the skin; negative where they overlap."""
+        """Clearance (m) and radius (m) at points of a soft body's skin; negative where they overlap."""
         u = np.asarray(self.skin.interpolate(state.displacement))
         x = np.asarray(self.skin.global_coordinates())
         radius = x[0] + u[0]
         return x[1] + u[1] - obstacle.level - 0.5 * obstacle.curvature * radius**2, radius
 
     def touch(self, state: State, obstacle: Obstacle) -> Array:
-        """Contact pressure at the points of the skin, Pa of the undeformed surface."""
+        """Contact pressure at points of a soft body's skin, Pa of the undeformed surface."""
         return np.maximum(0.0, state.multiplier - self.penalty * self.gap(state, obstacle)[0])
 
     def force(self, state: State, obstacle: Obstacle) -> float:
-        """Force on the obstacle along the axis, N."""
+        """Force of a soft body on the obstacle along the axis, N."""
         ring = 2.0 * np.pi * np.asarray(self.skin.global_coordinates()[0]) * self.skin.dx
         return float(np.sum(self.touch(state, obstacle) * ring))
 
     def residual(self, state: State, obstacle: Obstacle) -> tuple[Array, tuple[Jet, Jet, Array]]:
-        """What is out of balance, and what the derivative needs."""
+        """Residual of a soft body's balance, and what the derivative needs."""
         strain, p = self.strain(state), self.pressures(state)
         energy, volume = self.energy_density(strain), invariants(strain)[2]
         stress = (energy.gradient + p * volume.gradient) * self._measure
@@ -188,7 +188,7 @@ class SoftBody:
         return np.concatenate([force, kept]), (energy, volume, p)
 
     def tangent(self, state: State, obstacle: Obstacle, known: tuple[Jet, Jet, Array]) -> csc_matrix:
-        """Derivative of the residual, sparse and symmetric."""
+        """Derivative of a soft body's residual, sparse and symmetric."""
         energy, volume, p = known
         stiffness = (energy.hessian + p * volume.hessian) * self._measure
         shapes = np.stack([np.asarray(shape) for (shape,) in self.inner.basis])
@@ -202,7 +202,7 @@ class SoftBody:
         return csc_matrix(bmat([[K, G.T], [G, -(self.merge.T @ C @ self.merge)]]))
 
     def _slopes(self, state: State, obstacle: Obstacle) -> tuple[Array, Array, Array]:
-        """Derivatives of the gap by the displacements of an element, shapes' radial values, and the measure."""
+        """Derivatives of a soft body's gap by an element's displacements, and the measure."""
         radius = self.gap(state, obstacle)[1]
         values = np.stack([np.asarray(shape) for (shape,) in self.skin.basis])
         ring = 2.0 * np.pi * np.asarray(self.skin.global_coordinates()[0]) * self.skin.dx
@@ -222,12 +222,12 @@ class SoftBody:
 
 
 def _gathered(local: Array, basis: Any) -> Array:  # noqa: ANN401
-    """Vector of the whole from those of the elements."""
+    """Vector of the whole soft body from those of the elements."""
     return np.asarray(np.bincount(basis.element_dofs.reshape(-1), local.reshape(-1), basis.N), dtype=float)
 
 
 def _spread(local: Array, rows: Any, columns: Any) -> csr_matrix:  # noqa: ANN401
-    """Sparse matrix of the whole from those of the elements, shape (rows, columns, elements)."""
+    """Sparse matrix of the whole soft body from those of the elements."""
     i = np.broadcast_to(rows.element_dofs[:, None], local.shape).reshape(-1)
     j = np.broadcast_to(columns.element_dofs[None], local.shape).reshape(-1)
     return csr_matrix((local.reshape(-1), (i, j)), shape=(rows.N, columns.N))

@@ -40,7 +40,7 @@ class Solid:
 
     @cached_property
     def basis(self) -> Any:  # noqa: ANN401
-        """Displacements: 20 nodes on each brick, as in the thesis."""
+        """Basis of a solid's displacements: 20 nodes on each brick, as in the thesis."""
         skfem = finite_elements()
         return skfem.Basis(self.mesh, skfem.ElementVector(skfem.ElementHexS2()), intorder=4)
 
@@ -52,7 +52,7 @@ class Solid:
         return linear_elasticity(*lame_parameters(self.young, self.poisson)).assemble(self.basis).tocsc()
 
     def load(self, facets: Facets, traction: Traction) -> Array:
-        """Forces of a traction on faces, N."""
+        """Forces of a traction on a solid's faces, N."""
         skfem = finite_elements()
         face = skfem.FacetBasis(self.mesh, self.basis.elem, facets=facets, intorder=4)
 
@@ -62,7 +62,7 @@ class Solid:
         return np.asarray(skfem.LinearForm(work).assemble(face))
 
     def solve(self, fixed: NDArray[np.int64], *loads: Array) -> list[Array]:
-        """Displacements of all nodes (m) under each load, some held."""
+        """Solve a solid: displacements of all nodes (m) under each load, some held."""
         from scipy.sparse.linalg import splu
 
         free = np.setdiff1d(np.arange(self.basis.N), fixed)
@@ -75,7 +75,7 @@ class Solid:
         return answers
 
     def corner_stress(self, displacement: Array) -> Array:
-        """Stress at the corners of the bricks, Pa, the mean of the bricks that meet there, shape (3, 3, corners)."""
+        """Stress of a solid at the corners of the bricks, Pa, their mean, shape (3, 3, corners)."""
         skfem = finite_elements()
         places = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)]).T
         at = skfem.Basis(self.mesh, self.basis.elem, quadrature=(places, np.ones(8)))
@@ -88,11 +88,11 @@ class Solid:
 
     @cached_property
     def corners(self) -> Array:
-        """Corners of the bricks, m, shape (3, corners)."""
+        """Corners of a solid's bricks, m, shape (3, corners)."""
         return np.asarray(self.mesh.doflocs[:, : self.basis.nodal_dofs.shape[1]])
 
     def _mean_at_corners(self, places: Array, values: Array) -> Array:
-        """Values at the corners of each brick to those of the mesh, whose order they may not share."""
+        """Mean values at a solid's mesh corners from those of each brick."""
         around = self.corners[:, self.mesh.t[:8]]
         distance = ((places[:, :, :, None] - np.moveaxis(around, 1, 2)[:, :, None, :]) ** 2).sum(axis=0)
         number = np.take_along_axis(self.mesh.t[:8].T, distance.argmin(axis=2), axis=1)
@@ -105,17 +105,17 @@ class Solid:
 
 
 def von_mises(stress: Array) -> Array:
-    """Stress of von Mises, of stresses of the shape (3, 3, ...)."""
+    """Von Mises stress of a solid, of stresses of the shape (3, 3, ...)."""
     deviator = stress - np.einsum("ii...", stress) / 3.0 * np.eye(3).reshape(3, 3, *(1,) * (stress.ndim - 2))
     return np.asarray(np.sqrt(1.5 * np.einsum("ij...,ij...", deviator, deviator)))
 
 
 def brick(first: Array, second: Array, third: Array) -> MeshHex2:
-    """A box of bricks between the given planes, whose nodes can be moved."""
+    """Solid box of bricks between the given planes, whose nodes can be moved."""
     skfem = finite_elements()
     return skfem.MeshHex2.from_mesh(skfem.MeshHex.init_tensor(first, second, third))
 
 
 def moved(mesh: MeshHex2, places: Array) -> MeshHex2:
-    """Mesh of the same bricks with its nodes at other places."""
+    """Mesh of a solid with its nodes at other places."""
     return finite_elements().MeshHex2(places, mesh.t)

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from vpm.files import make_folder, replacing, write_text
-from vpm.plain import plain
+from vpm.json_values import plain
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -43,7 +43,7 @@ class Compared:
 
     @property
     def difference(self) -> float | None:
-        """Ours less the printed one, % of the printed one."""
+        """Difference of a study's figure to the printed one, % of that."""
         return None if self.printed is None else 100.0 * (self.ours / self.printed - 1.0)
 
 
@@ -97,7 +97,7 @@ class Study:
     pictures: tuple[Picture, ...] = ()
 
     def to_dict(self) -> dict[str, object]:
-        """Numbers and words, as JSON has them."""
+        """Numbers and words of a study, as JSON has them."""
         compared = [{**vars(each), "difference": each.difference} for each in self.compared]
         tables = [vars(each) for each in self.tables]
         document = plain({"name": self.name, "title": self.title, "compared": compared, "tables": tables})
@@ -105,7 +105,7 @@ class Study:
 
     @property
     def all_tables(self) -> tuple[Table, ...]:
-        """The comparison as a table, and the others."""
+        """All tables of a study, the comparison first."""
         rows = tuple((c.what, c.unit, c.ours, c.printed, c.difference, c.mesh, c.source) for c in self.compared)
         first = Table(
             "Beside the printed figures",

@@ -52,30 +52,30 @@ class Yoke:
 
     @property
     def turn(self) -> float:
-        """Radius of the middle line in the corners, m."""
+        """Radius of the yoke's middle line in the corners, m."""
         return self.corner + 0.5 * self.thickness
 
     @property
     def top(self) -> float:
-        """Length of the straight top, m."""
+        """Length of the yoke's straight top, m."""
         return self.spacing - 2.0 * self.turn
 
     @property
     def leg(self) -> float:
-        """Length of a straight leg, m."""
+        """Length of a straight leg of the yoke, m."""
         return self.height - self.turn
 
     def with_(self, **changes: float) -> Yoke:
-        """A copy with other sizes."""
+        """Copy of the yoke with other sizes."""
         return replace(self, **changes)
 
     def lengths(self) -> Array:
-        """Ends of the pieces along half of the middle line from the held end: leg, corner, top to the pad, pad."""
+        """Ends of the yoke's pieces along half of the middle line: leg, corner, top to the pad, pad."""
         arc = 0.5 * np.pi * self.turn
         return np.cumsum([0.0, self.leg, arc, 0.5 * (self.top - self.pad), 0.5 * self.pad])
 
     def clear(self, places: Array) -> NDArray[np.bool_]:
-        """Which places, shape (3, ...), are one and a half thicknesses along the arch from its ends and the pad."""
+        """Places of the yoke, shape (3, ...), one and a half thicknesses away from its ends and the pad."""
         ends, inner = self.lengths(), 0.5 * self.spacing - self.turn
         side, z = np.abs(places[0]), places[2]
         angle = np.clip(np.arctan2(z - self.leg, np.maximum(side - inner, 0.0)), 0.0, 0.5 * np.pi)
@@ -84,7 +84,7 @@ class Yoke:
         return np.asarray((way > far) & (way < ends[3] - far))
 
     def bend(self, along: Array, across: Array, depth: Array) -> Array:
-        """Places of points given by the way along the middle line, the way outwards from it, and y."""
+        """Places of yoke points by the way along the middle line, the way outwards from it, and y."""
         ends = self.lengths()
         half = ends[-1]
         side = np.where(along <= half, -1.0, 1.0)
@@ -96,7 +96,7 @@ class Yoke:
         return np.stack([side * x, depth, z])
 
     def mesh(self, fineness: int) -> tuple[MeshHex2, Any, Any]:
-        """Bricks, the faces that are held, and those under the pad.
+        """Mesh of the yoke: bricks, held faces, and those under the pad.
 
         Parameters
         ----------
@@ -119,7 +119,7 @@ class Yoke:
         return moved(flat, self.bend(*flat.doflocs)), held, pad
 
     def pressed(self, place: Array, side: float, front: float) -> Array:
-        """Traction of 1 N downwards whose line passes the point (side, front): linear over the pad, Pa."""
+        """Traction of 1 N on the yoke's pad whose line passes the point (side, front), Pa."""
         area = self.pad * self.width
         share = 1.0 / area + 12.0 * (side * place[0] / self.pad**2 + front * place[1] / self.width**2) / area
         return np.stack([0.0 * share, 0.0 * share, -share])

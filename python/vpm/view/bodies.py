@@ -16,12 +16,12 @@ LIGHTEST = 10.0
 
 
 def sphere_radius(mass: float) -> float:
-    """Radius (m) of a sphere of aluminium of that mass (kg)."""
+    """Radius (m) of an aluminium sphere that shows a body of that mass (kg)."""
     return math.cbrt(3.0 * max(mass, 0.0) / (4.0 * math.pi * DENSITY))
 
 
 def box_of(mass: float, inertia: Array) -> tuple[Array, Array] | None:
-    """The uniform box with the inertia of a body.
+    """Uniform box that shows a body of the same inertia.
 
     A box of sides a, b, c has ``I_a = m (b^2 + c^2)/12`` about the direction of a, so ``a^2 = 6 (I_b + I_c - I_a)/m``.
     A side that vanishes, as of a thin rod, gets the thickness of as much aluminium as weighs the mass.

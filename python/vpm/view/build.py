@@ -24,7 +24,7 @@ RAISED, TURNED = 0.30, 0.75
 
 
 def scene_of(model: Model, course: Course) -> Scene:
-    """The machine in a motion, as shapes.
+    """Build the scene of a machine in a motion, as shapes.
 
     Parameters
     ----------
@@ -67,7 +67,7 @@ def _up(model: Model) -> Array:
 
 
 def _front(skeleton: Skeleton, pose: Pose, up: Array) -> Array:
-    """A machine in a plane is seen from its side, any other one from a corner; a little from above."""
+    """Front view to build: a plane machine from its side, any other one from a corner."""
     hinges = [skeleton.joints[name] for name in skeleton.joints if name in skeleton.turning]
     axes = [direction @ pose.axes[0, frame] for frame, direction in hinges]
     parallel = all(abs(axis @ axes[0]) > 1.0 - 1e-9 for axis in axes)
@@ -94,7 +94,7 @@ def _front(skeleton: Skeleton, pose: Pose, up: Array) -> Array:
 
 
 def _forces(skeleton: Skeleton, pose: Pose, loads: Mapping[str, Array], scales: dict[str, str]) -> Iterator[Shape]:
-    """Arrows of forces and torques, in one round scale for each kind."""
+    """Build arrows of forces and torques, in one round scale for each kind."""
     found: dict[str, list[tuple[str, Array, Array]]] = {}
     for role, name, start, vector in _vectors(skeleton, pose, loads):
         if np.max(np.linalg.norm(vector, axis=1)) > 0.0:
@@ -110,7 +110,7 @@ def _forces(skeleton: Skeleton, pose: Pose, loads: Mapping[str, Array], scales: 
 
 
 def _vectors(skeleton: Skeleton, pose: Pose, loads: Mapping[str, Array]) -> Iterator[tuple[str, str, Array, Array]]:
-    """Role, name, point and vector (N or N m) of every force that is known."""
+    """Role, name, point and vector (N or N m) of every force, to build arrows."""
     for name, frame in skeleton.contacts.items():
         if all(f"{name}.{way}" in loads for way in ("fx", "fy", "fz")):
             force = np.column_stack([loads[f"{name}.{way}"] for way in ("fx", "fy", "fz")])

@@ -52,7 +52,7 @@ class Course:
 
 
 def course_of(model: Model, source: Run | ScenarioRun | Experiment | None, mode: str | None = None) -> Course:
-    """The motion of a run, or of a log after a simulation on its inputs; without either the machine at zero.
+    """Course of a run, or of a log after a simulation; without either the machine at zero.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def course_of(model: Model, source: Run | ScenarioRun | Experiment | None, mode:
 
 
 def resting(model: Model, joints: Array) -> Array:
-    """Coordinates (1, n) with the joints held: flexible links hang as they do at rest."""
+    """Course of rest: coordinates (1, n) with the joints held, flexible links hanging."""
     return np.asarray(model.equilibrium(joints)[0] if len(model.coordinates) > joints.size else joints)[None]
 
 
@@ -126,7 +126,7 @@ def _of_run(model: Model, run: Run) -> Course:
 
 
 def _coordinates(model: Model, run: Run) -> Array:
-    """Coordinates of a run; from its channels where no run goes through."""
+    """Coordinates of a run's course; from its channels where no run goes through."""
     if run.coordinates is not None:
         return run.coordinates
     missing = [name for name in model.joints if f"{name}.position" not in run.channels]
@@ -140,7 +140,7 @@ def _coordinates(model: Model, run: Run) -> Array:
 
 
 def _measured(model: Model, run: Run, coordinates: Array, notes: list[str]) -> Array | None:
-    """Where the joints were measured, as the log says; the rest as simulated."""
+    """Measured course of the joints, as the log says; the rest as simulated."""
     if run.mode == "prescribed_motion":
         notes.append("The joints move as they were measured; only what they carry is simulated.")
         return None

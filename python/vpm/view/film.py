@@ -39,7 +39,7 @@ SHORT = 5.0
 
 
 def draw(scene: Scene, sample: int, *, dark: bool = False, size: tuple[int, int] = (WIDTH, HEIGHT)) -> Figure:
-    """One picture of a scene.
+    """Draw one picture of a film.
 
     Parameters
     ----------
@@ -69,7 +69,7 @@ def draw(scene: Scene, sample: int, *, dark: bool = False, size: tuple[int, int]
 
 
 def _polygons(scene: Scene, sample: int, aspect: float, *, dark: bool) -> tuple[Array, Array]:
-    """Triangles in the picture (F, 3, 2) and their colours (F, 4), from far to near."""
+    """Polygons of a film's picture (F, 3, 2) and their colours (F, 4), from far to near."""
     camera = scene.camera(aspect, room=STAGE)
     lamp = camera.axes[2] + 0.6 * camera.axes[1] - 0.4 * camera.axes[0]
     lamp /= np.linalg.norm(lamp)
@@ -176,7 +176,7 @@ def film_samples(scene: Scene, speed: float | None = None) -> NDArray[np.int64]:
 
 
 def picture(figure: Figure) -> NDArray[np.uint8]:
-    """The pixels of a figure, shape (height, width, 3)."""
+    """Pixels of a film's picture, shape (height, width, 3)."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     canvas: Any = FigureCanvasAgg(figure)  # ships no types

@@ -36,11 +36,11 @@ class Frames:
 
     @property
     def content(self) -> Content:
-        """The core's description of the machine."""
+        """Core's description of the machine with its frames."""
         return self._content
 
     def value(self, place: int | None) -> float:
-        """Parameter by its place in the description (SI); zero where there is none."""
+        """Parameter by its place in the description of the frames (SI); zero where there is none."""
         return 0.0 if place is None else float(self._theta[place])
 
     def add(self, on: object, translation: Sequence[float] = (0.0,) * 3, rotation: Sequence[float] = _UPRIGHT) -> int:

@@ -50,7 +50,7 @@ class Stage:
         self.hidden: set[str] = set()
 
     def show(self, scene: Scene, sample: int) -> None:
-        """Show a sample."""
+        """Show a sample live."""
         with self._server.atomic():
             for role in scene.roles:
                 self._show_role(role, *mesh_of([shape for shape in scene.shapes if shape.role == role], sample))
@@ -76,7 +76,7 @@ class Stage:
             mesh.visible = False
 
     def corners(self, role: str) -> Array:
-        """Corners of the mesh of a role (C, 3)."""
+        """Corners of a role's mesh on the live stage (C, 3)."""
         return np.array(self._meshes[role].vertices, dtype=np.float64)
 
 
@@ -192,7 +192,7 @@ class Page:
         self._stale = True
 
     def advance(self, seconds: float) -> None:
-        """Let time pass, and draw if something has changed."""
+        """Let time pass on the live page, and draw if something has changed."""
         if self.course.time.size > 1 and self._play.value and seconds > 0.0:
             duration = float(self.scene.time[-1] - self.scene.time[0])
             self._now = (self._now + seconds * float(self._speed.value)) % duration
@@ -203,7 +203,7 @@ class Page:
             self._draw_now()
 
     def drawn(self, role: str) -> Array:
-        """Corners of what the browser was told of a role last, shape (C, 3), m."""
+        """Corners of a role that the live browser was told last, shape (C, 3), m."""
         return self._stage.corners(role)
 
     def close(self) -> None:
@@ -213,7 +213,7 @@ class Page:
 
 
 def serve(page: Page, ended: Callable[[], bool] = lambda: False) -> None:
-    """Play a page until Ctrl-C, or until ``ended`` says so; the server ends with it."""
+    """Serve a live page until Ctrl-C, or until ``ended`` says so; the server ends with it."""
     try:
         before = time.monotonic()
         while not ended():
@@ -226,7 +226,7 @@ def serve(page: Page, ended: Callable[[], bool] = lambda: False) -> None:
 
 
 def show(page: Page) -> bool:
-    """Open a page in a browser; False where there is none."""
+    """Open a live page in a browser; False where there is none."""
     try:
         return webbrowser.open(page.address)
     except webbrowser.Error:
@@ -234,7 +234,7 @@ def show(page: Page) -> bool:
 
 
 def free_port(port: int | None) -> int:
-    """A port that nobody uses: the one that is asked for, or the first free one.
+    """Free port for a live page: the one that is asked for, or the first free one.
 
     Raises
     ------
@@ -255,5 +255,5 @@ def free_port(port: int | None) -> int:
 
 
 def _plain(text: str) -> str:
-    """A text in which no letter has a meaning of Markdown or HTML."""
+    """Text for a live page without Markdown or HTML."""
     return "".join(f"&#{ord(letter)};" if letter in "\\`*_{}[]<>()#+!|&$~" else letter for letter in text)

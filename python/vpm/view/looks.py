@@ -57,7 +57,7 @@ SOFT = Look("#5d6b7a", "#93a1b0", "")
 
 
 def colour(look: Look, *, dark: bool) -> tuple[float, float, float]:
-    """Red, green and blue from 0 to 1."""
+    """Colour of a look: red, green and blue from 0 to 1."""
     text = look.dark if dark else look.light
     red, green, blue = (int(text[i : i + 2], 16) / 255.0 for i in (1, 3, 5))
     return red, green, blue

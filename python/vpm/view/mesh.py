@@ -17,7 +17,7 @@ SIDES, ROWS = 14, 9
 
 
 def mesh_of(shapes: Sequence[Shape], sample: int) -> tuple[Array, Whole]:
-    """Triangles of some shapes at a sample.
+    """Mesh of some shapes at a sample, in triangles.
 
     Returns
     -------
@@ -50,7 +50,7 @@ def _parts(shape: Shape, points: Array) -> Iterator[tuple[Array, Whole]]:
 
 
 def tube(path: Array, radius: Array, sides: int = SIDES) -> tuple[Array, Whole]:
-    """A tube about a path (K, 3), closed at both ends; its rings are carried along without a twist."""
+    """Mesh of a tube about a path (K, 3), closed at both ends, without twist."""
     tangents = np.gradient(path, axis=0)
     tangents /= np.maximum(np.linalg.norm(tangents, axis=1, keepdims=True), 1e-12)
     angles = np.linspace(0.0, 2.0 * np.pi, sides, endpoint=False)[:, None]
@@ -74,7 +74,7 @@ def tube(path: Array, radius: Array, sides: int = SIDES) -> tuple[Array, Whole]:
 
 
 def sphere(centre: Array, radius: float) -> tuple[Array, Whole]:
-    """A sphere of rows and columns."""
+    """Mesh of a sphere in rows and columns."""
     down, around = np.meshgrid(np.linspace(0, np.pi, ROWS + 1), np.linspace(0, 2 * np.pi, 2 * ROWS + 1), indexing="ij")
     unit = np.stack([np.sin(down) * np.cos(around), np.sin(down) * np.sin(around), np.cos(down)], axis=-1)
     number = np.arange(unit[..., 0].size).reshape(down.shape)
@@ -84,7 +84,7 @@ def sphere(centre: Array, radius: float) -> tuple[Array, Whole]:
 
 
 def box(points: Array) -> tuple[Array, Whole]:
-    """A box by its centre and the middle of a face of each side (4, 3); corners are not shared, for sharp edges."""
+    """Mesh of a box by its centre and the middle of a face of each side (4, 3)."""
     sides = points[1:] - points[0]
     if np.linalg.det(sides) < 0.0:
         sides = -sides
@@ -100,7 +100,7 @@ def box(points: Array) -> tuple[Array, Whole]:
 
 
 def arrow(start: Array, end: Array, radius: float) -> Iterator[tuple[Array, Whole]]:
-    """Shaft and head; nothing of one that is shorter than thin."""
+    """Mesh of an arrow, shaft and head; nothing of one that is shorter than thin."""
     length = float(np.linalg.norm(end - start))
     if length < 1e-3 * radius:
         return

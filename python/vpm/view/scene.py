@@ -34,11 +34,11 @@ class Shape:
 
     @property
     def points(self) -> Array:
-        """Points that it is made of, shape (N or 1, K, 3)."""
+        """Points of a scene's shape, (N or 1, K, 3)."""
         raise NotImplementedError
 
     def at(self, sample: int) -> Array:
-        """The points of a sample, shape (K, 3)."""
+        """Points of a scene's shape at a sample, (K, 3)."""
         points = self.points
         return np.asarray(points[min(sample, len(points) - 1)])
 
@@ -60,7 +60,7 @@ class Tube(Shape):
 
     @property
     def points(self) -> Array:
-        """Centreline of a tube."""
+        """Centreline of a tube in the scene."""
         return self.path
 
 
@@ -79,7 +79,7 @@ class Sphere(Shape):
 
     @property
     def points(self) -> Array:
-        """Centre of a sphere."""
+        """Centre of a sphere in the scene."""
         return self.centre[:, None, :]
 
 
@@ -102,7 +102,7 @@ class Box(Shape):
 
     @property
     def points(self) -> Array:
-        """Its centre, and the middle of a face of each side."""
+        """Centre of a box in the scene, and the middle of a face of each side."""
         faces = self.centre[:, None, :] + 0.5 * self.size[:, None] * self.axes
         return np.concatenate([self.centre[:, None, :], faces], axis=1)
 
@@ -125,7 +125,7 @@ class Arrow(Shape):
 
     @property
     def points(self) -> Array:
-        """Start and end of an arrow."""
+        """Start and end of an arrow in the scene."""
         return np.stack([self.start, self.end], axis=1)
 
 
@@ -163,24 +163,24 @@ class Scene:
     notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> tuple[Shape, ...]:
-        """Shapes of a component of the model."""
+        """Shapes of a component of the model in the scene."""
         return tuple(shape for shape in self.shapes if shape.name == name)
 
     @property
     def roles(self) -> tuple[str, ...]:
-        """Roles of its shapes, each once."""
+        """Roles of a scene's shapes, each once."""
         return tuple(dict.fromkeys(shape.role for shape in self.shapes))
 
     @cached_property
     def bounds(self) -> tuple[Array, float]:
-        """Centre (3,) and radius (m) of a sphere about all that is no floor, at all samples."""
+        """Bounds of a scene: centre (3,) and radius (m) of a sphere about all but the floor."""
         clouds = [shape.points.reshape(-1, 3) for shape in self.shapes if shape.role not in {"floor", "plane"}]
         points = np.concatenate(clouds) if clouds else np.zeros((1, 3))
         centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
         return centre, max(float(np.max(np.linalg.norm(points - centre, axis=1))), 1e-3)
 
     def camera(self, aspect: float, *, room: float = 1.0) -> Camera:
-        """The view of who looks at it first.
+        """First camera of a scene.
 
         Parameters
         ----------
@@ -193,5 +193,5 @@ class Scene:
         return Camera.about(centre, radius, self.front, self.up, aspect, room)
 
     def frames(self, most: int) -> Iterator[int]:
-        """At most so many samples, evenly apart, the first one among them."""
+        """At most so many samples of a scene, evenly apart, the first one among them."""
         yield from range(0, self.time.size, max(1, -(-self.time.size // most)))

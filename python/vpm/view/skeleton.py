@@ -62,7 +62,7 @@ class Skeleton:
         self._add_all()
 
     def pose(self, coordinates: Array, size: float | None = None) -> Pose:
-        """Places along a motion, coordinates of shape (N, n); the size of the machine (m) is its largest in it."""
+        """Pose the skeleton along a motion, coordinates of shape (N, n); its size (m) is its largest."""
         origins, axes = self.frames.poses(coordinates)
         if size is None and not origins.shape[1]:
             raise SimulationError(
@@ -74,11 +74,11 @@ class Skeleton:
         return Pose(origins, axes, coordinates, size)
 
     def shapes(self, pose: Pose) -> tuple[Shape, ...]:
-        """Drawn shapes of all parts in a pose."""
+        """Shapes of all parts of the skeleton in a pose."""
         return tuple(shape for draw in self._draws for shape in draw(pose))
 
     def ghost(self, pose: Pose) -> tuple[Shape, ...]:
-        """Links alone, in the look of what was measured."""
+        """Links of the skeleton alone, in the look of what was measured."""
         links = [shape for shape in self.shapes(pose) if isinstance(shape, Tube) and shape.role in {"link", "beam"}]
         return tuple(Tube(shape.name, "measured", shape.path, 1.08 * shape.radius) for shape in links)
 
@@ -102,11 +102,11 @@ class Skeleton:
         self._draws.insert(0, self._bars)
 
     def _home(self, placed: Content) -> int:
-        """Frame of a part that sits at a place of another one."""
+        """Frame of a skeleton's part that sits at a place of another one."""
         return self.frames.add(placed["on"], placed["translation"], placed["rotation"])
 
     def _lead(self, on: object, to: int, translation: object) -> None:
-        """A bar from the frame of what carries a part to the part; beams are drawn themselves."""
+        """Bar of the skeleton from the frame of what carries a part to the part."""
         if isinstance(on, dict) and "body" in on and np.any(np.asarray(translation)):
             self._reached.setdefault(self.frames.add(on), []).append(to)
 
@@ -179,7 +179,7 @@ class Skeleton:
         self._draws.append(draw)
 
     def _add_solid(self, number: int, solid: Content) -> None:
-        """A bar from the root of a reduced solid to each of its interfaces."""
+        """Bars of the skeleton from the root of a reduced solid to each of its interfaces."""
         root, *ends = [
             self.frames.add({"section": {"beam": number, "at": float(at)}}) for at in range(int(solid["length"]) + 1)
         ]
@@ -254,7 +254,7 @@ class Skeleton:
 
 
 def _equal_radius(shape: Content, frames: Frames) -> float:
-    """Radius (m) of the round bar with the area of a section; of a tube its outer one."""
+    """Radius (m) of a skeleton's round bar with the area of a section; of a tube its outer one."""
     if shape["shape"] == "stiffness":
         # A bar that resists bending as it resists extension: EJ / EA = r^2 / 4.
         bending = min(frames.value(shape[key]) for key in ("bending_x", "bending_y"))
@@ -274,7 +274,7 @@ def _equal_radius(shape: Content, frames: Frames) -> float:
 
 
 def _rail(name: str, pose: Pose, home: int, direction: Array, place: Array) -> Iterator[Shape]:
-    """The way of a slider, from its zero to where it went."""
+    """Rail of a slider in the skeleton, from its zero to where it went."""
     low, high = min(0.0, float(np.min(place))), max(0.0, float(np.max(place)))
     along = np.einsum("i,nij->nj", direction, pose.axes[:, home])[:, None, :]
     ends = np.array([low - 2.0 * AXIS * pose.size, high + 2.0 * AXIS * pose.size])[None, :, None]
@@ -288,7 +288,7 @@ def _triad(name: str, pose: Pose, frame: int) -> Iterator[Shape]:
 
 
 def plane(name: str, role: str, point: Array, normal: Array, pose: Pose) -> Iterator[Shape]:
-    """Lines of a net in a plane, in squares of a round width about what is below the machine."""
+    """Plane of a skeleton's floor as lines of a net in squares of a round width."""
     normal = normal / np.linalg.norm(normal)
     first = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
     first /= np.linalg.norm(first)
@@ -305,6 +305,6 @@ def plane(name: str, role: str, point: Array, normal: Array, pose: Pose) -> Iter
 
 
 def round_down(value: float) -> float:
-    """The next 1, 2 or 5 times a power of ten below."""
+    """Round width for the skeleton's floor: the next 1, 2 or 5 times a power of ten below."""
     power = 10.0 ** np.floor(np.log10(value))
     return float(power * max(step for step in (1.0, 2.0, 5.0) if step * power <= value * (1.0 + 1e-9)))

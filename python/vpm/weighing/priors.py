@@ -45,19 +45,19 @@ class Prior:
     logarithmic: bool = False
 
     def standard(self, value: float) -> float:
-        """The value in deviations from the centre."""
+        """Value in deviations from the prior's centre."""
         if self.logarithmic:
             return float(np.log(max(value, 1e-300) / self.centre)) / self.spread
         return (value - self.centre) / self.spread
 
     def value(self, standard: float) -> float:
-        """The value that lies so many deviations from the centre, as far as it is possible."""
+        """Value that lies so many prior deviations from the centre, as far as it is possible."""
         far = self.spread * standard
         value = self.centre * float(np.exp(far)) if self.logarithmic else self.centre + far
         return min(max(value, self.low), self.high)
 
     def slope(self, value: float) -> float:
-        """Change of the value by a deviation."""
+        """Change of the value by one prior deviation."""
         return self.spread * (max(value, 1e-300) if self.logarithmic else 1.0)
 
     @property
@@ -68,7 +68,7 @@ class Prior:
 
 
 def natural_sizes(effort: float, speed: float, way: float) -> dict[str, float]:
-    """Sizes of each kind of quantity at a joint with this effort, speed and way; zero or less where they show none."""
+    """Natural sizes for priors of each kind of quantity at a joint with this effort, speed and way."""
     return {
         "one": 1.0,
         "effort": effort,
@@ -85,7 +85,7 @@ def natural_sizes(effort: float, speed: float, way: float) -> dict[str, float]:
 
 
 def log_share(lower: float, upper: float) -> float:
-    """Logarithm of the share of a normal bell between two ends, in deviations."""
+    """Logarithm of the share of a prior's normal bell between two ends, in deviations."""
     # The smaller tails are differences of numbers near zero, not near one.
     pair = (-lower, -upper) if lower > 0.0 else (upper, lower)
     first, second = log_ndtr(pair[0]), log_ndtr(pair[1])
@@ -93,7 +93,7 @@ def log_share(lower: float, upper: float) -> float:
 
 
 def priors_of(model: Model, data: PredictionErrorProblem) -> dict[str, Prior]:
-    """What is known of each adjustable parameter before the records.
+    """Priors of each adjustable parameter before the records.
 
     Raises
     ------
@@ -150,7 +150,7 @@ class _Sizes:
         return Prior(value, FACTOR, *box, logarithmic=True)
 
     def _size(self, effect: Effect, parameter: EffectParameter) -> float:
-        """Size of a kind of quantity at the joint of an effect, in the records.
+        """Size for priors of a kind of quantity at the joint of an effect, in the records.
 
         Raises
         ------
@@ -177,7 +177,7 @@ class _Sizes:
         return size
 
     def _joint(self, site: str) -> str:
-        """The joint or transmission at which an effect acts; the first joint where it acts on all."""
+        """Joint or transmission of an effect for its priors; the first joint where it acts on all."""
         if site in (*self.model.joints, *self.model.transmissions):
             return site
         if site in self.model.actuators:
@@ -188,5 +188,5 @@ class _Sizes:
         return next((name for name in self._shown if self.model.sensor_of(name) == site), "")
 
     def _strength(self, channel: str) -> float:
-        """Root mean square of a channel; zero where there is none."""
+        """Root mean square of a channel for priors; zero where there is none."""
         return float(np.sqrt(np.mean(self._shown[channel] ** 2))) if channel in self._shown else 0.0

@@ -54,7 +54,7 @@ class Weighing(Result):
     models: tuple[Model, ...]
 
     def __getitem__(self, name: str) -> float:
-        """Probability of one of the models."""
+        """Probability of one weighed model."""
         if name not in self.names:
             raise IdentificationError(f'"{name}" was not weighed; weighed were {", ".join(self.names)}')
         return float(self.probability[self.names.index(name)])
@@ -78,7 +78,7 @@ def weigh(
     channels: Sequence[str] | None = None,
     setup: Setup | None = None,
 ) -> Weighing:
-    """Tell how probable each of several models is.
+    """Weigh models: how probable each of several is.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ class _Known:
         self.blocks = tuple(blocks)
 
     def evaluate(self, model: Model, theta: Array, columns: Sequence[int] = ()) -> tuple[Array, Array]:
-        """Residual and derivative with prior knowledge as rows; see `vpm.identify.Problem`."""
+        """Residual and derivative with prior rows, to weigh models; see `vpm.identify.Problem`."""
         residual, jacobian = self.data.evaluate(model, theta, columns)
         off, slopes = self.standard(model, theta)
         rows = np.zeros((len(off), len(columns)))
@@ -174,13 +174,13 @@ class _Known:
         return np.concatenate([residual, off]), np.concatenate([jacobian, rows])
 
     def standard(self, model: Model, theta: Array) -> tuple[Array, Array]:
-        """Each parameter in deviations of its prior, and its change by a deviation."""
+        """Parameters of a weighed model in prior deviations, and their change by a deviation."""
         values = [(prior, float(theta[model.index(name)])) for name, prior in self.priors.items()]
         return np.array([p.standard(x) for p, x in values]), np.array([p.slope(x) for p, x in values])
 
 
 def _evidence(model: Model, known: _Known) -> tuple[float, float]:
-    """Evidence by Laplace's method about the values of the model, and the log likelihood there.
+    """Evidence to weigh a model by Laplace's method, and its log likelihood.
 
     In deviations ``z`` of the priors: ``l - z'z/2 - ln det(1 + J'J)/2``, with the share of each parameter's bell that
     is possible, after the records and before.
@@ -202,7 +202,7 @@ def _evidence(model: Model, known: _Known) -> tuple[float, float]:
 
 
 def _inside(prior: Prior, own: float, width: float, pull: float) -> float:
-    """Logarithm of the share of a bell of that width within what is possible; at a bound it falls off with ``pull``."""
+    """Log-share of a bell within what is possible, to weigh models; at a bound it falls off with ``pull``."""
     low, high = prior.ends
     resting = own - low < 1e-3 * width or high - own < 1e-3 * width
     lean = pull * width if resting else 0.0

@@ -60,7 +60,7 @@ impl<P> DcMotor<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of the motor and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let mut domains = vec![
             (&self.resistance, Domain::Positive),
@@ -77,7 +77,7 @@ impl<P> DcMotor<P> {
 }
 
 impl<S: Scalar> DcMotor<S> {
-    /// Effort on the joint in N m at `current` (A), the joint turning with `rate` (rad/s).
+    /// Effort of the motor on the joint in N m at `current` (A), the joint turning with `rate` (rad/s).
     #[inline]
     pub fn effort(&self, current: S, rate: S) -> S {
         let driving = self.driving(current);
@@ -97,31 +97,31 @@ impl<S: Scalar> DcMotor<S> {
         CoulombFriction { coulomb, transition_velocity: self.transition_velocity }.resistance(S::zero(), rate)
     }
 
-    /// di/dt in A/s at `current` (A) under `voltage` (V), the joint turning with `rate` (rad/s).
+    /// Motor current rate di/dt in A/s at `current` (A) under `voltage` (V), the joint turning with `rate` (rad/s).
     #[inline]
     pub fn current_rate(&self, current: S, voltage: S, rate: S) -> S {
         (self.settled(voltage, rate) - current) / self.time_constant
     }
 
-    /// Current in A that flows for good under `voltage` (V) at `rate` (rad/s) of the joint.
+    /// Settled motor current in A under `voltage` (V) at `rate` (rad/s) of the joint.
     #[inline]
     pub fn settled(&self, voltage: S, rate: S) -> S {
         (voltage - self.back_emf * self.gear_ratio * rate) / self.resistance
     }
 
-    /// `N^2 J` in kg m^2, what the rotor adds to the inertia of the joint.
+    /// Inertia `N^2 J` in kg m^2 that the motor's rotor adds to the joint.
     #[inline]
     pub fn reflected_inertia(&self) -> S {
         self.rotor_inertia.map_or(S::zero(), |inertia| self.gear_ratio * self.gear_ratio * inertia)
     }
 
-    /// Energy of the magnetic field in J at `current` (A): `tau_e R i^2 / 2`.
+    /// Energy of the motor's magnetic field in J at `current` (A): `tau_e R i^2 / 2`.
     #[inline]
     pub fn magnetic(&self, current: S) -> S {
         self.time_constant * self.resistance * current * current * 0.5
     }
 
-    /// Power in W that becomes heat at `current` (A) and `rate` (rad/s) of the joint: in the copper, and in the gear.
+    /// Losses of the motor in W at `current` (A) and `rate` (rad/s) of the joint: in copper and gear.
     #[inline]
     pub fn losses(&self, current: S, rate: S) -> (S, S) {
         let driving = self.driving(current);

@@ -44,7 +44,7 @@ impl<P> Drive<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of a drive and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         match self {
             Self::Ideal(law) => law.domains(),
@@ -56,7 +56,7 @@ impl<P> Drive<P> {
         }
     }
 
-    /// Its type in descriptions and messages.
+    /// Type of a drive in descriptions and messages.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Ideal(_) => "ideal",
@@ -70,7 +70,7 @@ impl<P> Drive<P> {
         }
     }
 
-    /// Names of its states, in their order.
+    /// Names of a drive's states, in their order.
     pub fn states(&self) -> &'static [&'static str] {
         match self {
             Self::Ideal(_) | Self::SpringDamper(_) | Self::Table(_) | Self::Narx(_) | Self::MaxwellNarx(_) => &[],
@@ -80,12 +80,12 @@ impl<P> Drive<P> {
         }
     }
 
-    /// Whether it acts at samples of its own and holds its effort in between.
+    /// Whether a drive acts at samples of its own and holds its effort in between.
     pub fn is_sampled(&self) -> bool {
         matches!(self, Self::Narx(_) | Self::MaxwellNarx(_))
     }
 
-    /// Whether its effort follows from its input alone, without states and motion.
+    /// Whether a drive's effort follows from its input alone, without states and motion.
     pub fn is_direct(&self) -> bool {
         matches!(self, Self::Ideal(_)) || self.is_sampled()
     }

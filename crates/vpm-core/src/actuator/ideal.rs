@@ -22,12 +22,12 @@ pub struct Ideal<P> {
 }
 
 impl<P> Ideal<P> {
-    /// The same drive over another number type.
+    /// Ideal drive over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Ideal<T> {
         Ideal { gain: f(&self.gain), limit: self.limit.as_ref().map(|limit| limit.map(f)) }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of the ideal drive and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let mut domains = vec![(&self.gain, Domain::Any)];
         domains.extend(self.limit.as_ref().map(|limit| (&limit.limit, Domain::Positive)));
@@ -36,14 +36,14 @@ impl<P> Ideal<P> {
 }
 
 impl<S: Scalar> Ideal<S> {
-    /// Effort delivered.
+    /// Effort that the ideal drive delivers.
     #[inline]
     pub fn effort(&self, x: S) -> S {
         let effort = self.gain * x;
         self.limit.map_or(effort, |limit| limit.apply(effort))
     }
 
-    /// Change of the effort per change of `x`: nothing beyond the limit.
+    /// Slope of the ideal drive's effort by `x`: nothing beyond the limit.
     #[inline]
     pub fn slope(&self, x: S) -> S {
         let Some(limit) = self.limit else { return self.gain };

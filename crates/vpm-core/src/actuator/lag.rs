@@ -25,13 +25,14 @@ impl<P> Lag<P> {
 }
 
 impl<S: Scalar> Lag<S> {
-    /// dx/dt at state `x` under command `w`.
+    /// Rate dx/dt of a lag at state `x` under command `w`.
     #[inline]
     pub fn rate(&self, x: S, w: S) -> S {
         (w - x) / self.time_constant
     }
 
-    /// State after, and mean state over, an interval `time_step` (s) with constant command `w`, from state `x`.
+    /// Lag over an interval `time_step` (s) with constant command `w`: state after it, and mean state. It starts from
+    /// state `x`.
     #[inline]
     pub fn interval(&self, x: S, w: S, time_step: f64) -> (S, S) {
         let decay_less_one = (-(self.time_constant.recip() * time_step)).exp_m1();

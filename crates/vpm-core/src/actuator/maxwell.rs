@@ -27,7 +27,7 @@ pub struct Maxwell<P> {
 }
 
 impl<P> Maxwell<P> {
-    /// The same law over another number type.
+    /// Maxwell element over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Maxwell<T> {
         let Self { stiffness, free_length, fast_stiffness, relaxation_time } = self;
         Maxwell {
@@ -38,7 +38,7 @@ impl<P> Maxwell<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of the Maxwell element and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let Self { stiffness, free_length, fast_stiffness, relaxation_time } = self;
         vec![
@@ -51,26 +51,28 @@ impl<P> Maxwell<P> {
 }
 
 impl<S: Scalar> Maxwell<S> {
-    /// Force in N that pulls the ends together, at length `s` (m) with the damper stretched by `x` (m).
+    /// Force in N of the Maxwell element, at length `s` (m) with the damper stretched by `x` (m). It pulls the ends
+    /// together.
     #[inline]
     pub fn force(&self, s: S, x: S) -> S {
         let stretch = s - self.free_length;
         self.stiffness * stretch + self.fast_stiffness * (stretch - x)
     }
 
-    /// dx/dt in m/s.
+    /// Rate dx/dt of the Maxwell element's damper in m/s.
     #[inline]
     pub fn rate(&self, s: S, x: S) -> S {
         (s - self.free_length - x) / self.relaxation_time
     }
 
-    /// Stretch of the damper (m) at which nothing flows any more at length `s` (m): the state of an element that has stood.
+    /// Settled stretch (m) of the Maxwell element's damper at length `s` (m): the state after standing.
     #[inline]
     pub fn settled(&self, s: S) -> S {
         s - self.free_length
     }
 
-    /// Force (N) after an interval `time_step` (s) in which the length goes evenly from `start` to `end` (m), from `force` (N).
+    /// Force (N) of the Maxwell element after an interval `time_step` (s), from `force` (N). The length goes evenly
+    /// from `start` to `end` (m).
     #[inline]
     pub fn interval(&self, force: S, start: S, end: S, time_step: f64) -> S {
         let inverse = self.relaxation_time.recip() * time_step;
@@ -80,14 +82,14 @@ impl<S: Scalar> Maxwell<S> {
         self.stiffness * (end - self.free_length) + fast * (decay_less_one + 1.0) + built
     }
 
-    /// Energy in both springs in J.
+    /// Energy in both springs of the Maxwell element in J.
     #[inline]
     pub fn potential(&self, s: S, x: S) -> S {
         let stretch = s - self.free_length;
         (self.stiffness * stretch * stretch + self.fast_stiffness * (stretch - x) * (stretch - x)) * 0.5
     }
 
-    /// Power in W that the damper takes: `k_1 (s - s_0 - x)^2 / tau`.
+    /// Power in W that the Maxwell element's damper takes: `k_1 (s - s_0 - x)^2 / tau`.
     #[inline]
     pub fn dissipation(&self, s: S, x: S) -> S {
         let fast = s - self.free_length - x;

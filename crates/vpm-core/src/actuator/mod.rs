@@ -72,7 +72,7 @@ pub struct Actuator<P> {
     pub friction: Option<LoadDependentFriction<P>>,
 }
 
-/// A missing link (the derive would ask for `P: Default`).
+/// Missing link of an actuator (the derive would ask for `P: Default`).
 fn none<T>() -> Option<T> {
     None
 }
@@ -92,7 +92,7 @@ impl<P> Actuator<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of an actuator and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let mut domains = self.drive.domains();
         domains.extend(self.delay.as_ref().map(|link| (&link.time, Domain::NonNegative)));
@@ -103,24 +103,25 @@ impl<P> Actuator<P> {
         domains
     }
 
-    /// Names of its states, in their order: that of the lag, then those of the drive.
+    /// Names of an actuator's states, in their order: that of the lag, then those of the drive.
     pub fn states(&self) -> impl Iterator<Item = &'static str> {
         self.lag.as_ref().map(|_| "lag").into_iter().chain(self.drive.states().iter().copied())
     }
 
-    /// Whether its effort follows from its input alone, without states of the drive and motion.
+    /// Whether an actuator's effort follows from its input alone, without drive states and motion.
     pub fn is_direct(&self) -> bool {
         self.drive.is_direct() && self.friction.is_none()
     }
 
-    /// Number of its states.
+    /// Number of an actuator's states.
     pub fn n_states(&self) -> usize {
         usize::from(self.lag.is_some()) + self.drive.states().len()
     }
 }
 
 impl<S: Scalar> Actuator<S> {
-    /// What enters the lag over the interval that begins at sample `k`: the held command after delay, dead zone and saturation.
+    /// Input of an actuator's lag over the interval from sample `k`: the held command after all before it. That is
+    /// delay, dead zone and saturation.
     #[inline]
     pub fn input(&self, k: usize, time_step: f64, command: impl Fn(usize) -> S) -> S {
         self.enter(match &self.delay {
@@ -129,7 +130,7 @@ impl<S: Scalar> Actuator<S> {
         })
     }
 
-    /// What enters the lag of a command that has arrived: what dead zone and saturation leave.
+    /// Input of an actuator's lag from an arrived command: what dead zone and saturation leave.
     #[inline]
     pub fn enter(&self, arrived: S) -> S {
         let mut input = arrived;
@@ -150,7 +151,7 @@ impl<S: Scalar> Actuator<S> {
         self.friction.as_ref().map_or_else(S::zero, |law| -law.effort_under(S::zero(), rate, force))
     }
 
-    /// Resistance of all that rubs in it at `rate`, the chord from rest, where its drive gives `force` at rest.
+    /// Friction resistance of an actuator at `rate`: the chord from rest, where its drive gives `force` at rest.
     pub(crate) fn resistance(&self, force: S, rate: S) -> S {
         let own = match &self.drive {
             Drive::Hydraulic(law) => law.cylinder.seal.resistance(rate),

@@ -16,14 +16,14 @@ pub struct Saturation<P> {
 }
 
 impl<P> Saturation<P> {
-    /// The same limit over another number type.
+    /// Saturation over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Saturation<T> {
         Saturation { limit: f(&self.limit) }
     }
 }
 
 impl<S: Scalar> Saturation<S> {
-    /// The command within its limits.
+    /// Command after saturation, within its limits.
     #[inline]
     pub fn apply(&self, command: S) -> S {
         let below = || command.if_less(-self.limit, || -self.limit, || command);

@@ -21,13 +21,13 @@ pub struct SpringDamper<P> {
 }
 
 impl<P> SpringDamper<P> {
-    /// The same law over another number type.
+    /// Spring-damper over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> SpringDamper<T> {
         let Self { stiffness, free_length, damping } = self;
         SpringDamper { stiffness: f(stiffness), free_length: f(free_length), damping: f(damping) }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of the spring-damper and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let Self { stiffness, free_length, damping } = self;
         vec![(stiffness, Domain::Any), (free_length, Domain::Any), (damping, Domain::Any)]
@@ -35,7 +35,7 @@ impl<P> SpringDamper<P> {
 }
 
 impl<S: Scalar> SpringDamper<S> {
-    /// Force in N that pushes the ends apart, at length `s` (m) and its rate (m/s).
+    /// Force in N of the spring-damper that pushes the ends apart, at length `s` (m) and its rate (m/s).
     #[inline]
     pub fn force(&self, s: S, rate: S) -> S {
         self.stiffness * (self.free_length - s) - self.damping * rate

@@ -55,7 +55,7 @@ impl From<Written> for TableDrive {
     }
 }
 
-/// Slope at place `k` of an axis; `cut` where nothing may overshoot.
+/// Slope of a table at place `k` of an axis; `cut` where nothing may overshoot.
 fn node_slope(axis: &[f64], k: usize, value: impl Fn(usize) -> f64, cut: bool) -> f64 {
     let secant = |first: usize| (value(first + 1) - value(first)) / (axis[first + 1] - axis[first]);
     let last = axis.len() - 1;
@@ -86,7 +86,7 @@ fn node_slope(axis: &[f64], k: usize, value: impl Fn(usize) -> f64, cut: bool) -
 }
 
 impl TableDrive {
-    /// Effort (N or N m) under a `command` at a `velocity` (m/s or rad/s).
+    /// Effort (N or N m) of a table under a `command` at a `velocity` (m/s or rad/s).
     #[inline]
     pub fn effort<S: Scalar>(&self, command: S, velocity: S) -> S {
         let patch = |row, column| self.patch((row, command), (column, velocity));
@@ -146,7 +146,7 @@ impl TableDrive {
     }
 }
 
-/// What `of` gives for the interval of an axis where a number is, the nearest one beyond its ends.
+/// Interval of a table's axis in which a number lies, for `of`; the nearest one beyond its ends.
 #[inline]
 fn within<S: Scalar>(axis: &[f64], number: S, of: &impl Fn(usize) -> S) -> S {
     let last = axis.len() - 2;
@@ -157,7 +157,7 @@ fn within<S: Scalar>(axis: &[f64], number: S, of: &impl Fn(usize) -> S) -> S {
     of(axis.partition_point(|&node| node <= number).saturating_sub(1).min(last))
 }
 
-/// Share of interval `at` of an axis that lies below a number, held at both ends of the axis.
+/// Share of interval `at` of a table's axis below a number, held at both ends of the axis.
 #[inline]
 fn share<S: Scalar>(axis: &[f64], at: usize, number: S) -> S {
     let [low, high] = [axis[at], axis[at + 1]];
@@ -166,7 +166,7 @@ fn share<S: Scalar>(axis: &[f64], at: usize, number: S) -> S {
     if at == 0 { S::from_f64(low).if_less(number, below, S::zero) } else { below() }
 }
 
-/// What value and slope of both ends of an interval count at a share of it.
+/// Hermite weights of a table interval's end values and slopes at a share of it.
 #[inline]
 fn hermite<S: Scalar>(t: S) -> [[S; 2]; 2] {
     let (square, rest) = (t * t, -t + 1.0);

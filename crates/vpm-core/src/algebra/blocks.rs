@@ -30,7 +30,7 @@ impl<S: Scalar> BlockCholesky<S> {
         Self { dim: blocks.len(), blocks: numbers.into_iter().map(block).collect() }
     }
 
-    /// Factorises `matrix`, of which the lower triangle counts, row by row.
+    /// Factorises the blocks of `matrix`, of which the lower triangle counts, row by row.
     pub fn factorise(&mut self, matrix: &[S]) {
         let dim = self.dim;
         match &mut self.blocks[..] {
@@ -43,7 +43,7 @@ impl<S: Scalar> BlockCholesky<S> {
         }
     }
 
-    /// Replaces `b` by the solution x of `A x = b`.
+    /// Solves `A x = b` by blocks: x takes the place of `b`.
     pub fn solve(&self, b: &mut [S]) {
         match &self.blocks[..] {
             [whole] => whole.factors.solve(b),

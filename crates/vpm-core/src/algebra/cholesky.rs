@@ -14,18 +14,18 @@ pub struct Cholesky<S> {
 }
 
 impl<S: Scalar> Cholesky<S> {
-    /// Buffer for matrices of `dim` rows.
+    /// Cholesky buffer for matrices of `dim` rows.
     pub fn new(dim: usize) -> Self {
         Self { dim, lower: vec![S::zero(); dim * dim] }
     }
 
-    /// Factorises `matrix`, of which the lower triangle counts, row by row.
+    /// Cholesky factorisation of `matrix`, of which the lower triangle counts, row by row.
     pub fn factorise(&mut self, matrix: &[S]) {
         let n = self.dim;
         self.factorise_by(|row, column| matrix[row * n + column]);
     }
 
-    /// Factorises the matrix of these entries, of which the lower triangle is asked for.
+    /// Cholesky factorisation of the matrix of these entries, of which the lower triangle is asked for.
     #[inline]
     pub(super) fn factorise_by(&mut self, entry: impl Fn(usize, usize) -> S) {
         let n = self.dim;
@@ -42,7 +42,7 @@ impl<S: Scalar> Cholesky<S> {
         }
     }
 
-    /// Replaces `b` by the solution x of `A x = b`.
+    /// Solves `A x = b` by Cholesky factors: x takes the place of `b`.
     pub fn solve(&self, b: &mut [S]) {
         let n = self.dim;
         for row in 0..n {
@@ -72,7 +72,7 @@ impl<S: Scalar> Cholesky<S> {
         }
     }
 
-    /// The square of the pivot of a row: what is left of its diagonal entry after the rows before it.
+    /// Square of a row's Cholesky pivot: its diagonal entry less the rows before it.
     pub fn pivot(&self, row: usize) -> S {
         let inverse = self.lower[row * self.dim + row];
         (inverse * inverse).recip()

@@ -10,7 +10,8 @@ pub const LARGE: usize = 64;
 /// QR sweeps before an eigenproblem counts as lost.
 const SWEEPS: usize = 10_000;
 
-/// Eigenvalues of a square matrix in any order; none if the QR algorithm does not converge or an entry is not finite.
+/// Eigenvalues of a dense square matrix in any order. There are none if the QR algorithm does not converge or an entry
+/// is not finite.
 pub fn eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     if matrix.iter().any(|entry| !entry.is_finite()) {
         return None;
@@ -23,7 +24,7 @@ pub fn eigenvalues(matrix: DMatrix<f64>) -> Option<Vec<Complex<f64>>> {
     Some(values.into_iter().map(|value| Complex::new(value.re, value.im)).collect())
 }
 
-/// The x of `A x = b`; none for a matrix that is singular to rounding.
+/// Solution x of the dense system `A x = b`; none for a matrix that is singular to rounding.
 pub fn solve(matrix: &DMatrix<f64>, right: &DVector<f64>) -> Option<DVector<f64>> {
     let found = if matrix.nrows() < LARGE {
         matrix.clone().lu().solve(right)?

@@ -3,7 +3,8 @@
 /// A coefficient below this fraction of the largest one is rounding left over from terms that cancel.
 const CANCELLED: f64 = 1e-12;
 
-/// Both real roots of `c0 + c1 x + c2 x^2`, the larger one first; none if they are complex or `c2` is zero.
+/// Real roots of the polynomial `c0 + c1 x + c2 x^2`, the larger one first. There are none if they are complex or `c2`
+/// is zero.
 ///
 /// Law: the larger root in size without cancellation, the other one from their product (Press et al. 2007, "Numerical
 /// Recipes", section 5.6).

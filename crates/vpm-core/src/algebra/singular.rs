@@ -43,7 +43,8 @@ impl SingularValues {
     }
 }
 
-/// Turns two columns, and what belongs to them, so that the columns become orthogonal; their cosine before that.
+/// Jacobi turn for singular values: two columns become orthogonal; returns their cosine before that. What belongs to
+/// the columns turns too.
 fn orthogonalise(left: &mut (Vec<f64>, Vec<f64>), right: &mut (Vec<f64>, Vec<f64>)) -> f64 {
     let (a, b, product) = (dot(&left.0, &left.0), dot(&right.0, &right.0), dot(&left.0, &right.0));
     let size = (a * b).sqrt();
@@ -64,7 +65,7 @@ fn dot(left: &[f64], right: &[f64]) -> f64 {
     left.iter().zip(right).map(|(l, r)| l * r).sum()
 }
 
-/// Determinant of the square matrix with these columns, by elimination with column pivoting.
+/// Determinant of the matrix with these columns, by elimination: zero if it is singular. With column pivoting.
 pub fn determinant(columns: &[Vec<f64>]) -> f64 {
     let mut a = columns.to_vec();
     let mut product = 1.0;
@@ -88,7 +89,8 @@ pub fn determinant(columns: &[Vec<f64>]) -> f64 {
     product
 }
 
-/// Whether all eigenvalues of a symmetric matrix have one sign and stand clear of `floor`, by elimination.
+/// Whether no eigenvalue of a symmetric matrix makes it singular or indefinite. All have one sign and stand clear of
+/// `floor`, by elimination.
 pub fn is_definite(matrix: &[Vec<f64>], floor: f64) -> bool {
     let sign = matrix.first().and_then(|row| row.first()).map_or(0.0, |entry| entry.signum());
     let mut a: Vec<Vec<f64>> = matrix.iter().map(|row| row.iter().map(|entry| sign * entry).collect()).collect();

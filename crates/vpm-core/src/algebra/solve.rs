@@ -5,7 +5,8 @@ use crate::scalar::Scalar;
 /// A pivot below this fraction of its row's largest entry counts as zero.
 const SINGULAR: f64 = 1e-13;
 
-/// The x of `A x = b`; for a singular matrix instead the smallest pivot, as a fraction of its row's largest entry.
+/// Solves `A x = b` for a matrix of known size. For a singular matrix it gives the smallest pivot, as a fraction of its
+/// row's largest entry.
 ///
 /// Law: Gaussian elimination with scaled row pivoting (Golub & Van Loan 2013, "Matrix Computations", section 3.4): rows
 /// may have different units. Allocates nothing.
@@ -33,7 +34,7 @@ pub fn solve<S: Scalar, const N: usize>(mut a: [[S; N]; N], mut b: [S; N]) -> Re
     Ok(b)
 }
 
-/// Subtracts multiples of row `column` from the rows below, so that they are zero in `column`.
+/// Elimination to solve a system: rows below become zero in `column` by multiples of that row.
 fn eliminate<S: Scalar, const N: usize>(a: &mut [[S; N]; N], b: &mut [S; N], column: usize) {
     let (pivot_row, pivot_right) = (a[column], b[column]);
     for row in column + 1..N {

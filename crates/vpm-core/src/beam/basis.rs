@@ -26,7 +26,7 @@ enum Kind {
 }
 
 impl Basis {
-    /// The Bernstein polynomials of a Bezier curve whose first `clamped` control points are fixed at zero.
+    /// Basis of Bernstein polynomials of a Bezier curve whose first `clamped` control points are fixed at zero.
     ///
     /// Two fixed points hold place and direction at the root (shear-rigid beams), one holds the place (fields of shear-flexible
     /// beams), none leaves all free. Law: `B_k = C(n, k) x^k (1 - x)^(n - k)`, `x = mu / L`, and
@@ -36,13 +36,14 @@ impl Basis {
         Self::new(length, Kind::Bernstein { degree, clamped })
     }
 
-    /// Cubic Hermite elements of equal length, clamped at the root: the coordinates are deflection and slope of each further node.
+    /// Basis of cubic Hermite elements of equal length, clamped at the root. The coordinates are deflection and slope
+    /// of each further node.
     pub fn hermite(length: f64, elements: usize) -> Result<Self> {
         within("the number of Hermite elements", elements, 1, 1000)?;
         Self::new(length, Kind::Hermite { elements })
     }
 
-    /// Piecewise linear functions on elements of equal length, one for each node but the first `clamped` (0 or 1).
+    /// Basis of piecewise linear functions on equal elements, one for each node but the first `clamped` (0 or 1).
     pub fn linear(length: f64, elements: usize, clamped: usize) -> Result<Self> {
         within("the number of linear elements", elements, 1, 1000)?;
         within("the clamped nodes of linear elements", clamped, 0, 1)?;
@@ -55,7 +56,7 @@ impl Basis {
         Self::new(length, Kind::Legendre { count })
     }
 
-    /// Powers `(mu / L)^k`, `k = 0 .. count-1`.
+    /// Basis of powers `(mu / L)^k`, `k = 0 .. count-1`.
     pub fn monomial(length: f64, count: usize) -> Result<Self> {
         within("the number of monomials", count, 1, 13)?;
         Self::new(length, Kind::Monomial { count })
@@ -72,12 +73,12 @@ impl Basis {
         Ok(Self { length, kind })
     }
 
-    /// Length of the beam in m.
+    /// Length in m of the beam that the basis spans.
     pub fn length(&self) -> f64 {
         self.length
     }
 
-    /// How many functions there are.
+    /// Number of functions of the basis.
     pub fn len(&self) -> usize {
         match &self.kind {
             Kind::Bernstein { degree, clamped } => degree + 1 - clamped,
@@ -88,12 +89,12 @@ impl Basis {
         }
     }
 
-    /// Whether there is no function at all.
+    /// Whether the basis has no function at all.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Arc lengths between which every function is one polynomial, in m, root and tip included.
+    /// Breaks of the basis in m, root and tip included: between them every function is one polynomial.
     pub fn breaks(&self) -> Vec<f64> {
         match &self.kind {
             Kind::Hermite { elements } | Kind::Linear { elements, .. } => {
@@ -104,7 +105,7 @@ impl Basis {
         }
     }
 
-    /// Points a Gauss rule needs on each piece to integrate a product of two functions exactly.
+    /// Points that a Gauss rule needs on each piece to integrate a product of two basis functions exactly.
     pub fn points(&self) -> usize {
         match &self.kind {
             Kind::Bernstein { degree, .. } => degree + 1,
@@ -115,7 +116,7 @@ impl Basis {
         }
     }
 
-    /// The functions at `mu` (m), differentiated `order` times, in 1/m^order.
+    /// Evaluates the basis functions at `mu` (m), differentiated `order` times, in 1/m^order.
     pub fn evaluate(&self, mu: f64, order: usize) -> Vec<f64> {
         let x = mu / self.length;
         let scale = self.length.powi(-(order as i32));
@@ -144,7 +145,7 @@ fn within(setting: &'static str, value: usize, least: usize, most: usize) -> Res
     Err(Error::Setting { setting, condition, value: value as f64, repair: "choose another basis or another size" })
 }
 
-/// The Bernstein polynomial `k` of degree `n`, differentiated `order` times with respect to x.
+/// Basis function: the Bernstein polynomial `k` of degree `n`, differentiated `order` times by x.
 fn bernstein(n: usize, k: usize, order: usize, x: f64) -> f64 {
     if k > n {
         return 0.0;
@@ -160,7 +161,7 @@ fn bernstein(n: usize, k: usize, order: usize, x: f64) -> f64 {
     n as f64 * (left - bernstein(n - 1, k, order - 1, x))
 }
 
-/// Shifted Legendre polynomials, differentiated `order` times with respect to x in [0, 1].
+/// Basis functions: shifted Legendre polynomials, differentiated `order` times by x in [0, 1].
 ///
 /// Law: `(n + 1) P_(n+1) = (2n + 1) t P_n - n P_(n-1)` and `P_(n+1)' = P_(n-1)' + (2n + 1) P_n`, `t = 2x - 1`.
 fn legendre(count: usize, order: usize, x: f64) -> Vec<f64> {
@@ -189,7 +190,7 @@ fn monomial(power: usize, order: usize, x: f64) -> f64 {
     factor * x.powi((power - order) as i32)
 }
 
-/// Hermite functions of all nodes but the root, as polynomials of their element.
+/// Basis functions: Hermite functions of all nodes but the root, as polynomials of their element.
 fn hermite(length: f64, elements: usize, mu: f64, order: usize) -> Vec<f64> {
     let size = length / elements as f64;
     let element = ((mu / size) as usize).min(elements - 1);
@@ -206,7 +207,7 @@ fn hermite(length: f64, elements: usize, mu: f64, order: usize) -> Vec<f64> {
     row.split_off(2)
 }
 
-/// Hat functions of all nodes but the first `clamped`; at a node the slope is that of the element after it.
+/// Basis functions: hats of all nodes but the first `clamped`. At a node the slope is that of the element after it.
 fn linear(length: f64, elements: usize, clamped: usize, (mu, order): (f64, usize)) -> Vec<f64> {
     let size = length / elements as f64;
     let element = ((mu / size) as usize).min(elements - 1);

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::scalar::Scalar;
 
 impl Level {
-    /// The number that comes with the level, its bounds, and the sentence that names them.
+    /// Range to check for a level's number: name, bounds, and the sentence that names them.
     fn range(self) -> Option<(usize, usize, usize, &'static str)> {
         match self {
             Self::Rigid => None,
@@ -25,8 +25,8 @@ impl Level {
 }
 
 impl<S: Scalar> BeamEntry<S> {
-    /// Whether the beam exists: positive length and sections, a level in its range, at least one component, places on the axis,
-    /// damping that takes energy out.
+    /// Checks whether the beam can exist as described. It needs positive length and sections, a level in its range, at
+    /// least one component, places on the axis, and damping that takes energy out.
     pub fn check(&self) -> Result<()> {
         positive(&format!("{}.length", self.name), self.length)?;
         match &self.reduced {
@@ -59,12 +59,12 @@ impl<S: Scalar> BeamEntry<S> {
         }
     }
 
-    /// An error of a number of this beam, called `{name}.{what}`.
+    /// Error of the check of one number of this beam, called `{name}.{what}`.
     pub(super) fn domain(&self, what: &str, condition: &'static str, value: f64) -> Error {
         Error::Domain { path: format!("{}.{what}", self.name), condition, value }
     }
 
-    /// Whether a place along the axis lies on the beam.
+    /// Checks whether a place along the axis lies on the beam.
     pub(super) fn check_place(&self, what: &str, at: f64) -> Result<()> {
         // Places that a length was computed for may miss the tip by rounding.
         if at >= 0.0 && at <= self.length * (1.0 + 1e-12) {
@@ -112,7 +112,7 @@ impl<S: Scalar> BeamEntry<S> {
         Ok(())
     }
 
-    /// Whether a section given by its moduli has those that its beam shears with.
+    /// Checks whether a section given by its moduli has those that its beam shears with.
     fn check_shear(&self, shape: &Shape<S>, what: &str) -> Result<()> {
         let Shape::Stiffness(moduli) = shape else { return Ok(()) };
         let shears = [("shear_x", Component::ShearX, moduli.shear_x), ("shear_y", Component::ShearY, moduli.shear_y)];
@@ -144,7 +144,7 @@ impl<S: Scalar> BeamEntry<S> {
         Ok(())
     }
 
-    /// Puts the name of the beam, and of the section, in front of a parameter's.
+    /// Names beam and section before a parameter in an error of the check.
     fn named(&self, error: Error, section: &str) -> Error {
         let full = |path: String| match (path.strip_prefix("section."), path.strip_prefix("material.")) {
             (Some(size), _) => format!("{}.{section}.{size}", self.name),

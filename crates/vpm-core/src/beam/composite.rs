@@ -68,7 +68,7 @@ fn none<P>() -> Option<P> {
 }
 
 impl<P> Laminate<P> {
-    /// The same layers over another parameter type.
+    /// Composite section of the same layers over another parameter type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Laminate<T> {
         let width = f(&self.width);
         let layer = |layer: &Layer<P>| Layer { thickness: f(&layer.thickness), material: layer.material.map(f) };
@@ -77,7 +77,7 @@ impl<P> Laminate<P> {
 }
 
 impl<P> Moduli<P> {
-    /// The same numbers over another parameter type.
+    /// Moduli of the same composite section over another parameter type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Moduli<T> {
         Moduli {
             bending_x: f(&self.bending_x),
@@ -94,7 +94,8 @@ impl<P> Moduli<P> {
 }
 
 impl<S: Scalar> Moduli<S> {
-    /// The section. Where no shear is given the beam is rigid in it, and any number stands there.
+    /// Composite section from measured or computed moduli. Where no shear is given the beam is rigid in it, and any
+    /// number stands there.
     pub(super) fn section(&self) -> Result<Section<S>> {
         let shear = [self.shear_x, self.shear_y].map(|shear| shear.unwrap_or(self.extension));
         let stiffness = [self.bending_x, self.bending_y, self.torsion, shear[0], shear[1], self.extension];
@@ -122,7 +123,8 @@ struct Ply<S> {
 }
 
 impl<S: Scalar> Laminate<S> {
-    /// The section. Its axis runs through the neutral axis, where a force along it does not bend; the centre of mass may lie beside it.
+    /// Composite section from glued layers. Its axis runs through the neutral axis, where a force along it does not
+    /// bend; the centre of mass may lie beside it.
     ///
     /// Law: parallel axes, with the moduli as weights. Shear along y stores what the stress of equilibrium stores, `1 / GA = 1 / EJ^2
     /// int Q^2 / (G b) dy` with `Q = int E y b dy`; along x each layer carries 5/6 of its area. Sources: Bert 1973, "Simplified analysis of
@@ -171,7 +173,7 @@ impl<S: Scalar> Laminate<S> {
     }
 }
 
-/// Shear stiffness through the layers.
+/// Shear stiffness of a composite section through the layers.
 fn shear_along<S: Scalar>(plies: &[Ply<S>], width: S, neutral: S, bending: S) -> S {
     let (mut flow, mut energy) = (S::zero(), S::zero());
     for ply in plies {
@@ -188,7 +190,7 @@ fn shear_along<S: Scalar>(plies: &[Ply<S>], width: S, neutral: S, bending: S) ->
     bending * bending / energy
 }
 
-/// Torsional stiffness of the whole block.
+/// Torsional stiffness of a composite section as a whole block.
 ///
 /// Law: Prandtl's stress function, `div(grad phi / G) = -2`, zero at the edge, `GJ = 2 int phi dA`, as a cosine series across the width:
 /// in a layer `f = p + A cosh + B sinh`, continuous with `f' / G` from layer to layer. The terms of far ends, `1 / n^5`, are summed in
@@ -207,7 +209,8 @@ fn torsion<S: Scalar>(plies: &[Ply<S>], width: S) -> S {
     width.powi(3) * (walls / 3.0 + width * series * (32.0 / PI.powi(5)))
 }
 
-/// `sum (u_below + u_above - 2 G) tanh` over the layers, u the stress function at their faces; `sides` are the `tanh`.
+/// Term of a composite section's torsion: `sum (u_below + u_above - 2 G) tanh` over the layers. u is the stress
+/// function at their faces; `sides` are the `tanh`.
 fn term<S: Scalar>(plies: &[Ply<S>], sides: &[S]) -> S {
     // u is zero at both outer faces; between them a tridiagonal system, solved from below.
     let own = |k: usize| {

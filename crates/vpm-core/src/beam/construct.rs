@@ -32,7 +32,8 @@ enum Order {
     Second,
 }
 
-/// Whether the poses of the sections are integrated from the strain, exact at any deflection; elsewhere they are right to second order.
+/// Whether a constructed beam integrates poses from the strain, exact at any deflection. Elsewhere they are right to
+/// second order.
 fn integrated(level: Level) -> bool {
     matches!(level, Level::Strain(_) | Level::Elements(_) | Level::Bezier(_))
 }
@@ -52,12 +53,13 @@ impl Place {
 }
 
 impl<S: Scalar> Beam<S> {
-    /// The beam of an entry with additional stations at the arc lengths `marks` (m). Checked: as by [`BeamEntry::check`], marks on the beam.
+    /// Constructs the beam of an entry with additional stations at the arc lengths `marks` (m). Checked: as by
+    /// [`BeamEntry::check`], marks on the beam.
     pub fn new(entry: &BeamEntry<S>, marks: &[f64]) -> Result<Self> {
         Self::of_order(entry, marks, Order::Second)
     }
 
-    /// As [`Beam::new`], but with a deflection that is linear in the coordinates: nothing that is of second order in it. Rigid beams have no
+    /// Constructs a beam as [`Beam::new`], but with a deflection that is linear in the coordinates. Rigid beams have no
     /// deflection, and the hinges of lumped ones no terms of second order apart from the others: those are as they are.
     pub fn first_order(entry: &BeamEntry<S>, marks: &[f64]) -> Result<Self> {
         Self::of_order(entry, marks, Order::First)
@@ -82,7 +84,7 @@ impl<S: Scalar> Beam<S> {
         }
     }
 
-    /// A beam whose strain or deflection is interpolated.
+    /// Constructs a beam whose strain or deflection is interpolated.
     fn smooth(entry: &BeamEntry<S>, profile: &Profile<S>, marks: &[f64], order: Order) -> Result<Self> {
         let field = |&component| Ok(Field { component, basis: basis(entry.level, component, entry.length)? });
         let mut list = entry.deforms.iter().map(field).collect::<Result<Vec<_>>>()?;
@@ -140,7 +142,7 @@ impl<S: Scalar> Beam<S> {
         beam.damped(entry, &groups)
     }
 
-    /// A beam of rigid segments, or a rigid one.
+    /// Constructs a beam of rigid segments, or a rigid one.
     fn segmented(
         entry: &BeamEntry<S>,
         profile: &Profile<S>,
@@ -185,7 +187,7 @@ impl<S: Scalar> Beam<S> {
         beam.damped(entry, &groups)
     }
 
-    /// The first modes of a reduced solid: its point masses, then the interfaces that carry something.
+    /// Constructs the first modes of a reduced solid: its point masses, then the interfaces that carry something.
     fn reduced(entry: &BeamEntry<S>, reduced: &Reduced, marks: &[f64], order: Order) -> Result<Self> {
         let n = if let Level::Reduced(n) = entry.level { n } else { 0 };
         let (solid, quadratic) = (reduced.solid(), order == Order::Second);
@@ -239,7 +241,7 @@ impl<S: Scalar> Beam<S> {
     }
 }
 
-/// From the first entry of a row that is not zero to behind the last one.
+/// Range of a constructed matrix row from the first entry that is not zero to behind the last one.
 fn filled<S: Scalar>(row: &[S]) -> Range<usize> {
     // Moduli are positive, so that only shapes which do not overlap give zeros.
     let filled = |entry: &S| entry.inspect() != 0.0;
@@ -247,7 +249,8 @@ fn filled<S: Scalar>(row: &[S]) -> Range<usize> {
     first..row.iter().rposition(filled).map_or(first, |last| last + 1)
 }
 
-/// Coordinates that couple at rest: in a straight beam with its mass on the axis each bending with the shear of its plane, else all.
+/// Groups of coordinates that couple at rest in a constructed beam. In a straight beam with its mass on the axis each
+/// bending couples with the shear of its plane, else all do.
 fn groups<S: Scalar>(profile: &Profile<S>, of: impl Fn(Component) -> Vec<usize>) -> Vec<Vec<usize>> {
     if profile.is_eccentric() || !profile.rest().is_straight() {
         let mut all: Vec<usize> = Component::ALL.into_iter().flat_map(of).collect();
@@ -263,7 +266,7 @@ fn groups<S: Scalar>(profile: &Profile<S>, of: impl Fn(Component) -> Vec<usize>)
     ]
 }
 
-/// Stations and marks, root to tip, and the place of each mark in the list.
+/// Stations and marks of a constructed beam, root to tip, and the place of each mark in the list.
 fn merged(mut places: Vec<Place>, marks: &[f64]) -> (Vec<Place>, Vec<usize>) {
     for &at in marks {
         if !places.iter().any(|place| place.at == at) {

@@ -10,7 +10,8 @@ use crate::scalar::Scalar;
 /// Newton steps on a mode: each makes one more order of derivatives exact, starting from exact values.
 const STEPS: usize = 3;
 
-/// `D = beta K + alpha M + sum_k 2 zeta_k omega_k (M a_k)(M a_k)^T`, row by row; `groups` are coordinates that may couple at rest.
+/// Damping matrix `D = beta K + alpha M + sum_k 2 zeta_k omega_k (M a_k)(M a_k)^T`, row by row. `groups` are
+/// coordinates that may couple at rest.
 ///
 /// Source: Caughey & O'Kelly 1965, "Classical normal modes in damped linear dynamic systems", J. Appl. Mech. 32, for modal damping with
 /// modes `a_k` of unit modal mass. Ratios of modes that a coarse level does not have damp nothing, so that a beam can change its level.
@@ -51,8 +52,8 @@ struct Mode<S> {
     shape: Vec<S>,
 }
 
-/// All modes, slowest first. Modes of one group differ in frequency, so that each has its derivatives; two groups may share one, as
-/// both planes of a round beam do.
+/// Modes of the clamped beam for its damping, slowest first. Modes of one group differ in frequency, so that each has
+/// its derivatives; two groups may share one, as both planes of a round beam do.
 fn clamped_modes<S: Scalar>(stiffness: &[S], mass: &[S], groups: &[Vec<usize>]) -> Result<Vec<Mode<S>>> {
     let n = groups.iter().map(Vec::len).sum::<usize>();
     let mut all = Vec::with_capacity(n);
@@ -70,7 +71,7 @@ fn clamped_modes<S: Scalar>(stiffness: &[S], mass: &[S], groups: &[Vec<usize>]) 
     Ok(all)
 }
 
-/// Modes of `K a = omega^2 M a` with derivatives.
+/// Modes of `K a = omega^2 M a` with derivatives, for modal damping.
 ///
 /// Law: Newton's method on `K a - s M a = 0`, `1 - a^T M a = 0` from the values of the modes, its matrix that of the values alone: the
 /// residual of the values is zero, so each step makes one order of derivatives exact (Griewank & Walther 2008, section 15.1).
@@ -92,7 +93,7 @@ fn modes<S: Scalar>(stiffness: &[S], mass: &[S], n: usize) -> Result<Vec<Mode<S>
     Ok(all)
 }
 
-/// The inverse of `[K - s M, -M a; -(M a)^T, 0]`.
+/// Inverse of `[K - s M, -M a; -(M a)^T, 0]`, for derivatives of modal damping.
 fn bordered(k: &DMatrix<f64>, m: &DMatrix<f64>, square: f64, shape: &DVector<f64>) -> Result<DMatrix<f64>> {
     let n = shape.len();
     let momentum = m * shape;

@@ -14,7 +14,7 @@ pub struct Modes {
     pub shapes: DMatrix<f64>,
 }
 
-/// Solves `K a = omega^2 M a`.
+/// Eigenmodes of `K a = omega^2 M a`.
 ///
 /// Law: with `M = L L^T` the problem becomes that of the symmetric `L^-1 K L^-T` (Golub & Van Loan 2013, "Matrix Computations",
 /// algorithm 8.7.1). Checked: both matrices of one size, K finite, M positive definite. Of K the symmetric part counts.
@@ -40,7 +40,7 @@ pub fn modes(stiffness: &DMatrix<f64>, mass: &DMatrix<f64>) -> Result<Modes> {
     Ok(Modes { frequencies, shapes })
 }
 
-/// Solves `K q = f` for a symmetric positive definite K.
+/// Solves `K q = f` for a symmetric positive definite K of an eigenproblem.
 pub fn solve(stiffness: &DMatrix<f64>, load: &DVector<f64>) -> Result<DVector<f64>> {
     Ok(factor(stiffness)?.solve(load))
 }

@@ -73,12 +73,12 @@ pub struct SectionEntry<P> {
 }
 
 impl<P> SectionEntry<P> {
-    /// A section of the beam's material.
+    /// Entry of a section of the beam's material.
     pub fn new(at: f64, shape: Shape<P>) -> Self {
         Self { at, shape, material: None }
     }
 
-    /// The same section over another parameter type.
+    /// Section entry over another parameter type.
     fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> SectionEntry<T> {
         let shape = self.shape.map(f);
         SectionEntry { at: self.at, shape, material: self.material.as_ref().map(|material| material.map(f)) }
@@ -145,7 +145,7 @@ pub struct BeamEntry<P> {
 }
 
 impl<P> BeamEntry<P> {
-    /// The same beam over another parameter type.
+    /// Beam entry over another parameter type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> BeamEntry<T> {
         BeamEntry {
             name: self.name.clone(),
@@ -169,14 +169,14 @@ impl<P> BeamEntry<P> {
 }
 
 impl<S: Scalar> BeamEntry<S> {
-    /// Factors on stiffness and mass of a reduced solid: its material's `young` and `density`.
+    /// Factors in a beam entry on stiffness and mass of a reduced solid: its material's `young` and `density`.
     pub(crate) fn factors(&self) -> (S, S) {
         self.material.as_ref().map_or((S::one(), S::one()), |material| (material.young, material.density))
     }
 }
 
 impl<'de, P: DeserializeOwned> Deserialize<'de> for BeamEntry<P> {
-    /// Reads strictly, and says in which beam a mistake is.
+    /// Reads a beam entry strictly, and says in which beam a mistake is.
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let table = Map::<String, Value>::deserialize(deserializer)?;
         let name = table.get("name").and_then(Value::as_str).unwrap_or("without name").to_owned();

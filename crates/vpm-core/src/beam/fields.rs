@@ -43,27 +43,27 @@ impl Fields {
         Self { interpolated, list, components }
     }
 
-    /// How many coordinates there are.
+    /// Number of coordinates that the fields interpolate.
     pub fn len(&self) -> usize {
         self.components.len()
     }
 
-    /// Arc lengths between which all shape functions are smooth.
+    /// Breaks of the fields: arc lengths between which all shape functions are smooth.
     pub fn breaks(&self) -> Vec<f64> {
         self.list.first().map_or_else(Vec::new, |field| field.basis.breaks())
     }
 
-    /// Points a Gauss rule needs on each piece to integrate products of two shape functions exactly.
+    /// Points that a Gauss rule needs on each piece to integrate products of two fields exactly.
     pub fn points(&self) -> usize {
         self.list.iter().map(|field| field.basis.points()).max().unwrap_or(1)
     }
 
-    /// All shape functions at `mu`, differentiated `order(component)` times.
+    /// Row of the fields at `mu`: all shape functions, differentiated `order(component)` times.
     pub fn row(&self, mu: f64, order: impl Fn(Component) -> usize) -> Vec<f64> {
         self.list.iter().flat_map(|field| field.basis.evaluate(mu, order(field.component))).collect()
     }
 
-    /// The strain per unit of each coordinate at `mu`, each in its own component.
+    /// Strain fields at `mu` per unit of each coordinate, each in its own component.
     ///
     /// Law: `e = (theta_x', theta_y', theta_z', ...)`, with `theta_x = -v_y'`, `theta_y = v_x'` for the deflection by bending.
     pub fn strain_row(&self, mu: f64) -> Vec<f64> {
@@ -79,7 +79,7 @@ impl Fields {
         row
     }
 
-    /// Elastic stiffness `int Phi^T K Phi`, row by row; different components do not couple.
+    /// Elastic stiffness of the fields, `int Phi^T K Phi`, row by row; different components do not couple.
     pub fn stiffness<S: Scalar>(&self, profile: &Profile<S>) -> Result<Vec<S>> {
         let n = self.len();
         let mut stiffness = vec![S::zero(); n * n];
@@ -96,7 +96,7 @@ impl Fields {
         Ok(stiffness)
     }
 
-    /// Which coordinates couple by stiffness: those of one component.
+    /// Coordinates that couple by stiffness of the fields: those of one component.
     ///
     /// In a uniform beam with a single field those whose strains are orthogonal do not: between them stands nothing but rounding.
     fn coupled<S: Scalar>(&self, profile: &Profile<S>) -> Vec<bool> {
@@ -119,13 +119,13 @@ impl Fields {
 }
 
 impl Component {
-    /// Whether it is a curvature.
+    /// Whether a field's component is a curvature.
     pub(super) fn bends(self) -> bool {
         matches!(self, Self::BendingX | Self::BendingY)
     }
 }
 
-/// The shape functions of a component at a level that is neither rigid, lumped nor modal.
+/// Basis of a component's field at a level that is neither rigid, lumped nor modal.
 ///
 /// Deflections by bending are clamped in value and slope, the others in value; shear has a deflection of its own, so that the
 /// rotation of the section is a field of its own. Strains need no clamp: the root stands where it stands.

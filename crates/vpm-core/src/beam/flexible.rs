@@ -63,13 +63,13 @@ pub(super) enum Map {
 }
 
 impl Axis {
-    /// The exact map of strains: in a plane where it bends in one and is straight at rest, else in space.
+    /// Exact strain map of a flexible beam: in a plane if it bends in one and is straight at rest, else in space.
     pub(super) fn integrated(fields: &Fields, places: &[f64], rest: &Rest, rule: Rule) -> Self {
         let plane = if rest.is_straight() { PlaneAxis::new(fields, places, rule) } else { None };
         plane.map_or_else(|| Self::Space(SpaceAxis::new(fields, places, rest)), Self::Plane)
     }
 
-    /// Numbers of partial sums that a motion needs.
+    /// Numbers of partial sums that a flexible beam's motion needs.
     pub(super) fn scratch(&self) -> usize {
         match self {
             Self::Plane(axis) => axis.scratch(),
@@ -78,7 +78,7 @@ impl Axis {
         }
     }
 
-    /// Poses, twists and columns of all sections; their accelerations too if these are asked for, else they mean nothing.
+    /// Motion of a flexible beam's sections: poses, twists and columns, and accelerations if asked for.
     #[inline]
     pub(super) fn sweep<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>, accelerates: bool) {
         match self {
@@ -93,7 +93,7 @@ impl Axis {
 }
 
 impl<S: Scalar> Beam<S> {
-    /// How many elastic coordinates there are.
+    /// Number of elastic coordinates of a flexible beam.
     pub fn len(&self) -> usize {
         match &self.map {
             Map::Fields(fields) => fields.len(),
@@ -102,48 +102,50 @@ impl<S: Scalar> Beam<S> {
         }
     }
 
-    /// Whether there are none: the beam is rigid.
+    /// Whether a flexible beam has no elastic coordinates: it is rigid.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// How many sections there are along the axis, root to tip: those with inertia and those that carry something.
+    /// Number of sections along a flexible beam, root to tip. They have inertia or carry something.
     pub fn stations(&self) -> usize {
         self.inertia.len()
     }
 
-    /// The station of mark `i`.
+    /// Station of mark `i` on a flexible beam.
     pub fn mark(&self, i: usize) -> usize {
         self.marks[i]
     }
 
-    /// The inertia lumped at a station, in section axes; zero where a section only carries something.
+    /// Inertia lumped at a flexible beam's station, in section axes; zero where it only carries something.
     pub fn inertia(&self, station: usize) -> SpatialInertia<S> {
         self.inertia[station]
     }
 
-    /// Whether inertia is lumped at a station, of whatever size.
+    /// Whether inertia is lumped at a flexible beam's station, of whatever size.
     pub(crate) fn is_heavy(&self, station: usize) -> bool {
         self.heavy[station]
     }
 
-    /// Buffers for [`Beam::motion`], of any number type that the beam's can be lifted to.
+    /// Section buffers of a flexible beam for [`Beam::motion`], of any number type that lifts the beam's.
     pub fn sections(&self) -> Sections<S> {
         Sections::new(self.stations(), self.len(), self.axis.scratch())
     }
 
-    /// Poses, twists, accelerations and Jacobian columns of all sections at coordinates `q` and rates `v`; allocates nothing.
+    /// Motion of a flexible beam's sections at coordinates `q` and rates `v`; allocates nothing. It has poses, twists,
+    /// accelerations and Jacobian columns.
     pub fn motion(&self, q: &[S], v: &[S], out: &mut Sections<S>) {
         self.sweep(q, v, out, true);
     }
 
-    /// As [`Beam::motion`], but the accelerations only if they are asked for; else they mean nothing.
+    /// Motion of a flexible beam as [`Beam::motion`], with accelerations only if asked for; else they mean nothing.
     pub(crate) fn sweep(&self, q: &[S], v: &[S], out: &mut Sections<S>, accelerates: bool) {
         debug_assert!(q.len() == self.len() && v.len() == self.len() && out.at.len() == self.stations());
         self.axis.sweep(q, v, out, accelerates);
     }
 
-    /// As [`Beam::motion`] in what `slices` leaves out, for a root that turns with `turn` about the axis of bending; of the slices only sums.
+    /// Motion of a flexible beam outside of its `slices`, for a root that turns with `turn` about the bending axis. Of
+    /// the slices there are only sums. Else as [`Beam::motion`].
     pub(crate) fn gather(
         &self,
         motion: (&[S], &[S]),
@@ -156,7 +158,7 @@ impl<S: Scalar> Beam<S> {
         }
     }
 
-    /// The axis about which it bends, if it bends in one plane and does nothing else.
+    /// Axis about which a flexible beam bends, if it bends in one plane and does nothing else.
     pub(crate) fn bending_axis(&self) -> Option<Vector3<f64>> {
         match &self.axis {
             Axis::Plane(axis) => Some(axis.axis()),
@@ -164,7 +166,8 @@ impl<S: Scalar> Beam<S> {
         }
     }
 
-    /// The slices of a beam that bends in one plane, on a root at `root`, which moves in space or about the axis of bending alone.
+    /// Slices of a flexible beam that bends in one plane, on a root at `root`. The root moves in space or about the
+    /// axis of bending alone.
     ///
     /// Where anything else can sit there are none: at the marks.
     pub(crate) fn slices(&self, root: &Pose<f64>, spatial: bool) -> Option<Slices<S>> {
@@ -172,7 +175,8 @@ impl<S: Scalar> Beam<S> {
         Some(axis.slices(&self.inertia, |station| self.is_slice(station), (root, spatial)))
     }
 
-    /// The slices of each segment, seen from where the segment begins; none if one of them does not bend in one plane.
+    /// Slices of each segment of a flexible beam, seen from where the segment begins. There are none if one of them
+    /// does not bend in one plane.
     pub(crate) fn segment_slices(&self, spatial: bool) -> Option<Vec<Slices<S>>> {
         let of = |segment: &Segment| segment.slices(&self.inertia, |station| self.is_slice(station), spatial);
         self.segments.iter().map(of).collect()
@@ -182,33 +186,33 @@ impl<S: Scalar> Beam<S> {
         self.heavy[station] && !self.eccentric && !self.marks.contains(&station)
     }
 
-    /// The segments of the beam, root to tip: in each only some of its coordinates act.
+    /// Segments of a flexible beam, root to tip: in each only some of its coordinates act.
     pub(crate) fn segments(&self) -> &[Segment] {
         &self.segments
     }
 
-    /// The range of columns that may hold entries in row `row` of stiffness and damping.
+    /// Range of columns that may hold entries in row `row` of a flexible beam's stiffness and damping.
     #[inline]
     pub(crate) fn couplings(&self, row: usize) -> Range<usize> {
         self.couplings[row].clone()
     }
 
-    /// Elastic stiffness, row by row.
+    /// Elastic stiffness of a flexible beam, row by row.
     pub fn stiffness(&self) -> &[S] {
         &self.stiffness
     }
 
-    /// Damping, row by row.
+    /// Damping of a flexible beam, row by row.
     pub fn damping(&self) -> &[S] {
         &self.damping
     }
 
-    /// Whether it is described with any damping, of whatever size.
+    /// Whether a flexible beam is described with any damping, of whatever size.
     pub(crate) fn is_damped(&self) -> bool {
         self.damped
     }
 
-    /// The strain at `mu` (m), prepared: the map is made once, outside of hot paths.
+    /// Gauge of a flexible beam at `mu` (m): the strain map is made once, outside of hot paths.
     pub fn gauge(&self, mu: f64) -> Gauge {
         let mut entries: Vec<_> = match &self.map {
             Map::Fields(fields) => {
@@ -224,13 +228,14 @@ impl<S: Scalar> Beam<S> {
         Gauge { entries }
     }
 
-    /// The strain screw (kappa_x, kappa_y, twist, shear_x, shear_y, extension) at `mu` (m); in a loop, use [`Beam::gauge`].
+    /// Strain screw of a flexible beam at `mu` (m); in a loop, use [`Beam::gauge`]. It is (kappa_x, kappa_y, twist,
+    /// shear_x, shear_y, extension).
     pub fn strain(&self, mu: f64, q: &[S]) -> [S; 6] {
         self.gauge(mu).strain(q)
     }
 
-    /// The largest slope of the axis against its direction at the root in rad, where the map is right to first or second order in it only;
-    /// none where it is exact.
+    /// Largest slope of a flexible beam in rad, where its map is right to first or second order only. It is that of the
+    /// axis against its direction at the root; none where the map is exact.
     pub fn slope(&self, q: &[S]) -> Option<S> {
         match &self.axis {
             Axis::Deflection(axis) => Some(axis.slope(q)),
@@ -240,13 +245,14 @@ impl<S: Scalar> Beam<S> {
         }
     }
 
-    /// The slope (rad) beyond which a beam with interpolated deflection is wrong by more than 1 % of its deflection, under the hardest of
-    /// the usual loads: a force across the tip. The error goes with the square of the slope.
+    /// Slope limit (rad) of a flexible beam, beyond which interpolated deflection is wrong by more than 1 %. That share
+    /// of its deflection holds under the hardest of the usual loads: a force across the tip. The error goes with the
+    /// square of the slope.
     pub const fn slope_limit() -> f64 {
         0.147
     }
 
-    /// Where the mark `i`, at the place `at`, stands in the root frame at rest.
+    /// Place of the mark `i` of a flexible beam in the root frame at rest, for the place `at`.
     pub(crate) fn at_rest(&self, i: usize, at: f64) -> Pose<f64> {
         let place = match &self.axis {
             Axis::Reduced(axis) => axis.place(i),
@@ -255,7 +261,7 @@ impl<S: Scalar> Beam<S> {
         Pose { translation: place, ..Pose::identity() }
     }
 
-    /// Mass matrix of the clamped beam at rest, row by row.
+    /// Mass matrix of the clamped flexible beam at rest, row by row.
     pub fn mass(&self) -> Vec<S> {
         let (n, mut sections) = (self.len(), self.sections());
         let (zero, mut mass) = (vec![S::zero(); n], vec![S::zero(); n * n]);
@@ -271,7 +277,7 @@ impl<S: Scalar> Beam<S> {
         mass
     }
 
-    /// Natural frequencies (rad/s) and modes of the clamped beam alone, from the values of the parameters.
+    /// Natural frequencies (rad/s) and modes of the clamped flexible beam alone, from its parameter values.
     pub fn modes(&self) -> Result<Modes> {
         let values = |matrix: &[S]| DMatrix::from_row_iterator(self.len(), self.len(), matrix.iter().map(Scalar::re));
         eigen::modes(&values(&self.stiffness), &values(&self.mass()))

@@ -10,7 +10,8 @@ pub struct Gauge {
 }
 
 impl Gauge {
-    /// The strain screw (kappa_x, kappa_y, twist, shear_x, shear_y, extension) at coordinates `q`; allocates nothing.
+    /// Gauge reading: the strain screw at coordinates `q`; allocates nothing. It is (kappa_x, kappa_y, twist, shear_x,
+    /// shear_y, extension).
     pub fn strain<S: Scalar>(&self, q: &[S]) -> [S; 6] {
         let mut strain = [S::zero(); 6];
         for &(coordinate, component, entry) in &self.entries {
@@ -19,7 +20,7 @@ impl Gauge {
         strain
     }
 
-    /// Adds to `row` what each coordinate contributes to the sum of the components of the strain screw, each times its weight.
+    /// Adds to `row` each coordinate's contribution to a gauge: strain components times their weights.
     pub fn add_weighted(&self, weights: [f64; 6], row: &mut [f64]) {
         for &(coordinate, component, entry) in &self.entries {
             row[coordinate] += weights[component] * entry;

@@ -37,7 +37,7 @@ enum Step {
 }
 
 impl LumpedAxis {
-    /// An axis of `segments` with hinges of these components; with none of them it is rigid.
+    /// Lumped axis of `segments` with hinges of these components; with none of them it is rigid.
     pub fn new(components: &[Component], (segments, length): (usize, f64), places: &[f64], rest: &Rest) -> Self {
         let mut axis = Self { components: components.to_vec(), segments, length, steps: Vec::new() };
         let (mut here, mut next) = (0.0, 0);
@@ -63,23 +63,23 @@ impl LumpedAxis {
         }
     }
 
-    /// Where a hinge is.
+    /// Place of a hinge on a lumped beam.
     fn hinge(&self, number: usize) -> f64 {
         self.length * number as f64 / self.segments as f64
     }
 
-    /// How many coordinates there are.
+    /// Number of coordinates of a lumped beam.
     pub fn len(&self) -> usize {
         self.components.len() * self.segments
     }
 
-    /// Middles of the segments: the places of their inertia.
+    /// Middles of a lumped beam's segments: the places of their inertia.
     pub fn middles(components: &[Component], segments: usize, length: f64) -> Vec<f64> {
         let segments = if components.is_empty() { 1 } else { segments };
         (0..segments).map(|k| length * (k as f64 + 0.5) / segments as f64).collect()
     }
 
-    /// Inertia of a whole segment, in the axes of the section in its middle.
+    /// Inertia of a whole segment of a lumped beam, in the axes of the section in its middle.
     pub fn segment<S: Scalar>(profile: &Profile<S>, middle: f64, segments: usize) -> Result<SpatialInertia<S>> {
         let (half, rest) = (0.5 * profile.length() / segments as f64, profile.rest());
         let mut inertia = SpatialInertia::zero();
@@ -89,13 +89,13 @@ impl LumpedAxis {
         Ok(inertia)
     }
 
-    /// What a spring stands for: from the middle of one segment to the middle of the next, or from the clamp.
+    /// Region of a lumped beam's spring: from one segment's middle to the next, or from the clamp.
     fn region(&self, hinge: usize) -> [f64; 2] {
         let (at, half) = (self.hinge(hinge), 0.5 * self.length / self.segments as f64);
         [(at - half).max(0.0), at + half]
     }
 
-    /// Spring constants, as a diagonal matrix, row by row.
+    /// Spring constants of a lumped beam, as a diagonal matrix, row by row.
     pub fn stiffness<S: Scalar>(&self, profile: &Profile<S>) -> Result<Vec<S>> {
         let n = self.len();
         let mut stiffness = vec![S::zero(); n * n];
@@ -115,7 +115,8 @@ impl LumpedAxis {
         Ok(stiffness)
     }
 
-    /// The strain per unit of each coordinate at `mu`: that of the hinge whose spring stands for the place, spread evenly over it.
+    /// Strain of a lumped beam at `mu` per unit of each coordinate. It is that of the hinge whose spring stands for the
+    /// place, spread evenly over it.
     pub fn strain_row(&self, mu: f64) -> Vec<(usize, Component, f64)> {
         let size = self.length / self.segments as f64;
         let hinge = ((mu / size + 0.5) as usize).min(self.segments - 1);
@@ -124,7 +125,7 @@ impl LumpedAxis {
         self.components.iter().enumerate().map(|(k, &part)| (first + k, part, 1.0 / (end - begin))).collect()
     }
 
-    /// Poses, twists, columns and accelerations of all sections.
+    /// Motion of a lumped beam: poses, twists, columns and accelerations of all sections.
     pub fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>) {
         let (n, mut station) = (self.len(), 0);
         let mut moving = out.begin(station, n);
@@ -158,7 +159,7 @@ impl LumpedAxis {
     }
 }
 
-/// Ends of the smooth pieces between two places.
+/// Ends of the smooth pieces of a lumped beam between two places.
 fn pieces<S: Scalar>(profile: &Profile<S>, begin: f64, end: f64) -> Vec<f64> {
     let inside = profile.breaks(&[0.0, profile.length()]).into_iter().filter(|&at| at > begin && at < end);
     std::iter::once(begin).chain(inside).chain([end]).collect()
@@ -170,7 +171,7 @@ fn carry<S: Scalar>(across: &Pose<S>, columns: &mut [Twist<S>]) {
     }
 }
 
-/// The motion of a hinge per unit rate.
+/// Motion of a lumped beam's hinge per unit rate.
 fn axis<S: Scalar>(component: Component) -> Twist<S> {
     let unit = |k: usize| Vector3::from_f64([0, 1, 2].map(|at| if at == k { 1.0 } else { 0.0 }));
     match component as usize {
@@ -180,7 +181,7 @@ fn axis<S: Scalar>(component: Component) -> Twist<S> {
 }
 
 impl Component {
-    /// The pose across a hinge at coordinate `q` (rad or m).
+    /// Pose across a lumped beam's hinge at coordinate `q` (rad or m).
     fn joint<S: Scalar>(self, q: S) -> Pose<S> {
         let motion = axis::<S>(self);
         match self {

@@ -75,7 +75,7 @@ pub(crate) fn not_negative<S: Scalar>(path: &str, value: S) -> Result<S> {
     Ok(value)
 }
 
-/// Checks how many numbers an array holds.
+/// Checks how many numbers an array of a beam holds.
 pub(crate) fn dimension(what: &str, expected: usize, found: usize, each: &str) -> Result<()> {
     if expected == found {
         return Ok(());

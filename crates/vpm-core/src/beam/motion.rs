@@ -26,7 +26,7 @@ pub struct Sections<S> {
 }
 
 impl<S: Scalar> Sections<S> {
-    /// Room for so many stations and coordinates.
+    /// Room for the motion of so many stations and coordinates.
     pub(super) fn new(stations: usize, coordinates: usize, scratch: usize) -> Self {
         let still = SectionMotion { pose: Pose::identity(), twist: Twist::zero(), acceleration: Twist::zero() };
         Self {
@@ -36,7 +36,7 @@ impl<S: Scalar> Sections<S> {
         }
     }
 
-    /// Begins section `station` where the section before it stands, the first one at the root.
+    /// Begins the motion of section `station` where the section before it stands, the first one at the root.
     pub(super) fn begin(&mut self, station: usize, n: usize) -> SectionMotion<S> {
         if station == 0 {
             self.columns[..n].fill(Twist::zero());
@@ -48,7 +48,8 @@ impl<S: Scalar> Sections<S> {
 }
 
 impl<S: Scalar> SectionMotion<S> {
-    /// Goes on to a frame at `across`, which moves relative to this one with `twist` and, at constant rates, `acceleration`.
+    /// Advances a section's motion to a frame at `across`. It moves relative to this one with `twist` and, at constant
+    /// rates, `acceleration`.
     ///
     /// Law: `V = Ad V + v`, `A = Ad A + V x v + dv/dt`, Ad the transport into the new frame (Featherstone 2008, section 3.5).
     #[inline]

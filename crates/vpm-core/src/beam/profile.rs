@@ -18,27 +18,27 @@ pub(super) struct Profile<'a, S> {
 }
 
 impl<'a, S: Scalar> Profile<'a, S> {
-    /// The sections of a beam whose entry has been checked.
+    /// Profile of the sections of a beam whose entry has been checked.
     pub fn new(entry: &'a BeamEntry<S>) -> Self {
         Self { entry }
     }
 
-    /// Length of the beam in m.
+    /// Length in m of the beam with this profile.
     pub fn length(&self) -> f64 {
         self.entry.length
     }
 
-    /// Points of a Gauss rule beyond those of the shape functions.
+    /// Points of a Gauss rule that the profile needs beyond those of the shape functions.
     pub fn extra(&self) -> usize {
         if self.entry.sections.len() > 1 { TAPER } else { 0 }
     }
 
-    /// Whether there is one section for the whole beam.
+    /// Whether the profile has one section for the whole beam.
     pub fn is_uniform(&self) -> bool {
         self.entry.sections.len() == 1
     }
 
-    /// Arc lengths between which the section changes smoothly and shape functions with these `breaks` are smooth, ascending.
+    /// Breaks of the profile and the shape functions' `breaks`, ascending: all is smooth between them.
     pub fn breaks(&self, breaks: &[f64]) -> Vec<f64> {
         let (sections, rest) = (&self.entry.sections, &self.entry.rest);
         let places = sections.iter().map(|entry| entry.at).chain(rest.iter().map(|entry| entry.at));
@@ -49,12 +49,12 @@ impl<'a, S: Scalar> Profile<'a, S> {
         all
     }
 
-    /// A Gauss rule of `count` points, and more for tapered beams, on every smooth piece.
+    /// Gauss rule for the profile on every smooth piece: `count` points, and more for tapered beams.
     pub fn rule(&self, count: usize, breaks: &[f64]) -> Vec<Station> {
         composite(count + self.extra(), &self.breaks(breaks))
     }
 
-    /// The section at `mu`.
+    /// Section of the profile at `mu`.
     pub fn at(&self, mu: f64) -> Result<Section<S>> {
         let sections = &self.entry.sections;
         let own = |entry: &SectionEntry<S>| Section::of(&entry.shape, self.material(entry));
@@ -76,23 +76,23 @@ impl<'a, S: Scalar> Profile<'a, S> {
         entry.material.as_ref().or(self.entry.material.as_ref())
     }
 
-    /// The material in between; where no section has its own, that of the beam as it is.
+    /// Material of the profile in between; where no section has its own, that of the beam as it is.
     fn mixed(&self, here: &Material<S>, there: &Material<S>, part: f64) -> Material<S> {
         let alike = self.entry.sections.iter().all(|entry| entry.material.is_none());
         if alike { *here } else { here.between(there, part) }
     }
 
-    /// Whether the centre of mass may lie beside the axis.
+    /// Whether the profile may have its centre of mass beside the axis.
     pub fn is_eccentric(&self) -> bool {
         self.entry.sections.iter().any(|entry| matches!(entry.shape, Shape::Layers(_)))
     }
 
-    /// The shape at rest.
+    /// Shape at rest of a beam's profile.
     pub fn rest(&self) -> Rest {
         Rest::new(&self.entry.rest)
     }
 
-    /// A slice of the beam of that length, in section axes, its centre in the origin.
+    /// Slice of the beam's profile of that length, in section axes, its centre in the origin.
     pub fn slice(&self, mu: f64, length: f64) -> Result<SpatialInertia<S>> {
         let Section { inertia, center, .. } = self.at(mu)?;
         let ([x, y, z, mass, ..], zero) = (inertia.map(|density| density * length), S::zero());

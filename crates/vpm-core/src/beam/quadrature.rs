@@ -11,7 +11,7 @@ pub struct Station {
     pub weight: f64,
 }
 
-/// The rule of `count` points on `[begin, end]`, exact for polynomials of degree `2 count - 1`.
+/// Quadrature rule of `count` points on `[begin, end]`, exact for polynomials of degree `2 count - 1`.
 ///
 /// Law: the places are the roots of the Legendre polynomial P, the weights `2 / ((1 - x^2) P'(x)^2)`, found by Newton's method
 /// (Press et al. 2007, "Numerical Recipes", section 4.6). Checked: exact for those polynomials to rounding.
@@ -26,12 +26,12 @@ pub fn gauss(count: usize, begin: f64, end: f64) -> Vec<Station> {
         .collect()
 }
 
-/// The rule of `count` points on each piece between neighbouring `breaks`.
+/// Quadrature rule of `count` points on each piece between neighbouring `breaks`.
 pub fn composite(count: usize, breaks: &[f64]) -> Vec<Station> {
     breaks.windows(2).flat_map(|piece| gauss(count, piece[0], piece[1])).collect()
 }
 
-/// Root number `k` (descending) of the Legendre polynomial of degree `n`, and the slope there.
+/// Quadrature point: root `k` (descending) of the Legendre polynomial of degree `n`, with the slope there.
 fn root(n: usize, k: usize) -> (f64, f64) {
     let mut x = (PI * (k as f64 + 0.75) / (n as f64 + 0.5)).cos();
     for _ in 0..8 {
@@ -41,7 +41,7 @@ fn root(n: usize, k: usize) -> (f64, f64) {
     (x, legendre(n, x).1)
 }
 
-/// Value and slope of the Legendre polynomial of degree `n` inside (-1, 1), by the three-term recurrence.
+/// Legendre polynomial of degree `n` for quadrature: value and slope inside (-1, 1). By the three-term recurrence.
 fn legendre(n: usize, x: f64) -> (f64, f64) {
     let (mut value, mut before) = (1.0, 0.0);
     for k in 1..=n {

@@ -33,18 +33,18 @@ impl Rest {
         Self { entries: entries.to_vec() }
     }
 
-    /// Whether the axis is straight and not twisted.
+    /// Whether the axis at rest is straight and not twisted.
     pub fn is_straight(&self) -> bool {
         self.entries.is_empty()
     }
 
-    /// The same shape with arc lengths that count from `begin`.
+    /// Shape at rest with arc lengths that count from `begin`.
     pub fn from(&self, begin: f64) -> Self {
         let moved = |entry: &RestEntry| RestEntry { at: entry.at - begin, curvature: entry.curvature };
         Self { entries: self.entries.iter().map(moved).collect() }
     }
 
-    /// Places between which it is smooth.
+    /// Breaks of the shape at rest: places between which it is smooth.
     pub fn breaks(&self) -> impl Iterator<Item = f64> {
         self.entries.iter().map(|entry| entry.at)
     }
@@ -74,7 +74,7 @@ impl Rest {
         sums.map(|turn| Twist::new(Vector3::from(turn), Vector3::zero()))
     }
 
-    /// The pose at `end` in the axes at `begin`, which lies before or behind it.
+    /// Pose at rest of `end` in the axes at `begin`, which lies before or behind it.
     ///
     /// Law: fourth-order Magnus steps with exact moments, as along a beam that bends; constant curvature is exact in one step.
     pub fn across(&self, begin: f64, end: f64) -> Pose<f64> {
@@ -106,7 +106,7 @@ impl Rest {
 pub(super) const STRAIGHT: &str =
     "be straight and untwisted at levels that interpolate the deflection: modal, deflection, hermite";
 
-/// A pose without derivatives, over any number type.
+/// Pose at rest without derivatives, lifted to any number type.
 pub(super) fn lift<S: Scalar>(pose: &Pose<f64>) -> Pose<S> {
     Pose::from_f64(*pose)
 }

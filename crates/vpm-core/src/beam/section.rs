@@ -20,19 +20,19 @@ pub struct Material<P = f64> {
 }
 
 impl<P> Material<P> {
-    /// The same material over another parameter type.
+    /// Material of a section over another parameter type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Material<T> {
         Material { young: f(&self.young), poisson: f(&self.poisson), density: f(&self.density) }
     }
 }
 
 impl<S: Scalar> Material<S> {
-    /// Shear modulus `G = E / (2 (1 + nu))` in Pa.
+    /// Shear modulus of a section's material `G = E / (2 (1 + nu))` in Pa.
     pub fn shear(&self) -> S {
         self.young / ((self.poisson + 1.0) * 2.0)
     }
 
-    /// Checks the material, whose numbers are called `{path}.young` and so on.
+    /// Checks the material of a section, whose numbers are called `{path}.young` and so on.
     pub(super) fn check_at(&self, path: &str) -> Result<()> {
         positive(&format!("{path}.young"), self.young)?;
         positive(&format!("{path}.density"), self.density)?;
@@ -44,7 +44,7 @@ impl<S: Scalar> Material<S> {
         Err(Error::Domain { path: format!("{path}.poisson"), condition, value: poisson })
     }
 
-    /// The material at `part` (0 to 1) of the way to another, each number in between.
+    /// Material between two sections at `part` (0 to 1) of the way, each number in between.
     pub(super) fn between(&self, other: &Self, part: f64) -> Self {
         let mix = |here: S, there: S| here * (1.0 - part) + there * part;
         Self {
@@ -121,7 +121,7 @@ impl<S: Scalar> Section<S> {
         Ok(Self { stiffness, inertia, center: None })
     }
 
-    /// Mass per length in kg/m.
+    /// Mass per length of a section in kg/m.
     pub fn line_density(&self) -> S {
         self.inertia[3]
     }

@@ -48,7 +48,7 @@ impl Segment {
         vec![Self { axis: axis.clone(), coordinates, shared: 0, stations: 0..stations, sections: stations }]
     }
 
-    /// The elements of a beam of linear strains with stations at `places`, in its deflected shape as exact as the whole.
+    /// Segments of a beam of linear strains with stations at `places`, as exact as the whole when deflected.
     pub(super) fn elements(
         deforms: &[Component],
         (length, count): (f64, usize),
@@ -86,7 +86,7 @@ impl Segment {
         cuts(length, count, places).into_iter().enumerate().map(segment).collect()
     }
 
-    /// How many coordinates act in it.
+    /// Number of coordinates that act in a segment.
     pub(crate) fn len(&self) -> usize {
         self.coordinates.len()
     }
@@ -96,7 +96,7 @@ impl Segment {
         Sections::new(self.sections, self.len(), self.axis.scratch())
     }
 
-    /// Poses, twists and columns of all sections relative to its begin at its coordinates and their rates, and accelerations if asked for.
+    /// Motion of a segment's sections relative to its begin: poses, twists, columns, accelerations if asked for.
     #[inline]
     pub(crate) fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>, accelerates: bool) {
         self.axis.sweep(q, v, out, accelerates);
@@ -134,12 +134,12 @@ impl Segment {
     }
 }
 
-/// Whether the damping of a beam couples its coordinates no further than its stiffness does.
+/// Whether damping couples coordinates of segments no further than the beam's stiffness does.
 pub(super) fn damps_locally<S: Scalar>(entry: &BeamEntry<S>) -> bool {
     entry.damping.mass.is_none() && entry.damping.ratios.is_empty()
 }
 
-/// An axis in parts of equal length, with the sections of each.
+/// Cuts an axis into segments of equal length, with the sections of each.
 fn cuts(length: f64, count: usize, places: &[f64]) -> Vec<Cut> {
     let node = |number: usize| length * number as f64 / count as f64;
     let mut first = 0;
@@ -158,7 +158,7 @@ fn cuts(length: f64, count: usize, places: &[f64]) -> Vec<Cut> {
     (0..count).map(cut).collect()
 }
 
-/// The linear functions of both nodes of an element: all components at the first node, then all at the second.
+/// Linear functions of both nodes of a segment: all components at the first node, then at the second.
 fn nodal(deforms: &[Component], size: f64) -> Result<Vec<Field>> {
     let both = Basis::linear(size, 1, 0)?;
     if let [component] = *deforms {

@@ -47,7 +47,7 @@ pub struct BushingEnd {
 }
 
 impl<P> BushingEntry<P> {
-    /// The law over another number type, zero where there is no parameter.
+    /// Law of a bushing's entry over another number type, zero where there is no parameter.
     pub fn law<S: Scalar>(&self, f: &mut impl FnMut(&P) -> S) -> Bushing<S> {
         let mut number = |entry: &Option<P>| entry.as_ref().map_or(S::zero(), &mut *f);
         Bushing {
@@ -57,7 +57,7 @@ impl<P> BushingEntry<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of a bushing's entry and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let of = |place: usize| if place.is_multiple_of(7) { Domain::NonNegative } else { Domain::Any };
         let matrices = [&self.stiffness, &self.damping].into_iter();
@@ -66,7 +66,7 @@ impl<P> BushingEntry<P> {
         matrices.chain(self.preload.iter().flatten().map(|entry| (entry, Domain::Any))).collect()
     }
 
-    /// Both frames, A first, as frames to keep track of.
+    /// Frames of a bushing's entry, A first, as frames to keep track of.
     pub fn markers(&self) -> [Marker; 2] {
         [("a", self.a), ("b", self.b)].map(|(end, frame)| {
             let BushingEnd { on, translation, rotation } = frame;
@@ -76,8 +76,8 @@ impl<P> BushingEntry<P> {
 }
 
 impl BushingEntry<usize> {
-    /// Whether the law has a meaning with the parameters `theta`, beyond the domain of each: a symmetric stiffness, and neither matrix
-    /// gives energy away.
+    /// Checks a bushing's entry with the parameters `theta`, beyond the domain of each. It needs a symmetric stiffness,
+    /// and neither matrix gives energy away.
     pub fn check(&self, theta: &[f64]) -> Result<()> {
         let law: Bushing<f64> = self.law(&mut |&index| theta[index]);
         let largest = law.stiffness.as_flattened().iter().fold(0.0_f64, |most, entry| most.max(entry.abs()));
@@ -99,7 +99,8 @@ impl BushingEntry<usize> {
     }
 }
 
-/// Smallest eigenvalue of the symmetric part, scaled to a diagonal of 1, so that angles and ways count alike.
+/// Smallest eigenvalue of the symmetric part of a bushing's entry, scaled to a diagonal of 1. So angles and ways count
+/// alike.
 ///
 /// A direction without an own entry must not be coupled to any other: the smallest eigenvalue is then minus infinity.
 fn smallest(matrix: &[[f64; 6]; 6]) -> f64 {

@@ -17,7 +17,7 @@ struct External {
     outputs: Vec<Entry>,
 }
 
-/// Declarations for the header and definitions for the source.
+/// External functions for CasADi and acados: declarations for the header and definitions for the source.
 pub(super) fn externals(machine: &Machine, name: &str) -> (String, String) {
     let (mut header, mut source) = (String::new(), tables(machine, name));
     for external in all(machine, name) {
@@ -26,7 +26,8 @@ pub(super) fn externals(machine: &Machine, name: &str) -> (String, String) {
     (header, source)
 }
 
-/// How many numbers the functions need beside those of a run: prepared constants and results that nobody asks for.
+/// Working memory of the external functions beside that of a run. It is for prepared constants and results that nobody
+/// asks for.
 pub(super) fn work(machine: &Machine) -> usize {
     let of =
         |derivatives: &super::machine::Derivatives| derivatives.patterns.iter().map(|one| one.len()).sum::<usize>();
@@ -67,7 +68,7 @@ fn all(machine: &Machine, name: &str) -> Vec<External> {
     all
 }
 
-/// Patterns of full vectors and matrices, and of results that a Jacobian does not need.
+/// Patterns for the external functions: of full vectors and matrices, and of results without a Jacobian.
 fn tables(machine: &Machine, name: &str) -> String {
     let &Machine { nx, nu, ny, np, .. } = machine;
     let full = [

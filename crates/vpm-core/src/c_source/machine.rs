@@ -53,7 +53,7 @@ pub(super) struct Machine {
 }
 
 impl Pattern {
-    /// Number of entries of the pattern.
+    /// Number of entries of a machine's derivative pattern.
     pub(super) fn len(&self) -> usize {
         self.places.len()
     }
@@ -127,13 +127,14 @@ impl Machine {
         Ok(Self { nx, nu, ny, np, constants, rates: of_rates, outputs: of_outputs, functions, balls })
     }
 
-    /// How many numbers the functions need to hand on.
+    /// Number of values that the functions of a machine's source hand on.
     pub(super) fn work(&self) -> usize {
         self.functions.iter().map(|function| function.work).max().unwrap_or(0)
     }
 }
 
-/// Rates and outputs over states, inputs, orientations of ball joints and the parameters at the places `free`, as numbers of a graph.
+/// Recorded rates and outputs of the machine for its source, as numbers of a graph. They are over states, inputs,
+/// orientations of ball joints and the parameters at the places `free`.
 fn recorded(description: &Description, theta: &[f64], free: &[usize]) -> Result<(Places, Recording)> {
     let recorded = |free: &[usize]| description.recorded_turned((theta, free), &Kind::Readings);
     let (places, recording) = recorded(free)?;

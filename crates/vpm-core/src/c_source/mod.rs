@@ -154,7 +154,7 @@ fn patterns(text: &mut String, name: &str, derivatives: &Derivatives) {
     }
 }
 
-/// Limits of ball joints in place of their names.
+/// C source with limits of ball joints in place of their names.
 fn with_limits(text: &str) -> String {
     let limits = [
         ("LEAST_COSINE", ball::LEAST),
@@ -167,7 +167,7 @@ fn with_limits(text: &str) -> String {
     limits.into_iter().fold(text.to_owned(), |text, (name, value)| text.replace(name, &literal(value)))
 }
 
-/// What takes care of ball joints in steps; nothing where there are none.
+/// C source for ball joints in steps; nothing where there are none.
 fn balls(balls: &Balls) -> String {
     if balls.angles.is_empty() {
         return String::new();
@@ -189,7 +189,7 @@ fn balls(balls: &Balls) -> String {
         .replace("{UPRIGHT}", &format!("{{{upright}}}"))
 }
 
-/// The functions that are the same for every machine, but for what `turning` ball joints and `parameters` add.
+/// C source of the functions that are the same for every machine. `turning` ball joints and `parameters` add to them.
 fn functions(parameters: bool, turning: bool) -> String {
     let rows = |table: &[[f64; 6]; 6]| {
         let rows: Vec<_> = table.iter().map(|row| format!("{{{}}}", row.map(literal).join(", "))).collect();

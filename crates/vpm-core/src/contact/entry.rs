@@ -38,31 +38,31 @@ pub struct PlaneEntry {
     pub normal: [f64; 3],
 }
 
-/// No friction (the derive would ask for `P: Default`).
+/// Contact entry without friction (the derive would ask for `P: Default`).
 fn none<T>() -> Option<T> {
     None
 }
 
 impl<P> ContactEntry<P> {
-    /// The law over another number type.
+    /// Law of a contact entry over another number type.
     pub fn law<T>(&self, f: &mut impl FnMut(&P) -> T) -> Contact<T> {
         Contact { normal: self.normal.map(f), friction: self.friction.as_ref().map(|law| law.map(f)) }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of a contact entry and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let mut domains = self.normal.domains();
         domains.extend(self.friction.iter().flat_map(ContactFriction::domains));
         domains
     }
 
-    /// The point as a frame to keep track of.
+    /// Point of a contact entry as a frame to keep track of.
     pub fn marker(&self) -> Marker {
         let rotation = [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0];
         Marker { name: self.name.clone(), on: self.on, translation: self.point, rotation }
     }
 
-    /// The plane, if it is one.
+    /// Plane of a contact entry, if it is one.
     pub fn plane<S: Scalar>(&self) -> Result<Plane<S>> {
         let PlaneEntry { point, normal } = self.plane;
         check_finite(&self.name, "plane.point", &point)?;
@@ -77,7 +77,7 @@ impl<P> ContactEntry<P> {
 }
 
 impl ContactEntry<usize> {
-    /// Whether the law has a meaning with the parameters `theta`, beyond the domain of each.
+    /// Checks whether a contact entry's law has a meaning with the parameters `theta`, beyond the domain of each.
     pub fn check(&self, theta: &[f64]) -> Result<()> {
         let Some(friction) = &self.friction else { return Ok(()) };
         let (static_velocity, dynamic_velocity) = (theta[friction.static_velocity], theta[friction.dynamic_velocity]);

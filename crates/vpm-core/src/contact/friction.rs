@@ -29,7 +29,7 @@ pub struct ContactFriction<P> {
 }
 
 impl<P> ContactFriction<P> {
-    /// The same law over another number type.
+    /// Contact friction over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> ContactFriction<T> {
         let Self { static_coefficient, static_velocity, dynamic_coefficient, dynamic_velocity } = self;
         ContactFriction {
@@ -40,7 +40,7 @@ impl<P> ContactFriction<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of contact friction and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let Self { static_coefficient, static_velocity, dynamic_coefficient, dynamic_velocity } = self;
         vec![
@@ -53,7 +53,8 @@ impl<P> ContactFriction<P> {
 }
 
 impl<S: Scalar> ContactFriction<S> {
-    /// mu at a sliding speed of 0 or more (m/s). Without a way from v_s to v_d, mu falls at v_s at once.
+    /// Friction coefficient mu of a contact at a sliding speed of 0 or more (m/s). Without a way from v_s to v_d, mu
+    /// falls at v_s at once.
     #[inline]
     pub fn coefficient(&self, speed: S) -> S {
         let rising = || self.static_coefficient * step(speed / self.static_velocity);
@@ -65,7 +66,8 @@ impl<S: Scalar> ContactFriction<S> {
         self.static_velocity.if_less(speed, beyond, rising)
     }
 
-    /// Resistance r in N s/m under the normal force (N) at a sliding speed whose square is `square` (m^2/s^2): `F_t = -r v`, zero at rest.
+    /// Friction resistance r of a contact in N s/m under the normal force (N): `F_t = -r v`, zero at rest. The square
+    /// of the sliding speed is `square` (m^2/s^2).
     #[inline]
     pub fn resistance(&self, square: S, normal: S) -> S {
         let moving = || {
@@ -75,8 +77,8 @@ impl<S: Scalar> ContactFriction<S> {
         square.if_positive(moving, S::zero)
     }
 
-    /// The resistance per normal force that an implicit step needs at a sliding speed whose square is `square` (m^2/s^2), in s/m: the
-    /// chord from rest or the tangent, whichever is larger.
+    /// Friction resistance per normal force of a contact for an implicit step, in s/m. It is the chord from rest or the
+    /// tangent, whichever is larger, at a sliding speed whose square is `square` (m^2/s^2).
     ///
     /// The tangent alone is negative where the friction falls, and flat beyond: a step that crosses rest would not see the friction turn
     /// around.

@@ -30,7 +30,7 @@ pub use plane::{Contact, Plane};
 
 use crate::scalar::Scalar;
 
-/// The cubic step from 0 at t = 0 to 1 at t = 1, level outside: `3 t^2 - 2 t^3`. Its slope is continuous.
+/// Cubic step for contacts from 0 at t = 0 to 1 at t = 1, level outside: `3 t^2 - 2 t^3`. Its slope is continuous.
 #[inline]
 fn step<S: Scalar>(t: S) -> S {
     let rising = || S::one().if_less(t, S::one, || t * t * (-(t * 2.0) + 3.0));

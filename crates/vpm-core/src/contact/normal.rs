@@ -29,7 +29,7 @@ pub struct NormalContact<P> {
 }
 
 impl<P> NormalContact<P> {
-    /// The same law over another number type.
+    /// Normal contact over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> NormalContact<T> {
         let Self { stiffness, exponent, damping, damping_depth } = self;
         NormalContact {
@@ -40,7 +40,7 @@ impl<P> NormalContact<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of normal contact and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let Self { stiffness, exponent, damping, damping_depth } = self;
         vec![
@@ -53,39 +53,41 @@ impl<P> NormalContact<P> {
 }
 
 impl<S: Scalar> NormalContact<S> {
-    /// Force in N that pushes the bodies apart, at depth `d` (m) and its rate (m/s).
+    /// Normal force of a contact in N that pushes the bodies apart, at depth `d` (m) and its rate (m/s).
     #[inline]
     pub fn force(&self, d: S, rate: S) -> S {
         let push = || (self.spring(d) + self.damping * step(d / self.damping_depth) * rate).max(S::zero());
         touching(d, S::zero(), push)
     }
 
-    /// The spring's part of the force in N.
+    /// Normal force of a contact's spring in N.
     #[inline]
     pub fn spring(&self, d: S) -> S {
         touching(d, S::zero(), || self.stiffness * (self.exponent * d.ln()).exp())
     }
 
-    /// Slope of the spring in N/m, and resistance of the damper in N s/m, at depth `d` (m).
+    /// Slopes of normal contact at depth `d` (m): spring in N/m, resistance of the damper in N s/m.
     pub fn slopes(&self, d: S) -> [S; 2] {
         let slopes = || [self.exponent * self.spring(d) / d, self.damping * step(d / self.damping_depth)];
         touching(d, [S::zero(); 2], slopes)
     }
 
-    /// Energy in the spring in J: `k d^(n+1) / (n + 1)`.
+    /// Energy of the spring in normal contact in J: `k d^(n+1) / (n + 1)`.
     #[inline]
     pub fn potential(&self, d: S) -> S {
         touching(d, S::zero(), || self.spring(d) * d / (self.exponent + 1.0))
     }
 
-    /// Power in W that is lost, `(F - k d^n) d'`: never negative, whether the damper acts or the pull is cut off.
+    /// Power lost in normal contact in W, `(F - k d^n) d'`. It is never negative, whether the damper acts or the pull
+    /// is cut off.
     #[inline]
     pub fn dissipation(&self, d: S, rate: S) -> S {
         (self.force(d, rate) - self.spring(d)) * rate
     }
 }
 
-/// What holds in contact, else `apart`; a depth that has no finite inverse counts as none, so that derivatives stay finite.
+/// Value in normal contact, else `apart`. A depth that has no finite inverse counts as none, so that derivatives stay
+/// finite.
 #[inline]
 fn touching<S: Scalar, T: Choice<S>>(d: S, apart: T, contact: impl FnOnce() -> T) -> T {
     d.if_less(S::from_f64(f64::MIN_POSITIVE), || apart, contact)

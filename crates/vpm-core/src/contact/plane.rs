@@ -31,7 +31,7 @@ impl<S: Scalar> Plane<S> {
         Ok(Self { point, normal: scaled * scaled.dot(scaled).sqrt().recip() })
     }
 
-    /// Its unit normal, towards the free side.
+    /// Unit normal of a contact plane, towards the free side.
     #[inline]
     pub fn normal(&self) -> Vector3<S> {
         self.normal
@@ -59,18 +59,18 @@ pub struct Contact<P> {
     pub friction: Option<ContactFriction<P>>,
 }
 
-/// No friction (the derive would ask for `P: Default`).
+/// Contact with a plane without friction (the derive would ask for `P: Default`).
 fn none<T>() -> Option<T> {
     None
 }
 
 impl<P> Contact<P> {
-    /// The same contact over another number type.
+    /// Contact with a plane over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Contact<T> {
         Contact { normal: self.normal.map(f), friction: self.friction.as_ref().map(|law| law.map(f)) }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of a contact with a plane and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let mut domains = self.normal.domains();
         domains.extend(self.friction.iter().flat_map(ContactFriction::domains));
@@ -86,8 +86,8 @@ impl<S: Scalar> Contact<S> {
         self.force_with(plane, place, velocity, ContactFriction::resistance)
     }
 
-    /// As [`Contact::force`], with the resistance in N s/m of the friction law, the square of the sliding speed (m^2/s^2) and the normal
-    /// force (N) by `resistance`.
+    /// Force of a contact with a plane as [`Contact::force`], with a given friction `resistance` in N s/m. It gets the
+    /// square of the sliding speed (m^2/s^2) and the normal force (N).
     #[inline]
     pub(crate) fn force_with(
         &self,

@@ -26,7 +26,7 @@ pub struct Cascade<P> {
 }
 
 impl<P> Cascade<P> {
-    /// The same law over another number type.
+    /// Cascade law over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Cascade<T> {
         Cascade {
             position_gain: f(&self.position_gain),
@@ -35,14 +35,15 @@ impl<P> Cascade<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of the cascade and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         domains(vec![&self.position_gain, &self.velocity_gain], self.limit.as_ref())
     }
 }
 
 impl<S: Scalar> Cascade<S> {
-    /// The command for `reference` and the measured position `y` (m or rad), `time_step` (s) after the last call.
+    /// Command of the cascade for `reference` and the measured position `y` (m or rad). It is `time_step` (s) after the
+    /// last call.
     #[inline]
     pub fn command(&self, memory: &mut ControlMemory<S>, reference: S, y: S, time_step: f64) -> S {
         memory.begin(reference, y);

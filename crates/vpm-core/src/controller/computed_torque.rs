@@ -46,7 +46,7 @@ pub struct Differences<S> {
 }
 
 impl<P> ComputedTorque<P> {
-    /// The same law over another number type.
+    /// Computed-torque law over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> ComputedTorque<T> {
         ComputedTorque {
             proportional: self.proportional.iter().map(&mut *f).collect(),
@@ -55,7 +55,7 @@ impl<P> ComputedTorque<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of computed torque and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let free = self.proportional.iter().chain(&self.derivative).map(|gain| (gain, Domain::Any));
         let limits = self.limit.iter().flatten().map(|limit| (&limit.limit, Domain::Positive));
@@ -64,13 +64,13 @@ impl<P> ComputedTorque<P> {
 }
 
 impl<S: Scalar> ComputedTorque<S> {
-    /// The acceleration that joint number `place` of the controller is to have, for its reference with its rates.
+    /// Acceleration that computed torque wants of joint number `place`, for its reference with its rates.
     #[inline]
     pub fn acceleration(&self, place: usize, [r, dr, ddr]: [S; 3], q: S, dq: S) -> S {
         ddr + self.derivative[place] * (dr - dq) + self.proportional[place] * (r - q)
     }
 
-    /// A command within the limits of actuator number `place` of the controller.
+    /// Computed-torque command within the limits of actuator number `place` of the controller.
     #[inline]
     pub fn limited(&self, place: usize, command: S) -> S {
         self.limit.as_ref().map_or(command, |limits| limits[place].apply(command))
@@ -78,7 +78,7 @@ impl<S: Scalar> ComputedTorque<S> {
 }
 
 impl<S: Scalar> Differences<S> {
-    /// The reference with its rates, `time_step` (s) after the last call.
+    /// Reference of computed torque with its rates, `time_step` (s) after the last call.
     #[inline]
     pub fn next(&mut self, reference: S, time_step: f64) -> [S; 3] {
         let [last, before] = self.last;

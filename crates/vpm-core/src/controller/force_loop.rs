@@ -49,7 +49,7 @@ pub struct Stroke<S> {
 }
 
 impl<P> ForceLoop<P> {
-    /// The same law over another number type.
+    /// Force-loop law over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> ForceLoop<T> {
         ForceLoop {
             proportional: f(&self.proportional),
@@ -61,7 +61,7 @@ impl<P> ForceLoop<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of the force loop and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let mut free = vec![&self.proportional, &self.derivative, &self.force_gain, &self.velocity_gain];
         free.extend(self.feed_forward.as_ref());
@@ -70,7 +70,8 @@ impl<P> ForceLoop<P> {
 }
 
 impl<S: Scalar> ForceLoop<S> {
-    /// The command for `reference` at the measured joint position `q` and rate `dq`, with what is seen of the actuator.
+    /// Command of the force loop for `reference` at the measured joint position `q` and rate `dq`. It has what is seen
+    /// of the actuator.
     #[inline]
     pub fn command(&self, reference: S, q: S, dq: S, stroke: Stroke<S>) -> S {
         let wanted = (self.proportional * (reference - q) - self.derivative * dq) / stroke.arm;

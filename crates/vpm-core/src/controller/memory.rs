@@ -15,7 +15,7 @@ pub struct ControlMemory<S> {
 }
 
 impl<S: Scalar> ControlMemory<S> {
-    /// Before the first sample everything stood as it stands now.
+    /// Begins a controller's memory: before the first sample everything stood as it stands now.
     #[inline]
     pub(super) fn begin(&mut self, reference: S, y: S) {
         if !self.started {
@@ -23,7 +23,7 @@ impl<S: Scalar> ControlMemory<S> {
         }
     }
 
-    /// Keeps the sample for the next one.
+    /// Keeps the sample in a controller's memory for the next one.
     #[inline]
     pub(super) fn keep(&mut self, reference: S, y: S) {
         self.measured = [y, self.measured[0]];

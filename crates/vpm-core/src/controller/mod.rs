@@ -39,24 +39,24 @@ pub enum ControlLaw<P> {
     ComputedTorque(ComputedTorque<P>),
 }
 
-/// A missing number (the derive would ask for `P: Default`).
+/// Missing number of a controller (the derive would ask for `P: Default`).
 fn none<T>() -> Option<T> {
     None
 }
 
-/// A limit over another number type.
+/// Limit of a controller over another number type.
 fn limit<P, T>(limit: Option<&Saturation<P>>, f: &mut impl FnMut(&P) -> T) -> Option<Saturation<T>> {
     limit.map(|limit| limit.map(f))
 }
 
-/// Numbers that may be anything, and a limit that has to be positive.
+/// Domains of a controller's numbers that may be anything, and of a limit that has to be positive.
 fn domains<'a, P>(free: Vec<&'a P>, limit: Option<&'a Saturation<P>>) -> Vec<(&'a P, Domain)> {
     let free = free.into_iter().map(|number| (number, Domain::Any));
     free.chain(limit.map(|limit| (&limit.limit, Domain::Positive))).collect()
 }
 
 impl<P> ControlLaw<P> {
-    /// The same law over another number type.
+    /// Controller law over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> ControlLaw<T> {
         match self {
             Self::Cascade(law) => ControlLaw::Cascade(law.map(f)),
@@ -67,7 +67,7 @@ impl<P> ControlLaw<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of a controller and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         match self {
             Self::Cascade(law) => law.domains(),
@@ -78,7 +78,7 @@ impl<P> ControlLaw<P> {
         }
     }
 
-    /// Its name in descriptions.
+    /// Name of a controller's law in descriptions.
     pub fn name(&self) -> &'static str {
         match self {
             Self::Cascade(_) => "cascade",

@@ -26,7 +26,7 @@ pub struct Pd<P> {
 }
 
 impl<P> Pd<P> {
-    /// The same law over another number type.
+    /// PD law over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Pd<T> {
         Pd {
             proportional: f(&self.proportional),
@@ -35,14 +35,14 @@ impl<P> Pd<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of PD control and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         domains(vec![&self.proportional, &self.derivative], self.limit.as_ref())
     }
 }
 
 impl<S: Scalar> Pd<S> {
-    /// The command for `reference` at the measured `y` (m or rad) and its measured `rate`.
+    /// PD command for `reference` at the measured `y` (m or rad) and its measured `rate`.
     #[inline]
     pub fn command(&self, reference: S, y: S, rate: S) -> S {
         let command = self.proportional * (reference - y) - self.derivative * rate;

@@ -29,7 +29,7 @@ pub struct Pid<P> {
 }
 
 impl<P> Pid<P> {
-    /// The same law over another number type.
+    /// PID law over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Pid<T> {
         Pid {
             proportional: f(&self.proportional),
@@ -39,14 +39,14 @@ impl<P> Pid<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of PID control and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         domains(vec![&self.proportional, &self.integral, &self.derivative], self.limit.as_ref())
     }
 }
 
 impl<S: Scalar> Pid<S> {
-    /// The command for `reference` and the measured position `y` (m or rad), `time_step` (s) after the last call.
+    /// PID command for `reference` and the measured position `y` (m or rad), `time_step` (s) after the last call.
     #[inline]
     pub fn command(&self, memory: &mut ControlMemory<S>, reference: S, y: S, time_step: f64) -> S {
         memory.begin(reference, y);

@@ -64,7 +64,7 @@ impl Description {
             .then(|| "the model leaves out terms that depend on the choice of coordinates".to_owned())
     }
 
-    /// Whether the angles follow each other with nothing between them.
+    /// Whether the angles of a ball joint follow each other with nothing between them.
     fn is_chain(&self, [first, second, third]: [usize; 3]) -> bool {
         [(first, second), (second, third)].into_iter().all(|(before, after)| {
             let carried = self.bodies.iter().filter(|body| body.on == Mount::Body(before)).count();
@@ -82,7 +82,7 @@ impl Description {
         self.free_balls().for_each(|ball| dynamics.model.turn_freely(ball.angles[0][0]));
     }
 
-    /// Where the inputs of the functions of the turned machine stand: orientations follow the inputs.
+    /// Places of the inputs of functions with ball joints: orientations follow the inputs.
     fn places_of_turned(&self) -> Places {
         Places { inputs: self.n_inputs() + 4 * self.free_balls().count(), ..self.places() }
     }

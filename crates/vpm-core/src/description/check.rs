@@ -7,7 +7,7 @@ use crate::effect::{Domain, JointEffect, Seat};
 use crate::error::{Error, Result};
 use crate::sensor::Channel;
 
-/// Every number that refers to something refers to something that exists, and nothing is claimed twice.
+/// Checks that every number that refers to something refers to something that exists. Nothing may be claimed twice.
 pub(super) fn references(description: &Description) -> Result<()> {
     if description.parameter_names.len() != description.parameters.len() {
         return Err(Error::Dimension {
@@ -33,7 +33,7 @@ pub(super) fn references(description: &Description) -> Result<()> {
     unique_claims(description)
 }
 
-/// Length, finiteness and domain of every parameter.
+/// Checks length, finiteness and domain of every parameter.
 pub(super) fn parameters(description: &Description, theta: &[f64]) -> Result<()> {
     if theta.len() != description.n_parameters() {
         return Err(Error::Dimension {
@@ -73,7 +73,7 @@ fn domains(description: &Description) -> impl Iterator<Item = (usize, Domain)> {
     domains.map(|(&index, domain)| (index, domain))
 }
 
-/// Every place in the parameter vector that is used, and by what.
+/// Places in the parameter vector that are used, and by what, for their check.
 fn used_parameters(description: &Description) -> Vec<(String, usize)> {
     let mut used = Vec::new();
     for body in &description.bodies {
@@ -166,7 +166,7 @@ fn sites(description: &Description) -> Result<()> {
     Ok(())
 }
 
-/// A shaft does not know the load of a joint.
+/// Checks that effects of shafts need no load: a shaft does not know that of a joint.
 fn follows_no_load(what: &str, transmission: &str, effect: &EffectEntry) -> Result<()> {
     let EffectEntry::Joint { law, .. } = effect else { return Ok(()) };
     let follows = |law: &JointEffect<usize>| {
@@ -222,7 +222,7 @@ pub(super) fn channel(what: &str, channel: Channel, description: &Description) -
     }
 }
 
-/// One sensor per channel, one controller per actuator.
+/// Checks for one sensor per channel, one controller per actuator.
 fn unique_claims(description: &Description) -> Result<()> {
     for (k, second) in description.sensors.iter().enumerate() {
         if let Some(first) = description.sensors[..k].iter().find(|first| first.channel == second.channel) {

@@ -25,14 +25,14 @@ pub struct LoadCell {
 }
 
 impl Description {
-    /// The frames that contacts, bushings and loops act on: points of the contacts, then A and B of each bushing and of each loop.
+    /// Frames of connections: points of the contacts, then A and B of each bushing and of each loop.
     pub(super) fn attachments(&self) -> Vec<Marker> {
         let points = self.contacts.iter().map(|contact| contact.marker());
         let bushings = self.bushings.iter().flat_map(|bushing| bushing.markers());
         points.chain(bushings).chain(self.loops.iter().flat_map(|closure| closure.markers())).collect()
     }
 
-    /// The closed loops, on the frames of `model`.
+    /// Closed loops as connections, on the frames of `model`.
     pub(super) fn closures<S: Scalar>(&self, model: &Model<S>) -> Result<Option<Loops<S>>> {
         let Some(first) = self.loops.first() else { return Ok(None) };
         if self.drop_velocity_terms || self.omissions != Omissions::default() {
@@ -42,7 +42,7 @@ impl Description {
         Loops::new(model, &self.loops, &model.attachments()[ends..]).map(Some)
     }
 
-    /// Whether a state (coordinates and rates first) leaves all loops closed.
+    /// Checks whether a state (coordinates and rates first) leaves the connections of all loops closed.
     pub(crate) fn check_closed(&self, state: &[f64]) -> Result<()> {
         if self.loops.is_empty() || state.iter().any(|number| !number.is_finite()) {
             return Ok(());
@@ -69,7 +69,7 @@ impl Description {
         Ok(())
     }
 
-    /// Complains about closed loops where `what` is asked for, which is not known of them.
+    /// Refuses connections by closed loops where `what` is asked for, which is not known of them.
     pub(crate) fn refuse_loops(&self, what: &'static str, repair: &'static str) -> Result<()> {
         let refused = |closure: &LoopEntry| {
             Err(ConnectionError::LoopRefused { closure: closure.name.clone(), what, repair }.into())
@@ -94,13 +94,13 @@ impl Description {
     }
 }
 
-/// The parameters and where each is defined.
+/// Parameters of the connections and where each is defined.
 pub(super) fn domains(description: &Description) -> impl Iterator<Item = (&usize, Domain)> {
     let contacts = description.contacts.iter().flat_map(|contact| contact.domains());
     contacts.chain(description.bushings.iter().flat_map(|bushing| bushing.domains()))
 }
 
-/// Every place in the parameter vector that is used, and by what.
+/// Places in the parameter vector that connections use, and by what.
 pub(super) fn used(description: &Description) -> impl Iterator<Item = (String, usize)> {
     let contacts = description.contacts.iter().flat_map(|contact| {
         contact.domains().into_iter().map(|(&index, _)| (format!("contact `{}`", contact.name), index))

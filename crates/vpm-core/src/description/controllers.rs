@@ -28,7 +28,7 @@ pub(super) fn check(description: &Description) -> Result<()> {
     Ok(())
 }
 
-/// No law that needs the motion of every coordinate in a machine that has elastic ones.
+/// Checks that no controller needs the motion of every coordinate in a machine with elastic ones.
 pub(super) fn check_rigid(description: &Description) -> Result<()> {
     let inverting = |controller: &&ControllerEntry| matches!(controller.law, ControlLaw::ComputedTorque(_));
     let elastic = description.beams.iter().zip(description.elastic()).find(|(_, len)| **len > 0);
@@ -46,7 +46,7 @@ fn refuse(message: String) -> Result<()> {
     Err(Error::Description { message })
 }
 
-/// One actuator, one channel; or as many of both as there are gains.
+/// Checks a controller's shape: one actuator, one channel; or as many of both as there are gains.
 fn shape(what: &str, controller: &ControllerEntry) -> Result<()> {
     let (actuators, measures) = (controller.actuators.len(), controller.measures.len());
     let wanted = match &controller.law {
@@ -71,7 +71,8 @@ fn shape(what: &str, controller: &ControllerEntry) -> Result<()> {
     refuse(format!("{what} lists {actuators} actuators and {measures} measures, but a {kind} has one of each"))
 }
 
-/// A law sees positions of joints; of lines, numbered below `lines`, and of shafts after them some see the length or the angle.
+/// Checks what a controller measures. A law sees positions of joints; of lines, numbered below `lines`, and of shafts
+/// after them some see the length or the angle.
 fn sees(what: &str, controller: &ControllerEntry, measured: Channel, lines: usize) -> Result<()> {
     match (&controller.law, measured) {
         (ControlLaw::Cascade(_) | ControlLaw::Pid(_), Channel::Length { line }) if line >= lines => Ok(()),
@@ -83,7 +84,8 @@ fn sees(what: &str, controller: &ControllerEntry, measured: Channel, lines: usiz
     }
 }
 
-/// A force loop needs the way from its joint to its actuator, computed torque the joint itself.
+/// Checks what a controller acts on. A force loop needs the way from its joint to its actuator, computed torque the
+/// joint itself.
 fn acts(what: &str, controller: &ControllerEntry, description: &Description, place: usize) -> Result<()> {
     let (Channel::Position { joint }, Some(&number)) = (controller.measures[place], controller.actuators.get(place))
     else {

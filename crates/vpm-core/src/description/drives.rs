@@ -50,7 +50,7 @@ fn target(description: &Description, actuator: &Actuator<usize>) -> Result<()> {
     Err(DriveError::Target { actuator, drive, found, needed }.into())
 }
 
-/// What an actuator acts on in words: the quantity that it changes, and the part.
+/// Words for what a drive acts on: the quantity that it changes, and the part.
 fn measured(description: &Description, on: Target) -> (&'static str, String) {
     match on {
         Target::Joint(joint) => {
@@ -69,7 +69,7 @@ fn measured(description: &Description, on: Target) -> (&'static str, String) {
     }
 }
 
-/// Parameters whose order has a meaning.
+/// Parameters of drives whose order has a meaning.
 pub(super) fn orders(description: &Description, theta: &[f64]) -> Result<()> {
     let order = |low: usize, high: usize, repair: &'static str| -> Result<()> {
         let [path, other] = [low, high].map(|place| description.parameter_names[place].clone());
@@ -96,7 +96,7 @@ pub(super) fn orders(description: &Description, theta: &[f64]) -> Result<()> {
     Ok(())
 }
 
-/// The complaint about a piston at `place` from mid-stroke, whose stroke ends at ± `reach`.
+/// Complaint about a drive whose piston is at `place` from mid-stroke, with a stroke to ± `reach`.
 pub(crate) fn piston_outside(
     description: &Description,
     theta: &[f64],

@@ -60,7 +60,7 @@ pub struct ControllerEntry {
 }
 
 impl EffectEntry {
-    /// The parameters and where each is defined.
+    /// Parameters of an effect's entry and where each is defined.
     pub fn domains(&self) -> Vec<(&usize, Domain)> {
         match self {
             Self::Joint { law, .. } => law.domains(),
@@ -71,12 +71,12 @@ impl EffectEntry {
     }
 }
 
-/// Takes one field out of a table, so that the rest can be read strictly by the law it belongs to.
+/// Takes one field out of an entry's table, so that the law can read the rest strictly.
 fn take<T: for<'de> Deserialize<'de>>(table: &mut Map<String, Value>, field: &'static str) -> serde_json::Result<T> {
     serde_json::from_value(table.remove(field).ok_or_else(|| serde_json::Error::missing_field(field))?)
 }
 
-/// As [`take`], for a field that may be missing or null.
+/// Takes a field of an entry as [`take`], where it may be missing or null.
 fn optional(table: &mut Map<String, Value>, field: &'static str) -> serde_json::Result<Option<f64>> {
     table.remove(field).map_or(Ok(None), serde_json::from_value)
 }

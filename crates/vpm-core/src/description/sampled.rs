@@ -6,7 +6,7 @@ use crate::actuator::{Actuator, Drive, MaxwellNarxDrive, NarxDrive, Reading, Sch
 use crate::error::{DriveError, Error, Result};
 use crate::narx::{Factor, MaxwellNarx, MaxwellScheme, Narx, Structure, Surface, Term};
 
-/// The model of a NARX drive; its output is called `effort`.
+/// Model of a sampled NARX drive; its output is called `effort`.
 pub(crate) fn narx_of(drive: &NarxDrive) -> Result<Narx> {
     let names: Vec<String> =
         ["effort"].into_iter().chain(drive.inputs.iter().map(|(name, _)| name.as_str())).map(str::to_owned).collect();
@@ -16,7 +16,7 @@ pub(crate) fn narx_of(drive: &NarxDrive) -> Result<Narx> {
     Narx::new(Structure::new(&names, drive.terms.iter().map(term).collect())?, &drive.coefficients)
 }
 
-/// The element of a drive of type maxwell_narx.
+/// Element of a sampled drive of type maxwell_narx.
 pub(crate) fn maxwell_of(drive: &MaxwellNarxDrive) -> Result<MaxwellNarx> {
     let scheme = match drive.scheme {
         Scheme::Trapezoidal => MaxwellScheme::Trapezoidal,

@@ -6,7 +6,7 @@ use crate::scalar::Scalar;
 use crate::system::{Machine, System};
 
 impl Description {
-    /// The machine to step in time, with the parameters `theta`: ball joints turn freely where they can.
+    /// System for stepping in time, with the parameters `theta`: ball joints turn freely where they can.
     pub(crate) fn system_to_step<S: Scalar>(&self, theta: &[S]) -> Result<System<S>> {
         let free: Vec<bool> = self.balls.iter().map(|ball| self.hindrance(ball).is_none()).collect();
         if !free.contains(&true) {
@@ -22,7 +22,7 @@ impl Description {
         Ok(System::new(machine)?.with_balls(self.balls.iter().zip(free)))
     }
 
-    /// The machine to look at for one step or less from `state`, which is brought into the coordinates of the step.
+    /// System for stepping once or less from `state`, which is brought into the coordinates of the step.
     pub(crate) fn system_to_step_from<S: Scalar>(&self, theta: &[S], state: &mut [S]) -> Result<System<S>> {
         let mut system = self.system_to_step(theta)?;
         system.enter(state);

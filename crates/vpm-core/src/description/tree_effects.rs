@@ -65,7 +65,7 @@ impl<P> TreeEffect<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of a tree effect and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         match self {
             Self::RotorInertia { inertia, .. } => vec![(inertia, Domain::NonNegative)],
@@ -88,7 +88,7 @@ impl<P> TreeEffect<P> {
 }
 
 impl<S: Scalar> TreeEffect<S> {
-    /// Changes the parts of a machine. The joint or beam must exist.
+    /// Applies a tree effect: changes the parts of a machine. The joint or beam must exist.
     pub(super) fn apply(&self, parts: &mut Parts<S>) -> Result<()> {
         match *self {
             Self::RotorInertia { joint, inertia } => {

@@ -9,7 +9,7 @@ use crate::spatial::{ArticulatedInertia, Symmetric3, Twist, Vector3, Wrench};
 /// A joint counts as moving no inertia below this fraction of the inertia of its body in other directions.
 const SINGULAR: f64 = 1e-12;
 
-/// Joint accelerations (m/s^2 or rad/s^2) that efforts `tau` give at coordinates `q` and rates `v`.
+/// ABA: joint accelerations (m/s^2 or rad/s^2) that efforts `tau` give at `q` and `v`.
 ///
 /// Law: outward V and bias forces, inward the articulated inertia that each joint feels, outward the accelerations
 /// (Featherstone 2008, table 7.1). Gravity is an upward acceleration of the world. In a configuration in which a joint
@@ -22,7 +22,7 @@ pub fn aba<'d, S: Scalar>(model: &Model<S>, data: &'d mut Data<S>, q: &[S], v: &
     &data.acceleration
 }
 
-/// The joint that moves no inertia, and its articulated inertia, at coordinates `q`; if there is one.
+/// Joint that moves no inertia in the ABA at coordinates `q`, and its articulated inertia; if there is one.
 pub(super) fn singular_joint<S: Scalar>(
     model: &Model<S>,
     data: &mut Data<S>,
@@ -54,7 +54,8 @@ fn velocities<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S])
     }
 }
 
-/// Outward over one joint: pose, V, bias acceleration and bias force of the body numbered `frame`, on a carrier that moves with `carrier`.
+/// ABA outward over one joint: pose, V, bias acceleration and bias force of the body numbered `frame`. Its carrier
+/// moves with `carrier`.
 #[inline]
 pub(super) fn move_body<S: Scalar>(
     slot: &mut AbaSlot<S>,
@@ -97,7 +98,7 @@ fn inertias<S: Scalar>(model: &Model<S>, data: &mut Data<S>, tau: &[S]) {
     }
 }
 
-/// Inward at one joint: U, 1/D with an inertia `rotor` that feels the joint's acceleration alone, and u.
+/// ABA inward at one joint: U, 1/D with an inertia `rotor`, and u. The rotor feels the joint's acceleration alone.
 #[inline]
 pub(super) fn free_joint<S: Scalar>(slot: &mut AbaSlot<S>, kind: JointKind, rotor: S, tau: S) {
     slot.unit_wrench = unit_wrench(kind, &slot.inertia);
@@ -105,7 +106,7 @@ pub(super) fn free_joint<S: Scalar>(slot: &mut AbaSlot<S>, kind: JointKind, roto
     slot.effort = tau - kind.effort(&slot.bias_wrench);
 }
 
-/// What the parent feels when this joint is free: I^a = I^A - U U^T / D, p^a = p^A + I^a c + U u / D.
+/// ABA from a free joint to its parent: I^a = I^A - U U^T / D, p^a = p^A + I^a c + U u / D.
 #[inline]
 pub(super) fn hand_on<S: Scalar>(slot: &AbaSlot<S>, parent: &mut AbaSlot<S>) {
     let felt = slot.inertia.deflated(slot.unit_wrench, slot.inverse);
@@ -114,7 +115,7 @@ pub(super) fn hand_on<S: Scalar>(slot: &AbaSlot<S>, parent: &mut AbaSlot<S>) {
     parent.bias_wrench += slot.pose.wrench(bias);
 }
 
-/// What the parent of a free joint feels of an effort `tau` and a wrench on the body, without inertias and rates.
+/// ABA to the parent of a free joint: effort `tau` and the wrench on the body, without inertias and rates.
 #[inline]
 pub(super) fn push_body<S: Scalar>(slot: &mut AbaSlot<S>, kind: JointKind, tau: S) -> Wrench<S> {
     slot.effort = tau - kind.effort(&slot.bias_wrench);
@@ -131,7 +132,8 @@ fn accelerations<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     }
 }
 
-/// Outward over one joint: its acceleration, and A of its body on a carrier that accelerates with `carrier`, where rates alone add `drift`.
+/// ABA outward over one joint: its acceleration, and A of its body. Its carrier accelerates with `carrier`, where rates
+/// alone add `drift`.
 #[inline]
 pub(super) fn accelerate_body<S: Scalar>(
     slot: &mut AbaSlot<S>,
@@ -145,7 +147,7 @@ pub(super) fn accelerate_body<S: Scalar>(
     result
 }
 
-/// U = I^A S for a joint axis along z: one column of the 6 x 6 inertia, or a sum of two.
+/// U = I^A S in the ABA for a joint axis along z: one column of the 6 x 6 inertia, or a sum of two.
 #[inline]
 fn unit_wrench<S: Scalar>(kind: JointKind, inertia: &ArticulatedInertia<S>) -> Wrench<S> {
     match kind {
@@ -155,7 +157,7 @@ fn unit_wrench<S: Scalar>(kind: JointKind, inertia: &ArticulatedInertia<S>) -> W
     }
 }
 
-/// Out of the way of the other two, which are in almost every machine.
+/// U of a screw joint in the ABA; out of the way of the other two, which are in almost every machine.
 #[cold]
 fn screwing<S: Scalar>(inertia: &ArticulatedInertia<S>, pitch: f64) -> Wrench<S> {
     turning(inertia) + sliding(inertia) * S::from_f64(pitch)

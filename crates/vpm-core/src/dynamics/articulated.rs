@@ -22,8 +22,8 @@ pub struct Shift<'a, S> {
     pub resistances: &'a [S],
 }
 
-/// Accelerations of all coordinates under efforts `tau` on them at coordinates `q` and rates `v`: `M a + bias = tau`, where `tau` holds what
-/// springs and dampers do, those of the beams included.
+/// Articulated forward dynamics: accelerations of all coordinates under efforts `tau`, `M a + bias = tau`. `tau` holds
+/// what springs and dampers do at coordinates `q` and rates `v`, those of the beams included.
 ///
 /// Law: articulated bodies (Featherstone 2008, table 7.1) with several coordinates per joint (section 7.2, there for joints alone); between
 /// neighbouring segments block elimination from the tip inward. Checked: against the mass matrix of composite bodies, for all levels;
@@ -72,7 +72,7 @@ fn sweep<'d, S: Scalar>(
     &data.acceleration
 }
 
-/// Velocities and what they need, and of each segment all that its own inertia does.
+/// Articulated tree outward: velocities and what they need, and each segment's own inertia.
 fn outward<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
     let Data { aba: frames, segments, drifts, .. } = data;
     for node in model.order() {
@@ -95,7 +95,7 @@ fn outward<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
     }
 }
 
-/// Outward along a beam, whose stations are the first of `stations`.
+/// Articulated tree outward along a beam, whose stations are the first of `stations`.
 fn along<S: Scalar>(
     elastic: &Elastic<S>,
     slots: &mut [SegmentSlot<S>],
@@ -144,7 +144,7 @@ fn inward<S: Scalar>(model: &Model<S>, data: &mut Data<S>, tau: &[S], shift: Opt
     }
 }
 
-/// Inward along a beam.
+/// Articulated tree inward along a beam.
 fn gather<S: Scalar>(
     model: &Model<S>,
     elastic: &Elastic<S>,
@@ -193,7 +193,7 @@ fn push<S: Scalar>(model: &Model<S>, data: &mut Data<S>, tau: &[S]) {
     }
 }
 
-/// The same along a beam.
+/// Articulated tree inward along a beam for other efforts.
 fn push_along<S: Scalar>(
     model: &Model<S>,
     elastic: &Elastic<S>,
@@ -222,7 +222,8 @@ fn push_along<S: Scalar>(
     }
 }
 
-/// Accelerations, from a `world` that has its own to the tips; with those by rates alone where asked for.
+/// Articulated tree outward: accelerations from a `world` that has its own to the tips. Those by rates alone come where
+/// asked for.
 fn accelerations<S: Scalar>(model: &Model<S>, data: &mut Data<S>, world: Twist<S>, keeps: bool) {
     let Data { aba: frames, segments, acceleration: result, .. } = data;
     let of_rates = |drift: Twist<S>| if keeps { drift } else { Twist::zero() };

@@ -6,7 +6,7 @@ use crate::model::Model;
 use crate::scalar::Scalar;
 use crate::spatial::{SpatialInertia, Vector3, Wrench};
 
-/// The mass matrix M(q), n x n, column by column (symmetric, so the order does not matter to the reader).
+/// CRBA: mass matrix M(q), n x n, column by column (symmetric, so the order does not matter to the reader).
 ///
 /// Law: M_ij = S_i . F with F the wrench on composite body j, at joint i, for a unit acceleration of joint j
 /// (Featherstone 2008, table 6.2). Entries of joints on different branches are zero.
@@ -18,7 +18,7 @@ pub fn crba<'d, S: Scalar>(model: &Model<S>, data: &'d mut Data<S>, q: &[S]) -> 
     &data.mass_matrix
 }
 
-/// Gathers in each slot the inertia of the body and of all it carries.
+/// CRBA composites: gathers in each slot the inertia of the body and of all it carries.
 fn composites<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S]) {
     let slots = &mut data.crba;
     for ((link, &q), slot) in model.links().iter().zip(q).zip(slots.iter_mut().skip(1)) {
@@ -33,7 +33,7 @@ fn composites<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S]) {
     }
 }
 
-/// Carries the wrench of each unit acceleration down to the root and reads it at every joint on the way.
+/// CRBA columns: carries the wrench of each unit acceleration to the root and reads it at every joint.
 fn columns<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     let (links, slots, n) = (model.links(), &data.crba, model.n_joints());
     let matrix = &mut data.mass_matrix;
@@ -51,7 +51,7 @@ fn columns<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     }
 }
 
-/// M S for a joint axis along z: one column of the 6 x 6 inertia, or a sum of two.
+/// M S in the CRBA for a joint axis along z: one column of the 6 x 6 inertia, or a sum of two.
 #[inline]
 fn unit_wrench<S: Scalar>(kind: JointKind, body: &SpatialInertia<S>) -> Wrench<S> {
     match kind {

@@ -13,7 +13,7 @@ use crate::model::{Elastic, Link, Model, Node, Shaft, Wire};
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, SpatialInertia, Vector3, Wrench};
 
-/// Mass matrix and bias at coordinates `q` and rates `v`, left in `data`.
+/// Mass matrix and bias of a flexible tree at coordinates `q` and rates `v`, left in `data`.
 ///
 /// Across joints that do not couple the entries of M are zero.
 /// Law: `M = sum J^T m J`, `bias = sum J^T (m A + V x* m V)` over bodies, stations and lines, A with gravity taken off.
@@ -40,7 +40,7 @@ pub fn terms<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) 
     mirror(&mut data.mass_matrix, model.n_coordinates());
 }
 
-/// Adds the rotors that several joints turn, `J r r^T`, to the lower triangle.
+/// Adds rotors that several joints turn, `J r r^T`, to the lower triangle of a flexible tree.
 ///
 /// Source: the kinetic energy `J (r . v)^2 / 2` of a shaft whose speed is a constant linear form of the rates, so that nothing comes to the
 /// bias. Checked: against Lagrange's equations of a wrist worked out by hand.
@@ -56,7 +56,7 @@ fn add_rotors<S: Scalar>(model: &Model<S>, mass: &mut [S]) {
     }
 }
 
-/// The wrench on each frame that its own inertia needs in the motion of [`super::frames()`].
+/// Wrench on each frame of a flexible tree that its own inertia needs in the motion of [`super::frames()`].
 pub(super) fn weigh_frames<S: Scalar>(model: &Model<S>, frames: &mut [FrameSlot<S>], stations: Stations) {
     for (frame, (slot, products)) in frames.iter_mut().zip(model.products()).enumerate().skip(1) {
         if stations == Stations::Summed && model.is_summed(frame) {
@@ -69,7 +69,7 @@ pub(super) fn weigh_frames<S: Scalar>(model: &Model<S>, frames: &mut [FrameSlot<
     }
 }
 
-/// A joint: its own entries of the mass matrix, and everything it carries one frame further in.
+/// Joint of a flexible tree: its entries of the mass matrix, and all it carries one frame further in.
 fn body<S: Scalar>(link: &Link<S>, number: usize, beyond: &[usize], data: &mut Composite<S>, mass: &mut [S]) {
     let Composite { frames, columns, bias, .. } = data;
     let n = bias.len();
@@ -89,7 +89,8 @@ fn body<S: Scalar>(link: &Link<S>, number: usize, beyond: &[usize], data: &mut C
     }
 }
 
-/// A beam: its own block of the mass matrix, of its slices together and else station by station, and everything it carries to what its root sits on.
+/// Beam of a flexible tree: its block of the mass matrix, and all it carries to what its root sits on. The block is of
+/// its slices together and else station by station.
 fn beam<S: Scalar>(
     (elastic, number): (&Elastic<S>, usize),
     beyond: &[(usize, usize)],
@@ -132,18 +133,18 @@ fn beam<S: Scalar>(
     }
 }
 
-/// Hands an inertia and the wrench on it to the frame that carries them.
+/// Hands an inertia and the wrench on it to the frame of a flexible tree that carries them.
 fn carry<S: Scalar>(parent: &mut FrameSlot<S>, across: &Pose<S>, inertia: &SpatialInertia<S>, wrench: &Wrench<S>) {
     parent.inertia += across.inertia(*inertia);
     parent.wrench += across.wrench(*wrench);
 }
 
-/// The entry of two coordinates in the lower triangle.
+/// Entry of two coordinates in the lower triangle of a flexible tree's mass matrix.
 pub(super) fn entry<S>(mass: &mut [S], n: usize, i: usize, j: usize) -> &mut S {
     &mut mass[i.max(j) * n + i.min(j)]
 }
 
-/// Adds the lines that weigh something: needles between their points.
+/// Adds lines with mass to a flexible tree: needles between their points.
 ///
 /// Law: with u the unit vector of the line and J_u its derivative by the coordinates, a centre at distance c from the beginning has
 /// `J = J_from + c J_u`, one at distance c from the end `J = J_to - c J_u`; `M += m J^T J + I J_u^T J_u`,
@@ -187,7 +188,7 @@ fn massive_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     }
 }
 
-/// Copies the lower triangle to the upper one.
+/// Copies the lower triangle of a flexible tree's mass matrix to the upper one.
 fn mirror<S: Copy>(matrix: &mut [S], n: usize) {
     for i in 0..n {
         for j in 0..i {
@@ -196,14 +197,14 @@ fn mirror<S: Copy>(matrix: &mut [S], n: usize) {
     }
 }
 
-/// Adds to `loads` what forces on the lines do to the coordinates: `J^T F`, after [`terms`] or [`super::observe`].
+/// Adds forces on lines to `loads` of a flexible tree: `J^T F`, after [`terms`] or [`super::observe`].
 pub(crate) fn add_line_forces<S: Scalar>(data: &Data<S>, forces: &[S], loads: &mut [S]) {
     for (line, &force) in forces.iter().enumerate() {
         data.line_load(line, force, loads);
     }
 }
 
-/// Takes off `loads` what the beams' stiffness and damping carry: `K q + D v`.
+/// Subtracts stiffness and damping of a flexible tree's beams from `loads`: `K q + D v`.
 pub(crate) fn subtract_elastic<S: Scalar>(model: &Model<S>, q: &[S], v: &[S], loads: &mut [S]) {
     for Elastic { beam, coordinate, .. } in model.beams() {
         let len = beam.len();
@@ -218,7 +219,8 @@ pub(crate) fn subtract_elastic<S: Scalar>(model: &Model<S>, q: &[S], v: &[S], lo
     }
 }
 
-/// Adds `reach D + reach^2 K` of the beams to the mass matrix, as a step does that takes their elasticity implicitly.
+/// Adds `reach D + reach^2 K` of a flexible tree's beams to the mass matrix. A step does that which takes their
+/// elasticity implicitly.
 pub(crate) fn stiffen<S: Scalar>(model: &Model<S>, reach: S, mass: &mut [S]) {
     let n = model.n_coordinates();
     for Elastic { beam, coordinate, .. } in model.beams() {
@@ -233,7 +235,8 @@ pub(crate) fn stiffen<S: Scalar>(model: &Model<S>, reach: S, mass: &mut [S]) {
     }
 }
 
-/// Kinetic energy, and potential energy in gravity and in the beams, in J, at coordinates `q` and rates `v`.
+/// Kinetic and potential energy of a flexible tree in J, at `q` and `v`. The potential is that in gravity and in the
+/// beams.
 ///
 /// Checked: free motion conserves their sum.
 pub fn energy<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) -> Energy<S> {
@@ -271,7 +274,8 @@ fn product<S: Scalar>(row: &[S], x: &[S]) -> S {
     row.iter().zip(x).map(|(&entry, &x)| entry * x).sum()
 }
 
-/// Accelerations under `tau` on all coordinates, after [`terms`] at the same `q` and `v`; the factors of M stay in `data`.
+/// Accelerations of a flexible tree under `tau`, after [`terms`] at the same `q` and `v`. The factors of M stay in
+/// `data`.
 pub fn solve<'d, S: Scalar>(model: &Model<S>, data: &'d mut Data<S>, q: &[S], v: &[S], tau: &[S]) -> &'d [S] {
     data.factorise();
     let Data { composite: Composite { bias, factors, .. }, acceleration, .. } = data;
@@ -283,7 +287,7 @@ pub fn solve<'d, S: Scalar>(model: &Model<S>, data: &'d mut Data<S>, q: &[S], v:
     acceleration
 }
 
-/// Efforts on all coordinates that give accelerations `a`: `M a + bias + K q + D v`, after [`terms`] at the same `q` and `v`.
+/// Efforts of a flexible tree for accelerations `a`: `M a + bias + K q + D v`, after [`terms`] there.
 pub fn required<S: Scalar>(model: &Model<S>, data: &Data<S>, (q, v): (&[S], &[S]), a: &[S], efforts: &mut [S]) {
     let n = model.n_coordinates();
     efforts.fill(S::zero());

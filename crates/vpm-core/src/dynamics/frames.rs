@@ -91,7 +91,7 @@ pub(crate) fn outward<S: Scalar>(model: &Model<S>, data: &mut Data<S>, (q, v): (
     }
 }
 
-/// Poses `X_WF` and velocities of the bodies of a rigid tree, and nothing else: what forces on them need.
+/// Frames of the bodies of a rigid tree: poses `X_WF` and velocities, all that forces on them need.
 pub(crate) fn motion<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
     debug_assert!(model.is_recursive());
     let frames = &mut data.composite.frames;
@@ -124,7 +124,7 @@ pub(crate) fn poses<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     }
 }
 
-/// Geometry and motion of every line after [`poses`].
+/// Geometry and motion of every line between frames, after [`poses`].
 pub(crate) fn lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     bare_lines(model, data);
     let Composite { frames, sections, lines, .. } = &mut data.composite;
@@ -139,7 +139,8 @@ pub(crate) fn lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     }
 }
 
-/// Angle and speed of every shaft of a transmission at coordinates `q` and rates `v`; its levers stand since the data were made.
+/// Angle and speed of every transmission shaft at coordinates `q` and rates `v`, after the frames. Its levers stand
+/// since the data were made.
 #[inline]
 pub(crate) fn shafts<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v: &[S]) {
     for (shaft, slot) in model.shafts().iter().zip(&mut data.composite.lines[model.lines().len()..]) {
@@ -149,7 +150,7 @@ pub(crate) fn shafts<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v
     }
 }
 
-/// As [`lines`], but without the velocities per unit rate of the coordinates.
+/// Lines between frames as [`lines`], but without the velocities per unit rate of the coordinates.
 pub(super) fn bare_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     let Data { composite: Composite { frames, lines, .. }, drifts, .. } = data;
     let keeps = model.keeps_velocity_terms();

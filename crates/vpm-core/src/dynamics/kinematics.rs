@@ -4,7 +4,7 @@ use crate::data::{Data, KinematicsSlot};
 use crate::model::Model;
 use crate::scalar::Scalar;
 
-/// Poses `X_WB` and twists `V_WB` of all bodies, read afterwards with [`Data::pose`] and [`Data::twist`].
+/// Kinematics: poses `X_WB` and twists `V_WB` of all bodies, read with [`Data::pose`] and [`Data::twist`].
 ///
 /// Law: X_WB = X_WP X_PB(q), V_B = X_PB^-1 V_P + S v (Featherstone 2008, section 5.3). Works in the frames of the
 /// description, not in the aligned frames of the recursions, so that energies from here are an independent witness.

@@ -10,8 +10,9 @@ use crate::spatial::{Pose, Twist, Vector3, Wrench};
 /// A motion of all coordinates: positions, rates and accelerations.
 pub(crate) type Motion<'a, S> = [&'a [S]; 3];
 
-/// Wrench on every frame that its inertia and all that it carries need in the motion, in its own axes and about its origin, left in the
-/// frames' `wrench`; forces that act on them (N, along each line, and wrenches on frames added by `applied`) are taken off.
+/// Reactions: wrench on every frame that its inertia and all that it carries need, left in its `wrench`. It is in the
+/// frame's own axes and about its origin. Forces that act on them (N, along each line, and wrenches on frames added by
+/// `applied`) are taken off.
 ///
 /// Law: `F_B = m A_B + V_B x* m V_B - applied + sum of X_BC F_C` over what B carries (Featherstone 2008, table 5.1, with external forces);
 /// the parts of a line are carried by its ends. Checked: against `rnea` along the axes, weights at rest, and the rates of momenta.
@@ -37,7 +38,7 @@ pub(crate) fn reactions<S: Scalar>(
     inward(model, data);
 }
 
-/// Takes a wrench that acts on a frame, about its origin and in its axes, off what that has to be given otherwise.
+/// Takes a wrench that acts on a frame, about its origin and in its axes, off its reaction.
 pub(crate) fn take_off<S: Scalar>(data: &mut Data<S>, frame: usize, wrench: Wrench<S>) {
     if frame != 0 {
         let slot = &mut data.composite.frames[frame];
@@ -45,7 +46,7 @@ pub(crate) fn take_off<S: Scalar>(data: &mut Data<S>, frame: usize, wrench: Wren
     }
 }
 
-/// Adds to the accelerations of all frames what the accelerations of the coordinates give.
+/// Adds the accelerations of the coordinates to those of all frames, for reactions.
 fn accelerate<S: Scalar>(model: &Model<S>, data: &mut Data<S>, a: &[S], extra: &mut [Twist<S>]) {
     let composite = &mut data.composite;
     extra[0] = Twist::zero();
@@ -75,7 +76,7 @@ fn accelerate<S: Scalar>(model: &Model<S>, data: &mut Data<S>, a: &[S], extra: &
     }
 }
 
-/// Loads the frames of a line's ends with what its parts need and its force takes.
+/// Loads the frames of a line's ends with what its parts need and its force takes, for reactions.
 ///
 /// As in the equations of motion: a part moves with `J = J_end + c J_u`, so that its own end carries it along the line and both do across.
 fn line<S: Scalar>(wire: &Wire<S>, number: usize, data: &mut Data<S>, (tension, keeps): (S, bool)) {
@@ -108,12 +109,12 @@ fn line<S: Scalar>(wire: &Wire<S>, number: usize, data: &mut Data<S>, (tension, 
     }
 }
 
-/// A wrench about the origin of a frame from world axes into its own.
+/// Wrench of a reaction about the origin of a frame from world axes into its own.
 pub(crate) fn in_axes<S: Scalar>(pose: &Pose<S>, wrench: Wrench<S>) -> Wrench<S> {
     Wrench::new(pose.rotation.transpose_mul(wrench.angular), pose.rotation.transpose_mul(wrench.linear))
 }
 
-/// Hands on to each frame what it carries.
+/// Reactions inward: hands on to each frame what it carries.
 fn inward<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     let frames = &mut data.composite.frames;
     let mut hand = |parent: usize, own: usize| {

@@ -10,7 +10,7 @@ use crate::scalar::Scalar;
 /// A pivot of the mass matrix counts as zero below this fraction of its diagonal entry.
 const SINGULAR: f64 = 1e-12;
 
-/// Whether every joint moves inertia, so that the accelerations exist.
+/// Whether the tree is regular: every joint moves inertia, so that the accelerations exist.
 ///
 /// Judged at one generic configuration: a tree that is singular there is singular everywhere. A regular tree can still be
 /// singular in special configurations.
@@ -31,7 +31,8 @@ pub fn check_regular<S: Scalar>(model: &Model<S>, data: &mut Data<S>) -> Result<
     }
 }
 
-/// The first joint whose pivot of the mass matrix vanishes. Beams have mass all along, so theirs do not.
+/// First joint at which the tree is not regular: its pivot of the mass matrix vanishes. Beams have mass all along, so
+/// theirs do not.
 fn singular_pivot<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], rest: &[S]) -> Option<(usize, f64)> {
     flexible::terms(model, data, q, rest);
     data.factorise();

@@ -5,7 +5,7 @@ use crate::model::{Model, Products};
 use crate::scalar::Scalar;
 use crate::spatial::{Twist, Vector3};
 
-/// Joint efforts tau (N or N m) that give accelerations `a` at coordinates `q` and rates `v`.
+/// RNEA: joint efforts tau (N or N m) that give accelerations `a` at coordinates `q` and rates `v`.
 ///
 /// Law: outward V_B, A_B and F_B = M_B A_B + V_B x* M_B V_B; inward tau = S . F_B, F_P += F_B
 /// (Featherstone 2008, table 5.1). Gravity is an upward acceleration of the world.

@@ -13,7 +13,8 @@ use crate::model::Elastic;
 use crate::scalar::Scalar;
 use crate::spatial::{Pose, Twist, Vector3, Wrench};
 
-/// How fast the root of a beam turns about the axis of bending, from the velocity of what carries it.
+/// Turning rate of the root of a beam with slices about the axis of bending. It follows from the velocity of what
+/// carries it.
 pub(super) fn turn<S: Scalar>(slices: &Slices<S>, velocity: Twist<S>) -> S {
     velocity.angular.dot(Vector3::from_f64(slices.frame.rotation.columns[1].to_array()))
 }

@@ -32,20 +32,20 @@ pub struct Terms<S, const N: usize> {
 }
 
 impl<S: Scalar, const N: usize> Terms<S, N> {
-    /// `M a`, the efforts that accelerate.
+    /// Efforts `M a` that accelerate, by virtual work.
     pub fn inertia(&self, a: &[S; N]) -> [S; N] {
         from_fn(|i| (0..N).map(|j| self.mass_matrix[i][j] * a[j]).sum())
     }
 
-    /// `M a + V + G`, the efforts for accelerations `a`. Source: D'Imperio 2016, eq 2.104, with all signs as written
-    /// here.
+    /// Efforts `M a + V + G` for accelerations `a`, by virtual work. Source: D'Imperio 2016, eq 2.104, with all signs
+    /// as written here.
     pub fn effort(&self, a: &[S; N]) -> [S; N] {
         let inertia = self.inertia(a);
         from_fn(|i| inertia[i] + self.velocity[i] + self.gravity[i])
     }
 }
 
-/// The terms of the equation of motion, summed over bodies.
+/// Terms of the equation of motion by virtual work, summed over bodies.
 ///
 /// Law: with `K = J Psi` the Jacobian for the independent rates `v`, `M = sum K^T m K`,
 /// `V = sum K^T (m K_dot + gamma K) v`, `G = -sum K^T (0; m g)`, `m = diag(I, m 1)`, `gamma = diag([w]x I, 0)`, and
@@ -82,7 +82,7 @@ pub fn virtual_work<S: Scalar, const B: usize, const N: usize>(
     terms
 }
 
-/// Efforts of a wrench `(moment, force)` that acts on a body, for the independent coordinates: `Psi^T J^T w`.
+/// Virtual work of a wrench `(moment, force)` on a body: efforts `Psi^T J^T w` of independent coordinates.
 ///
 /// Source: D'Imperio 2016, eq 2.108, with the wrench in the order of all others. On the side of `tau` in the equation
 /// of motion.
@@ -94,7 +94,7 @@ pub fn effort_of_wrench<S: Scalar, const B: usize, const N: usize>(
     from_fn(|n| split(&independent(jacobian, psi, n)).0.power(wrench))
 }
 
-/// Column n of `J Psi`.
+/// Column n of `J Psi` for virtual work.
 fn independent<S: Scalar, const B: usize, const N: usize>(
     jacobian: &[Twist<Rate<S>>; B],
     psi: &[[Rate<S>; N]; B],
@@ -103,7 +103,7 @@ fn independent<S: Scalar, const B: usize, const N: usize>(
     jacobian.iter().zip(psi).fold(Twist::zero(), |sum, (column, row)| sum + *column * row[n])
 }
 
-/// A twist and its time derivative.
+/// Twist and its time derivative for virtual work.
 fn split<S: Scalar>(twist: &Twist<Rate<S>>) -> (Twist<S>, Twist<S>) {
     let part = |pick: fn(Rate<S>) -> S| {
         let [a, b] = [twist.angular, twist.linear].map(|v| Vector3::new(pick(v.x), pick(v.y), pick(v.z)));

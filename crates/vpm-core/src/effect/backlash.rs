@@ -43,7 +43,7 @@ impl<S: Scalar> Law<S> for Backlash<S> {
         self.damping + self.contact_damping * (corners * 0.5 + 1.0)
     }
 
-    /// Zero in the middle of the play.
+    /// Potential of a backlash: zero in its middle.
     #[inline]
     fn potential(&self, q: S) -> S {
         let half = self.gap * 0.5;
@@ -53,13 +53,13 @@ impl<S: Scalar> Law<S> for Backlash<S> {
 }
 
 impl<S: Scalar> Backlash<S> {
-    /// Rounded absolute value.
+    /// Rounded absolute value in the law of a backlash.
     #[inline]
     fn distance(&self, way: S) -> S {
         (way * way + self.width * self.width).sqrt()
     }
 
-    /// Integral of the rounded absolute value from zero.
+    /// Integral of the backlash's rounded absolute value from zero.
     #[inline]
     fn area(&self, way: S) -> S {
         let (size, distance) = (way.abs(), self.distance(way));

@@ -26,7 +26,7 @@ impl<S: Scalar> Law<S> for BiasForce<S> {
         Some(S::zero())
     }
 
-    /// Zero at q = 0.
+    /// Potential of a bias force: zero at q = 0.
     #[inline]
     fn potential(&self, q: S) -> S {
         self.force * q

@@ -30,7 +30,7 @@ impl Domain {
             }
     }
 
-    /// The condition in words, after "must".
+    /// Condition of a domain in words, after "must".
     pub fn condition(self) -> &'static str {
         match self {
             Self::Any => "be a finite number",

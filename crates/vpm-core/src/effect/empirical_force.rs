@@ -75,7 +75,7 @@ pub struct EmpiricalForce<P> {
 }
 
 impl<P> EmpiricalForce<P> {
-    /// The same law over another number type.
+    /// Empirical force over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> EmpiricalForce<T> {
         let (middle, reach, speed) = (f(&self.middle), f(&self.reach), f(&self.speed));
         let transition_velocity = f(&self.transition_velocity);
@@ -109,7 +109,7 @@ impl<P> EmpiricalForce<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of the empirical force and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let shapes = [
             (&self.middle, Domain::Any),
@@ -122,7 +122,7 @@ impl<P> EmpiricalForce<P> {
         shapes.into_iter().chain(period).chain(terms).collect()
     }
 
-    /// The coefficients.
+    /// Coefficients of the empirical force.
     fn terms(&self) -> [Option<&P>; 20] {
         [
             &self.constant,
@@ -150,13 +150,13 @@ impl<P> EmpiricalForce<P> {
     }
 }
 
-/// `coefficient value`, or nothing.
+/// Term of an empirical force, `coefficient value`, or nothing.
 #[inline]
 fn times<S: Scalar>(coefficient: Option<S>, value: S) -> S {
     coefficient.map_or(S::zero(), |coefficient| coefficient * value)
 }
 
-/// What is held at -1 and 1.
+/// Position in an empirical force, held at -1 and 1.
 #[inline]
 fn held<S: Scalar>(value: S) -> S {
     value.max(-S::one()).min(S::one())

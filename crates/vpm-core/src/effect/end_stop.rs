@@ -56,7 +56,7 @@ impl<S: Scalar> EndStop<S> {
         way.if_negative(|| square / (distance - way), || way + distance) * 0.5
     }
 
-    /// Integral of the depth.
+    /// Integral of the depth in an end stop.
     #[inline]
     fn area(&self, way: S) -> S {
         let size = ((way.abs() + self.distance(way)) / self.width).ln();
@@ -70,7 +70,7 @@ impl<S: Scalar> EndStop<S> {
     }
 }
 
-/// `(r(y) - 1)/y`, without a division by what may vanish.
+/// Chord of an end stop, `(r(y) - 1)/y`, without a division by what may vanish.
 #[inline]
 fn chord<S: Scalar>(y: S) -> S {
     let (b, at_rest) = (1.0 - 0.25 * FADE * FADE, 1.0 + 0.25 * FADE * FADE);

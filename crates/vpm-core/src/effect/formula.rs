@@ -53,7 +53,7 @@ pub enum Instruction {
 }
 
 impl Instruction {
-    /// How many numbers it takes off the stack; it puts one on.
+    /// Number of values that a formula's instruction takes off the stack; it puts one on.
     fn takes(self) -> usize {
         match self {
             Self::Position | Self::Velocity | Self::Parameter(_) | Self::Constant(_) => 0,
@@ -109,7 +109,7 @@ impl<P> TryFrom<Text<P>> for Formula<P> {
     }
 }
 
-/// Whether the program finds every number it asks for and leaves one.
+/// Checks whether a formula's program finds every number it asks for and leaves one.
 fn check(program: &[Instruction], constants: usize, parameters: usize) -> Result<(), String> {
     let mut depth = 0;
     for instruction in program {
@@ -131,13 +131,13 @@ fn check(program: &[Instruction], constants: usize, parameters: usize) -> Result
 }
 
 impl<P> Formula<P> {
-    /// The same law over another number type.
+    /// Formula over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Formula<T> {
         let parameters = std::array::from_fn(|place| self.parameters[place].as_ref().map(&mut *f));
         Formula { program: self.program, length: self.length, constants: self.constants, parameters }
     }
 
-    /// The parameters; their ranges are those of the one who wrote it.
+    /// Parameters of a formula; their ranges are those of the one who wrote it.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         self.parameters.iter().flatten().map(|parameter| (parameter, Domain::Any)).collect()
     }
@@ -178,7 +178,7 @@ impl<S: Scalar> Law<S> for Formula<S> {
     }
 }
 
-/// What an operation makes of one number, or of two.
+/// Result of a formula's operation on one number, or on two.
 #[inline]
 fn result<S: Scalar>(operation: Instruction, first: S, second: S) -> S {
     match operation {

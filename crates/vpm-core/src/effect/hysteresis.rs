@@ -28,7 +28,7 @@ law! {
 }
 
 impl<S: Scalar> MemoryLaw<S> for Hysteresis<S> {
-    /// The fading is not negative.
+    /// Chords of a hysteresis: the fading is not negative.
     #[inline]
     fn chords(&self, v: S, z: S) -> MemoryChords<S> {
         let loading = v.abs() / self.displacement;
@@ -37,8 +37,11 @@ impl<S: Scalar> MemoryLaw<S> for Hysteresis<S> {
         MemoryChords { push, resistance: zero, gain, source: zero, fading }
     }
 
-    /// Law: with `u = |way| / displacement` and y = z along the motion, `y+ = (y + (1 - e^(-b u))/b) - y (1 - e^(-b u))` for y < 0, b the
-    /// shape, until y = 0 at `u = ln(1 - b y)/b`; from there `1 - y` falls by `e^(-u)`.
+    /// Memory of a hysteresis after a way.
+    ///
+    /// Law: with `u = |way| / displacement` and y = z along the motion,
+    /// `y+ = (y + (1 - e^(-b u))/b) - y (1 - e^(-b u))` for y < 0, b the shape, until y = 0 at `u = ln(1 - b y)/b`;
+    /// from there `1 - y` falls by `e^(-u)`.
     #[inline]
     fn advance(&self, z: S, way: S, _: S) -> S {
         let along = way.if_negative(|| -z, || z);
@@ -58,7 +61,7 @@ impl<S: Scalar> MemoryLaw<S> for Hysteresis<S> {
 }
 
 impl<S: Scalar> Hysteresis<S> {
-    /// Energy in J that unloading gives back.
+    /// Energy in J stored in a hysteresis, which unloading gives back.
     #[inline]
     pub fn stored(&self, z: S) -> S {
         let (size, b) = (z.abs(), self.shape);
@@ -72,14 +75,14 @@ impl<S: Scalar> Hysteresis<S> {
 /// Below this the laws of a shape are their series, whose next terms are below a millionth of a millionth.
 const SMALL: f64 = 1e-5;
 
-/// (1 - exp(-b u))/b, u where b vanishes.
+/// Saturation of a hysteresis, (1 - exp(-b u))/b; u where b vanishes.
 #[inline]
 fn saturation<S: Scalar>(b: S, u: S) -> S {
     let x = b * u;
     x.if_less(S::from_f64(SMALL), || u * (x * (x * (1.0 / 6.0) - 0.5) + 1.0), || -(-x).exp_m1() / b)
 }
 
-/// ln(1 + b y)/b, y where b vanishes.
+/// Logarithm ln(1 + b y)/b in a hysteresis; y where b vanishes.
 #[inline]
 fn logarithm<S: Scalar>(b: S, y: S) -> S {
     let x = b * y;

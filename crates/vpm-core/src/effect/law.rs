@@ -16,56 +16,59 @@ pub(super) fn within_largest<S: Scalar>(share: S) -> S {
 ///
 /// Law: `tau = effort(q, v) - share_of_load(q, v, u) |u|`. A law says what differs from nothing at all.
 pub trait Law<S: Scalar> {
-    /// Effort, N or N m, but for what follows the load.
+    /// Effort of a law, N or N m, but for what follows the load.
     #[inline]
     fn effort(&self, q: S, v: S) -> S {
         self.effort_at_rest(q) - self.resistance(q, v) * v
     }
 
-    /// The same at rest.
+    /// Effort of a law at rest, but for what follows the load.
     #[inline]
     fn effort_at_rest(&self, _q: S) -> S {
         S::zero()
     }
 
-    /// Resistance r in N s/m or N m s/rad: what depends on the velocity is `-r v`, so that `effort(q, v) = effort(q, 0) - r v`. It is the
-    /// slope of the chord from rest to `v`, not of the tangent, and finite at rest.
+    /// Resistance r of a law in N s/m or N m s/rad: its velocity-dependent part is `-r v`.
+    ///
+    /// So `effort(q, v) = effort(q, 0) - r v`. It is the slope of the chord from rest to `v`, not of the tangent, and
+    /// finite at rest.
     #[inline]
     fn resistance(&self, _q: S, _v: S) -> S {
         self.damping().unwrap_or_else(S::zero)
     }
 
-    /// The resistance where it is the same everywhere; none where it is not.
+    /// Damping of a law: its resistance where it is the same everywhere; none where it is not.
     #[inline]
     fn damping(&self) -> Option<S> {
         None
     }
 
-    /// Potential energy in J, `effort_at_rest = -d potential/dq`: zero for friction, for formulas and for what is read off data.
+    /// Potential energy of a law in J, `effort_at_rest = -d potential/dq`. It is zero for friction, for formulas and
+    /// for what is read off data.
     #[inline]
     fn potential(&self, _q: S) -> S {
         S::zero()
     }
 
-    /// Effort with what follows the load.
+    /// Effort of a law with what follows the load.
     #[inline]
     fn effort_under(&self, q: S, v: S, u: S) -> S {
         if self.follows_load() { self.effort(q, v) - self.share_of_load(q, v, u) * u.abs() } else { self.effort(q, v) }
     }
 
-    /// Whether it takes a share of the load, which the motor side of a joint knows alone.
+    /// Whether a law takes a share of the load, which the motor side of a joint knows alone.
     #[inline]
     fn follows_load(&self) -> bool {
         false
     }
 
-    /// Share k of the load |u| that is taken off besides, within -1 and 1. Of u it may ask the sign alone.
+    /// Share k of the load |u| that a law takes off besides, within -1 and 1. Of u it may ask the sign alone.
     #[inline]
     fn share_of_load(&self, _q: S, _v: S, _u: S) -> S {
         S::zero()
     }
 
-    /// Resistance per load |u|, the chord from rest of the part of that share that vanishes there.
+    /// Resistance of a law per load |u|. It is the chord from rest of the part of that share that vanishes there.
     #[inline]
     fn resistance_per_load(&self, _v: S, _u: S) -> S {
         S::zero()
@@ -74,26 +77,26 @@ pub trait Law<S: Scalar> {
 
 /// A law with a memory z, a state without unit that is zero at first.
 pub trait MemoryLaw<S: Scalar> {
-    /// What it is at velocity `v` and memory `z`, in terms that are linear in both.
+    /// Chords of a law with memory at velocity `v` and memory `z`: terms that are linear in both.
     fn chords(&self, v: S, z: S) -> MemoryChords<S>;
 
-    /// The memory after a `time` (s) in which the joint has moved on by `way` (m or rad) in one direction, from `z`: exact for a steady
-    /// velocity.
+    /// Memory of a law after a `time` (s), from `z`: exact for a steady velocity. The joint has moved on by `way` (m or
+    /// rad) in one direction.
     fn advance(&self, z: S, way: S, time: S) -> S;
 
-    /// How far from zero it leads the memory at most.
+    /// Reach of a law's memory: how far from zero it leads it at most.
     #[inline]
     fn reach(&self) -> S {
         S::one()
     }
 
-    /// Effort, N or N m.
+    /// Effort of a law with memory, N or N m.
     #[inline]
     fn effort(&self, v: S, z: S) -> S {
         self.chords(v, z).effort(v, z)
     }
 
-    /// dz/dt, 1/s.
+    /// Rate dz/dt of a law's memory, 1/s.
     #[inline]
     fn rate(&self, v: S, z: S) -> S {
         self.chords(v, z).rate(v, z)
@@ -116,13 +119,13 @@ pub struct MemoryChords<S> {
 }
 
 impl<S: Scalar> MemoryChords<S> {
-    /// Effort at `v` and `z`.
+    /// Effort at `v` and `z` by the chords of a law with memory.
     #[inline]
     pub fn effort(&self, v: S, z: S) -> S {
         -(self.push * z + self.resistance * v)
     }
 
-    /// dz/dt at `v` and `z`.
+    /// Rate dz/dt at `v` and `z` by the chords of a law with memory.
     #[inline]
     pub fn rate(&self, v: S, z: S) -> S {
         self.gain * v + self.source - self.fading * z
@@ -133,7 +136,7 @@ impl<S: Scalar> MemoryChords<S> {
         Self { resistance: S::zero(), fading: S::zero(), ..self }
     }
 
-    /// Each number through `f`.
+    /// Chords of a law with memory, each number through `f`.
     pub(crate) fn map(self, f: impl Fn(S) -> S) -> Self {
         let Self { push, resistance, gain, source, fading } = self;
         Self { push: f(push), resistance: f(resistance), gain: f(gain), source: f(source), fading: f(fading) }
@@ -156,7 +159,7 @@ macro_rules! law {
                 $name { $($field: f(&self.$field),)* }
             }
 
-            /// The parameters and where each is defined.
+            /// Parameters of a law with memory and where each is defined.
             pub fn domains(&self) -> Vec<(&P, super::Domain)> {
                 vec![$((&self.$field, super::Domain::$domain),)*]
             }
@@ -175,14 +178,14 @@ macro_rules! family {
         }
 
         impl<P> $name<P> {
-            /// The same effect over another number type.
+            /// Effect with its law over another number type.
             pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> $name<T> {
                 match self {
                     $(Self::$kind(law) => $name::$kind(law.map(f)),)*
                 }
             }
 
-            /// The parameters and where each is defined.
+            /// Parameters of an effect's law and where each is defined.
             pub fn domains(&self) -> Vec<(&P, Domain)> {
                 match self {
                     $(Self::$kind(law) => law.domains(),)*

@@ -44,7 +44,7 @@ impl<S: Scalar> Law<S> for LoadDependentFriction<S> {
 }
 
 impl<S: Scalar> LoadDependentFriction<S> {
-    /// What multiplies the direction.
+    /// Level of load-dependent friction, which multiplies the direction.
     #[inline]
     fn level(&self, direction: S, u: S) -> S {
         let along = u.if_negative(|| -direction, || direction);

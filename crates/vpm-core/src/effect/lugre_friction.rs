@@ -53,7 +53,7 @@ impl<S: Scalar> MemoryLaw<S> for LugreFriction<S> {
 }
 
 impl<S: Scalar> LugreFriction<S> {
-    /// Resistance in steady motion over that in fast motion.
+    /// Level of LuGre friction: resistance in steady motion over that in fast motion.
     #[inline]
     fn level(&self, v: S) -> S {
         let ratio = v / self.stribeck_velocity;

@@ -114,7 +114,7 @@ family! {
 }
 
 impl<S: Scalar> JointEffect<S> {
-    /// Slope of the effort at rest by the coordinate, N/m or N m/rad.
+    /// Slope of an effect's effort at rest by the coordinate, N/m or N m/rad.
     #[inline]
     pub fn slope_at_rest(&self, q: S) -> S {
         let lifted = self.map(&mut |&parameter| Dual::<S, 1>::constant(parameter));
@@ -122,7 +122,7 @@ impl<S: Scalar> JointEffect<S> {
     }
 }
 
-/// tanh(x)/x, smooth through x = 0.
+/// Function tanh(x)/x of effects, smooth through x = 0.
 #[inline]
 fn tanh_ratio<S: Scalar>(x: S) -> S {
     // The series 1 - x^2/3 + 2 x^4/15 ...: what is left out is below rounding.

@@ -25,7 +25,7 @@ impl<P> Payload<P> {
         Payload { mass: f(&self.mass), position: self.position.each_ref().map(f) }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of a payload and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let [x, y, z] = &self.position;
         [&self.mass, x, y, z].map(|parameter| (parameter, Domain::Any)).to_vec()

@@ -53,7 +53,7 @@ impl<P> Seat<P> {
         }
     }
 
-    /// The joint whose coordinate alone is its own, if there is one.
+    /// Joint whose coordinate alone is that of a seat, if there is one.
     #[inline]
     pub(crate) fn alone(&self) -> Option<usize> {
         match self {
@@ -62,7 +62,7 @@ impl<P> Seat<P> {
         }
     }
 
-    /// The joint at which it is, on either side; none of a shaft.
+    /// Joint of a seat, on either side; none of a shaft.
     #[inline]
     pub(crate) fn joint(&self) -> Option<usize> {
         match self {
@@ -71,7 +71,7 @@ impl<P> Seat<P> {
         }
     }
 
-    /// The joints that move it.
+    /// Joints that move a seat.
     pub fn joints(&self) -> Vec<usize> {
         match self {
             Self::Joint { joint, behind } => [*joint].into_iter().chain(*behind).collect(),
@@ -103,7 +103,7 @@ impl<S: Scalar> Seat<S> {
         self.joint().map_or_else(S::zero, |joint| efforts[joint])
     }
 
-    /// Adds an `effort` on it to those on the joints.
+    /// Adds an `effort` on a seat to those on the joints.
     #[inline]
     pub fn push(&self, efforts: &mut [S], effort: S) {
         match self {

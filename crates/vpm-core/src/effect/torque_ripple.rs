@@ -34,7 +34,7 @@ impl<S: Scalar> Law<S> for TorqueRipple<S> {
         Some(S::zero())
     }
 
-    /// Zero on average over a period.
+    /// Potential of a torque ripple: zero on average over a period.
     #[inline]
     fn potential(&self, q: S) -> S {
         let (sine, cosine) = (q * TAU / self.period).sin_cos();

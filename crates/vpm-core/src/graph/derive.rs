@@ -22,7 +22,7 @@ enum Variables<'a> {
 }
 
 impl Variables<'_> {
-    /// Which of them a number is.
+    /// Place of a number among the variables of a derivative.
     fn place(self, node: Node, operation: Operation) -> Option<usize> {
         match (self, operation) {
             (Self::Inputs(inputs), Operation::Input(number)) => inputs.iter().position(|&input| input == number),
@@ -145,7 +145,7 @@ impl Graph {
         }
     }
 
-    /// f'(a), where f(a) is number `value`.
+    /// Derivative f'(a) of a function, where f(a) is number `value`.
     fn slope(&mut self, function: Function, a: Node, value: Node) -> Node {
         let one = self.constant(1.0);
         match function {
@@ -176,7 +176,7 @@ impl Graph {
     }
 }
 
-/// Two gradients, column by column: each column that either has.
+/// Joins two gradients of derivatives, column by column: each column that either has.
 fn join(
     left: &[(u32, Node)],
     right: &[(u32, Node)],

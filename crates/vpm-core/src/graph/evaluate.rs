@@ -11,21 +11,21 @@ pub const LANES: usize = 8;
 
 /// What a program can be worked out in.
 pub trait Number: Copy {
-    /// A constant.
+    /// Evaluates a constant.
     fn constant(value: f64) -> Self;
-    /// a + b.
+    /// Evaluates a + b.
     fn plus(self, other: Self) -> Self;
-    /// a - b.
+    /// Evaluates a - b.
     fn minus(self, other: Self) -> Self;
-    /// a b.
+    /// Evaluates a b.
     fn times(self, other: Self) -> Self;
-    /// a / b.
+    /// Evaluates a / b.
     fn over(self, other: Self) -> Self;
-    /// A function of the number.
+    /// Evaluates a function of the number.
     fn apply(self, function: Function) -> Self;
-    /// `yes` where the first number is less than the second, else `no`.
+    /// Evaluates a choice: `yes` where the first number is less than the second, else `no`.
     fn choose(pair: [&Self; 2], yes: &Self, no: &Self) -> Self;
-    /// What the search of a call finds, where `at` tells its arguments.
+    /// Evaluates the search of a call, where `at` tells its arguments.
     fn found(call: &Call, at: impl Fn(Node) -> Self) -> Self;
 }
 
@@ -187,7 +187,7 @@ pub struct Evaluator<T> {
 }
 
 impl<T: Number> Evaluator<T> {
-    /// Prepares `program`.
+    /// Prepares `program` for evaluation.
     pub fn new(program: &Program) -> Self {
         let layout = program.layout();
         let mut memory = vec![T::constant(0.0); layout.places as usize];
@@ -195,12 +195,12 @@ impl<T: Number> Evaluator<T> {
         Self { inputs: layout.inputs.clone(), n_inputs: program.n_inputs(), memory, layout }
     }
 
-    /// How many numbers come out.
+    /// Number of outputs of an evaluated program.
     pub fn n_outputs(&self) -> usize {
         self.layout.outputs.len()
     }
 
-    /// All outputs at `inputs`.
+    /// Evaluates all outputs at `inputs`.
     pub fn evaluate(&mut self, inputs: &[T], outputs: &mut [T]) {
         for &(place, number) in &self.inputs {
             self.memory[place as usize] = inputs[number as usize];
@@ -235,7 +235,7 @@ impl<T: Number> Evaluator<T> {
 }
 
 impl Evaluator<Lanes> {
-    /// Inputs from place `first` on keep these values from now on: rows of inputs end before them.
+    /// Holds inputs from place `first` on at these values for all evaluations: rows of inputs end before them.
     pub fn hold(&mut self, first: usize, values: &[f64]) {
         let Self { inputs, memory, .. } = self;
         inputs.retain(|&(place, number)| match (number as usize).checked_sub(first) {
@@ -248,7 +248,8 @@ impl Evaluator<Lanes> {
         self.n_inputs = first;
     }
 
-    /// Outputs (row by row, one row for each sample) at `inputs` (likewise). Rows that are not full on either side are left out.
+    /// Evaluates outputs for many samples, one row each, at `inputs` (likewise). Rows that are not full on either side
+    /// are left out.
     pub fn run(&mut self, inputs: &[f64], outputs: &mut [f64]) {
         let (wide, out) = (self.n_inputs.max(1), self.n_outputs().max(1));
         for (inputs, outputs) in inputs.chunks(wide * LANES).zip(outputs.chunks_mut(out * LANES)) {
@@ -270,7 +271,7 @@ impl Evaluator<Lanes> {
     }
 }
 
-/// The operation that needs each number last; those that come out are needed to the end.
+/// Last operation of an evaluation that needs each number; outputs are needed to the end.
 fn last_uses(program: &Program) -> Vec<usize> {
     let operations = program.operations();
     let mut last = vec![0; operations.len()];

@@ -20,7 +20,7 @@ pub(super) struct Known {
 }
 
 impl Known {
-    /// Where `operation` stands among `all` if it does, else where it will stand as the next one, which the caller appends.
+    /// Place of a known `operation` among `all`, or that of the next one, which the caller appends.
     pub fn place(&mut self, operation: &Operation, all: &[Operation]) -> Node {
         if 2 * all.len() >= self.slots.len() {
             self.grow(all);
@@ -32,7 +32,7 @@ impl Known {
         self.slots[slot]
     }
 
-    /// The first slot that is free or of the number that is looked for.
+    /// First slot among known operations that is free or holds the number looked for.
     fn slot(&self, operation: &Operation, found: impl Fn(Node) -> bool) -> usize {
         let mask = self.slots.len() - 1;
         let mut slot = FxBuildHasher.hash_one(operation) as usize & mask;

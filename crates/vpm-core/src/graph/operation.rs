@@ -63,7 +63,7 @@ pub struct Call {
 }
 
 impl Call {
-    /// The result of the search, where `value` gives the values of its arguments.
+    /// Result of a search operation, where `value` gives the values of its arguments.
     #[inline]
     pub fn value(&self, value: impl Fn(Node) -> f64) -> f64 {
         self.search.value(self.arguments.iter().map(|&argument| value(argument)))
@@ -71,7 +71,7 @@ impl Call {
 }
 
 impl Function {
-    /// The value of the function at `x`.
+    /// Value at `x` of the function in an operation.
     #[inline]
     pub fn of<S: Scalar>(self, x: S) -> S {
         match self {
@@ -90,7 +90,7 @@ impl Function {
 }
 
 impl Operation {
-    /// Calls `visit` with each number that it is made of; `calls` are those beside it.
+    /// Calls `visit` with each argument of an operation; `calls` are those beside it.
     #[inline]
     pub fn arguments(&self, calls: &[Call], mut visit: impl FnMut(Node)) {
         match *self {

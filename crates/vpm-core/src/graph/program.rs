@@ -45,7 +45,7 @@ enum Frozen {
 }
 
 impl Program {
-    /// What `outputs` need of `graph`, as a function of `inputs` numbers.
+    /// Program of what `outputs` need of `graph`, as a function of `inputs` numbers.
     ///
     /// Numbers are worked out as late as the order of the recording lets them, so that few stay alive at a time.
     pub fn new(graph: &Graph, outputs: &[Node], inputs: usize) -> Self {
@@ -107,32 +107,32 @@ impl Program {
         Self::of((&self.operations, &self.calls), &outputs, self.inputs, Frozen::Kept)
     }
 
-    /// The operations.
+    /// Operations of the program.
     pub fn operations(&self) -> &[Operation] {
         &self.operations
     }
 
-    /// The calls that operations refer to.
+    /// Calls to which the program's operations refer.
     pub fn calls(&self) -> &[Call] {
         &self.calls
     }
 
-    /// Which numbers come out.
+    /// Numbers that the program puts out.
     pub fn outputs(&self) -> &[Node] {
         &self.outputs
     }
 
-    /// How many numbers go in.
+    /// Number of the program's inputs.
     pub fn n_inputs(&self) -> usize {
         self.inputs
     }
 
-    /// How the operations are run.
+    /// Layout in which the program's operations are run.
     pub(super) fn layout(&self) -> Arc<Layout> {
         self.layout.0.get_or_init(|| Arc::new(Layout::new(self))).clone()
     }
 
-    /// How many operations there are, constants and inputs not counted.
+    /// Number of operations in the program, constants and inputs not counted.
     pub fn size(&self) -> usize {
         self.operations
             .iter()
@@ -140,7 +140,7 @@ impl Program {
             .count()
     }
 
-    /// Cut by how often inputs change: `seldom` tells of an input whether it changes seldom.
+    /// Splits the program by how often inputs change: `seldom` tells of an input whether it changes seldom.
     pub fn split(&self, seldom: impl Fn(usize) -> bool) -> Stages {
         let mut early = Vec::with_capacity(self.operations.len());
         for operation in &self.operations {
@@ -159,7 +159,8 @@ impl Program {
         }
     }
 
-    /// The numbers that the late operations, or the outputs, need of the early ones: neither constants nor inputs.
+    /// Numbers passed from a program's early operations to the late ones or outputs. They are neither constants nor
+    /// inputs.
     fn passed(&self, early: &[bool]) -> Vec<Node> {
         let mut wanted = vec![false; self.operations.len()];
         for (operation, _) in self.operations.iter().zip(early).filter(|&(_, &early)| !early) {

@@ -37,7 +37,7 @@ pub struct Decision {
 }
 
 impl Decision {
-    /// File, from the folder of the sources on, and line.
+    /// Recorded place of a decision: file, from the folder of the sources on, and line.
     pub fn place(&self) -> String {
         let file = self.location.file();
         format!("{}, line {}", file.rsplit_once("src/").map_or(file, |(_, file)| file), self.location.line())
@@ -51,7 +51,7 @@ impl Default for Graph {
 }
 
 impl Graph {
-    /// An empty graph whose inputs from `first_parameter` on are parameters.
+    /// Empty graph to record into, whose inputs from `first_parameter` on are parameters.
     pub fn new(first_parameter: u32) -> Self {
         let mut graph = Self {
             operations: Vec::new(),
@@ -67,7 +67,7 @@ impl Graph {
         graph
     }
 
-    /// The graph of a program, and the numbers of it that come out.
+    /// Recorded graph of a program, and the numbers of it that come out.
     pub fn of(program: &Program) -> (Self, Vec<Node>) {
         let mut graph = Self::default();
         let mut places: Vec<Node> = Vec::with_capacity(program.operations().len());
@@ -81,22 +81,22 @@ impl Graph {
         (graph, outputs)
     }
 
-    /// All operations; arguments stand before what is made of them.
+    /// Recorded operations; arguments stand before what is made of them.
     pub fn operations(&self) -> &[Operation] {
         &self.operations
     }
 
-    /// The calls that operations refer to, each once.
+    /// Recorded calls that operations refer to, each once.
     pub fn calls(&self) -> &[Call] {
         &self.calls
     }
 
-    /// Where values decided, each place once.
+    /// Recorded decisions by values, each place once.
     pub fn decisions(&self) -> &[Decision] {
         &self.decisions
     }
 
-    /// The value of a constant.
+    /// Value of a recorded constant.
     pub fn known_value(&self, node: Node) -> Option<f64> {
         match self.operations[node as usize] {
             Operation::Constant(bits) => Some(f64::from_bits(bits)),
@@ -104,19 +104,19 @@ impl Graph {
         }
     }
 
-    /// A constant.
+    /// Records a constant.
     pub fn constant(&mut self, value: f64) -> Node {
         // Both zeros are one number.
         let value = if value == 0.0 { 0.0 } else { value };
         self.make(Operation::Constant(value.to_bits()))
     }
 
-    /// Input `number`, at its reference `value`.
+    /// Records input `number`, at its reference `value`.
     pub fn input(&mut self, number: u32, value: f64) -> Node {
         self.push(Operation::Input(number), value)
     }
 
-    /// The number of `operation`, appended if it is new; an input has the value `input`.
+    /// Records `operation` if it is new, and returns its number; an input has the value `input`.
     fn push(&mut self, operation: Operation, input: f64) -> Node {
         let node = self.known.place(&operation, &self.operations);
         if (node as usize) < self.operations.len() {
@@ -135,7 +135,7 @@ impl Graph {
         self.push(operation, f64::NAN)
     }
 
-    /// a + b.
+    /// Records a + b.
     pub fn add(&mut self, a: Node, b: Node) -> Node {
         match (self.known_value(a), self.known_value(b)) {
             (Some(x), Some(y)) => return self.constant(x + y),
@@ -150,7 +150,7 @@ impl Graph {
         }
     }
 
-    /// a - b.
+    /// Records a - b.
     pub fn subtract(&mut self, a: Node, b: Node) -> Node {
         if a == b {
             return self.constant(0.0);
@@ -167,7 +167,7 @@ impl Graph {
         }
     }
 
-    /// -a.
+    /// Records the negative of a number: -a.
     pub fn negative(&mut self, a: Node) -> Node {
         match self.operations[a as usize] {
             Operation::Constant(bits) => self.constant(-f64::from_bits(bits)),
@@ -177,7 +177,7 @@ impl Graph {
         }
     }
 
-    /// a b.
+    /// Records a b.
     pub fn multiply(&mut self, a: Node, b: Node) -> Node {
         match (self.known_value(a), self.known_value(b)) {
             (Some(x), Some(y)) => return self.constant(x * y),
@@ -191,7 +191,7 @@ impl Graph {
         if left_turned == right_turned { product } else { self.negative(product) }
     }
 
-    /// The product with the constant `factor`, which is number `constant`.
+    /// Records the product with the constant `factor`, which is number `constant`.
     fn scale(&mut self, factor: f64, constant: Node, b: Node) -> Node {
         if factor == 0.0 {
             return self.constant(0.0);
@@ -214,7 +214,7 @@ impl Graph {
         }
     }
 
-    /// a / b; by a constant as a product with its inverse.
+    /// Records a / b; by a constant as a product with its inverse.
     pub fn divide(&mut self, a: Node, b: Node) -> Node {
         match (self.known_value(a), self.known_value(b)) {
             (Some(x), Some(y)) => self.constant(x / y),
@@ -227,7 +227,7 @@ impl Graph {
         }
     }
 
-    /// A function of a number.
+    /// Records a function of a number.
     pub fn apply(&mut self, function: Function, a: Node) -> Node {
         match (function, self.known_value(a)) {
             (Function::Negative, _) => self.negative(a),
@@ -236,7 +236,7 @@ impl Graph {
         }
     }
 
-    /// `yes` where a < b, else `no`.
+    /// Records a choice: `yes` where a < b, else `no`.
     pub fn select(&mut self, [a, b, yes, no]: [Node; 4]) -> Node {
         if yes == no {
             return yes;
@@ -253,7 +253,7 @@ impl Graph {
         }
     }
 
-    /// What a search finds with the numbers of the call.
+    /// Records a search with the numbers of the call.
     pub fn search(&mut self, call: Call) -> Node {
         if call.arguments.iter().all(|&argument| self.known_value(argument).is_some()) {
             let found = call.value(|node| self.values[node as usize]);
@@ -267,7 +267,7 @@ impl Graph {
         self.make(Operation::Search(place as u32))
     }
 
-    /// The value of a number at the reference inputs, for a law that decides by it.
+    /// Records that a law decides by a number's value at the reference inputs.
     fn decide(&mut self, node: Node, location: &'static Location<'static>) -> f64 {
         if self.known_value(node).is_none() {
             let decision = Decision { location, of_parameters: self.of_parameters[node as usize] };
@@ -328,7 +328,7 @@ fn on<R>(work: impl FnOnce(&mut Graph) -> R) -> R {
 pub struct Recorded(Node);
 
 impl Recorded {
-    /// Its place in the graph.
+    /// Place of a recorded number in the graph.
     pub fn node(self) -> Node {
         self.0
     }

@@ -33,7 +33,8 @@ enum Place {
 }
 
 impl Program {
-    /// `static void NAME(const double *INPUT, ..., double *w, double *OUTPUT, ...)`, in pieces of at most a thousand statements.
+    /// C source of a program: `static void NAME(const double *INPUT, ..., double *w, double *OUTPUT, ...)`. It is in
+    /// pieces of at most a thousand statements.
     ///
     /// The blocks of `inputs` are the program's inputs in order, those of `outputs` its outputs; a block without a name is none of the
     /// arguments, and nothing may need it. Arrays must not overlap. Constants have as many digits as it takes to read them back exactly.
@@ -57,7 +58,7 @@ impl Program {
     }
 }
 
-/// A number of C that reads back as the same `f64`.
+/// C source of a number that reads back as the same `f64`.
 pub fn literal(value: f64) -> String {
     match value {
         value if value.is_nan() => "NAN".to_owned(),
@@ -93,7 +94,8 @@ impl<'a> Writer<'a> {
         !matches!(self.program.operations()[node], Operation::Constant(_) | Operation::Input(_))
     }
 
-    /// The numbers that each function makes, in order; what is known without work is shown by the last.
+    /// Pieces of C source: the numbers that each function makes, in order. What is known without work is shown by the
+    /// last.
     fn pieces(&self) -> Vec<Vec<Node>> {
         let made: Vec<_> =
             (0..self.program.operations().len()).filter(|&node| self.made(node)).map(|node| node as Node).collect();
@@ -106,7 +108,8 @@ impl<'a> Writer<'a> {
         pieces
     }
 
-    /// Gives places in the working memory to the numbers that later pieces need; each again once nothing needs it any more.
+    /// Places in the C source's working memory for numbers that later pieces need. Each is used again once nothing
+    /// needs it any more.
     fn hand_on(&mut self) {
         let pieces = self.pieces();
         let mut piece_of = vec![0; self.places.len()];
@@ -176,7 +179,7 @@ impl<'a> Writer<'a> {
         format!("{}{{\n{unused}{body}}}\n\n", self.signature(name))
     }
 
-    /// A number as part of an expression.
+    /// C source of a number as part of an expression.
     fn term(&self, node: Node, local: bool) -> String {
         match (self.program.operations()[node as usize], self.places[node as usize]) {
             (Operation::Constant(bits), _) => literal(f64::from_bits(bits)),
@@ -187,7 +190,7 @@ impl<'a> Writer<'a> {
     }
 }
 
-/// Entry `place` of all blocks in a row.
+/// C source of entry `place` of all blocks in a row.
 fn entry(blocks: &[Block<'_>], mut place: usize) -> String {
     for &(name, length) in blocks {
         if place < length {
@@ -219,7 +222,7 @@ fn expression(operation: Operation, calls: &[Call], term: impl Fn(Node) -> Strin
     }
 }
 
-/// The functions behind searches, each once.
+/// Functions behind searches in the C source, each once.
 fn called(calls: &[Call]) -> Vec<&'static str> {
     let mut texts = Vec::new();
     for &text in calls.iter().flat_map(|call| call.search.source) {
@@ -230,7 +233,7 @@ fn called(calls: &[Call]) -> Vec<&'static str> {
     texts
 }
 
-/// The name of a function in `math.h`; a sign has none.
+/// Name of a C source function in `math.h`; a sign has none.
 fn in_c(function: Function) -> &'static str {
     match function {
         Function::Negative => "-",

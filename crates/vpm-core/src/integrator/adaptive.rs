@@ -35,7 +35,7 @@ struct Rule {
 }
 
 impl Rule {
-    /// As many steps as the tolerance needs.
+    /// Rule of the adaptive method: as many steps as the tolerance needs.
     const fn exact(tolerance: f64) -> Self {
         Self { tolerance, first: 1e-3, floor: 0.0, longer: 5.0, refused: 1.0 }
     }
@@ -101,7 +101,7 @@ pub struct Stuck {
 }
 
 impl Stuck {
-    /// What the state does that no step can follow: the verb of a sentence about it.
+    /// Event that the adaptive method cannot follow: the verb of a sentence about the state.
     pub fn event(&self) -> String {
         if self.many {
             return format!("takes more than {MOST_STEPS} steps to follow");
@@ -109,7 +109,7 @@ impl Stuck {
         "changes faster than any step can follow".to_owned()
     }
 
-    /// What a user can do about it, for the end of the message.
+    /// Repair for a state that the adaptive method cannot follow, for the end of the message.
     pub fn repair(&self) -> &'static str {
         if self.many {
             "use a larger tolerance or more substeps, and look for a vibration or a growth that should not be there"
@@ -120,7 +120,7 @@ impl Stuck {
 }
 
 impl Halt {
-    /// This halt, with its time counted from `time` (s) earlier.
+    /// Halt of the adaptive method, with its time counted from `time` (s) earlier.
     pub(super) fn later(self, time: f64) -> Self {
         match self {
             Self::Interrupted => Self::Interrupted,
@@ -150,7 +150,7 @@ struct Verdict {
 }
 
 impl<S: Scalar> Adaptive<S> {
-    /// Buffers for systems of `dim` states; errors of `tolerance` relative to each state and its scale.
+    /// Buffers of the adaptive method for `dim` states; `tolerance` is relative to each state and its scale.
     pub fn new(tolerance: f64, dim: usize) -> Result<Self> {
         check(tolerance)?;
         Ok(Self::unchecked(tolerance, dim))
@@ -160,8 +160,9 @@ impl<S: Scalar> Adaptive<S> {
         Self::with(Rule::exact(tolerance), dim)
     }
 
-    /// Buffers for systems of `dim` states, for bounded work: a call takes one step where its error stays below 1e-2, and no more than
-    /// 16 (and 20 refused ones) where not. Steps of a sixteenth are taken whatever their error.
+    /// Buffers of the adaptive method for `dim` states with bounded work. A call takes one step where its error stays
+    /// below 1e-2, and no more than 16 (and 20 refused ones) where not. Steps of a sixteenth are taken whatever their
+    /// error.
     pub fn guarded(dim: usize) -> Self {
         Self::with(Rule::GUARDED, dim)
     }
@@ -171,12 +172,13 @@ impl<S: Scalar> Adaptive<S> {
         Self { method, rule, scales: vec![1.0; dim], next, proposed: None, attempts: 0 }
     }
 
-    /// Forgets the length of the last step.
+    /// Forgets the length of the last adaptive step.
     pub fn reset(&mut self) {
         self.proposed = None;
     }
 
-    /// Moves `x` on by `duration` (s), from a first step that the last call proposed or, at first, a thousandth of the duration.
+    /// Moves `x` on by `duration` (s) in adaptive steps. The first is what the last call proposed or, at first, a
+    /// thousandth of the duration.
     ///
     /// Now and then it asks whether to stop.
     pub fn advance(
@@ -233,7 +235,7 @@ impl<S: Scalar> Adaptive<S> {
         Ok(steps)
     }
 
-    /// Computes a step into `next`, and judges it.
+    /// Attempts an adaptive step into `next`, and judges it.
     fn attempt(&mut self, ode: &mut impl Ode<S>, x: &[S], step: f64) -> Verdict {
         self.method.attempt(ode, x, step);
         self.method.accept(&mut self.next);
@@ -253,7 +255,7 @@ impl<S: Scalar> Adaptive<S> {
     }
 }
 
-/// Complains about a tolerance that means nothing.
+/// Refuses a meaningless tolerance of the adaptive method.
 pub(super) fn check(tolerance: f64) -> Result<()> {
     let [least, most] = TOLERANCES;
     if (least..=most).contains(&tolerance) {

@@ -76,12 +76,12 @@ pub struct Additive<S> {
 }
 
 impl<S: Scalar> Additive<S> {
-    /// Buffers for systems of `dim` states.
+    /// Buffers of the additive method for systems of `dim` states.
     pub fn new(dim: usize) -> Self {
         Self { split: Split::new(dim), slopes: vec![S::zero(); STAGES * dim] }
     }
 
-    /// Moves `x` on by `step` (s).
+    /// Moves `x` on by an additive step (s).
     pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: f64) {
         let dim = x.len();
         ode.additive_rates(x, x, 0.0, &mut self.slopes[..dim]);
@@ -98,7 +98,7 @@ impl<S: Scalar> Additive<S> {
     }
 }
 
-/// Puts `place` a step of `step` (s) along the weighted `slopes` from `x`.
+/// Puts `place` an additive step of `step` (s) along the weighted `slopes` from `x`.
 #[inline]
 fn ahead<S: Scalar>(place: &mut [S], x: &[S], slopes: &[S], weights: &[f64; STAGES], step: f64) {
     place.copy_from_slice(x);

@@ -33,13 +33,13 @@ pub struct CrankNicolson<S> {
 }
 
 impl<S: Scalar> CrankNicolson<S> {
-    /// Buffers for systems of `dim` states.
+    /// Buffers of the Crank-Nicolson method for systems of `dim` states.
     pub fn new(dim: usize) -> Self {
         let [before, end, rates] = [0; 3].map(|_| vec![S::zero(); dim]);
         Self { split: Split::new(dim), before, end, length: 0.0, rates }
     }
 
-    /// Moves `x` on by `step` (s).
+    /// Moves `x` on by a Crank-Nicolson step (s).
     pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: f64) {
         let reach = 0.5 * (1.0 + SHARE) * step;
         if !self.goes_on(x, step) {
@@ -57,13 +57,13 @@ impl<S: Scalar> CrankNicolson<S> {
         self.length = step;
     }
 
-    /// Whether a step goes on where the last one ended, derivatives included.
+    /// Whether a Crank-Nicolson step goes on where the last one ended, derivatives included.
     fn goes_on(&self, x: &[S], step: f64) -> bool {
         let same = |(&a, &b): (&S, &S)| a.inspect().to_bits() == b.inspect().to_bits() && (a - b).is_constant();
         self.length.to_bits() == step.to_bits() && x.iter().zip(&self.end).all(same)
     }
 
-    /// Finds rates of a step before, of which there is none.
+    /// Begins the Crank-Nicolson method: finds rates in place of a step before.
     #[cold]
     fn begin(&mut self, ode: &mut impl Ode<S>, x: &[S], reach: f64) {
         ode.additive_rates(x, x, 0.0, &mut self.before);
@@ -72,7 +72,7 @@ impl<S: Scalar> CrankNicolson<S> {
         self.split.rates(ode, reach, &mut self.before);
     }
 
-    /// Takes note that a step of that length (s) has led from `start` to `x`.
+    /// Notes for Crank-Nicolson that a step of that length (s) has led from `start` to `x`.
     pub(super) fn follow(&mut self, start: &[S], x: &[S], step: f64) {
         for (before, (&start, &x)) in self.before.iter_mut().zip(start.iter().zip(x)) {
             *before = (x - start) / step;
@@ -81,24 +81,24 @@ impl<S: Scalar> CrankNicolson<S> {
         self.length = step;
     }
 
-    /// Takes note that a state counts anew from `value`.
+    /// Notes for Crank-Nicolson that a state counts anew from `value`.
     pub(super) fn recount(&mut self, state: usize, value: S) {
         self.end[state] = value;
     }
 
-    /// Takes note that a small correction has moved the leading states to `x`.
+    /// Notes for Crank-Nicolson that a small correction has moved the leading states to `x`.
     pub(super) fn correct(&mut self, x: &[S]) {
         self.end[..x.len()].copy_from_slice(x);
     }
 
-    /// Forgets the last step.
+    /// Forgets the last Crank-Nicolson step.
     pub(super) fn reset(&mut self) {
         self.length = 0.0;
     }
 }
 
-/// By what a step multiplies the implicit mode `e^(s t)`, z = h s: the larger root of the characteristic polynomial
-/// `(1 - (1 + c)/2 z) r^2 - (1 + (1/2 - c) z) r - c/2 z`.
+/// Growth of the implicit mode `e^(s t)`, z = h s, in a Crank-Nicolson step. It is the larger root of the
+/// characteristic polynomial `(1 - (1 + c)/2 z) r^2 - (1 + (1/2 - c) z) r - c/2 z`.
 pub(super) fn growth(z: Complex<f64>) -> Complex<f64> {
     let square = -z * (0.5 * (1.0 + SHARE)) + 1.0;
     let (half, last) = ((z * (0.5 - SHARE) + 1.0) * 0.5, z * (0.5 * SHARE));

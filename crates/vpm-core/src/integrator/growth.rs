@@ -23,8 +23,8 @@ pub struct Rates<'a> {
     pub names: &'a [String],
 }
 
-/// Checks that `step` (s) with `method` is stable for `system`; the error names the state with the largest part in the mode that allows
-/// the shortest step.
+/// Checks that a `step` (s) with `method` lets no first-order mode of `system` grow. The error names the state with the
+/// largest part in the mode that allows the shortest step.
 ///
 /// Law: as in [`super::stability::check`], with the states that are no coordinates by the explicit Euler rule in `semi_implicit`.
 /// Checked: closed forms of a decay and of a vibration; the limits of second-order systems are those of that function.
@@ -38,8 +38,9 @@ pub fn check_rates(method: Method, step: f64, system: &Rates<'_>) -> Result<()> 
     judge(method, step, system, worst)
 }
 
-/// As [`check_rates`], for any method of fixed steps; `derivative` is that of the state after a step (s) by the state before, row by row.
-/// Of a method of several steps it is that of the last states, newest first, by those before.
+/// Checks growth as [`check_rates`], for any method of fixed steps. `derivative` is that of the state after a step (s)
+/// by the state before, row by row. Of a method of several steps it is that of the last states, newest first, by those
+/// before.
 ///
 /// Checked: against the stability functions of the methods.
 pub fn check_steps(
@@ -108,7 +109,7 @@ impl Scaled {
         }))
     }
 
-    /// The mode that a step grows most, which makes `turn` of the state for a step, if that is more than it grows by itself.
+    /// Mode of the largest growth by a step, which makes `turn` of the state, if that exceeds its own growth.
     fn stepped(&self, step: f64, mut turn: impl FnMut(f64) -> DMatrix<f64>) -> Result<Option<Worst>> {
         // A system that grows by itself is not the fault of the step.
         let own = eigenvalues(self.matrix.clone())?;
@@ -140,7 +141,7 @@ impl Scaled {
         Ok(Some(Worst { place, frequency, limit: low }))
     }
 
-    /// What a semi-implicit step makes of the state.
+    /// Growth matrix of a semi-implicit step.
     fn turn(&self, step: f64) -> DMatrix<f64> {
         let (n, count) = (self.matrix.nrows(), self.coordinates);
         let mut turn = DMatrix::identity(n, n) + &self.matrix * step;
@@ -166,7 +167,7 @@ impl Scaled {
         turn
     }
 
-    /// The state with the largest part in the mode of `matrix` with that eigenvalue.
+    /// State with the largest part in the growing mode of `matrix` with that eigenvalue.
     fn largest_part(&self, matrix: &DMatrix<f64>, value: Complex<f64>) -> usize {
         let n = matrix.nrows();
         let shifted = DMatrix::from_fn(n, n, |i, j| {

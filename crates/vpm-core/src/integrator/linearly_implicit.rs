@@ -27,13 +27,13 @@ pub struct LinearlyImplicit<S, L = f64> {
 }
 
 impl<S: Scalar + Mul<L, Output = S>, L: Length> LinearlyImplicit<S, L> {
-    /// Buffers for systems of `dim` states.
+    /// Buffers of the linearly implicit method for systems of `dim` states.
     pub fn new(dim: usize) -> Self {
         let zero = vec![S::zero(); dim];
         Self { left: Stage::new(dim), first: zero.clone(), second: zero.clone(), stage: zero }
     }
 
-    /// Moves `x` on by `step` (s).
+    /// Moves `x` on by a linearly implicit step (s).
     pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: L) {
         ode.prepare(x, self.left.matrix(), &mut self.first);
         self.left.factorise(ode.coordinates(), step * GAMMA);
@@ -51,8 +51,8 @@ impl<S: Scalar + Mul<L, Output = S>, L: Length> LinearlyImplicit<S, L> {
         }
     }
 
-    /// The largest factor of the elimination in the last step: where it is large in numbers that do not tell how they compare, so that
-    /// rows stay where they are, the step is not exact.
+    /// Largest elimination factor in the last linearly implicit step: where it is large, the step is not exact. That
+    /// happens in numbers that do not tell how they compare, so that rows stay where they are.
     pub(crate) fn largest_factor(&self) -> S {
         self.left.largest_factor()
     }

@@ -22,18 +22,18 @@ pub struct Lu<S> {
 }
 
 impl<S: Scalar> Lu<S> {
-    /// Buffers for matrices of `dim` rows.
+    /// LU buffers for matrices of `dim` rows.
     pub fn new(dim: usize) -> Self {
         let (square, line) = (vec![S::zero(); dim * dim], vec![S::zero(); dim]);
         Self { dim, factors: square.clone(), columns: square, order: (0..dim).collect(), scratch: line }
     }
 
-    /// Rows of the matrix.
+    /// Rows of the LU-factorised matrix.
     pub(super) fn dim(&self) -> usize {
         self.dim
     }
 
-    /// Makes the buffers fit matrices of `dim` rows; allocates only where they were never that large.
+    /// Resizes the LU buffers to matrices of `dim` rows; allocates only where they were never that large.
     pub fn resize(&mut self, dim: usize) {
         self.dim = dim;
         self.factors.resize(dim * dim, S::zero());
@@ -47,7 +47,7 @@ impl<S: Scalar> Lu<S> {
         &mut self.factors
     }
 
-    /// Factorises the matrix in place.
+    /// LU-factorises the matrix in place.
     pub fn factorise(&mut self) {
         for_size!(self.dim, N => self.factorise_of::<N>());
     }
@@ -85,7 +85,7 @@ impl<S: Scalar> Lu<S> {
         }
     }
 
-    /// The largest entry of L below its diagonal, by its size: at most one where rows were exchanged for the largest pivot.
+    /// Largest entry of L below its diagonal in the LU factors: at most one with row exchanges.
     pub(super) fn largest_factor(&self) -> S {
         let columns = self.columns.chunks_exact(self.dim.max(1)).enumerate();
         columns
@@ -93,12 +93,12 @@ impl<S: Scalar> Lu<S> {
             .fold(S::zero(), |largest, factor| largest.max(factor.abs()))
     }
 
-    /// The order in which the factors take the rows of the matrix.
+    /// Order in which the LU factors take the rows of the matrix.
     pub(super) fn order(&self) -> &[usize] {
         &self.order
     }
 
-    /// Replaces `b` by the solution x of `A x = b`.
+    /// Replaces `b` by the solution x of `A x = b` from the LU factors.
     pub fn solve(&mut self, b: &mut [S]) {
         for_size!(self.dim, N => self.solve_of::<N>(b, |_| ()));
     }
@@ -150,7 +150,7 @@ impl Lu<f64> {
     }
 }
 
-/// Takes `factor` times a column off.
+/// Takes `factor` times a column off in an LU factorisation.
 #[inline]
 pub(super) fn take<S: Scalar + Mul<F, Output = S>, F: Copy>(entries: &mut [S], column: &[F], factor: S) {
     for (entry, &part) in entries.iter_mut().zip(column) {
@@ -158,7 +158,7 @@ pub(super) fn take<S: Scalar + Mul<F, Output = S>, F: Copy>(entries: &mut [S], c
     }
 }
 
-/// The row from `column` down with the largest entry in that column; numbers that do not tell how they compare stay where they are.
+/// Pivot row of an LU factorisation from `column` down; incomparable numbers stay where they are.
 #[inline(always)]
 fn largest<S: Scalar>(factors: &[S], column: usize, n: usize) -> usize {
     let size = |row: usize| factors[row * n + column].abs();

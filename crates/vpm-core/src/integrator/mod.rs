@@ -98,8 +98,8 @@ impl Method {
         Self::Guarded,
     ];
 
-    /// What a step takes at least, in evaluations of the rates. Exact derivatives count as ten: without machine code they are worked out
-    /// operation by operation.
+    /// Least number of rate evaluations in a step of an integrator's method. Exact derivatives count as ten: without
+    /// machine code they are worked out operation by operation.
     pub fn evaluations(self) -> usize {
         match self {
             Self::SemiImplicit | Self::CrankNicolson => 1,
@@ -110,12 +110,12 @@ impl Method {
         }
     }
 
-    /// Whether it takes what is stiff implicitly by [`Ode::additive_rates`], and all else explicitly.
+    /// Whether an integrator's method takes what is stiff implicitly by [`Ode::additive_rates`].
     pub fn is_additive(self) -> bool {
         matches!(self, Self::Additive | Self::CrankNicolson)
     }
 
-    /// Its name in options, without a tolerance.
+    /// Name of an integrator's method in options, without a tolerance.
     pub fn name(self) -> &'static str {
         match self {
             Self::SemiImplicit => "semi_implicit",
@@ -129,7 +129,7 @@ impl Method {
         }
     }
 
-    /// The method of that name; `adaptive(1e-8)` is `adaptive` with another tolerance.
+    /// Integrator's method of that name; `adaptive(1e-8)` is `adaptive` with another tolerance.
     pub fn from_name(name: &str) -> Result<Self> {
         let tolerance = name.strip_prefix("adaptive(").and_then(|rest| rest.strip_suffix(')'));
         if let Some(tolerance) = tolerance.and_then(|number| number.trim().parse().ok()) {
@@ -142,7 +142,7 @@ impl Method {
             .ok_or_else(|| Error::Integrator { name: name.to_owned() })
     }
 
-    /// Complains about a tolerance that means nothing.
+    /// Refuses a meaningless tolerance of an integrator.
     pub fn check(self) -> Result<()> {
         if let Self::Adaptive { tolerance } = self { adaptive::check(tolerance) } else { Ok(()) }
     }
@@ -192,8 +192,8 @@ impl<S: Scalar> Integrator<S> {
         Self { scheme, steps: 0 }
     }
 
-    /// Moves `x` on by `step` (s): one step, or as many as it takes to control the error. Where those do not get there, the state that
-    /// stops them is not a number.
+    /// Moves `x` on by the integrator's `step` (s): one step, or as many as error control needs. Where those do not get
+    /// there, the state that stops them is not a number.
     pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: f64) {
         match &mut self.scheme {
             Scheme::SemiImplicit(method) => method.step(ode, x, step),
@@ -216,7 +216,7 @@ impl<S: Scalar> Integrator<S> {
         ode.arrive(x, Some(step));
     }
 
-    /// Moves `x` on by `duration` (s) in that many equal `pieces`, and asks now and then whether to stop.
+    /// Moves `x` on by the integrator over `duration` (s) in equal `pieces`, and asks whether to stop.
     pub fn advance(
         &mut self,
         ode: &mut impl Ode<S>,
@@ -239,28 +239,28 @@ impl<S: Scalar> Integrator<S> {
         Ok(())
     }
 
-    /// Takes note that a step of that length (s) has led from `start` to `x`, for methods that remember it.
+    /// Notes for the integrator that a step of that length (s) led from `start` to `x`, if it remembers.
     pub(crate) fn follow(&mut self, start: &[S], x: &[S], step: f64) {
         if let Scheme::CrankNicolson(method) = &mut self.scheme {
             method.follow(start, x, step);
         }
     }
 
-    /// Takes note that a state counts anew from `value`, without a jump of what it stands for.
+    /// Notes for the integrator that a state counts anew from `value`, without a jump.
     pub(crate) fn recount(&mut self, state: usize, value: S) {
         if let Scheme::CrankNicolson(method) = &mut self.scheme {
             method.recount(state, value);
         }
     }
 
-    /// Takes note that a small correction has moved the leading states to `x`.
+    /// Notes for the integrator that a small correction has moved the leading states to `x`.
     pub(crate) fn correct(&mut self, x: &[S]) {
         if let Scheme::CrankNicolson(method) = &mut self.scheme {
             method.correct(x);
         }
     }
 
-    /// Forgets what earlier steps have told about the next.
+    /// Forgets what earlier steps of the integrator have told about the next.
     pub fn reset(&mut self) {
         match &mut self.scheme {
             Scheme::Adaptive(method) => method.reset(),

@@ -24,7 +24,7 @@ struct Shared<'a, O> {
 }
 
 impl<O: Ode<f64>> Shared<'_, O> {
-    /// `df/dx v` at x.
+    /// Product `df/dx v` at x for the reference solver.
     fn product(&mut self, x: &[f64], v: &[f64], out: &mut [f64]) {
         if self.state != x {
             self.state.clear();
@@ -37,7 +37,7 @@ impl<O: Ode<f64>> Shared<'_, O> {
     }
 }
 
-/// States of `ode` at `times` (s, ascending, after 0) from `start` at time 0, one row per time.
+/// Reference solution of `ode` at `times` (s, ascending, after 0) from `start` at time 0, row by row.
 ///
 /// Law: backward differentiation of variable order and step (the crate `diffsol`; Shampine & Reichelt 1997, "The MATLAB ODE suite",
 /// SIAM J. Sci. Comput. 18(1)) with exact Jacobians. Checked: sizes, tolerances and times; that the solver arrives.

@@ -94,7 +94,7 @@ impl Resolution {
 }
 
 impl Steps {
-    /// A lightly damped vibration of which the method makes another one.
+    /// Lightly damped vibration that a method does not resolve and damps or shifts.
     fn damped(&self, value: Complex<f64>) -> Option<Damped> {
         let (size, ratio) = (value.norm(), -value.re / value.norm());
         if value.im == 0.0 || ratio >= LIGHT {
@@ -111,7 +111,7 @@ impl Steps {
         (left < 1.0 - LOST || moved).then_some(mode)
     }
 
-    /// What does not grow by itself and does by the method.
+    /// Unresolved mode that grows by the method and not by itself.
     fn grown(&self, value: Complex<f64>) -> Option<Damped> {
         let (size, ratio) = (value.norm(), -value.re / value.norm());
         let growth = match value.im == 0.0 {
@@ -123,7 +123,7 @@ impl Steps {
         (ratio >= 0.0 && growth > 1.0 + GROWN && left > 1.0 + LOST).then_some(mode)
     }
 
-    /// Frequency in Hz above which the method makes another vibration of an undamped one.
+    /// Resolution limit: frequency in Hz above which the method changes an undamped vibration.
     fn limit(&self) -> f64 {
         let lost = |reach: f64| {
             let turn = self.turn(reach, 0.0);
@@ -140,7 +140,7 @@ impl Steps {
         high / (std::f64::consts::TAU * self.step)
     }
 
-    /// What one step of `reach` radians multiplies an oscillator of that damping ratio with.
+    /// Factor of one step of `reach` radians on an oscillator of that damping ratio, for its resolution.
     fn turn(&self, reach: f64, ratio: f64) -> Complex<f64> {
         if self.method == Method::CrankNicolson {
             return crank_nicolson::growth(Complex::new(-ratio, (1.0 - ratio * ratio).max(0.0).sqrt()) * reach);
@@ -154,7 +154,7 @@ impl Steps {
         }
     }
 
-    /// By how much one step of `reach` time constants makes a decay grow.
+    /// Growth of a decay in one step of `reach` time constants, which a method does not resolve.
     fn decay(&self, reach: f64) -> f64 {
         if self.method == Method::CrankNicolson {
             return crank_nicolson::growth(Complex::from(-reach)).norm();
@@ -164,7 +164,7 @@ impl Steps {
         (a * d - b * c).abs()
     }
 
-    /// The derivative of the state after a step by the state before.
+    /// Derivative of the state after a step by the state before, for the resolution of steps.
     fn columns(&self, stiffness: f64, damping: f64, reach: f64) -> [[f64; 2]; 2] {
         let mut oscillator = Oscillator { stiffness, damping, implicit: self.implicit };
         let mut integrator = Integrator::new(self.method, 2);
@@ -185,8 +185,9 @@ pub enum Taken {
     ByChord,
 }
 
-/// Whether steps bring a joint to rest that dry friction brakes, and keep it there. `turn` is the slope of the friction at rest, times the
-/// step, over the inertia that it moves: the steps in which friction at that slope stops the joint.
+/// Whether steps resolve sticking: dry friction brings a joint to rest and keeps it there. `turn` is the slope of the
+/// friction at rest, times the step, over the inertia that it moves: the steps in which friction at that slope stops
+/// the joint.
 ///
 /// Law: `v' = -turn (tanh(v) - load)` in steps of 1, v over the width in which friction turns around, from speeds that friction takes ten
 /// steps to stop, under loads up to 7/8 of the friction. The method itself makes the steps. What does not stay within 1 of `atanh(load)`,
@@ -209,8 +210,9 @@ pub fn sticks(method: Method, turn: f64, taken: Taken) -> bool {
     })
 }
 
-/// Whether steps bring a joint to rest that friction brakes which bends before it slides. `stiffness` is that of the bending, times the
-/// square of the step, over the inertia that it moves; `damping` its resistance to bending, times the step, over that inertia.
+/// Whether steps resolve sticking by friction that bends before it slides. `stiffness` is that of the bending, times
+/// the square of the step, over the inertia that it moves; `damping` its resistance to bending, times the step, over
+/// that inertia.
 ///
 /// Law: as [`sticks`], with `v' = -stiffness z - damping z'` and `z' = v - |v| z` (Dahl), v over the way that it bends in a step: friction that
 /// has stopped a joint stores no more than what moves it by the root of the stiffness. What stays faster is driven by the steps.
@@ -223,7 +225,8 @@ pub fn bends(method: Method, [stiffness, damping]: [f64; 2]) -> bool {
     rests::<3>(method, &mut Bristles { stiffness, damping }, stiffness, stiffness.sqrt())
 }
 
-/// Whether steps of 1 brake a joint to `slowest`, whatever its phase, where friction takes off `braked` of its speed in each.
+/// Whether steps of 1 resolve rest: they brake a joint to `slowest`, whatever its phase. Friction takes off `braked` of
+/// its speed in each step.
 fn rests<const STATES: usize>(method: Method, joint: &mut impl Ode<f64>, braked: f64, slowest: f64) -> bool {
     (0..PHASES).all(|phase| {
         let mut integrator = Integrator::new(method, STATES);
@@ -276,7 +279,7 @@ struct Bristles {
 }
 
 impl Bristles {
-    /// Derivatives of the bending by velocity and bending, then those of the velocity.
+    /// Derivatives of bristle bending, for the resolution of friction: by velocity and bending, then of the velocity.
     fn matrix(&self, [by_v, by_z]: [f64; 2], matrix: &mut [f64]) {
         let Self { stiffness, damping } = self;
         matrix.copy_from_slice(&[0.0, 1.0, 0.0, 0.0, -damping * by_v, -stiffness - damping * by_z, 0.0, by_v, by_z]);

@@ -16,13 +16,13 @@ pub struct Rk4<S> {
 }
 
 impl<S: Scalar> Rk4<S> {
-    /// Buffers for systems of `dim` states.
+    /// Buffers of RK4 for systems of `dim` states.
     pub fn new(dim: usize) -> Self {
         let zero = vec![S::zero(); dim];
         Self { stage: zero.clone(), rate: zero.clone(), sum: zero }
     }
 
-    /// Moves `x` on by `step` (s).
+    /// Moves `x` on by an RK4 step (s).
     pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: f64) {
         // (weight of the stage in the result, distance from x to the next stage), both in units of h.
         const TABLEAU: [(f64, f64); 4] = [(1.0 / 6.0, 0.5), (1.0 / 3.0, 0.5), (1.0 / 3.0, 1.0), (1.0 / 6.0, 0.0)];

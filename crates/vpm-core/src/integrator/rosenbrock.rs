@@ -70,7 +70,7 @@ pub struct Rosenbrock<S> {
 }
 
 impl<S: Scalar> Rosenbrock<S> {
-    /// Buffers for systems of `dim` states.
+    /// Buffers of the Rosenbrock method for systems of `dim` states.
     pub fn new(dim: usize) -> Self {
         Self {
             left: Stage::new(dim),
@@ -80,19 +80,19 @@ impl<S: Scalar> Rosenbrock<S> {
         }
     }
 
-    /// Moves `x` on by `step` (s).
+    /// Moves `x` on by a Rosenbrock step (s).
     pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: f64) {
         self.linearise(ode, x);
         self.attempt(ode, x, step);
         self.accept(x);
     }
 
-    /// Rates and Jacobian at `x`, where a step begins.
+    /// Rates and Jacobian at `x`, where a Rosenbrock step begins.
     pub(super) fn linearise(&mut self, ode: &mut impl Ode<S>, x: &[S]) {
         ode.linearise(x, self.left.matrix(), &mut self.rates);
     }
 
-    /// Computes the stages of a step from the `x` of the last [`Self::linearise`], and leaves x where it is.
+    /// Stages of a Rosenbrock step from the `x` of the last [`Self::linearise`]; x stays where it is.
     pub(super) fn attempt(&mut self, ode: &mut impl Ode<S>, x: &[S], step: f64) {
         let dim = x.len();
         self.left.factorise(ode.coordinates(), RODAS4P2.gamma * step);
@@ -113,7 +113,7 @@ impl<S: Scalar> Rosenbrock<S> {
         }
     }
 
-    /// Moves `x` to the end of the step that was computed last.
+    /// Moves `x` to the end of the Rosenbrock step that was computed last.
     pub(super) fn accept(&self, x: &mut [S]) {
         // The last stage stands at x + sum a_6j u_j already.
         for ((state, &stage), &increment) in x.iter_mut().zip(&self.stage).zip(self.last_increment()) {
@@ -121,13 +121,13 @@ impl<S: Scalar> Rosenbrock<S> {
         }
     }
 
-    /// What the last stage adds: the difference between the step and its companion of third order, `x + sum a_6j u_j`.
+    /// Last Rosenbrock increment: difference to the companion of third order, `x + sum a_6j u_j`.
     pub(super) fn last_increment(&self) -> &[S] {
         &self.increments[(STAGES - 1) * self.stage.len()..]
     }
 }
 
-/// Makes `total` its `scale` times, and adds the first N of the `known` increments with their `weights`.
+/// Scales `total` and adds the first N `known` Rosenbrock increments with their `weights`.
 fn add<S: Scalar, const N: usize>(total: &mut [S], scale: f64, known: &[S], weights: &[f64; STAGES]) {
     let dim = total.len();
     let known: [&[S]; N] = std::array::from_fn(|stage| &known[stage * dim..(stage + 1) * dim]);

@@ -22,14 +22,14 @@ pub struct SemiImplicit<S> {
 }
 
 impl<S: Scalar> SemiImplicit<S> {
-    /// Buffers for systems of `dim` states.
+    /// Buffers of semi-implicit Euler for systems of `dim` states.
     pub fn new(dim: usize) -> Self {
         // There are coordinates for half of the states at most.
         let most = dim / 2;
         Self { rate: vec![S::zero(); dim], elastic: vec![S::zero(); 2 * most * most], lu: Lu::new(most) }
     }
 
-    /// Moves `x` on by `step` (s).
+    /// Moves `x` on by a semi-implicit Euler step (s).
     pub fn step(&mut self, ode: &mut impl Ode<S>, x: &mut [S], step: f64) {
         let n = ode.coordinates();
         ode.rhs(x, &mut self.rate);

@@ -17,7 +17,7 @@ pub(super) struct Split<S> {
 }
 
 impl<S: Scalar> Split<S> {
-    /// Buffers for systems of `dim` states.
+    /// Buffers of a split stage for systems of `dim` states.
     pub(super) fn new(dim: usize) -> Self {
         // There are coordinates for half of the states at most.
         let most = dim / 2;
@@ -25,7 +25,7 @@ impl<S: Scalar> Split<S> {
         Self { explicit, implicit, elastic: vec![S::zero(); 2 * most * most], lu: Lu::new(most) }
     }
 
-    /// Writes the `rates` that a stage adds for a time `reach` (s) to its implicit state, see [`Ode::additive_rates`].
+    /// Rates that a split stage adds for `reach` (s) to its implicit state, see [`Ode::additive_rates`].
     #[inline]
     pub(super) fn rates(&mut self, ode: &mut impl Ode<S>, reach: f64, rates: &mut [S]) {
         if !ode.additive_rates(&self.explicit, &self.implicit, reach, rates) {
@@ -33,7 +33,7 @@ impl<S: Scalar> Split<S> {
         }
     }
 
-    /// Takes the elasticity that the system tells of implicitly in explicit rates.
+    /// Relaxes explicit rates of a split stage by the system's elasticity, taken implicitly.
     ///
     /// Law: with `[A, B] = [-M^-1 K, -M^-1 D]` and r the reach, `(1 - r B - r^2 A) a = a_E + A (q_I + r v_I - q_E) + B (v_I - v_E)`.
     fn relax(&mut self, ode: &mut impl Ode<S>, reach: f64, rates: &mut [S]) {
@@ -61,7 +61,7 @@ impl<S: Scalar> Split<S> {
     }
 }
 
-/// Coordinates and their rates.
+/// Coordinates and their rates in a split stage.
 fn halves<S>(x: &[S], n: usize) -> [&[S]; 2] {
     [&x[..n], &x[n..2 * n]]
 }

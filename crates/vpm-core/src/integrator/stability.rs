@@ -36,7 +36,8 @@ struct Mode {
     limit: f64,
 }
 
-/// Checks that `step` (s) with `method` is stable for `system`; the error names the mode that allows the shortest step.
+/// Checks the stability of `step` (s) with `method` for `system`. The error names the mode that allows the shortest
+/// step.
 ///
 /// Law: `rk4` multiplies a mode `e^(s t)` by `R(z) = 1 + z + z^2/2 + z^3/6 + z^4/24`, `z = h s`, at every step (Hairer & Wanner 1996,
 /// section IV.2), `semi_implicit` turns `(q, v)` by `[1 - h^2 K, h (1 - h D); -h K, 1 - h D]`, with M = 1. None may grow, unless the
@@ -94,7 +95,8 @@ impl Reduced {
         Ok(Self { lower, stiffness, damping })
     }
 
-    /// Eigenvalues `s` of `s^2 + s D + K` from the companion matrix, in a time in which K and 1 are of one size.
+    /// Eigenvalues `s` of `s^2 + s D + K` for stability, from the companion matrix in scaled time. K and 1 are of one
+    /// size in that time.
     fn eigenvalues(&self) -> Result<Vec<Complex<f64>>> {
         let n = self.stiffness.nrows();
         let size =
@@ -120,7 +122,7 @@ impl Reduced {
             .collect())
     }
 
-    /// The one mode that allows `semi_implicit` the shortest step, if `step` is too long.
+    /// Mode that limits the stability of `semi_implicit`, if `step` is too long.
     fn semi_implicit_modes(&self, step: f64) -> Result<Vec<Mode>> {
         let growth = |step: f64| -> Result<Complex<f64>> {
             let factors = eigenvalues(self.semi_implicit_turn(step))?;
@@ -163,7 +165,7 @@ impl Reduced {
         turn
     }
 
-    /// The null vector of a matrix in reduced coordinates, in the coordinates of the system.
+    /// Shape of a mode in a stability check: null vector in the coordinates of the system.
     fn shape(&self, matrix: DMatrix<Complex<f64>>) -> DVector<Complex<f64>> {
         let n = matrix.nrows();
         let decomposed = matrix.svd(false, true);
@@ -172,7 +174,7 @@ impl Reduced {
         self.lower.map(Complex::from).ad_solve_lower_triangular(&null).unwrap_or(null)
     }
 
-    /// The coordinate with the largest part in the kinetic energy of a shape, which does not depend on the units of coordinates.
+    /// Coordinate with the largest kinetic energy in a mode of the stability check, whatever its units.
     fn largest_part(&self, shape: &DVector<Complex<f64>>) -> usize {
         let lower = self.lower.map(Complex::from);
         let momentum = &lower * (lower.adjoint() * shape);
@@ -181,7 +183,7 @@ impl Reduced {
     }
 }
 
-/// Largest step for which `rk4` lets `e^(value t)` grow no more than it does by itself.
+/// Stability limit of `rk4`: the largest step that lets `e^(value t)` grow no more than by itself.
 pub(super) fn rk4_limit(value: Complex<f64>) -> f64 {
     let stable = |reach: f64| {
         let z = value * (reach / value.norm());

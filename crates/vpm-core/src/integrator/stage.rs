@@ -33,7 +33,7 @@ pub(super) struct Stage<S, L = f64> {
 }
 
 impl<S: Scalar + Mul<L, Output = S>, L: Length> Stage<S, L> {
-    /// Buffers for systems of `dim` states.
+    /// Buffers of an implicit stage for systems of `dim` states.
     pub(super) fn new(dim: usize) -> Self {
         let (square, line) = (vec![S::zero(); dim * dim], vec![S::zero(); dim]);
         Self {
@@ -49,12 +49,12 @@ impl<S: Scalar + Mul<L, Output = S>, L: Length> Stage<S, L> {
         }
     }
 
-    /// Where A has to be written, row by row, before it is factorised; it stays there.
+    /// Matrix A of an implicit stage, to be written row by row before it is factorised; it stays there.
     pub(super) fn matrix(&mut self) -> &mut [S] {
         &mut self.matrix
     }
 
-    /// Prepares `1 - reach A`, where that many coordinates lead the state.
+    /// Factorises `1 - reach A` of an implicit stage, where that many coordinates lead the state.
     pub(super) fn factorise(&mut self, coordinates: usize, reach: L) {
         (self.coordinates, self.reach) = (coordinates, reach);
         if let Some(values) = &mut self.values {
@@ -68,7 +68,7 @@ impl<S: Scalar + Mul<L, Output = S>, L: Length> Stage<S, L> {
         for_size!(left, N => self.eliminate::<N>());
     }
 
-    /// Factorises the matrix that is left without the coordinates; of N rows, or of any number if N is 0.
+    /// Eliminates the coordinates from an implicit stage and factorises the rest; of N rows, or any if N is 0.
     fn eliminate<const N: usize>(&mut self) {
         let (n, reach) = (self.coordinates, self.reach);
         let left = if N == 0 { self.dim - n } else { N };
@@ -95,7 +95,7 @@ impl<S: Scalar + Mul<L, Output = S>, L: Length> Stage<S, L> {
         }
     }
 
-    /// The largest factor of the elimination, see [`Lu::largest_factor`].
+    /// Largest elimination factor of an implicit stage, see [`Lu::largest_factor`].
     pub(super) fn largest_factor(&self) -> S {
         match &self.values {
             Some(values) => S::from_f64(values.largest_factor()),
@@ -103,7 +103,7 @@ impl<S: Scalar + Mul<L, Output = S>, L: Length> Stage<S, L> {
         }
     }
 
-    /// Replaces `b` by the solution x of `(1 - reach A) x = b`, A the last matrix of that system.
+    /// Solution x of an implicit stage `(1 - reach A) x = b` in the place of `b`. A is the last matrix of that system.
     pub(super) fn solve(&mut self, ode: &mut impl Ode<S>, b: &mut [S]) {
         if let Some(mut values) = self.values.take() {
             self.solve_by(&mut values, ode, b);
@@ -129,7 +129,7 @@ impl<S: Scalar + Mul<L, Output = S>, L: Length> Stage<S, L> {
         self.missing = missing;
     }
 
-    /// The same of numbers with first derivatives, by the factors of the values.
+    /// Solution of an implicit stage for numbers with first derivatives, by the factors of the values.
     fn solve_by(&mut self, values: &mut Stage<f64>, ode: &mut impl Ode<S>, b: &mut [S]) {
         let (dim, n) = (self.dim, self.coordinates);
         let mut solution = std::mem::take(&mut values.missing);

@@ -22,7 +22,8 @@ pub(super) struct Course {
 }
 
 impl Course {
-    /// Runs `job` and keeps its first array, with derivatives by the parameters asked for among `own`; it depends on no others.
+    /// Course of `job` with derivatives by the parameters asked for among `own`. It keeps the first array, and depends
+    /// on no other parameters.
     pub(super) fn new(job: &impl Job, theta: &[f64], sensitivities: &[usize], own: &[usize]) -> Result<Self> {
         let by: Vec<usize> = (0..sensitivities.len()).filter(|&place| own.contains(&sensitivities[place])).collect();
         let chosen: Vec<usize> = by.iter().map(|&place| sensitivities[place]).collect();
@@ -30,12 +31,12 @@ impl Course {
         Ok(Self { values: pair.first, by, slopes })
     }
 
-    /// Whether any of the parameters asked for moves it.
+    /// Whether any of the parameters asked for moves a course.
     pub(super) fn is_moved(&self) -> bool {
         !self.by.is_empty()
     }
 
-    /// Adds `factor` times the derivatives of number `place` to those by all parameters asked for.
+    /// Adds `factor` times the derivatives of a course's number `place` to those by all parameters asked for.
     #[inline]
     pub(super) fn add_slopes(&self, place: usize, factor: f64, slopes: &mut [f64]) {
         for (&column, &slope) in self.by.iter().zip(&self.slopes[place * self.by.len()..]) {
@@ -51,7 +52,7 @@ pub(super) struct Behind<'a> {
 }
 
 impl Behind<'_> {
-    /// The parameters of the sensor.
+    /// Parameters of the sensor of a course.
     pub(super) fn parameters(&self) -> Vec<usize> {
         let channel = Channel::Position { joint: self.joint };
         let sensor = self.record.description.sensors.iter().find(|sensor| sensor.channel == channel);
@@ -74,7 +75,7 @@ pub(super) struct Memory<'a> {
 }
 
 impl Memory<'_> {
-    /// The parameters of the effect and of the sensors of its joints.
+    /// Parameters of the effect of a course and of the sensors of its joints.
     pub(super) fn parameters(&self) -> Vec<usize> {
         let mut own: Vec<usize> = self.entry.domains().into_iter().map(|(&index, _)| index).collect();
         let joints = self.entry.seat().into_iter().flat_map(Seat::joints);
@@ -84,7 +85,7 @@ impl Memory<'_> {
 }
 
 impl Job for Memory<'_> {
-    /// The memory sample by sample, relaxed at first; nothing of an effect that does not remember.
+    /// Course of a memory sample by sample, relaxed at first; nothing of an effect that does not remember.
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
         let sensors = position_sensors(self.record.description, theta);
         let (mut first, mut memory, mut before) = (Vec::new(), S::zero(), None);
@@ -115,7 +116,7 @@ pub(super) struct Delivered<'a> {
 }
 
 impl Delivered<'_> {
-    /// The parameters of the actuator.
+    /// Parameters of the actuator of a course.
     pub(super) fn parameters(&self) -> Vec<usize> {
         self.actuator.domains().into_iter().map(|(&index, _)| index).chain(self.ratio).collect()
     }

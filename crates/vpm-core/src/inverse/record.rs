@@ -26,18 +26,18 @@ pub(super) struct Record<'a> {
 }
 
 impl Record<'_> {
-    /// Numbers of its samples.
+    /// Numbers of a record's samples.
     pub(super) fn samples(&self) -> std::ops::Range<usize> {
         0..self.motion.position.rows()
     }
 
-    /// Position, velocity and acceleration of a joint at sample `k`, behind its sensor.
+    /// Position, velocity and acceleration of a joint at sample `k` of a record, behind its sensor.
     #[inline]
     pub(super) fn behind<S: Scalar>(&self, k: usize, joint: usize, sensors: &[Option<Sensor<S>>]) -> [S; 3] {
         self.motion.behind(self.time_step, k, joint, sensors[joint].as_ref())
     }
 
-    /// Asks whether to stop.
+    /// Asks whether to stop on the way through a record.
     pub(super) fn ask(&self) -> Result<()> {
         if (self.interrupt)() { Err(Error::Interrupted) } else { Ok(()) }
     }
@@ -69,7 +69,7 @@ enum Column<'a> {
 }
 
 impl Column<'_> {
-    /// Adds what a derivative by the input at sample `k` is by the parameters.
+    /// Adds the derivative by the input at sample `k` of a record to those by the parameters.
     #[inline]
     fn add(&self, k: usize, entry: f64, slopes: &mut [f64]) {
         match self {
@@ -80,7 +80,7 @@ impl Column<'_> {
 }
 
 impl<'a> Along<'a> {
-    /// For the checked parameters `theta`.
+    /// Functions along a record for the checked parameters `theta`.
     pub(super) fn new(record: Record<'a>, theta: &'a [f64], sensitivities: &'a [usize]) -> Result<Self> {
         let (mut joints, mut memories) = (Vec::new(), Vec::new());
         for joint in 0..record.description.n_joints() {
@@ -98,7 +98,7 @@ impl<'a> Along<'a> {
         Ok(Self { record, theta, sensitivities, joints, memories })
     }
 
-    /// Evaluates the function `kind`, of `width` numbers, sample by sample, with derivatives where parameters are asked for.
+    /// Evaluates the function `kind`, of `width` numbers, along a record, with derivatives by parameters.
     pub(super) fn follow(&self, kind: Kind, width: usize) -> Result<Numbers> {
         let (description, theta) = (self.record.description, self.theta);
         let (places, functions) = (description.places(), description.functions());
@@ -117,7 +117,7 @@ impl<'a> Along<'a> {
         self.run(&Function { engine, places, width, entries: &function.entries, columns })
     }
 
-    /// The inputs by which functions are differentiated, and what they hand on.
+    /// Inputs of a record by which functions are differentiated, and what they hand on.
     fn columns(&self, places: Places) -> (Vec<u32>, Vec<Column<'_>>) {
         let (mut inputs, mut columns) = (Vec::new(), Vec::new());
         for &parameter in self.sensitivities {
@@ -190,7 +190,7 @@ impl<'a> Along<'a> {
         Ok(())
     }
 
-    /// Puts the motion and the memories at sample `k` where they stand among the inputs of a function.
+    /// Puts the motion and the memories at sample `k` of a record among the inputs of a function.
     fn put(&self, places: Places, sensors: &[Option<Sensor<f64>>], k: usize, inputs: &mut [f64]) {
         for joint in 0..sensors.len() {
             let [q, v, a] = self.record.behind(k, joint, sensors);

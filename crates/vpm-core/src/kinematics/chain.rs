@@ -56,18 +56,19 @@ impl SerialChain {
         Self::new(&joints, frame)
     }
 
-    /// How many coordinates it has.
+    /// Number of coordinates of a serial chain.
     pub fn n_coordinates(&self) -> usize {
         self.steps.len()
     }
 
-    /// The pose of the tool at coordinates `q` (rad or m). Source: eq 2.17.
+    /// Pose of the tool of a serial chain at coordinates `q` (rad or m). Source: eq 2.17.
     pub fn pose<S: Scalar>(&self, q: &[S]) -> Pose<S> {
         debug_assert!(q.len() == self.n_coordinates());
         self.walk(|k| q[k], |_, _, _| ())
     }
 
-    /// The pose of the tool and, in `frames`, that of the frame that each coordinate moves, before its own motion.
+    /// Tool pose of a serial chain and, in `frames`, those of the frames that coordinates move. Each is before its own
+    /// motion.
     ///
     /// For a chain by Denavit and Hartenberg, frame k is `A_0k` of eq 2.17, since its z axis is that of joint k + 1.
     pub fn frames<S: Scalar>(&self, q: &[S], frames: &mut [Pose<S>]) -> Pose<S> {
@@ -92,7 +93,7 @@ impl SerialChain {
     }
 }
 
-/// A pose without derivatives, over another number type.
+/// Pose in a chain without derivatives, over another number type.
 fn constant<S: Scalar>(pose: &Pose<f64>) -> Pose<S> {
     let [x, y, z] = pose.rotation.columns.map(|column| Vector3::from_f64(column.to_array()));
     Pose::new(Matrix3::from_columns(x, y, z), Vector3::from_f64(pose.translation.to_array()))

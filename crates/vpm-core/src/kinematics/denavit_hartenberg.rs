@@ -23,7 +23,7 @@ pub struct DenavitHartenberg {
 }
 
 impl DenavitHartenberg {
-    /// The pose of this link's frame in the previous one at coordinate zero.
+    /// Pose of a Denavit-Hartenberg link's frame in the previous one at coordinate zero.
     pub fn pose(&self) -> Pose<f64> {
         let about = |axis, angle| Matrix3::rotation(Vector3::from_f64(axis), angle);
         let (z, x) = ([0.0, 0.0, 1.0], [1.0, 0.0, 0.0]);

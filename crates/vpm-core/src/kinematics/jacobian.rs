@@ -26,7 +26,7 @@ impl SerialChain {
         self.walk(|k| q[k], |k, _, screw| columns[k] = screw)
     }
 
-    /// The tool's motion by differentiating its pose twice along the coordinates' motion `q`, `v`, `a`.
+    /// Tool motion without a Jacobian: its pose differentiated twice along the motion `q`, `v`, `a`.
     ///
     /// Law: `J a + J_dot v`, which is `phi_q a + phi_q_dot v + phi_t_dot = 0` with `phi = x - f(q)` (eq 2.37 with the
     /// signs corrected), exact by nested dual numbers. `a = 0` gives `J_dot v`. Checked: against
@@ -40,7 +40,7 @@ impl SerialChain {
         second_order(&self.walk::<Dual<Dual<S, 1>, 1>>(time, |_, _, _| ()))
     }
 
-    /// The tool's motion by sums over the screws.
+    /// Tool motion by the Jacobian: sums over the screws.
     ///
     /// Law: `V = sum $_i v_i` (eq 2.33), `V_dot = sum $_i a_i + sum_(i<j) v_i v_j [$_i, $_j]` (eq 2.38), with the
     /// bracket of two screws; the double sum is gathered joint by joint, since `sum_(i<j) v_i $_i` is the velocity
@@ -63,12 +63,12 @@ impl SerialChain {
     }
 }
 
-/// The velocity of a body in another of its points: `v_p = v_O + w x p`.
+/// Velocity of a body in another of its points, for the Jacobian: `v_p = v_O + w x p`.
 pub fn at_point<S: Scalar>(twist: Twist<S>, point: Vector3<S>) -> Twist<S> {
     Twist::new(twist.angular, twist.linear + twist.angular.cross(point))
 }
 
-/// Angular velocity and velocity of a frame whose pose carries its time derivative.
+/// Angular velocity and velocity of a frame whose pose carries its time derivative, beside the Jacobian.
 ///
 /// Law: `w = 1/2 sum c x c_dot` over the columns of R, the vector of `R_dot R^T` (eq 2.25).
 fn rate<S: Scalar>(pose: &Pose<Dual<S, 1>>) -> Twist<S> {
@@ -78,7 +78,7 @@ fn rate<S: Scalar>(pose: &Pose<Dual<S, 1>>) -> Twist<S> {
     Twist::new(angular * S::from_f64(0.5), map(&pose.translation, |entry| entry.gradient[0]))
 }
 
-/// The motion of a frame whose pose carries two time derivatives.
+/// Motion of a frame whose pose carries two time derivatives, beside the Jacobian.
 ///
 /// The derivative of `w = 1/2 sum c x c_dot` is `1/2 sum c x c_ddot`.
 fn second_order<S: Scalar>(pose: &Pose<Dual<Dual<S, 1>, 1>>) -> Motion<S> {

@@ -30,12 +30,12 @@ pub enum LowerPair {
 }
 
 impl LowerPair {
-    /// How many coordinates it has.
+    /// Number of coordinates of a lower pair.
     pub fn freedoms(self) -> usize {
         self.screws().len()
     }
 
-    /// The unit screws of its coordinates in the joint frame, in order; each moves those after it.
+    /// Unit screws of a lower pair's coordinates in the joint frame, in order; each moves those after it.
     pub fn screws(self) -> Vec<Screw> {
         const X: usize = 0;
         const Y: usize = 1;

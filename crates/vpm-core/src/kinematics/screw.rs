@@ -27,27 +27,27 @@ enum Pitch {
 }
 
 impl Screw {
-    /// Turns about the line through `point` (m) along the unit vector `direction`; coordinate in rad.
+    /// Screw that turns about the line through `point` (m) along the unit vector `direction`; coordinate in rad.
     pub fn revolute(direction: [f64; 3], point: [f64; 3]) -> Result<Self> {
         Self::helical(direction, point, 0.0)
     }
 
-    /// Slides along the unit vector `direction`; coordinate in m.
+    /// Screw that slides along the unit vector `direction`; coordinate in m.
     pub fn prismatic(direction: [f64; 3]) -> Result<Self> {
         Self { direction, point: [0.0; 3], pitch: Pitch::Infinite }.checked()
     }
 
-    /// Turns about a line and slides `pitch` (m/rad) along it; coordinate in rad.
+    /// Screw that turns about a line and slides `pitch` (m/rad) along it; coordinate in rad.
     pub fn helical(direction: [f64; 3], point: [f64; 3], pitch: f64) -> Result<Self> {
         Self { direction, point, pitch: Pitch::Finite(pitch) }.checked()
     }
 
-    /// Turns about coordinate axis `axis` (0, 1, 2 for x, y, z) through the origin, with a pitch in m/rad.
+    /// Screw about coordinate axis `axis` (0, 1, 2 for x, y, z) through the origin, with a pitch in m/rad.
     pub(crate) fn about(axis: usize, pitch: f64) -> Self {
         Self { direction: coordinate_axis(axis), point: [0.0; 3], pitch: Pitch::Finite(pitch) }
     }
 
-    /// Slides along coordinate axis `axis` (0, 1, 2 for x, y, z).
+    /// Screw that slides along coordinate axis `axis` (0, 1, 2 for x, y, z).
     pub(crate) fn along(axis: usize) -> Self {
         Self { direction: coordinate_axis(axis), point: [0.0; 3], pitch: Pitch::Infinite }
     }
@@ -73,7 +73,7 @@ impl Screw {
         Ok(self)
     }
 
-    /// The twist per unit rate of its coordinate.
+    /// Twist of a screw per unit rate of its coordinate.
     pub fn twist<S: Scalar>(&self) -> Twist<S> {
         let direction = Vector3::from_f64(self.direction);
         match self.pitch {

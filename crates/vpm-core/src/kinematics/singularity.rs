@@ -112,7 +112,7 @@ impl SerialChain {
 }
 
 impl Task {
-    /// The task's components of a twist, translations in lengths.
+    /// Components of a twist in the task of a singularity, translations in lengths.
     fn select(&self, twist: &Twist<f64>) -> Vec<f64> {
         let (angular, linear) = (twist.angular.to_array(), twist.linear.to_array());
         let one = |component: &Component| match *component {

@@ -27,8 +27,9 @@ pub struct Perpendicular {
 }
 
 impl StrokeLinkage {
-    /// The configurations with the rod perpendicular to the stroke: zeros of [`StrokeLinkage::stroke_slope`] on the closed
-    /// linkage, where the two strokes of an angle meet. None, two or four; the larger stroke first.
+    /// Configurations near an alignment with the rod perpendicular to the stroke. They are zeros of
+    /// [`StrokeLinkage::stroke_slope`] on the closed linkage, where the two strokes of an angle meet. None, two or
+    /// four; the larger stroke first.
     ///
     /// Law: in the axes of the body that carries the slider, the turning anchor is one rod length away from the slider's line,
     /// on either side: `n . R b = n . start +- l` with n normal to the stroke. Checked: slope and constraint vanish there.
@@ -54,8 +55,9 @@ impl StrokeLinkage {
         found
     }
 
-    /// The strokes at which axis, slider and anchor are in line: zeros of [`StrokeLinkage::determinant`] on the
-    /// closed linkage. First the two with rod and arm end to end, then the two folded, the larger stroke first.
+    /// Alignments: the strokes at which axis, slider and anchor are in line. They are zeros of
+    /// [`StrokeLinkage::determinant`] on the closed linkage. First the two with rod and arm end to end, then the two
+    /// folded, the larger stroke first.
     pub fn alignments(&self) -> Vec<Alignment> {
         let (rod, arm) = (self.rod(), self.arm());
         let mut found = Vec::with_capacity(4);
@@ -74,14 +76,13 @@ impl StrokeLinkage {
         wrapped(b.argument() - a.argument() + if extended { 0.0 } else { self.folded() })
     }
 
-    /// Angle at the axis between slider and anchor when folded: the axis lies between them if the rod is the longer
-    /// link.
+    /// Angle of the folded alignment at the axis between slider and anchor. The axis lies between them if the rod is
+    /// the longer link.
     fn folded(&self) -> f64 {
         if self.rod() > self.arm() { PI } else { 0.0 }
     }
 
-    /// How far the rocker turns (rad) in one assembly mode while the stroke goes from the extended to the folded
-    /// alignment.
+    /// Span of the rocker (rad) in one assembly mode between the extended and the folded alignment.
     ///
     /// Law: `arg b - arg a`, which follows the moving slider, changes by less than half a turn; the angle between
     /// slider and anchor goes from zero to its folded value, with the sign of `mode`, that in

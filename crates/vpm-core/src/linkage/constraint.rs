@@ -6,7 +6,7 @@ use crate::scalar::{Dual, Scalar};
 
 /// A linkage with `N` dependent coordinates that `N` constraints fix for given values of `I` inputs.
 pub trait ClosedLinkage<const N: usize, const I: usize> {
-    /// Name, for messages.
+    /// Name of a closed linkage's constraint, for messages.
     fn name(&self) -> &str;
     /// The constraint equations `phi(q, u)`, all zero where the linkage is closed. Source: eq 2.3.
     fn constraints<S: Scalar>(&self, q: &[S; N], input: &[S; I]) -> [S; N];
@@ -34,7 +34,7 @@ pub(super) fn linearised<S: Scalar, L: ClosedLinkage<N, I>, const N: usize, cons
     (phi.map(|entry| entry.value), phi.map(|entry| entry.gradient))
 }
 
-/// Rates `v` of the coordinates for input rates `du`.
+/// Constrained rates `v` of the coordinates for input rates `du`.
 ///
 /// Law: `phi_q v + phi_u du = 0`. Source: eq 2.31. In a singular configuration an error with the pivot.
 pub fn velocity<L: ClosedLinkage<N, I>, const N: usize, const I: usize>(
@@ -48,7 +48,7 @@ pub fn velocity<L: ClosedLinkage<N, I>, const N: usize, const I: usize>(
     balance(linkage, q, input, phi.map(|entry| entry.gradient[0]))
 }
 
-/// Motion of the coordinates for an input motion, at coordinates `q` that close the linkage.
+/// Constrained motion of the coordinates for an input motion, at coordinates `q` that close the linkage.
 ///
 /// Law: `phi_q a + phi_q_dot v + phi_t_dot = 0`, where the last two terms are the second time derivative of the
 /// constraints with `a = 0`. Source: eq 2.37 with its signs corrected. Checked: against finite differences and closed
@@ -70,7 +70,7 @@ pub fn acceleration<L: ClosedLinkage<N, I>, const N: usize, const I: usize>(
     Ok(LinkageMotion { q: *q, v, a })
 }
 
-/// The x of `phi_q x + right = 0`.
+/// Solution x of the constraint equation `phi_q x + right = 0`.
 fn balance<L: ClosedLinkage<N, I>, const N: usize, const I: usize>(
     linkage: &L,
     q: &[f64; N],

@@ -40,8 +40,8 @@ pub struct KarlGeometry {
 }
 
 impl Default for KarlGeometry {
-    /// The prototype. `ground_anchor` is 0.040 m from A by the printed singular strokes; that it lies below A is an
-    /// assumption.
+    /// Geometry of the KARL prototype. `ground_anchor` is 0.040 m from A by the printed singular strokes; that it lies
+    /// below A is an assumption.
     fn default() -> Self {
         let b = [0.300_f64, 0.050_f64];
         Self {
@@ -73,7 +73,7 @@ pub struct Karl {
 }
 
 impl Karl {
-    /// The limb with these dimensions, or what is wrong with them.
+    /// KARL limb with these dimensions, or what is wrong with them.
     pub fn new(geometry: KarlGeometry) -> Result<Self> {
         let KarlGeometry { medial, distal, sliders: [first, [x, y]], rods, .. } = geometry;
         for (path, value) in [("karl.medial", medial), ("karl.distal", distal)] {
@@ -101,30 +101,31 @@ impl Karl {
         Ok(Self { geometry, linkages })
     }
 
-    /// The two linkages, hip first, each between a stroke and an angle.
+    /// Two linkages of KARL, hip first, each between a stroke and an angle.
     pub fn linkages(&self) -> &[StrokeLinkage; 2] {
         &self.linkages
     }
 
-    /// The end point C in frame 0, in m. Source: eq 2.72.
+    /// End point C of KARL in frame 0, in m. Source: eq 2.72.
     pub fn end_point(&self, [q1, q2]: [f64; 2]) -> [f64; 2] {
         let ((s1, c1), (s12, c12)) = (q1.sin_cos(), (q1 + q2).sin_cos());
         let KarlGeometry { medial, distal, .. } = self.geometry;
         [medial * c1 + distal * c12, medial * s1 + distal * s12]
     }
 
-    /// `det dC/dq = L1 L2 sin q2` in m^2: zero with the limb stretched or folded. Source: eq 2.73.
+    /// End-point determinant of KARL `det dC/dq = L1 L2 sin q2` in m^2: zero stretched or folded. Source: eq 2.73.
     pub fn end_point_determinant(&self, [_, q2]: [f64; 2]) -> f64 {
         self.geometry.medial * self.geometry.distal * q2.sin()
     }
 
-    /// All four configurations at the given strokes (m). Source: eqs 2.61 to 2.71.
+    /// Direct kinematics of KARL: all four configurations at the given strokes (m). Source: eqs 2.61 to 2.71.
     pub fn direct(&self, strokes: [f64; 2]) -> Result<[KarlPose; 4]> {
         let [first, second] = [self.linkages[0].angles(strokes[0])?, self.linkages[1].angles(strokes[1])?];
         Ok(std::array::from_fn(|k| KarlPose { angles: [first[k / 2], second[k % 2]], strokes }))
     }
 
-    /// All eight configurations that put the end point C at `target` (m): two elbows, two strokes for each angle.
+    /// Inverse kinematics of KARL: all eight configurations that put the end point C at `target` (m). Two elbows, two
+    /// strokes for each angle.
     ///
     /// Source: section 2.4.1. Fails if C is out of reach, or if one of the elbows cannot be driven by any stroke.
     pub fn inverse(&self, target: [f64; 2]) -> Result<[KarlPose; 8]> {
@@ -136,7 +137,7 @@ impl Karl {
         }))
     }
 
-    /// The joint angles of both elbows at `target`, q2 >= 0 first, by the cosine law.
+    /// Elbows of KARL: the joint angles of both at `target`, q2 >= 0 first, by the cosine law.
     pub fn elbows(&self, [x, y]: [f64; 2]) -> Result<[[f64; 2]; 2]> {
         let KarlGeometry { medial, distal, .. } = self.geometry;
         let distance = x.hypot(y);
@@ -156,19 +157,20 @@ impl Karl {
         Ok([self.linkages[0].strokes(q1)?, self.linkages[1].strokes(q2)?])
     }
 
-    /// The diagonal of `Lambda` in rad/m: `q_dot = Lambda delta_dot`. Source: eqs 2.82 to 2.84.
+    /// Diagonal of KARL's `Lambda` in rad/m: `q_dot = Lambda delta_dot`. Source: eqs 2.82 to 2.84.
     pub fn lambda(&self, pose: &KarlPose) -> [f64; 2] {
         std::array::from_fn(|k| self.linkages[k].ratio(pose.strokes[k], pose.angles[k]))
     }
 
-    /// Joint torques (N m) of actuator forces (N, positive along the stroke): `tau = Lambda^-T F`. Source: after eq
-    /// 2.84.
+    /// Joint torques (N m) of KARL's actuator forces (N, positive along the stroke): `tau = Lambda^-T F`. Source: after
+    /// eq 2.84.
     pub fn torques(&self, pose: &KarlPose, forces: [f64; 2]) -> [f64; 2] {
         let lambda = self.lambda(pose);
         std::array::from_fn(|k| forces[k] / lambda[k])
     }
 
-    /// `det Psi` and `det Omega` in m^2, zero where a stroke loses control of its angle. Source: eqs 2.77 and 2.79.
+    /// Determinants of KARL `det Psi` and `det Omega` in m^2, zero where a stroke loses control of its angle. Source:
+    /// eqs 2.77 and 2.79.
     pub fn determinants(&self, pose: &KarlPose) -> [f64; 2] {
         std::array::from_fn(|k| self.linkages[k].determinant(pose.strokes[k], pose.angles[k]))
     }

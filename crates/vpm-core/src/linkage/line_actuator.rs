@@ -49,7 +49,7 @@ pub struct Line<S, const B: usize> {
 }
 
 impl<S: Scalar, const B: usize> Line<S, B> {
-    /// Between a base and a tip; undefined where they coincide.
+    /// Line actuator between a base and a tip; undefined where they coincide.
     pub fn new(base: &PointMotion<S, B>, tip: &PointMotion<S, B>) -> Self {
         let across = tip.place - base.place;
         let length = across.length();
@@ -91,7 +91,7 @@ impl LineActuator {
     }
 }
 
-/// A motion in the plane as a twist.
+/// Motion of a line actuator in the plane as a twist.
 pub(super) fn planar<S: Scalar>(spin: S, velocity: Vector2<S>) -> Twist<S> {
     let zero = S::zero();
     Twist::new(Vector3::new(zero, zero, spin), Vector3::new(velocity.x, velocity.y, zero))

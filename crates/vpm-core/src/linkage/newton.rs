@@ -26,14 +26,14 @@ pub struct Solution<const N: usize> {
 }
 
 impl Default for Newton {
-    /// 1e-14 (m^2 for rods of some decimetres: rounding) in at most 50 steps.
+    /// Newton's method with tolerance 1e-14 in at most 50 steps. In m^2 for rods of some decimetres: rounding.
     fn default() -> Self {
         Self { tolerance: 1e-14, max_iterations: 50 }
     }
 }
 
 impl Newton {
-    /// The coordinates near `start` that close the linkage at `input`.
+    /// Coordinates near `start` that close the linkage at `input`, by Newton's method.
     ///
     /// Law: `phi(q_k) + phi_q (q_(k+1) - q_k) = 0` (eq 2.19, which lacks the first term), the step halved while it does
     /// not reduce the violation; the number of steps is bounded. Fails with the violation that is left, or with the
@@ -78,7 +78,7 @@ impl Newton {
     }
 }
 
-/// `q - step`, or as many halvings of the step as it takes to reduce the violation, ten at most.
+/// Damped Newton step `q - step`, halved until the violation is smaller, ten times at most.
 fn damped<L: ClosedLinkage<N, I>, const N: usize, const I: usize>(
     linkage: &L,
     q: &[f64; N],

@@ -48,7 +48,7 @@ pub struct StrokeLinkage {
 }
 
 impl StrokeLinkage {
-    /// A linkage, or what is wrong with its dimensions.
+    /// Stroke linkage, or what is wrong with its dimensions.
     pub fn new(name: &str, geometry: StrokeGeometry) -> Result<Self> {
         let StrokeGeometry { start, direction, anchor, rod, .. } = geometry;
         let parts = [("start", &start[..]), ("direction", &[direction]), ("anchor", &anchor), ("rod", &[rod])];
@@ -66,7 +66,7 @@ impl StrokeLinkage {
         Ok(Self { name: name.to_owned(), geometry, direction: Vector2::new(cosine, sine) })
     }
 
-    /// Its name.
+    /// Name of the stroke linkage.
     pub fn name(&self) -> &str {
         &self.name
     }
@@ -76,7 +76,7 @@ impl StrokeLinkage {
         Vector2::from_f64(self.geometry.start) + Vector2::from_f64(self.direction.to_array()) * stroke
     }
 
-    /// The rod's end on the rocker (in the rocker's axes) and on the frame.
+    /// Ends of the stroke linkage's rod on the rocker (in the rocker's axes) and on the frame.
     pub(super) fn ends<S: Scalar>(&self, stroke: S) -> (Vector2<S>, Vector2<S>) {
         let (slider, anchor) = (self.slider(stroke), Vector2::from_f64(self.geometry.anchor));
         match self.geometry.slider {
@@ -85,7 +85,7 @@ impl StrokeLinkage {
         }
     }
 
-    /// `Pi(delta, q)` in m^2, zero where the linkage is closed.
+    /// Constraint `Pi(delta, q)` of the stroke linkage in m^2, zero where it is closed.
     pub fn constraint<S: Scalar>(&self, stroke: S, angle: S) -> S {
         let (a, b) = self.ends(stroke);
         let rod = a.rotated(angle.sin_cos()) - b;
@@ -180,25 +180,25 @@ impl StrokeLinkage {
         }
     }
 
-    /// `lambda = dq / d delta` in rad/m, infinite at an alignment.
+    /// Ratio `lambda = dq / d delta` of the stroke linkage in rad/m, infinite at an alignment.
     ///
     /// Law: `lambda = (dPi/d delta) / (s dPi/dc - c dPi/ds)`. Source: eqs 2.82 and 2.83.
     pub fn ratio(&self, stroke: f64, angle: f64) -> f64 {
         2.0 * self.stroke_slope(stroke, angle) / self.determinant(stroke, angle)
     }
 
-    /// Length of the rod in m.
+    /// Length of the stroke linkage's rod in m.
     pub(super) fn rod(&self) -> f64 {
         self.geometry.rod
     }
 
-    /// Distance of the anchor from the axis in m.
+    /// Arm of the stroke linkage: distance of the anchor from the axis in m.
     pub(super) fn arm(&self) -> f64 {
         let [x, y] = self.geometry.anchor;
         x.hypot(y)
     }
 
-    /// The rod's end that is not the slider, on its own body, in m.
+    /// Anchor of the stroke linkage: the rod's end that is not the slider, on its own body, in m.
     pub(super) fn anchor(&self) -> Vector2<f64> {
         Vector2::from_f64(self.geometry.anchor)
     }
@@ -208,7 +208,7 @@ impl StrokeLinkage {
         self.direction
     }
 
-    /// Which body carries the slider.
+    /// Body that carries the slider of the stroke linkage.
     pub(super) fn slider_on(&self) -> Slider {
         self.geometry.slider
     }
@@ -221,7 +221,8 @@ impl StrokeLinkage {
         LinkageError::Apart { linkage, input, value, distance: gap, nearest, farthest }.into()
     }
 
-    /// Distance that the links have to span: from the axis to the slider, or from the anchor to the slider's line.
+    /// Distance that the stroke linkage has to span. It is from the axis to the slider, or from the anchor to the
+    /// slider's line.
     fn distance(&self, input: &str, value: f64) -> f64 {
         if input.starts_with("stroke") {
             return self.slider(value).length();
@@ -233,7 +234,7 @@ impl StrokeLinkage {
     }
 }
 
-/// The same angle in (-pi, pi].
+/// Angle of the stroke linkage wrapped into (-pi, pi].
 pub(super) fn wrapped(angle: f64) -> f64 {
     let turn = angle.rem_euclid(2.0 * PI);
     if turn > PI { turn - 2.0 * PI } else { turn }

@@ -57,7 +57,7 @@ pub(super) struct Assembly<'a, S> {
 }
 
 impl<S: Scalar> Model<S> {
-    /// Builds the tree, or says what cannot be.
+    /// Assembles the tree, or says what cannot be.
     ///
     /// Checked: all references, one way from everything to the world, geometry, physical inertias, sections within their beams.
     pub fn assemble(parts: Parts<S>) -> Result<Self> {
@@ -80,7 +80,7 @@ impl<S: Scalar> Parts<S> {
         }
     }
 
-    /// What each part sits on, with the words that name it in a message.
+    /// Mounts of the parts to assemble, with the words that name each in a message.
     fn mounts(&self) -> impl Iterator<Item = (String, Mount)> {
         let bodies = self.bodies.iter().map(|body| (format!("joint `{}`", body.joint.name), body.on));
         let welds = self.welds.iter().map(|weld| (format!("body `{}`", weld.name), weld.on));
@@ -136,7 +136,7 @@ impl<S: Scalar> Parts<S> {
         Ok(())
     }
 
-    /// Numbers of the parts of which something is left out, with what they are and how many of it there are.
+    /// Numbers of assembled parts of which something is left out, what they are and how many there are.
     fn omitting(&self) -> impl Iterator<Item = (usize, &'static str, usize)> {
         let Omissions { velocity_of_bodies, velocity_of_beams, coupling, second_order } = &self.omissions;
         let (bodies, beams) = (self.bodies.len(), self.beams.len());
@@ -154,7 +154,7 @@ impl<S: Scalar> Parts<S> {
         }
     }
 
-    /// Where on a beam something sits, without repetition.
+    /// Marks on a beam in the assembly where something sits, without repetition.
     fn marks(&self, number: usize) -> Vec<f64> {
         let mut marks = Vec::new();
         let tips = self.point_masses.iter().filter(|point| point.on == Site::Tip(number));
@@ -172,7 +172,7 @@ impl<S: Scalar> Parts<S> {
 }
 
 impl<'a, S: Scalar> Assembly<'a, S> {
-    /// Makes the beams, not yet in their places.
+    /// Assembly with its beams, not yet in their places.
     fn new(parts: &'a Parts<S>) -> Result<Self> {
         let joints = parts.bodies.iter().map(|body| body.joint.checked()).collect::<Result<_>>()?;
         let marks: Vec<_> = (0..parts.beams.len()).map(|beam| parts.marks(beam)).collect();
@@ -213,7 +213,7 @@ impl<'a, S: Scalar> Assembly<'a, S> {
         Ok(())
     }
 
-    /// Where a mount is; on a body, in the body's own frame.
+    /// Place of a mount in the assembly; on a body, in the body's own frame.
     pub(super) fn resolved(&self, mount: Mount) -> Place {
         let (frame, pose) = match mount {
             Mount::World => (0, Pose::identity()),
@@ -230,19 +230,19 @@ impl<'a, S: Scalar> Assembly<'a, S> {
         Place { frame, pose }
     }
 
-    /// Where a mount is; on a body, in the body's aligned frame.
+    /// Place of a mount in the assembly; on a body, in the body's aligned frame.
     pub(super) fn aligned(&self, place: Place) -> Place {
         let pose = self.alignment(place.frame).inverse() * place.pose;
         Place { frame: place.frame, pose }
     }
 
-    /// The aligned frame of a body in its own; of any other frame, itself.
+    /// Aligned frame of an assembled body in its own; of any other frame, itself.
     pub(super) fn alignment(&self, frame: usize) -> Pose<f64> {
         let joint = frame.checked_sub(1).and_then(|body| self.joints.get(body));
         joint.map_or(Pose::identity(), |joint| Pose::new(joint.alignment(), Vector3::zero()))
     }
 
-    /// Brings all inertias to the frames that move them.
+    /// Assembles all inertias in the frames that move them.
     fn gather(&mut self) -> Result<()> {
         for (body, inertia) in self.parts.bodies.iter().zip(self.inertias.iter_mut().skip(1)) {
             *inertia = body.spatial_inertia()?;
@@ -261,7 +261,7 @@ impl<'a, S: Scalar> Assembly<'a, S> {
         Ok(())
     }
 
-    /// The frame of what a point mass sits on.
+    /// Frame in the assembly on which a point mass sits.
     fn site(&self, site: Site) -> Result<Place> {
         Ok(match site {
             Site::Body(body) => self.resolved(Mount::Body(body)),
@@ -295,7 +295,7 @@ impl<'a, S: Scalar> Assembly<'a, S> {
         self.heavy[place.frame] = true;
     }
 
-    /// What bodies have with all that is fixed to them is physical, and nothing hangs in the air.
+    /// Checks that assembled bodies are physical with all that is fixed to them, and nothing hangs in the air.
     fn check_bodies(&self) -> Result<()> {
         for point in &self.parts.point_masses {
             let (name, frame) = (self.parts.site_name(point.on), self.site(point.on)?.frame);
@@ -316,7 +316,7 @@ impl<'a, S: Scalar> Assembly<'a, S> {
         Ok(())
     }
 
-    /// Whether anything that may weigh something sits on a mount.
+    /// Whether anything in the assembly that may weigh something sits on a mount.
     fn carries(&self, mount: Mount) -> bool {
         let Parts { bodies, beams, lines, .. } = self.parts;
         let massive = lines.iter().filter(|line| line.barrel.is_some() || line.rod.is_some());

@@ -20,7 +20,7 @@ const MANY: usize = 10;
 const MANY_UNCUT: usize = 20;
 
 impl<S: Scalar> Assembly<'_, S> {
-    /// The tree.
+    /// Finishes an assembly: the tree.
     pub(super) fn model(mut self, order: &[Part]) -> Result<Model<S>> {
         let n_joints = self.joints.len();
         let n_coordinates = n_joints + self.beams.iter().map(|elastic| elastic.beam.len()).sum::<usize>();
@@ -96,7 +96,7 @@ impl<S: Scalar> Assembly<'_, S> {
         })
     }
 
-    /// Finds the slices of all beams whose products of rates count, and says which frames they are.
+    /// Finishes an assembly's slices of beams whose products of rates count, and says which frames they are.
     fn slices(&mut self, order: &[Node], links: &[Link<S>], products: &[Products]) -> Vec<bool> {
         let spatial = turning_in_space(order, links, &self.beams, products.len());
         let mut summed = vec![false; products.len()];
@@ -136,7 +136,7 @@ impl<S: Scalar> Assembly<'_, S> {
         Strip { first: *coordinate, len: beam.len(), section: beam.gauge(gauge.at), point: [gauge.x, gauge.y] }
     }
 
-    /// The nodes in their order, each with the coordinates beyond it.
+    /// Nodes of a finished tree in their order, each with the coordinates beyond it.
     fn nodes(&self, order: &[Part], links: &[Link<S>]) -> Vec<Node> {
         let mut beyond = vec![Vec::new(); self.inertias.len()];
         let mut nodes = Vec::new();
@@ -169,7 +169,7 @@ impl<S: Scalar> Assembly<'_, S> {
     }
 }
 
-/// A shaft; a rotor that one joint alone turns goes to the `links`, where the recursions know it.
+/// Shaft of a finished tree; a rotor that one joint alone turns goes to the `links`. The recursions know it there.
 fn shaft_of<S: Scalar>(transmission: &Transmission<S>, links: &mut [Link<S>]) -> Shaft<S> {
     let ratios = transmission.ratios.clone();
     if let ([Ratio { joint, ratio }], Some(inertia)) = (&*ratios, transmission.inertia) {
@@ -179,7 +179,7 @@ fn shaft_of<S: Scalar>(transmission: &Transmission<S>, links: &mut [Link<S>]) ->
     Shaft { ratios, inertia: transmission.inertia }
 }
 
-/// A joint in the frame that its mount sits on.
+/// Joint of a finished tree in the frame that its mount sits on.
 fn on_frame(joint: &Joint, on: Place) -> Joint {
     let frame = on.pose * joint.frame::<f64>();
     let rows = frame.rotation.transpose().columns.map(Vector3::to_array);

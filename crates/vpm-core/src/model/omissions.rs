@@ -48,7 +48,8 @@ pub(crate) struct Mixed {
 }
 
 impl Mixed {
-    /// Acceleration across the joint at zero coordinate accelerations, from the one by products of rates over this joint alone.
+    /// Acceleration step across a joint with omissions, from products of rates over this joint alone. It is at zero
+    /// coordinate accelerations.
     ///
     /// Law: with the acceleration by products of rates `D = X^-1 D_P + across`, a frame that counts them has D beside all else, one that
     /// does not has nothing of it; so the step from what it hangs on is `own D - X^-1 (carrier D_P)`. `drifts` holds D of all frames
@@ -79,7 +80,7 @@ impl Mixed {
 }
 
 impl Products {
-    /// Whether the acceleration by products of rates over a joint or along a beam is asked for.
+    /// Whether omissions leave the acceleration by products of rates over a joint or along a beam.
     #[inline]
     pub(crate) fn accelerates(self) -> bool {
         match self {
@@ -89,7 +90,7 @@ impl Products {
         }
     }
 
-    /// Whether they count at the frame itself.
+    /// Whether omissions leave the products of rates at the frame itself.
     #[inline]
     pub(crate) fn own(self) -> bool {
         match self {
@@ -110,7 +111,7 @@ pub(super) struct Tree<'a, S> {
 }
 
 impl<S: Scalar> Tree<'_, S> {
-    /// Each node's frames and the frame that it hangs on.
+    /// Frames of each node for omissions, and the frame that it hangs on.
     fn nodes(&self) -> impl DoubleEndedIterator<Item = (std::ops::Range<usize>, usize)> {
         self.order.iter().map(|node| match node {
             Node::Body(number, _) => (number + 1..number + 2, self.links[*number].parent),
@@ -122,7 +123,7 @@ impl<S: Scalar> Tree<'_, S> {
         })
     }
 
-    /// Which products of rates count at each frame; those of lines count unless all are left out.
+    /// Products of rates that omissions leave at each frame; those of lines count unless all are left out.
     pub(super) fn products(&self, omissions: &Omissions, all: bool) -> Vec<Products> {
         if all {
             return vec![Products::Dropped; self.n_frames];
@@ -163,7 +164,7 @@ impl<S: Scalar> Tree<'_, S> {
         products
     }
 
-    /// The block of the mass matrix that each coordinate is in.
+    /// Block of the mass matrix, after omissions, that each coordinate is in.
     pub(super) fn blocks(&self, omissions: &Omissions) -> Vec<usize> {
         let coordinates = self.links.len() + self.beams.iter().map(|elastic| elastic.beam.len()).sum::<usize>();
         let (mut of_frames, mut of_coordinates) = (vec![0; self.n_frames], vec![0; coordinates]);

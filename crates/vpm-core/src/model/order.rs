@@ -37,7 +37,7 @@ impl Hanging<'_> {
         Ok(order)
     }
 
-    /// What a part hangs on, if it is not the world.
+    /// Part below in the order: what a part hangs on, if it is not the world.
     fn below(&self, part: Part) -> Option<Part> {
         let (_, mount) = self.entry(part);
         match mount {
@@ -54,7 +54,7 @@ impl Hanging<'_> {
         }
     }
 
-    /// The ring that is reached from a part by going down.
+    /// Ring that makes an order impossible, reached from a part by going down.
     fn ring(&self, from: Part, steps: usize) -> Error {
         let down = |part: Part| self.below(part).unwrap_or(part);
         let start = (0..steps).fold(from, |part, _| down(part));

@@ -12,7 +12,7 @@ pub(crate) struct Place {
 }
 
 impl Place {
-    /// The world.
+    /// Place in the world.
     pub(crate) fn world() -> Self {
         Self { frame: 0, pose: Pose::identity() }
     }

@@ -18,7 +18,7 @@ enum Turning {
 }
 
 impl Turning {
-    /// The same in axes with that rotation.
+    /// Turning axes seen in axes with that rotation.
     fn seen(self, rotation: Matrix3<f64>) -> Self {
         match self {
             Self::About(axis) => Self::About(rotation.transpose_mul(axis)),

@@ -48,7 +48,7 @@ impl Design {
     }
 }
 
-/// Every channel that a term reads has to move in one record at least.
+/// Checks for a design that every channel that a term reads moves in one record at least.
 fn moving(structure: &Structure, records: &[Record<'_>]) -> Result<()> {
     let inputs = structure.inputs();
     for (signal, name) in structure.signals().iter().enumerate() {
@@ -69,7 +69,8 @@ fn moving(structure: &Structure, records: &[Record<'_>]) -> Result<()> {
     Ok(())
 }
 
-/// Least squares over all terms of the structure, one equation per sample with a full past, by QR of scaled columns.
+/// Fits all terms of the design by least squares. There is one equation per sample with a full past; by QR of scaled
+/// columns.
 ///
 /// # Errors
 ///
@@ -81,7 +82,7 @@ pub fn fit(structure: &Structure, records: &[Record<'_>]) -> Result<Narx> {
     Narx::new(structure.clone(), &theta)
 }
 
-/// Coefficients of the first `count` columns.
+/// Coefficients of the design's first `count` columns.
 pub(super) fn solve(structure: &Structure, design: &Design, count: usize) -> Result<Vec<f64>> {
     let (rows, columns) = (design.target.len(), &design.columns[..count]);
     let scale: Vec<f64> = columns.iter().map(|column| norm(column).max(f64::MIN_POSITIVE)).collect();
@@ -98,7 +99,7 @@ pub(super) fn solve(structure: &Structure, design: &Design, count: usize) -> Res
     Ok(theta.iter().zip(&scale).map(|(value, scale)| value / scale).collect())
 }
 
-/// Which columns before it span column `at`: those with a part in it.
+/// Columns of the design before column `at` that span it: those with a part in it.
 fn collinear(structure: &Structure, r: &DMatrix<f64>, at: usize) -> NarxError {
     let text = |term: usize| format!("`{}`", structure.terms()[term].text(structure.signals()));
     let mut weights = r.view((0, at), (at, 1)).into_owned();
@@ -113,7 +114,7 @@ pub(super) fn norm(values: &[f64]) -> f64 {
     dot(values, values).sqrt()
 }
 
-/// A dot product in four lanes.
+/// Dot product of design columns in four lanes.
 pub(super) fn dot(a: &[f64], b: &[f64]) -> f64 {
     let ((a, a_rest), (b, b_rest)) = (a.as_chunks::<4>(), b.as_chunks::<4>());
     let mut lanes = [0.0; 4];

@@ -5,8 +5,8 @@ use super::record::Record;
 use crate::error::{NarxError, Result};
 
 impl Narx {
-    /// Each sample computed from the **simulated** outputs before it; of the record's output only the first
-    /// [`Structure::longest_lag`](super::Structure::longest_lag) samples are read, as the start.
+    /// Free run over a record: each sample computed from the **simulated** outputs before it. Of the record's output
+    /// only the first [`Structure::longest_lag`](super::Structure::longest_lag) samples are read, as the start.
     ///
     /// # Errors
     ///

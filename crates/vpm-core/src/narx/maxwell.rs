@@ -8,14 +8,14 @@ use crate::scalar::Scalar;
 pub struct Surface(pub [f64; 10]);
 
 impl Surface {
-    /// A surface of the same value everywhere.
+    /// Map of the Maxwell element with the same value everywhere.
     pub fn constant(value: f64) -> Self {
         let mut coefficients = [0.0; 10];
         coefficients[0] = value;
         Self(coefficients)
     }
 
-    /// The value of the surface at (u, s).
+    /// Value of the Maxwell element's map at (u, s).
     #[inline]
     pub fn at<S: Scalar>(&self, u: S, s: S) -> S {
         let [c, u1, s1, u2, us, s2, u3, u2s, us2, s3] = self.0;
@@ -67,7 +67,8 @@ pub struct MaxwellState<S = f64> {
 }
 
 impl MaxwellNarx {
-    /// An element with stiffness map `k0` (N/m), free-length map `s0` (m), `k1` in N/m, `c1` in N s/m, sampled every `step` s.
+    /// Maxwell element with maps `k0` (N/m) and `s0` (m), `k1` in N/m, `c1` in N s/m, sampled every `step` s. `k0` is
+    /// the stiffness, `s0` the free length.
     ///
     /// # Errors
     ///
@@ -86,26 +87,27 @@ impl MaxwellNarx {
         Ok(Self { k0, s0, k1, tau_over_h: tau / step, scheme })
     }
 
-    /// Memory that starts with the forces (N) and lengths (m) of the last two samples, oldest first, at the drive signal `u` of the last.
+    /// Memory of the Maxwell element from forces (N) and lengths (m) of the last two samples, oldest first. The drive
+    /// signal of the last is `u`.
     pub fn start<S: Scalar>(&self, force: [S; 2], u: S, length: [S; 2]) -> MaxwellState<S> {
         let (elastic, stiffness) = self.elastic(u, length[1]);
         MaxwellState { force, length, elastic, stiffness }
     }
 
-    /// Force in N of an element that has stood at drive signal `u` and length `s` (m): that of its spring.
+    /// Settled force in N of the Maxwell element at drive signal `u` and length `s` (m): that of its spring.
     #[inline]
     pub fn settled<S: Scalar>(&self, u: S, s: S) -> S {
         self.elastic(u, s).0
     }
 
-    /// `k_0 (s - s_0)` and `k_0` at (u, s).
+    /// Elastic force of the Maxwell element, `k_0 (s - s_0)`, and `k_0` at (u, s).
     #[inline]
     fn elastic<S: Scalar>(&self, u: S, s: S) -> (S, S) {
         let stiffness = self.k0.at(u, s);
         (stiffness * (s - self.s0.at(u, s)), stiffness)
     }
 
-    /// Force in N at the next sample, where the drive signal is `u` and the length `s` (m).
+    /// Force in N of the Maxwell element at the next sample, where drive signal is `u` and length `s` (m).
     #[inline]
     pub fn step<S: Scalar>(&self, state: &mut MaxwellState<S>, u: S, s: S) -> S {
         let (r, [older, old], [s_older, s_old]) = (self.tau_over_h, state.force, state.length);
@@ -128,7 +130,7 @@ impl MaxwellNarx {
         force
     }
 
-    /// Forces in N of a whole record: the first two as given, the rest from the element's **own** past.
+    /// Free run of the Maxwell element: forces in N, the first two given, the rest from its **own** past.
     ///
     /// # Errors
     ///

@@ -41,27 +41,28 @@ impl Narx {
         Ok(Self { structure, coefficients: coefficients.to_vec(), program })
     }
 
-    /// Terms and names.
+    /// Structure of the NARX model: terms and names.
     pub fn structure(&self) -> &Structure {
         &self.structure
     }
 
-    /// One number per term.
+    /// Coefficients of the NARX model, one per term.
     pub fn coefficients(&self) -> &[f64] {
         &self.coefficients
     }
 
-    /// A simulation that is fed sample by sample; all its memory is made here.
+    /// Stepper of the NARX model that is fed sample by sample; all its memory is made here.
     pub fn stepper(&self) -> Stepper {
         Stepper::new(self)
     }
 
-    /// A simulation that is fed sample by sample, in numbers that may carry derivatives.
+    /// Stepper of the NARX model in numbers that may carry derivatives.
     pub(crate) fn stepper_in<S: Scalar>(&self) -> Stepper<S> {
         Stepper::new(self)
     }
 
-    /// Each sample computed from the **measured** outputs before it; the first samples, which have no past, are the measured ones.
+    /// One-step prediction of the NARX model from the **measured** outputs before each sample. The first samples, which
+    /// have no past, are the measured ones.
     ///
     /// # Errors
     ///

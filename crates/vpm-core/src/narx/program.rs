@@ -60,12 +60,12 @@ impl Program {
         Self { constant, sums, stride, window }
     }
 
-    /// How many numbers a buffer must have from the start of any window on.
+    /// Number of values that a program's buffer must have from the start of any window on.
     pub(super) fn reach(&self) -> usize {
         self.window.max(NARROW)
     }
 
-    /// The sum over the window that begins at `from`.
+    /// Evaluates a polynomial program: the sum over the window that begins at `from`.
     #[inline]
     pub(super) fn evaluate<S: Scalar>(&self, buffer: &[S], from: usize) -> S {
         let window = &buffer[from..];
@@ -105,7 +105,7 @@ impl<I: Copy> Sums<I> {
     }
 }
 
-/// A sum in four lanes, because each addition otherwise waits for the last one.
+/// Sum of a program in four lanes, because each addition otherwise waits for the last one.
 #[inline]
 fn spread<T, S: Scalar>(items: &[T], value: impl Fn(&T) -> S) -> S {
     let (fours, rest) = items.as_chunks::<4>();

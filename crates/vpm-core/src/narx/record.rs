@@ -15,7 +15,7 @@ pub struct Record<'a> {
 }
 
 impl Record<'_> {
-    /// Number of samples.
+    /// Number of samples in a NARX record.
     pub fn samples(&self) -> usize {
         self.output.len()
     }
@@ -51,7 +51,8 @@ impl Record<'_> {
         }
     }
 
-    /// Rows `[y, u_1, ..., u_m]`, and `reach` numbers behind the last; outputs after the first `outputs` are zero.
+    /// Rows `[y, u_1, ..., u_m]` of a NARX record, and `reach` numbers behind the last. Outputs after the first
+    /// `outputs` are zero.
     pub(super) fn interleaved(&self, inputs: usize, outputs: usize, reach: usize) -> Vec<f64> {
         let stride = inputs + 1;
         let mut rows = vec![0.0; self.samples() * stride + reach];

@@ -35,7 +35,7 @@ pub struct Selection {
     pub dependent: Vec<(String, String)>,
 }
 
-/// Chooses among the terms of `pool`, at most `most`, and fits their coefficients.
+/// Selects terms of `pool`, at most `most`, and fits their coefficients.
 ///
 /// Law: forward orthogonal least squares. Candidates `p` are orthogonalised against the chosen `w` as those are chosen (modified
 /// Gram-Schmidt), `ERR = <p, y>^2 / (<p, p> <y, y>)` is the share of the output's energy that a candidate would explain, and the
@@ -160,7 +160,7 @@ impl Path {
         Ok(path)
     }
 
-    /// After each number of terms.
+    /// Criterion of the selection after each number of terms.
     fn criterion(&self, stop: Stop, samples: usize) -> Vec<f64> {
         let count = samples as f64;
         let mut unexplained = 1.0;
@@ -213,7 +213,7 @@ impl Candidate {
     }
 }
 
-/// Takes from `values` their part along `direction`.
+/// Removes from a selection's `values` their part along `direction`.
 fn remove(values: &mut [f64], direction: &[f64], length: f64) {
     let share = dot(values, direction) / (length * length);
     for (value, direction) in values.iter_mut().zip(direction) {

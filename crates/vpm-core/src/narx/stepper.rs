@@ -28,7 +28,8 @@ impl<S: Scalar> Stepper<S> {
         Self { longest: model.structure().longest_lag(), program, buffer, from: 0, end }
     }
 
-    /// Sets the past: the last samples of the output and the rows of inputs, oldest first, both as long as the longest lag.
+    /// Starts the stepper with a past: the last samples of output and inputs, oldest first. Both are as long as the
+    /// longest lag.
     ///
     /// # Errors
     ///
@@ -52,7 +53,7 @@ impl<S: Scalar> Stepper<S> {
         Ok(())
     }
 
-    /// Sets a past in which output and inputs stood; numbers missing in `inputs` count as zero.
+    /// Starts the stepper with a past in which output and inputs stood; missing `inputs` count as zero.
     pub fn stand(&mut self, output: S, inputs: &[S]) {
         self.from = 0;
         for row in self.buffer.chunks_exact_mut(self.program.stride).take(self.longest) {
@@ -63,12 +64,13 @@ impl<S: Scalar> Stepper<S> {
         }
     }
 
-    /// How many inputs a step takes.
+    /// Number of inputs that a step of the stepper takes.
     pub fn inputs(&self) -> usize {
         self.program.stride - 1
     }
 
-    /// The output of this sample from its inputs and the **simulated** past; numbers missing in `inputs` count as zero.
+    /// Steps to the output of this sample from its inputs and the **simulated** past. Numbers missing in `inputs` count
+    /// as zero.
     #[inline]
     pub fn step(&mut self, inputs: &[S]) -> S {
         let (row, value) = self.present(inputs);
@@ -77,7 +79,7 @@ impl<S: Scalar> Stepper<S> {
         value
     }
 
-    /// As [`step`](Self::step), but the past of the next samples is what was **measured** here.
+    /// Steps as [`step`](Self::step), but the past of the next samples is what was **measured** here.
     #[inline]
     pub fn step_measured(&mut self, inputs: &[S], measured: S) -> S {
         let (row, value) = self.present(inputs);
@@ -86,7 +88,7 @@ impl<S: Scalar> Stepper<S> {
         value
     }
 
-    /// Takes the inputs of this sample: where its row begins, and the output that the model gives for it.
+    /// Takes this sample's inputs into the stepper: where their row begins, and the model's output for it.
     #[inline]
     fn present(&mut self, inputs: &[S]) -> (usize, S) {
         let row = self.from + self.longest * self.program.stride;

@@ -18,18 +18,18 @@ pub struct Term {
 }
 
 impl Term {
-    /// The product of these factors, in any order.
+    /// Term of a structure: the product of these factors, in any order.
     pub fn new(mut factors: Vec<Factor>) -> Self {
         factors.sort_unstable();
         Self { factors }
     }
 
-    /// The factors, sorted.
+    /// Factors of a structure's term, sorted.
     pub fn factors(&self) -> &[Factor] {
         &self.factors
     }
 
-    /// As it is written, with the names of output and inputs: `force[k-1]^2*u[k]`.
+    /// Text of a structure's term, with names of output and inputs: `force[k-1]^2*u[k]`.
     pub fn text(&self, signals: &[String]) -> String {
         let lagged = |factor: &Factor| {
             let unknown = format!("signal {}", factor.signal);
@@ -56,7 +56,7 @@ pub struct Structure {
 }
 
 impl Structure {
-    /// Terms over `signals`, the output's name first.
+    /// Structure of terms over `signals`, the output's name first.
     ///
     /// # Errors
     ///
@@ -80,27 +80,27 @@ impl Structure {
         Ok(Self { signals: signals.to_vec(), terms, longest })
     }
 
-    /// Names of the output and the inputs.
+    /// Names of a structure's output and inputs.
     pub fn signals(&self) -> &[String] {
         &self.signals
     }
 
-    /// How many inputs there are.
+    /// Number of a structure's inputs.
     pub fn inputs(&self) -> usize {
         self.signals.len() - 1
     }
 
-    /// The terms.
+    /// Terms of a structure.
     pub fn terms(&self) -> &[Term] {
         &self.terms
     }
 
-    /// Longest lag in samples: how many samples a simulation needs before its first.
+    /// Longest lag of a structure in samples: how many samples a simulation needs before its first.
     pub fn longest_lag(&self) -> usize {
         self.longest
     }
 
-    /// The first `count` terms alone.
+    /// Structure of the first `count` terms alone.
     pub fn first(&self, count: usize) -> Result<Self> {
         Self::new(&self.signals, self.terms.iter().take(count).cloned().collect())
     }
@@ -115,7 +115,8 @@ pub struct Lags {
     pub delays: Vec<usize>,
 }
 
-/// All products of at most `degree` lagged signals, lower degrees first, the constant term in front of them if asked.
+/// Candidate terms of a structure: all products of at most `degree` lagged signals. Lower degrees come first, the
+/// constant term in front of them if asked.
 pub fn candidates(lags: &[Lags], degree: usize, constant: bool) -> Vec<Term> {
     let single: Vec<Factor> =
         lags.iter().flat_map(|lags| lags.delays.iter().map(|&delay| Factor { signal: lags.signal, delay })).collect();

@@ -31,7 +31,7 @@ pub struct Rights {
 }
 
 impl Rights {
-    /// Asks for what is permitted; what is not is told, and no error.
+    /// Asks for the rights of a real-time loop; what is not permitted is told, and no error.
     ///
     /// `priority` is that of `SCHED_FIFO`, 1 to 99; 80 lies above the interrupt threads of Linux with real-time patches (50).
     pub fn ask(lock_memory: bool, priority: Option<u8>) -> Self {
@@ -54,7 +54,8 @@ impl Drop for Rights {
     }
 }
 
-/// Locks the memory there is and that to come. Under a limit what is to come could be refused in the middle of a run: then not at all.
+/// Right to locked memory: locks what there is and that to come. Under a limit what is to come could be refused in the
+/// middle of a run: then not at all.
 #[cfg(target_os = "linux")]
 fn lock() -> Right {
     if let (Some(limit), false) = (getrlimit(Resource::Memlock).current, geteuid().is_root()) {
@@ -102,7 +103,7 @@ fn raise(priority: u8) -> (Right, Option<(ThreadSchedulePolicy, ThreadPriority)>
     }
 }
 
-/// Nice value of this thread, -20 to 19.
+/// Nice value of this thread, -20 to 19, for its rights.
 #[cfg(target_os = "linux")]
 fn nice() -> i32 {
     getpriority_process(None).unwrap_or(0)
@@ -113,7 +114,8 @@ fn nice() -> i32 {
     0
 }
 
-/// Value from 0 to 99 that `thread_priority` takes for a nice value: it cuts 39 (1 - value / 99) - 20 to a whole number.
+/// Value from 0 to 99 that `thread_priority` takes as a right for a nice value. It cuts 39 (1 - value / 99) - 20 to a
+/// whole number.
 ///
 /// With the lowest one instead, an ordinary thread would come out of a loop as the last of all (nice 19), and only root
 /// could change that.

@@ -7,7 +7,7 @@ use super::Scalar;
 /// A plain number takes one branch and never works out the other; a number that records its operations works out both and
 /// keeps the choice, entry by entry.
 pub trait Choice<S>: Copy {
-    /// Puts together, from the two branches, what `pick` makes of each pair of numbers.
+    /// Result of a choice from its two branches: what `pick` makes of each pair of numbers.
     fn choose(pick: &impl Fn(S, S) -> S, yes: Self, no: Self) -> Self;
 }
 

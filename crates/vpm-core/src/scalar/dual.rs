@@ -15,7 +15,7 @@ pub struct Dual<S, const N: usize> {
     pub gradient: [S; N],
 }
 
-/// Lifts `values` to constants and makes the entries at `variables` the variables: lane `k` for `variables[k]`.
+/// Lifts `values` to dual constants and makes those at `variables` variables: lane `k` for `variables[k]`.
 ///
 /// The caller sees to it that there are at most `N` variables, all of them indices into `values`; others are left out.
 pub fn seed<S: Scalar, const N: usize>(values: &[S], variables: &[usize]) -> Vec<Dual<S, N>> {
@@ -30,13 +30,13 @@ pub fn seed<S: Scalar, const N: usize>(values: &[S], variables: &[usize]) -> Vec
 }
 
 impl<S: Scalar, const N: usize> Dual<S, N> {
-    /// A number that does not depend on the variables.
+    /// Dual number that does not depend on the variables.
     #[inline]
     pub fn constant(value: S) -> Self {
         Self { value, gradient: [S::zero(); N] }
     }
 
-    /// The variable number `lane` itself, at `value`. A lane of `N` or more gives a constant.
+    /// Dual variable number `lane` itself, at `value`. A lane of `N` or more gives a constant.
     #[inline]
     pub fn variable(value: S, lane: usize) -> Self {
         let mut number = Self::constant(value);
@@ -46,13 +46,13 @@ impl<S: Scalar, const N: usize> Dual<S, N> {
         number
     }
 
-    /// f(x) from its value and slope at x: `f + f' dx`.
+    /// Dual f(x) from its value and slope at x: `f + f' dx`.
     #[inline]
     fn chain(self, value: S, slope: S) -> Self {
         Self { value, gradient: self.gradient.map(|part| part * slope) }
     }
 
-    /// Combines two gradients lane by lane.
+    /// Combines two gradients of dual numbers lane by lane.
     #[inline]
     fn zip(self, other: Self, value: S, combine: impl Fn(S, S) -> S) -> Self {
         let mut gradient = self.gradient;
@@ -62,14 +62,14 @@ impl<S: Scalar, const N: usize> Dual<S, N> {
         Self { value, gradient }
     }
 
-    /// (a b)' = a' b + b' a.
+    /// Dual product (a b)' = a' b + b' a.
     #[inline]
     fn product(self, other: Self) -> Self {
         let (a, b) = (self.value, other.value);
         self.zip(other, a * b, |left, right| left * b + right * a)
     }
 
-    /// (a/b)' = (a' - (a/b) b') / b, with one division for all lanes.
+    /// Dual quotient (a/b)' = (a' - (a/b) b') / b, with one division for all lanes.
     #[inline]
     fn quotient(self, other: Self) -> Self {
         let quotient = self.value / other.value;

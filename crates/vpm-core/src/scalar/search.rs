@@ -21,7 +21,7 @@ pub struct Search {
 }
 
 impl Search {
-    /// What it finds with these arguments; zeros stand for those that are missing.
+    /// Result of a search with these arguments; zeros stand for those that are missing.
     #[inline]
     pub fn value(&self, arguments: impl Iterator<Item = f64>) -> f64 {
         let mut all = [0.0; ARGUMENTS];

@@ -21,8 +21,9 @@ pub struct Along {
     pub jacobian: Vec<f64>,
 }
 
-/// All joints follow `motion`, readings of the model's position sensors; drives and supplies answer to it and to `inputs` (N x inputs,
-/// each row held until the next), from the states `internal` at the first sample.
+/// Drives along a given `motion` that all joints follow: they answer to it and to `inputs`. The motion is that of the
+/// model's position sensors. `inputs` are N x inputs, each row held until the next. States of drives and supplies begin
+/// with `internal`.
 ///
 /// Law: `ds/dt = f(s, l(q(t)), dl(q(t), v(t)), u)`, s the states of drives and supplies; q(t) between samples is the polynomial of degree 5
 /// with position, velocity and acceleration of both. The outputs `effort` of the joints are the efforts that the motion needs, as in

@@ -127,7 +127,7 @@ impl Bounds {
         state.iter().zip(&self.most).position(wrong)
     }
 
-    /// What the state at `place` is and does, as the beginning of a sentence.
+    /// Complaint about a state beyond its bounds: what it is and does, as the beginning of a sentence.
     #[cold]
     pub(crate) fn complaint<S: Scalar>(&self, description: &Description, place: usize, state: S) -> (String, String) {
         let (name, most, value) = (state_name(description, place), self.most[place], state.inspect());
@@ -138,7 +138,7 @@ impl Bounds {
     }
 }
 
-/// The quantity itself, or only its derivative with respect to a parameter.
+/// Name of the quantity beyond its bounds, or of its derivative by a parameter.
 pub(crate) fn of_what<S: Scalar>(name: &str, number: S) -> String {
     if number.inspect().is_finite() && !number.is_finite() {
         return format!("the derivative of the {name} with respect to a parameter");
@@ -159,7 +159,7 @@ pub(crate) fn repair(method: Method) -> &'static str {
     }
 }
 
-/// What helps against such a state along a prescribed motion, with drives that answer to it or without.
+/// Repair against a state beyond its bounds along a prescribed motion, with drives that answer or without.
 pub(super) fn repair_along(method: Method, drives: bool) -> &'static str {
     match method {
         Method::Adaptive { .. } => "check units and jumps of the motion",
@@ -173,7 +173,7 @@ pub(super) fn repair_along(method: Method, drives: bool) -> &'static str {
     }
 }
 
-/// The rate of a joint, m/s or rad/s, at which its body is as fast as light; infinite for one that no rate moves.
+/// Bound on the rate of a joint, m/s or rad/s: its body is as fast as light; infinite if no rate moves it.
 fn fastest(body: &Body<f64>) -> f64 {
     let Some(inertia) = body.inertia.filter(|_| body.joint.kind != JointKind::Prismatic) else {
         return if body.joint.kind == JointKind::Prismatic { LIGHT } else { f64::INFINITY };
@@ -184,7 +184,8 @@ fn fastest(body: &Body<f64>) -> f64 {
     LIGHT / (own / inertia.mass + a * a + b * b + c * c - along * along).max(0.0).sqrt()
 }
 
-/// What a beam stores, J, whose strongest section is stretched by 1 from end to end; a reduced solid, moved as far as it is large.
+/// Bound on the energy of a beam, J: its strongest section stretched by 1 from end to end. A reduced solid is moved as
+/// far as it is large.
 fn largest_energy(beam: &BeamEntry<f64>) -> f64 {
     if let Some(reduced) = &beam.reduced {
         return beam.factors().0 * reduced.largest_energy();
@@ -194,7 +195,7 @@ fn largest_energy(beam: &BeamEntry<f64>) -> f64 {
     0.5 * beam.length * sections.map(|section| section.stiffness[5]).fold(0.0, f64::max)
 }
 
-/// The diagonal of the inverse of a stiffness matrix, row by row; empty if it has none.
+/// Diagonal of an inverse stiffness matrix, row by row, for bounds of beams; empty without one.
 fn inverse_diagonal(stiffness: &[f64], len: usize) -> Vec<f64> {
     let inverse = Cholesky::new(DMatrix::from_row_slice(len, len, stiffness)).map(|factors| factors.inverse());
     inverse.map_or_else(Vec::new, |inverse| inverse.diagonal().iter().copied().collect())

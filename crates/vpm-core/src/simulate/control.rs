@@ -72,7 +72,7 @@ impl<S: Scalar> Control<S> {
         Ok(Self { loops: loops.collect::<Result<_>>()?, drafts: zeros(rows * inputs), inputs, machine })
     }
 
-    /// Forgets everything.
+    /// Forgets everything that controllers remember.
     pub(super) fn restart(&mut self) {
         for control in &mut self.loops {
             control.memory = ControlMemory::default();
@@ -110,7 +110,7 @@ impl<S: Scalar> Control<S> {
         }
     }
 
-    /// Calls `put` with each actuator and the command that arrives there at sample `row`.
+    /// Calls `put` with each actuator and the control command that arrives there at sample `row`.
     pub(super) fn arrive(&self, row: usize, mut put: impl FnMut(usize, S)) {
         for control in &self.loops {
             for &Port { actuator, .. } in &control.ports {
@@ -149,7 +149,7 @@ impl<S: Scalar> Loop<S> {
         }
     }
 
-    /// Writes the commands of its actuators into `commands`.
+    /// Writes the commands of a control loop's actuators into `commands`.
     fn command(
         &mut self,
         references: &[f64],
@@ -217,7 +217,7 @@ impl Port {
 }
 
 impl<S: Scalar> Machine<S> {
-    /// Reads the joints; elastic coordinates have no sensor and count as they are.
+    /// Reads the joints for controllers; elastic coordinates have no sensor and count as they are.
     fn look(&mut self, state: &[S], system: &mut System<S>, see: &impl Fn(usize) -> S) {
         let layout = system.dynamics().layout();
         let motion = self.state.len();
@@ -238,15 +238,15 @@ impl<S: Scalar> Machine<S> {
         self.acceleration.fill(S::zero());
     }
 
-    /// Growth of an actuator's length per motion of the joint that is measured with it.
+    /// Lever arm for controllers: growth of an actuator's length per motion of the joint measured with it.
     fn arm(&self, port: &Port) -> S {
         let coordinates = self.acceleration.len();
         port.line.map_or(S::one(), |line| self.levers[line * coordinates + port.joint])
     }
 }
 
-/// What is seen of an output at sample `row`: its sensor's reading, or the truth where there is no sensor. `truth` holds the outputs of
-/// all samples until then, `width` each.
+/// Reading that controllers get of an output at sample `row`: its sensor's, or the truth without a sensor. `truth`
+/// holds the outputs of all samples until then, `width` each.
 pub(super) fn reading<S: Scalar>(
     sensors: &[(usize, Sensor<S>)],
     (truth, width): (&[S], usize),

@@ -41,7 +41,7 @@ pub(super) struct Drives<'a> {
 }
 
 impl Guide<'_> {
-    /// Outputs of each sample, then the efforts of the drives on each joint if these answer; states; derivatives.
+    /// Runs a guided motion: outputs of each sample, efforts of answering drives, states and derivatives.
     pub(super) fn run(&self) -> Result<Run> {
         let Setting { theta, sensitivities, .. } = self.setting;
         // Most questions are for a few parameters: lanes that nobody needs would be most of the work.
@@ -135,7 +135,7 @@ impl<'a, S: Scalar> Way<'a, S> {
         Ok(way)
     }
 
-    /// Puts the free coordinates to rest where the motion begins, or away from it, and drives into their first states.
+    /// Begins a guided motion: free coordinates at rest or away from it, and drives in their first states.
     fn begin(&mut self, theta: &[S]) -> Result<()> {
         let (description, count) = (self.guide.setting.description, self.machine.free().len());
         let mut joints = vec![S::zero(); description.n_joints()];
@@ -155,7 +155,7 @@ impl<'a, S: Scalar> Way<'a, S> {
         Ok(())
     }
 
-    /// The true motion of a joint at a sample.
+    /// Guided motion of a joint at a sample.
     fn joint(&self, joint: usize, k: usize) -> [S; 3] {
         self.guide.motion.behind(self.guide.setting.stepping.time_step, k, joint, self.of_joints[joint].as_ref())
     }
@@ -189,13 +189,13 @@ impl<'a, S: Scalar> Way<'a, S> {
         Ok(Pair { first: outputs, second: self.states.iter().map(Scalar::re).collect() })
     }
 
-    /// Numbers of a sample: outputs and, where drives answer, their efforts.
+    /// Number of values of a guided sample: outputs and, where drives answer, their efforts.
     fn width(&self) -> usize {
         let description = self.guide.setting.description;
         description.n_outputs() + if self.guidance.drives { description.n_joints() } else { 0 }
     }
 
-    /// Takes over what is given for the interval that begins at sample `k`.
+    /// Moves the guided motion on to the interval that begins at sample `k`.
     fn move_on(&mut self, k: usize) {
         let (samples, time_step) = ([k, (k + 1).min(self.guide.rows() - 1)], self.guide.setting.stepping.time_step);
         let mut given = std::mem::take(&mut self.given);
@@ -223,7 +223,7 @@ impl<'a, S: Scalar> Way<'a, S> {
         }
     }
 
-    /// Records what is seen and needed at a sample.
+    /// Records outputs and needed efforts at a sample of the guided motion.
     fn sample(&mut self, row: usize) -> Result<()> {
         if let Some(time) = self.state.last_mut() {
             *time = S::zero();
@@ -262,7 +262,7 @@ impl<'a, S: Scalar> Way<'a, S> {
         Err(self.diverged((what, Diverged::NOT_FINITE.to_owned()), row))
     }
 
-    /// Complains about a ball joint that answers to the motion too near to the singularity of its angles.
+    /// Watches a ball joint that answers to the guided motion too near to the singularity of its angles.
     fn watch(&self, row: usize) -> Result<()> {
         let Setting { description, stepping, .. } = self.guide.setting;
         let (dim, n) = (description.n_states(), description.n_coordinates());
@@ -278,7 +278,7 @@ impl<'a, S: Scalar> Way<'a, S> {
         Ok(())
     }
 
-    /// Puts the measured states of drives in the place of their own; tells whether there are any.
+    /// Puts measured states of drives in the place of their own in a guided run; tells whether there are any.
     fn measure(&mut self, row: usize) -> bool {
         let Some(Drives { places, seen, .. }) = self.guide.drives else { return false };
         let (first, time_step) = (2 * self.machine.free().len(), self.guide.setting.stepping.time_step);
@@ -293,7 +293,7 @@ impl<'a, S: Scalar> Way<'a, S> {
         !places.is_empty()
     }
 
-    /// Values of the samples before `row`: outputs and states.
+    /// Values of a guided run's samples before `row`: outputs and states.
     fn before(&self, row: usize) -> (Vec<f64>, Vec<f64>) {
         let (description, width) = (self.guide.setting.description, self.width());
         let rows = self.truth[..row * width].chunks_exact(width.max(1));

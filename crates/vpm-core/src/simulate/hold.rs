@@ -21,7 +21,7 @@ impl Hold {
     /// All of them.
     pub const ALL: [Self; 3] = [Self::ZeroOrder, Self::FirstOrder, Self::Cubic];
 
-    /// Its name in options.
+    /// Name of a hold in options.
     pub fn name(self) -> &'static str {
         match self {
             Self::ZeroOrder => "zero_order",
@@ -38,7 +38,7 @@ impl Hold {
         Self::ALL.into_iter().find(|hold| hold.name() == name).ok_or_else(|| Error::Hold { name: name.to_owned() })
     }
 
-    /// The course of a signal from sample `k` on, of a record whose last sample is `last`.
+    /// Course of a held signal from sample `k` on, of a record whose last sample is `last`.
     pub fn course<S: Scalar>(self, k: usize, last: usize, at: impl Fn(usize) -> S) -> Course<S> {
         let begin = at(k);
         if self == Self::ZeroOrder || k >= last {
@@ -90,14 +90,14 @@ impl<S: Scalar> Course<S> {
         Self([value, S::zero(), S::zero(), S::zero()])
     }
 
-    /// Its value at a share of the interval.
+    /// Value of a held signal at a share of the interval.
     #[inline]
     pub fn at(&self, share: S) -> S {
         let [begin, first, second, third] = self.0;
         begin + share * (first + share * (second + share * third))
     }
 
-    /// Its slope there, per interval.
+    /// Slope of a held signal at a share of the interval, per interval.
     #[inline]
     pub fn slope(&self, share: S) -> S {
         let [_, first, second, third] = self.0;

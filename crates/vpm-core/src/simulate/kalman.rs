@@ -75,7 +75,7 @@ pub struct Linear {
 }
 
 impl Kalman {
-    /// A filter that begins in `state` with the noise's deviations of the first state.
+    /// Kalman filter that begins in `state` with the noise's deviations of the first state.
     ///
     /// # Errors
     /// As [`super::filter`], and [`Error::Setting`] for a machine with delays, which remembers what no state holds.
@@ -139,22 +139,22 @@ impl Kalman {
         })
     }
 
-    /// The machine.
+    /// Machine of the Kalman filter.
     pub fn description(&self) -> &Description {
         &self.description
     }
 
-    /// What the last readings gave; before the first, what was known at the beginning.
+    /// Estimate of the Kalman filter after the last readings; before the first, the known beginning.
     pub fn estimate(&self) -> &Estimate {
         &self.found
     }
 
-    /// The state that is expected at the coming sample.
+    /// State that the Kalman filter expects at the coming sample.
     pub fn expected(&self) -> &[f64] {
         self.state.as_slice()
     }
 
-    /// Begins again in `state` with this covariance, nx x nx.
+    /// Resets the Kalman filter to `state` with this covariance, nx x nx.
     pub fn reset(&mut self, state: &[f64], covariance: &[f64]) -> Result<()> {
         check_state("state", &self.description, state)?;
         let nx = state.len();
@@ -169,7 +169,8 @@ impl Kalman {
         Ok(())
     }
 
-    /// Keeps this gain (nx x m) from now on, under which the estimate has this covariance (nx x nx) and the innovations that one (m x m).
+    /// Holds this Kalman gain (nx x m) from now on. The estimate then has this covariance (nx x nx) and the innovations
+    /// that one (m x m).
     pub fn hold_gain(&mut self, (gain, covariance, spread): (&[f64], &[f64], &[f64])) -> Result<()> {
         let (nx, m) = (self.state.len(), self.channels.len());
         Table::vector("gain", gain, nx * m, "entry of nx x channels")?;
@@ -181,7 +182,7 @@ impl Kalman {
         Ok(())
     }
 
-    /// The machine near the expected state under these inputs.
+    /// Machine linearised near the Kalman filter's expected state under these inputs.
     pub fn linearised(&mut self, inputs: &[f64]) -> Result<&Linear> {
         self.expect(inputs)?;
         self.hold(inputs);
@@ -190,8 +191,8 @@ impl Kalman {
         Ok(&self.linear)
     }
 
-    /// Corrects the state by the readings of this sample and carries it to the next, the inputs being held. Readings of outputs that depend
-    /// on inputs are those under these inputs.
+    /// Step of the Kalman filter: corrects the state by readings and carries it on, with the inputs held. Readings of
+    /// outputs that depend on inputs are those under these inputs.
     pub fn step(&mut self, readings: &[f64], inputs: &[f64]) -> Result<&Estimate> {
         let (expected, found) = (self.channels.len(), readings.len());
         if found != expected {
@@ -236,7 +237,7 @@ impl Kalman {
         Ok(())
     }
 
-    /// Corrects state and covariance by the readings that came.
+    /// Kalman correction of state and covariance by the readings that came.
     fn correct(&mut self) -> Result<()> {
         let came: Vec<usize> =
             (0..self.channels.len()).filter(|&place| !self.found.innovation[place].is_nan()).collect();
@@ -267,12 +268,12 @@ impl Kalman {
         channels.zip(inputs).for_each(|(channels, &input)| channels[0] = Number::constant(input));
     }
 
-    /// First directions of the passes that an evaluation takes: one, or as many as give all derivatives.
+    /// Passes of an evaluation in the Kalman filter: one, or as many as give all derivatives.
     fn passes(&self, derived: bool) -> impl Iterator<Item = usize> + use<> {
         (0..if derived { self.state.len() } else { 1 }).step_by(LANES)
     }
 
-    /// Puts the state in, with derivatives along [`LANES`] directions from `first` on.
+    /// Seeds the Kalman filter's state with derivatives along [`LANES`] directions from `first` on.
     fn seed(&mut self, first: usize) {
         for (place, (number, &value)) in self.lifted.iter_mut().zip(&self.state).enumerate() {
             // A direction before `first` wraps around to a lane that does not exist, which gives a constant.
@@ -282,7 +283,7 @@ impl Kalman {
         self.integrator.reset();
     }
 
-    /// The measured outputs at the state, and their derivative by it.
+    /// Measured outputs at the Kalman filter's state, and their derivative by it.
     fn look(&mut self, derived: bool) -> Result<()> {
         if let Some(place) = self.bounds.outside(self.state.as_slice()) {
             let (what, event) = self.bounds.complaint(&self.description, place, self.state[place]);
@@ -305,7 +306,7 @@ impl Kalman {
         }
     }
 
-    /// All outputs as the sensors show them.
+    /// All outputs of the Kalman filter as the sensors show them.
     fn observe(&mut self) {
         let (layout, held) = (self.description.layout(), self.shown.clone());
         self.system.sample(&self.lifted, &mut self.rate, &mut self.shown);
@@ -319,7 +320,7 @@ impl Kalman {
         }
     }
 
-    /// The next state, its derivative by this one, and what moves it for no known reason.
+    /// Next state of the Kalman filter, its derivative by this one, and the process noise.
     fn advance(&mut self, derived: bool) -> Result<()> {
         let pieces = (self.stepping.time_step, self.stepping.substeps);
         let pushed =
@@ -363,7 +364,7 @@ impl Kalman {
     }
 }
 
-/// Complains about delays.
+/// Refuses delays in a Kalman filter that is fed sample by sample.
 fn prompt(description: &Description, theta: &[f64]) -> Result<()> {
     let of_actuators = description.actuators.iter().filter_map(|actuator| actuator.delay.as_ref().map(|d| d.time));
     let of_sensors = description.sensors.iter().filter_map(|sensor| sensor.delay);
@@ -378,7 +379,7 @@ fn prompt(description: &Description, theta: &[f64]) -> Result<()> {
     }
 }
 
-/// The numbers of a matrix row by row, and its shape.
+/// Matrix of the Kalman filter row by row, and its shape.
 pub fn by_rows(matrix: &DMatrix<f64>) -> (Vec<f64>, [usize; 2]) {
     (matrix.transpose().as_slice().to_vec(), [matrix.nrows(), matrix.ncols()])
 }

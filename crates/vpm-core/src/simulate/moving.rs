@@ -22,7 +22,7 @@ pub(super) struct Courses<S> {
 }
 
 impl<S: Scalar> Courses<S> {
-    /// Courses of so many `inputs`, all zero yet, for a machine of `dim` states and `interval` (s) between samples.
+    /// Courses of moving `inputs`, all zero yet, for `dim` states and `interval` (s) between samples.
     pub(super) fn new(inputs: usize, dim: usize, interval: f64) -> Self {
         Self {
             inputs: vec![Course::constant(S::zero()); inputs],
@@ -34,13 +34,13 @@ impl<S: Scalar> Courses<S> {
         }
     }
 
-    /// What input `number` does from a sample on, at whose value the machine holds it.
+    /// Begins the course of moving input `number` from a sample on, at its held value.
     pub(super) fn begin(&mut self, number: usize, course: Course<S>) {
         self.inputs[number] = course;
         self.now = S::zero();
     }
 
-    /// As [`Integrator::advance`] over the interval, of an integrator for one state more.
+    /// Advances a machine with moving inputs by [`Integrator::advance`], with the time as one state more.
     pub(super) fn advance(
         &mut self,
         system: &mut System<S>,
@@ -76,7 +76,7 @@ struct Moving<'a, S> {
 }
 
 impl<S: Scalar> Moving<'_, S> {
-    /// Lets the inputs be what they are at a time since the sample, and gives the state of the machine alone.
+    /// Moves inputs to their values at a time since the sample; gives the state of the machine alone.
     fn enter<'x>(&mut self, x: &'x [S]) -> &'x [S] {
         let (state, time) = x.split_at(x.len() - 1);
         // Inputs that stand where they are wanted leave the system with what it knows of the state.
@@ -94,7 +94,7 @@ impl<S: Scalar> Moving<'_, S> {
         }
     }
 
-    /// Writes derivatives of the machine alone, found by `by`, and the column of the time, where the rates are `rates`.
+    /// Matrix of a machine with moving inputs: its derivatives `by`, and the column of the time.
     fn matrix(
         &mut self,
         x: &[S],

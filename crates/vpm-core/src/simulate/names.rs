@@ -5,7 +5,7 @@ use crate::description::Description;
 use crate::effect::Seat;
 use crate::sensor::Layout;
 
-/// A state in words.
+/// Name of a state in words.
 pub(crate) fn state_name(description: &Description, place: usize) -> String {
     let n = description.n_coordinates();
     if place < n {
@@ -25,7 +25,7 @@ pub(crate) fn state_name(description: &Description, place: usize) -> String {
     of_drives.chain(of_supplies).chain(of_effects).nth(place - 2 * n).unwrap_or_default()
 }
 
-/// Where an effect sits, in words.
+/// Name of an effect's site in words.
 pub(super) fn site(description: &Description, seat: &Seat<usize>) -> String {
     match seat {
         Seat::Joint { joint, .. } => format!("joint `{}`", description.bodies[*joint].joint.name),
@@ -42,7 +42,7 @@ fn coordinate_name(description: &Description, quantity: &str, place: usize) -> S
     }
 }
 
-/// A coordinate in words.
+/// Name of a coordinate in words.
 pub(super) fn coordinate(description: &Description, place: usize) -> String {
     if let Some(body) = description.bodies.get(place) {
         return body.joint.name.clone();
@@ -57,7 +57,7 @@ pub(super) fn coordinate(description: &Description, place: usize) -> String {
     format!("coordinate {place}")
 }
 
-/// An output in words.
+/// Name of an output in words.
 pub(crate) fn output_name(description: &Description, column: usize) -> String {
     const JOINT: [&str; 4] = ["position", "velocity", "acceleration", "effort"];
     const MARKER: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];

@@ -58,12 +58,12 @@ pub struct Gains<'a> {
 }
 
 impl Gains<'_> {
-    /// Whether the state alone decides all that is asked for: then samples need no rates.
+    /// Whether an observer needs the state alone: then samples need no rates.
     pub(super) fn is_of_motion(&self, layout: Layout) -> bool {
         self.alone && self.readings.channels.iter().all(|&channel| layout.is_of_motion(channel))
     }
 
-    /// Coordinates, of so many, that readings move.
+    /// Coordinates that the observer's readings move.
     pub(super) fn drawn(&self, coordinates: usize) -> Vec<u32> {
         let (rows, width) = (0..self.gains.rows(), self.readings.channels.len());
         let moves = |state: usize, row: usize| {
@@ -127,7 +127,8 @@ impl Noise<'_> {
 /// What closed loops take away.
 pub(super) const OBSERVED: &str = "an observer that corrects states one by one";
 
-/// The innovations of an extended Kalman filter on `readings` from `initial_state`, with its gains; a mere table of inputs is held.
+/// Observer by an extended Kalman filter: innovations on `readings` from `initial_state`, with its gains. A mere table
+/// of inputs is held.
 ///
 /// Its linear models are the exact derivatives of the steps that the integrator takes. A force that is held for a sample moves the machine by
 /// `dt/2 (F + 1) [0; M^-1]`, F the transition of the sample.
@@ -185,7 +186,7 @@ pub fn observe<'a>(
     execute(setting, Plan { drive, initial: initial_state, starts: &[0], horizon: rows, gains: Some(gains) })
 }
 
-/// Complains about moves of parameters that give no differences.
+/// Refuses moves of parameters that give the observer no differences.
 fn check_moves(moves: &[f64], count: usize) -> Result<()> {
     Table::vector("moves", moves, count, "derivative")?;
     let Some(&value) = moves.iter().find(|&&value| value == 0.0) else { return Ok(()) };
@@ -262,14 +263,14 @@ impl<'a> Filter<'a> {
         Ok(Filtered { innovations, covariances, gains, states, deviations })
     }
 
-    /// Puts the stepper at the state, with derivatives along [`LANES`] directions of which `first` is the first.
+    /// Seeds the observer's state with derivatives along [`LANES`] directions from `first` on.
     fn seed(&mut self, first: usize) {
         // A direction before `first` wraps around to a lane that does not exist, which gives a constant.
         let lift = |(place, &value): (usize, &f64)| Dual::variable(value, place.wrapping_sub(first));
         self.stepper.place(self.state.iter().enumerate().map(lift));
     }
 
-    /// The outputs at the state, and their derivative by it.
+    /// Outputs that the observer predicts at its state, and their derivative by it.
     fn predict(&mut self, row: usize) -> Result<()> {
         for first in (0..self.state.len()).step_by(LANES) {
             self.seed(first);
@@ -285,7 +286,7 @@ impl<'a> Filter<'a> {
         Ok(())
     }
 
-    /// State and covariance at the next sample.
+    /// Advances state and covariance of the observer to the next sample.
     fn advance(&mut self, row: usize, setting: Setting<'_>) -> Result<()> {
         let pushed = pushed(self.stepper.dynamics(), self.state.as_slice(), self.noise.forces);
         let mut next = self.state.clone();
@@ -305,7 +306,7 @@ impl<'a> Filter<'a> {
     }
 }
 
-/// `K = P H' S^-1`, and `S = H P H' + R`, of readings with these deviations at a sample.
+/// Observer gain `K = P H' S^-1` with `S = H P H' + R`, of readings with these deviations at a sample.
 pub(super) fn gain(
     covariance: &DMatrix<f64>,
     output: &DMatrix<f64>,
@@ -325,7 +326,7 @@ pub(super) fn gain(
     Ok((factors.solve(&shared.transpose()).transpose(), spread))
 }
 
-/// `P <- (1 - K H) P (1 - K H)' + K R K'`, which stays definite however it is rounded (Bucy & Joseph 1968).
+/// Observer covariance `P <- (1 - K H) P (1 - K H)' + K R K'`, definite despite rounding (Bucy & Joseph 1968).
 pub(super) fn corrected(
     covariance: &DMatrix<f64>,
     gain: &DMatrix<f64>,
@@ -341,8 +342,8 @@ pub(super) fn corrected(
     &left * covariance * left.transpose() + &weighed * weighed.transpose()
 }
 
-/// Adds to a covariance what moves the states over a sample, of which `half` is half: `pushed` accelerations under the transition, and the
-/// deviations of the states.
+/// Adds the process noise over a sample to the observer's covariance. Of that sample `half` is half. It has the
+/// `pushed` accelerations under the transition, and the deviations of the states.
 pub(super) fn add_process(
     covariance: &mut DMatrix<f64>,
     transition: &DMatrix<f64>,
@@ -359,7 +360,8 @@ pub(super) fn add_process(
     }
 }
 
-/// Accelerations in a state by one deviation of the force on each coordinate: `M^-1` with columns of these lengths.
+/// Accelerations of the observer's process noise: one deviation of force on each coordinate. They are `M^-1` with
+/// columns of these lengths.
 pub(super) fn pushed(dynamics: &mut Dynamics<f64>, state: &[f64], forces: &[f64]) -> DMatrix<f64> {
     let n = forces.len();
     let (q, v) = state[..2 * n].split_at(n);
@@ -372,7 +374,7 @@ pub(super) fn pushed(dynamics: &mut Dynamics<f64>, state: &[f64], forces: &[f64]
     pushed
 }
 
-/// Takes over the derivatives of a number along the directions from `first` into a row.
+/// Takes the derivatives of an observer's number along the directions from `first` into a row.
 pub(super) fn take(matrix: &mut DMatrix<f64>, row: usize, first: usize, number: &Number) {
     let width = matrix.ncols();
     for (column, &slope) in (first..width).zip(&number.gradient) {

@@ -10,8 +10,8 @@ use crate::table::Table;
 /// What closed loops take away.
 pub(super) const PRESCRIBED: &str = "a run in which some of its joints follow a log";
 
-/// Joints follow `motion`, readings of the model's position sensors, but for `passive` ones, whose columns mean nothing; these and the
-/// beams move freely.
+/// Prescribed `motion` of joints; `passive` joints and beams move freely. The motion is that of the model's position
+/// sensors. Columns of passive joints mean nothing.
 ///
 /// Law: `M_ff a_f = (effects - bias - K q - D v)_f - M_fj a_j`, j the joints that follow and f the free coordinates. Between samples the
 /// joints follow the polynomial of degree 5 with position, velocity and acceleration of both. The free coordinates begin at rest under

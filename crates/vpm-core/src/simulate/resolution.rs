@@ -30,7 +30,7 @@ struct Met {
     taken: Taken,
 }
 
-/// What these steps make of the machine's vibrations about `state` in a run of `duration` (s).
+/// Resolution of the machine's vibrations by these steps about `state` in a run of `duration` (s).
 ///
 /// Linear damping counts, dry friction does not: it stops at a part of what vibrates.
 pub fn resolution(
@@ -52,7 +52,8 @@ pub fn resolution(
     Resolution::new(&jacobian, &sizes, Steps { method, step, duration, implicit })
 }
 
-/// Where dry friction does not bring what it brakes to rest in these steps, with the machine at rest where `state` is, under `commands`.
+/// Dry friction that steps do not resolve: it never brings what it brakes to rest. The machine is at rest where `state`
+/// is, under `commands`.
 ///
 /// Law: [`sticks`] and [`bends`], with the resistance at rest less that of fast motion and the stiffness of what remembers, and the inertia
 /// `1 / (s^T M^-1 s)` that moves along the coordinate `s^T q` of the friction: all of them are entries of the derivative of the rates by the
@@ -99,7 +100,7 @@ pub fn unstuck(
     Ok(left.map(|(site, met)| Unstuck { site, turn: met.slope + met.stiffness }).collect())
 }
 
-/// Where all that can rub is, in the order of [`crate::system::Dynamics::rubbing`].
+/// Sites of all friction whose resolution is checked, in the order of [`crate::system::Dynamics::rubbing`].
 fn rubbing_sites(description: &Description) -> impl Iterator<Item = String> {
     let effects = description.effects.iter().filter(|entry| matches!(entry, EffectEntry::Joint { .. }));
     let seats = effects.filter_map(EffectEntry::seat).chain(description.remembering());

@@ -82,12 +82,12 @@ impl<S: Scalar> SampledDrives<S> {
         Ok(Self { drives: drives.collect::<Result<_>>()? })
     }
 
-    /// Whether there is none.
+    /// Whether there is no sampled drive.
     pub(crate) fn is_empty(&self) -> bool {
         self.drives.iter().all(Option::is_none)
     }
 
-    /// Forgets everything.
+    /// Forgets the past of all sampled drives.
     pub(crate) fn restart(&mut self) {
         for drive in self.drives.iter_mut().flatten() {
             (drive.started, drive.effort) = (false, S::zero());

@@ -12,7 +12,8 @@ use crate::scalar::Dual;
 use crate::sensitivity::LANES;
 use crate::system::System;
 
-/// Complains, with the mode and the largest stable step, if flexible links, drives, contacts and bushings cannot be stepped so from `state`.
+/// Checks the stability of steps for links, drives, contacts and bushings from `state`. The error has the mode and the
+/// largest stable step.
 ///
 /// Judged with the drives where they stand in that state; what friction, end stops, opening valves and contacts that
 /// are open add later is left to the run.
@@ -45,7 +46,8 @@ pub(crate) fn check_step(description: &Description, theta: &[f64], stepping: Ste
     check_rates(stepping.method, stepping.step(), &rates)
 }
 
-/// As [`check_step`] for additive methods, by the derivative of the step itself: contacts, bushings and drives are explicit in them.
+/// Checks the stability of additive steps by the derivative of the step itself. Contacts, bushings and drives are
+/// explicit in them. Else as [`check_step`].
 fn check_additive(description: &Description, theta: &[f64], stepping: Stepping, state: &[f64]) -> Result<()> {
     let direct = description.actuators.iter().all(|actuator| actuator.is_direct());
     let free = description.contacts.is_empty() && description.bushings.is_empty();
@@ -93,8 +95,8 @@ fn check_additive(description: &Description, theta: &[f64], stepping: Stepping, 
     check_steps(stepping.method, stepping.step(), &rates, derivative)
 }
 
-/// Complains, with the mode and the largest stable step, if the flexible links, contacts and bushings cannot be stepped so from `state`;
-/// the joints `driven` follow a motion of their own.
+/// Checks the stability of steps for flexible links, contacts and bushings from `state`. The error has the mode and the
+/// largest stable step. The joints `driven` follow a motion of their own.
 ///
 /// Judged at the mass matrix of that state, the constant stiffness and damping of the beams, and those of contacts and bushings where
 /// they are; friction and springs of joints, whose slopes change with the state, are left to the run itself, and so is a contact that is

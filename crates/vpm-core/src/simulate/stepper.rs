@@ -47,7 +47,7 @@ pub(crate) struct Plan<'a> {
 }
 
 impl Plan<'_> {
-    /// What inputs do between samples; those of controllers are held.
+    /// Hold of inputs between samples in the stepper's plan; those of controllers are held.
     fn hold(&self) -> Hold {
         match self.drive {
             Drive::Commands(inputs) => inputs.hold,
@@ -162,7 +162,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         })
     }
 
-    /// Goes on by machine code where a run of the whole plan is long enough and the machine has any; tells whether all of it has some.
+    /// Compiles the stepper to machine code where the run is long enough; tells whether all of it has some.
     pub(crate) fn compile_if_it_pays(&mut self) -> bool {
         let Stepping { substeps, method, .. } = self.stepping;
         let evaluations = self.plan.starts.len() * self.plan.horizon * substeps * method.evaluations();
@@ -178,7 +178,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         made.is_ok()
     }
 
-    /// Goes on by machine code, or says why there is none.
+    /// Compiles the stepper to machine code, or says why not.
     pub(crate) fn compile(&mut self) -> std::result::Result<(), String> {
         self.system.compile(self.stepping.method)
     }
@@ -191,7 +191,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         self.stepping
     }
 
-    /// All pieces, one after the other: outputs and states.
+    /// Runs the stepper over all pieces: outputs and states.
     pub(crate) fn run(mut self, interrupt: Interrupt<'_>) -> Result<Pair<S>> {
         let (starts, rows) = (self.plan.starts, self.plan.horizon);
         if let [start] = starts {
@@ -222,7 +222,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         Ok(())
     }
 
-    /// Puts the machine into the initial state of piece `number`.
+    /// Restarts the stepper in the initial state of piece `number`.
     pub(crate) fn restart(&mut self, number: usize) {
         let initial = self.plan.initial.iter().skip(number * self.state.len());
         for (state, &value) in self.state.iter_mut().zip(initial) {
@@ -236,7 +236,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         }
     }
 
-    /// Everything that happens at a sample: measure, command, hold, evaluate, record. `start` is the piece's place in the record.
+    /// Sample of the stepper: measure, command, hold, evaluate, record. `start` is the piece's place in the record.
     pub(crate) fn sample(&mut self, row: usize, start: usize) -> Result<()> {
         let dim = self.state.len();
         if let Some(place) = self.bounds.outside(&self.state) {
@@ -262,7 +262,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         Ok(())
     }
 
-    /// Carries the state from sample `row` of the piece that begins at `start` to the next.
+    /// Advances the stepper from sample `row` of the piece that begins at `start` to the next.
     pub(crate) fn advance(&mut self, row: usize, start: usize, interrupt: Interrupt<'_>) -> Result<()> {
         let (stepping, Self { integrator, system, courses, state, .. }) = (self.stepping, &mut *self);
         let end = match courses {
@@ -272,7 +272,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         end.map_err(|halt| halted(self.description, stepping, start + row, halt, self.before(row + 1)))
     }
 
-    /// Moves the state by the gains on what the readings of sample `row` are more than its outputs, if there are any.
+    /// Corrects the stepper's state by gains on readings of sample `row` less its outputs, if there are any.
     fn correct(&mut self, row: usize) {
         let Some(Gains { readings, gains, .. }) = self.plan.gains else { return };
         let outputs = &self.shown;
@@ -292,8 +292,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         self.integrator.correct(&self.state);
     }
 
-    /// Moves positions that have not arrived at a late sensor by sample `row` as an observer has `moved` those of the machine: else it
-    /// would answer that much later, and a late sensor would not be the same as a late command.
+    /// Corrects positions in the stepper that have not arrived at a delayed sensor by sample `row`. An observer has
+    /// `moved` those of the machine. Else it would answer that much later, and a delayed sensor would differ from a
+    /// delayed command.
     pub(crate) fn correct_arriving(&mut self, row: usize, moved: impl Fn(usize) -> S) {
         let (width, Self { sensors, truth, stepping, .. }) = (self.width, self);
         for (column, sensor) in &*sensors {
@@ -305,31 +306,32 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         }
     }
 
-    /// Puts the machine into another state.
+    /// Places the stepper in another state.
     pub(crate) fn place(&mut self, state: impl Iterator<Item = S>) {
         self.state.iter_mut().zip(state).for_each(|(own, other)| *own = other);
         self.integrator.reset();
         self.system.forget();
     }
 
-    /// The state now.
+    /// State of the stepper now.
     pub(crate) fn state(&self) -> &[S] {
         &self.state
     }
 
-    /// The machine in plain numbers.
+    /// Machine of the stepper in plain numbers.
     pub(crate) fn dynamics(&mut self) -> &mut Dynamics<f64> {
         self.system.dynamics()
     }
 
-    /// Shows the outputs at sample `row`, as sensors show them; from then on they are mere numbers for sensors that look back on them.
+    /// Settles the stepper's outputs at sample `row` as sensors show them. From then on they are mere numbers for
+    /// sensors that look back on them.
     pub(crate) fn settle(&mut self, row: usize, seen: impl FnOnce(&[S])) {
         seen(&self.shown);
         let own = self.own(row);
         self.truth[own].iter_mut().for_each(|number| *number = number.frozen());
     }
 
-    /// Complains about a piston that went through its stop; steps of controlled error do not let it.
+    /// Refuses a stepper's piston that went through its stop; steps of controlled error do not let it.
     fn check_stops(&mut self, row: usize, start: usize) -> Result<()> {
         if matches!(self.stepping.method, Method::Adaptive { .. } | Method::Guarded) {
             return Ok(());
@@ -342,7 +344,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         Err(leapt(self, what, place.abs() - reach, (row, start)))
     }
 
-    /// Records what controllers see and lets them command, if there is a loop to close.
+    /// Lets controllers in the stepper command, and records what they see, if there is a loop to close.
     fn control(&mut self, row: usize, start: usize) {
         if self.control.as_ref().is_some_and(|control| control.feels(row)) {
             // Forces under the commands that are still held.
@@ -359,8 +361,8 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         control.arrive(row, |actuator, command| commands[first + actuator] += command);
     }
 
-    /// Holds what every input amounts to at sample `row` of the piece, and tells what it does until the next; the effort of a sampled
-    /// drive is held until then.
+    /// Holds all inputs of the stepper at sample `row` of the piece, and their course until the next. The effort of a
+    /// sampled drive is held until then.
     fn hold(&mut self, row: usize, start: usize) -> std::result::Result<(), Astray> {
         let own = self.own(row);
         let Self { system, commands, stepping, description, sampled, courses, plan, truth, .. } = self;
@@ -379,7 +381,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         Ok(())
     }
 
-    /// Evaluates the machine at the sample and records all that happens there.
+    /// Evaluates the machine at a sample of the stepper and records it.
     fn record(&mut self, row: usize, start: usize) {
         let own = self.own(row);
         self.system.sample(&self.state, &mut self.rate, &mut self.truth[own.clone()]);
@@ -392,7 +394,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         }
     }
 
-    /// Shows the row as the sensors do.
+    /// Shows a row of the stepper's outputs as the sensors do.
     fn read(&mut self, row: usize) {
         let own = self.own(row);
         let Self { sensors, truth, shown, outputs, asked, stepping, width, depth, .. } = self;
@@ -410,14 +412,14 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         }
     }
 
-    /// Where the true channels of sample `row` stand.
+    /// Places of the stepper's true channels of sample `row`.
     #[inline]
     fn own(&self, row: usize) -> Range<usize> {
         let first = row % self.depth * self.width;
         first..first + self.width
     }
 
-    /// Values of the samples before `row`, if all outputs are asked for: outputs and states.
+    /// Values of the stepper's samples before `row`, if all outputs are asked for: outputs and states.
     pub(crate) fn before(&self, row: usize) -> (Vec<f64>, Vec<f64>) {
         let rows = if self.asked.is_none() { row } else { 0 };
         let outputs = self.outputs[..rows * self.width].iter().map(Scalar::re).collect();
@@ -437,7 +439,7 @@ impl Stepper<'_, f64> {
         Ok(calls)
     }
 
-    /// Seconds of each part of a step at the state now, with its name; of the matrices those that steps asked for.
+    /// Seconds of each named part of the stepper's step at the state now, with the matrices that steps need.
     pub(crate) fn parts(&mut self, asked: &Calls) -> Vec<(&'static str, f64)> {
         let Self { system, state, description, stepping, .. } = self;
         let has_code = system.has_code();

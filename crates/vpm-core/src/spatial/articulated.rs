@@ -17,7 +17,7 @@ pub struct ArticulatedInertia<S> {
 }
 
 impl<S: Scalar> ArticulatedInertia<S> {
-    /// Force for an acceleration.
+    /// Force for an acceleration of an articulated inertia.
     #[inline]
     pub fn apply(&self, a: Twist<S>) -> Wrench<S> {
         Wrench::new(
@@ -26,7 +26,7 @@ impl<S: Scalar> ArticulatedInertia<S> {
         )
     }
 
-    /// `M - U U^T / d`: what is left of the inertia when the joint that feels `U` per unit acceleration is free.
+    /// Articulated inertia `M - U U^T / d` when the joint that feels `U` per unit acceleration is free.
     #[inline]
     pub fn deflated(self, u: Wrench<S>, inverse: S) -> Self {
         let scaled = u * inverse;

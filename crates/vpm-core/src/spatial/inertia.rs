@@ -20,7 +20,7 @@ pub struct SpatialInertia<S> {
 }
 
 impl<S: Scalar> SpatialInertia<S> {
-    /// No mass.
+    /// Inertia of no mass.
     #[inline]
     pub fn zero() -> Self {
         Self { mass: S::zero(), first_moment: Vector3::zero(), rotational: Symmetric3::zero() }
@@ -33,12 +33,12 @@ impl<S: Scalar> SpatialInertia<S> {
         Self { mass, first_moment, rotational: central + steiner }
     }
 
-    /// A mass (kg) in one point (m).
+    /// Inertia of a mass (kg) in one point (m).
     pub fn point_mass(mass: S, position: Vector3<S>) -> Self {
         Self::new(mass, position, Symmetric3::zero())
     }
 
-    /// Centre of mass in m. Only for positive mass.
+    /// Centre of mass of an inertia in m. Only for positive mass.
     pub fn center_of_mass(self) -> Vector3<S> {
         self.first_moment * self.mass.recip()
     }
@@ -56,7 +56,7 @@ impl<S: Scalar> SpatialInertia<S> {
         SpatialInertia { mass: self.mass.inspect(), first_moment, rotational }
     }
 
-    /// Momentum of the body moving with `v`, as a wrench about the frame origin.
+    /// Momentum of an inertia moving with `v`, as a wrench about the frame origin.
     #[inline]
     pub fn apply(&self, v: Twist<S>) -> Wrench<S> {
         Wrench::new(
@@ -91,7 +91,8 @@ impl<S: Scalar> AddAssign for SpatialInertia<S> {
     }
 }
 
-/// The eigenvalues of a symmetric matrix, ascending, by Jacobi rotations (Golub & Van Loan 2013, section 8.5).
+/// Principal moments of inertia: eigenvalues of a symmetric matrix, ascending. By Jacobi rotations (Golub & Van Loan
+/// 2013, section 8.5).
 ///
 /// Used once per body at build, for the message as much as for the check.
 pub fn principal_moments(inertia: Symmetric3<f64>) -> [f64; 3] {
@@ -108,7 +109,7 @@ pub fn principal_moments(inertia: Symmetric3<f64>) -> [f64; 3] {
     moments
 }
 
-/// Zeroes entry (p, q), p < q, by a plane rotation on both sides.
+/// Jacobi rotation for principal moments of inertia: zeroes entry (p, q), p < q, on both sides.
 fn jacobi_rotation(a: &mut [[f64; 3]; 3], p: usize, q: usize) {
     if a[p][q] == 0.0 {
         return;

@@ -4,7 +4,7 @@ use super::{Matrix3, Vector3};
 use crate::scalar::Scalar;
 
 impl<S: Scalar> Matrix3<S> {
-    /// The rotation vector of a rotation matrix: axis times angle in rad, the angle from 0 to pi.
+    /// Logarithm of a rotation matrix: axis times angle in rad, the angle from 0 to pi.
     ///
     /// Law: through the unit quaternion `(w, v)`, `angle = 2 atan(|v| / w)` along v. The quaternion comes from its largest component
     /// (Shepperd 1978, "Quaternion from rotation matrix", J. Guidance and Control 1(3)), so that no digit is lost at any angle.
@@ -34,7 +34,7 @@ impl<S: Scalar> Matrix3<S> {
         v * square.if_less(small, near, far)
     }
 
-    /// The unit quaternion, its scalar part first.
+    /// Unit quaternion for the logarithm of a rotation, its scalar part first.
     fn quaternion(self) -> [S; 4] {
         let [x, y, z] = self.columns;
         let trace = x.x + y.y + z.z;
@@ -61,7 +61,7 @@ impl<S: Scalar> Matrix3<S> {
     }
 }
 
-/// What `of` gives for the place of the largest of four numbers, the first of equal ones.
+/// Value of `of` at the largest of four numbers, for the logarithm; the first of equal ones.
 fn at_largest<S: Scalar>(sizes: [S; 4], of: impl Fn(usize) -> [S; 4]) -> [S; 4] {
     let better = |(most, found): (S, [S; 4]), k: usize| most.if_less(sizes[k], || (sizes[k], of(k)), || (most, found));
     (1..4).fold((sizes[0], of(0)), better).1

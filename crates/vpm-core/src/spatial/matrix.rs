@@ -13,13 +13,13 @@ pub struct Matrix3<S> {
 }
 
 impl<S: Scalar> Matrix3<S> {
-    /// From its columns.
+    /// Matrix from its columns.
     #[inline]
     pub fn from_columns(x: Vector3<S>, y: Vector3<S>, z: Vector3<S>) -> Self {
         Self { columns: [x, y, z] }
     }
 
-    /// From nine constants, row by row.
+    /// Matrix from nine constants, row by row.
     #[inline]
     pub fn from_rows_f64(rows: [f64; 9]) -> Self {
         let [xx, xy, xz, yx, yy, yz, zx, zy, zz] = rows;
@@ -30,7 +30,7 @@ impl<S: Scalar> Matrix3<S> {
         )
     }
 
-    /// The identity.
+    /// Identity matrix.
     #[inline]
     pub fn identity() -> Self {
         Self::from_rows_f64([1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0])
@@ -43,7 +43,7 @@ impl<S: Scalar> Matrix3<S> {
         Self::from_columns(Vector3::new(zero, v.z, -v.y), Vector3::new(-v.z, zero, v.x), Vector3::new(v.y, -v.x, zero))
     }
 
-    /// The rotation by `angle` (rad) about the unit vector `axis`, right-handed.
+    /// Rotation matrix by `angle` (rad) about the unit vector `axis`, right-handed.
     ///
     /// Law: `R = 1 + sin(angle) [a]x + (1 - cos(angle)) [a]x^2` (Rodrigues; Featherstone 2008, section 2.8).
     pub fn rotation(axis: Vector3<S>, angle: S) -> Self {
@@ -54,27 +54,27 @@ impl<S: Scalar> Matrix3<S> {
         Self::from_columns(column(x), column(y), column(z))
     }
 
-    /// The transpose, for a rotation its inverse.
+    /// Transposed matrix, for a rotation its inverse.
     #[inline]
     pub fn transpose(self) -> Self {
         let [x, y, z] = self.columns;
         Self::from_columns(Vector3::new(x.x, y.x, z.x), Vector3::new(x.y, y.y, z.y), Vector3::new(x.z, y.z, z.z))
     }
 
-    /// `A^T v`, without forming the transpose.
+    /// Matrix product `A^T v`, without forming the transpose.
     #[inline]
     pub fn transpose_mul(self, v: Vector3<S>) -> Vector3<S> {
         let [x, y, z] = self.columns;
         Vector3::new(x.dot(v), y.dot(v), z.dot(v))
     }
 
-    /// `A B^T`.
+    /// Matrix product `A B^T`.
     #[inline]
     pub fn mul_transpose(self, other: Self) -> Self {
         self * other.transpose()
     }
 
-    /// Determinant.
+    /// Determinant of the matrix.
     pub fn determinant(self) -> S {
         let [x, y, z] = self.columns;
         x.dot(y.cross(z))
@@ -141,13 +141,13 @@ pub struct Symmetric3<S> {
 }
 
 impl<S: Scalar> Symmetric3<S> {
-    /// From xx yy zz xy xz yz.
+    /// Symmetric matrix from xx yy zz xy xz yz.
     #[inline]
     pub fn from_array([xx, yy, zz, xy, xz, yz]: [S; 6]) -> Self {
         Self { xx, yy, zz, xy, xz, yz }
     }
 
-    /// As xx yy zz xy xz yz.
+    /// Symmetric matrix as xx yy zz xy xz yz.
     #[inline]
     pub fn to_array(self) -> [S; 6] {
         [self.xx, self.yy, self.zz, self.xy, self.xz, self.yz]
@@ -159,14 +159,14 @@ impl<S: Scalar> Symmetric3<S> {
         Self::from_array([S::zero(); 6])
     }
 
-    /// `factor` times the identity.
+    /// Symmetric matrix: `factor` times the identity.
     #[inline]
     pub fn diagonal(factor: S) -> Self {
         let zero = S::zero();
         Self { xx: factor, yy: factor, zz: factor, xy: zero, xz: zero, yz: zero }
     }
 
-    /// All nine entries.
+    /// All nine entries of the symmetric matrix.
     #[inline]
     pub fn full(self) -> Matrix3<S> {
         Matrix3::from_columns(
@@ -176,7 +176,7 @@ impl<S: Scalar> Symmetric3<S> {
         )
     }
 
-    /// `R A R^T`: the same tensor in the axes that `R` turns into.
+    /// Rotated symmetric matrix `R A R^T`: the same tensor in the axes that `R` turns into.
     #[inline]
     pub fn rotated(self, rotation: Matrix3<S>) -> Self {
         let turned = rotation * self.full();

@@ -18,13 +18,13 @@ pub struct Pose<S> {
 }
 
 impl<S: Scalar> Pose<S> {
-    /// From its parts; `rotation` must be orthonormal and right-handed.
+    /// Pose from its parts; `rotation` must be orthonormal and right-handed.
     #[inline]
     pub fn new(rotation: Matrix3<S>, translation: Vector3<S>) -> Self {
         Self { rotation, translation }
     }
 
-    /// B on top of A.
+    /// Identity pose: B on top of A.
     #[inline]
     pub fn identity() -> Self {
         Self::new(Matrix3::identity(), Vector3::zero())
@@ -37,47 +37,47 @@ impl<S: Scalar> Pose<S> {
         Self::new(Matrix3 { columns }, Vector3::from_f64(pose.translation.to_array()))
     }
 
-    /// `X_BA` from `X_AB`.
+    /// Inverse pose `X_BA` from `X_AB`.
     #[inline]
     pub fn inverse(self) -> Self {
         Self::new(self.rotation.transpose(), -self.rotation.transpose_mul(self.translation))
     }
 
-    /// The point `p_A` from `p_B`, in m.
+    /// Point `p_A` from `p_B` by a pose, in m.
     #[inline]
     pub fn point(&self, p: Vector3<S>) -> Vector3<S> {
         self.rotation * p + self.translation
     }
 
-    /// The twist `V_A` from `V_B`.
+    /// Twist `V_A` from `V_B` by a pose.
     #[inline]
     pub fn twist(&self, v: Twist<S>) -> Twist<S> {
         let angular = self.rotation * v.angular;
         Twist::new(angular, self.rotation * v.linear + self.translation.cross(angular))
     }
 
-    /// The twist `V_B` from `V_A`.
+    /// Twist `V_B` from `V_A` by the inverse pose.
     #[inline]
     pub fn inverse_twist(&self, v: Twist<S>) -> Twist<S> {
         let at_b = v.linear - self.translation.cross(v.angular);
         Twist::new(self.rotation.transpose_mul(v.angular), self.rotation.transpose_mul(at_b))
     }
 
-    /// The wrench `F_A` from `F_B`.
+    /// Wrench `F_A` from `F_B` by a pose.
     #[inline]
     pub fn wrench(&self, f: Wrench<S>) -> Wrench<S> {
         let linear = self.rotation * f.linear;
         Wrench::new(self.rotation * f.angular + self.translation.cross(linear), linear)
     }
 
-    /// The wrench `F_B` from `F_A`.
+    /// Wrench `F_B` from `F_A` by the inverse pose.
     #[inline]
     pub fn inverse_wrench(&self, f: Wrench<S>) -> Wrench<S> {
         let at_b = f.angular - self.translation.cross(f.linear);
         Wrench::new(self.rotation.transpose_mul(at_b), self.rotation.transpose_mul(f.linear))
     }
 
-    /// The inertia `M_A` from `M_B` (Featherstone 2008, section 2.13, in the ten parameters).
+    /// Inertia `M_A` from `M_B` by a pose (Featherstone 2008, section 2.13, in the ten parameters).
     ///
     /// With first moment h turned into A: `I_A = R I_B R^T - [t]x[h]x - [h]x[t]x - m [t]x^2`, `h_A = h + m t`.
     #[inline]
@@ -93,7 +93,7 @@ impl<S: Scalar> Pose<S> {
         }
     }
 
-    /// The articulated inertia `M_A` from `M_B` (Featherstone 2008, section 7.1).
+    /// Articulated inertia `M_A` from `M_B` by a pose (Featherstone 2008, section 7.1).
     ///
     /// With J, H, M turned into A: `M_A = M`, `H_A = H + [t]x M`, `J_A = J - H_A [t]x + [t]x H^T`.
     #[inline]
@@ -108,7 +108,7 @@ impl<S: Scalar> Pose<S> {
     }
 }
 
-/// The symmetric `[t]x H^T - G [t]x`, where G - H is `[t]x` times a symmetric matrix.
+/// Symmetric `[t]x H^T - G [t]x` for a pose's shift, where G - H is `[t]x` times a symmetric matrix.
 #[inline]
 fn shift<S: Scalar>(t: Vector3<S>, g: Matrix3<S>, h: Matrix3<S>) -> Symmetric3<S> {
     // Row i of -G [t]x is t x (row i of G).

@@ -13,13 +13,13 @@ pub struct Quaternion<S> {
 }
 
 impl<S: Scalar> Quaternion<S> {
-    /// No rotation.
+    /// Identity quaternion: no rotation.
     #[inline]
     pub fn identity() -> Self {
         Self { real: S::one(), vector: Vector3::zero() }
     }
 
-    /// The rotation `Rx(a) Ry(b) Rz(c)` by three angles (rad).
+    /// Quaternion of the rotation `Rx(a) Ry(b) Rz(c)` by three angles (rad).
     pub fn from_angles(angles: [S; 3]) -> Self {
         let [x, y, z] = angles.map(|angle| (angle * 0.5).sin_cos());
         let zero = S::zero();
@@ -31,7 +31,7 @@ impl<S: Scalar> Quaternion<S> {
         x.then(y).then(z)
     }
 
-    /// The product: this rotation, then the other one in the axes that this one has turned.
+    /// Quaternion product: this rotation, then the other one in the axes that this one has turned.
     #[inline]
     #[must_use]
     pub fn then(self, other: Self) -> Self {
@@ -39,7 +39,7 @@ impl<S: Scalar> Quaternion<S> {
         Self { real: self.real * other.real - p.dot(q), vector: q * self.real + p * other.real + p.cross(q) }
     }
 
-    /// The same rotation without what rounding has added to the length.
+    /// Normalised quaternion, without what rounding has added to the length.
     #[inline]
     #[must_use]
     pub fn normalised(self) -> Self {
@@ -47,7 +47,7 @@ impl<S: Scalar> Quaternion<S> {
         Self { real: self.real / length, vector: self.vector * length.recip() }
     }
 
-    /// As a rotation matrix.
+    /// Rotation matrix of the quaternion.
     ///
     /// Law: `R = 1 + 2 w [v]x + 2 [v]x^2` (Rodrigues, by half the angle).
     #[inline]
@@ -61,7 +61,7 @@ impl<S: Scalar> Quaternion<S> {
         Matrix3::from_columns(column(x), column(y), column(z))
     }
 
-    /// Its four numbers, w first.
+    /// Four numbers of the quaternion, w first.
     #[inline]
     pub fn to_array(self) -> [S; 4] {
         let [x, y, z] = self.vector.to_array();

@@ -15,25 +15,26 @@ pub struct Twist<S> {
 }
 
 impl<S: Scalar> Twist<S> {
-    /// From its parts.
+    /// Twist from its parts.
     #[inline]
     pub fn new(angular: Vector3<S>, linear: Vector3<S>) -> Self {
         Self { angular, linear }
     }
 
-    /// No motion.
+    /// Zero twist: no motion.
     #[inline]
     pub fn zero() -> Self {
         Self::new(Vector3::zero(), Vector3::zero())
     }
 
-    /// Power in W of a wrench on this motion, both at the same origin and in the same axes.
+    /// Power in W of a wrench on this twist, both at the same origin and in the same axes.
     #[inline]
     pub fn power(self, wrench: Wrench<S>) -> S {
         self.angular.dot(wrench.angular) + self.linear.dot(wrench.linear)
     }
 
-    /// `V x U`: the rate of a motion `U` fixed in a body that moves with `V` (Featherstone 2008, section 2.9).
+    /// Cross product of twists `V x U`: rate of a motion `U` fixed in a body that moves with `V`. (Featherstone 2008,
+    /// section 2.9.)
     #[inline]
     pub fn cross(self, other: Self) -> Self {
         Self::new(
@@ -42,7 +43,8 @@ impl<S: Scalar> Twist<S> {
         )
     }
 
-    /// `V x* F`: the rate of a wrench `F` fixed in a body that moves with `V` (Featherstone 2008, section 2.9).
+    /// Cross product of twist and wrench `V x* F`: rate of a wrench `F` fixed in a body that moves with `V`.
+    /// (Featherstone 2008, section 2.9.)
     #[inline]
     pub fn cross_wrench(self, wrench: Wrench<S>) -> Wrench<S> {
         Wrench::new(

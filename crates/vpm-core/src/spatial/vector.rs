@@ -16,7 +16,7 @@ pub struct Vector3<S> {
 }
 
 impl<S: Scalar> Vector3<S> {
-    /// From its components.
+    /// Vector from its components.
     #[inline]
     pub fn new(x: S, y: S, z: S) -> Self {
         Self { x, y, z }
@@ -28,25 +28,25 @@ impl<S: Scalar> Vector3<S> {
         Self::new(S::zero(), S::zero(), S::zero())
     }
 
-    /// From three constants.
+    /// Vector from three constants.
     #[inline]
     pub fn from_f64([x, y, z]: [f64; 3]) -> Self {
         Self::new(S::from_f64(x), S::from_f64(y), S::from_f64(z))
     }
 
-    /// Its components as an array.
+    /// Components of the vector as an array.
     #[inline]
     pub fn to_array(self) -> [S; 3] {
         [self.x, self.y, self.z]
     }
 
-    /// Scalar product.
+    /// Scalar product of two vectors.
     #[inline]
     pub fn dot(self, other: Self) -> S {
         self.x * other.x + self.y * other.y + self.z * other.z
     }
 
-    /// Cross product `self x other`.
+    /// Cross product of two vectors, `self x other`.
     #[inline]
     pub fn cross(self, other: Self) -> Self {
         Self::new(

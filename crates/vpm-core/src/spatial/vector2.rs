@@ -14,7 +14,7 @@ pub struct Vector2<S> {
 }
 
 impl<S: Scalar> Vector2<S> {
-    /// From its components.
+    /// Plane vector from its components.
     #[inline]
     pub fn new(x: S, y: S) -> Self {
         Self { x, y }
@@ -26,37 +26,37 @@ impl<S: Scalar> Vector2<S> {
         Self::new(S::zero(), S::zero())
     }
 
-    /// From two constants.
+    /// Plane vector from two constants.
     #[inline]
     pub fn from_f64([x, y]: [f64; 2]) -> Self {
         Self::new(S::from_f64(x), S::from_f64(y))
     }
 
-    /// Its components as an array.
+    /// Components of the plane vector as an array.
     #[inline]
     pub fn to_array(self) -> [S; 2] {
         [self.x, self.y]
     }
 
-    /// Scalar product.
+    /// Scalar product of two plane vectors.
     #[inline]
     pub fn dot(self, other: Self) -> S {
         self.x * other.x + self.y * other.y
     }
 
-    /// The component of the cross product that is normal to the plane.
+    /// Cross product of two plane vectors: its component normal to the plane.
     #[inline]
     pub fn cross(self, other: Self) -> S {
         self.x * other.y - self.y * other.x
     }
 
-    /// Turned by +90 deg: the velocity of a point per unit angular velocity.
+    /// Plane vector turned by +90 deg: the velocity of a point per unit angular velocity.
     #[inline]
     pub fn perpendicular(self) -> Self {
         Self::new(-self.y, self.x)
     }
 
-    /// Turned by the angle with this sine and cosine.
+    /// Plane vector turned by the angle with this sine and cosine.
     #[inline]
     pub fn rotated(self, (sine, cosine): (S, S)) -> Self {
         Self::new(cosine * self.x - sine * self.y, sine * self.x + cosine * self.y)
@@ -70,7 +70,7 @@ impl<S: Scalar> Vector2<S> {
 }
 
 impl Vector2<f64> {
-    /// Its angle from the first axis in rad.
+    /// Angle of the plane vector from the first axis in rad.
     pub fn argument(self) -> f64 {
         self.y.atan2(self.x)
     }

@@ -15,13 +15,13 @@ pub struct Wrench<S> {
 }
 
 impl<S: Scalar> Wrench<S> {
-    /// From its parts.
+    /// Wrench from its parts.
     #[inline]
     pub fn new(angular: Vector3<S>, linear: Vector3<S>) -> Self {
         Self { angular, linear }
     }
 
-    /// No force.
+    /// Zero wrench: no force.
     #[inline]
     pub fn zero() -> Self {
         Self::new(Vector3::zero(), Vector3::zero())

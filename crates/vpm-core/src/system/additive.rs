@@ -53,19 +53,20 @@ struct Spring<S> {
 }
 
 impl<S: Scalar> Spring<S> {
-    /// About `q`. A spring that pushes away is left explicit.
+    /// Linear spring of an additive step about `q`; a spring that pushes away is left explicit. A spring that pushes
+    /// away is left explicit.
     fn new(effect: &JointEffect<S>, q: S) -> Self {
         Self { at_rest: effect.law().effort_at_rest(q), stiffness: -effect.slope_at_rest(q).min(S::zero()) }
     }
 
-    /// Its effort at `other`.
+    /// Effort of an additive step's linear spring at `other`.
     fn effort(&self, q: S, other: S) -> S {
         self.at_rest + self.stiffness * (q - other)
     }
 }
 
 impl<S: Scalar> Split<S> {
-    /// For the machine `dynamics`.
+    /// Split of the machine `dynamics` into explicit and implicit parts of an additive step.
     pub(super) fn new(dynamics: &Dynamics<S>) -> Self {
         let apart =
             |(seat, effect): &&(Seat<S>, JointEffect<S>)| seat.alone().is_none() || effect.law().damping().is_none();
@@ -81,14 +82,14 @@ impl<S: Scalar> Split<S> {
         Self { state, coasting, seats, columns, damping, free, velocity, resistance, rest, lu: Lu::new(count) }
     }
 
-    /// Begins a step at the rates `v` of all coordinates.
+    /// Begins an additive step at the rates `v` of all coordinates.
     pub(super) fn depart(&mut self, v: &[S]) {
         for (velocity, seat) in self.velocity.iter_mut().zip(&self.seats) {
             *velocity = seat.of(v);
         }
     }
 
-    /// Writes the accelerations of a stage into `rates`.
+    /// Writes the accelerations of an additive step's stage into `rates`.
     ///
     /// Law: with a without friction from `M + reach D + reach^2 K` and the columns Y of its inverse, the seats of the friction move at
     /// `(1 + reach Y R) w = v_I + reach (a + Y f)`, R and f taken where they are at w; then `a += Y (f - R w)`.
@@ -117,7 +118,7 @@ impl<S: Scalar> Split<S> {
         }
     }
 
-    /// Resistances at the velocities that are known, and what acts on the seats beside them.
+    /// Resistances in an additive step at the known velocities, and what acts on the seats beside them.
     fn rub(&mut self, dynamics: &Dynamics<S>, Stage { explicit, implicit, reach }: Stage<'_, S>) {
         let n = dynamics.coordinates();
         for (k, seat) in self.seats.iter().enumerate() {
@@ -150,7 +151,7 @@ impl<S: Scalar> Split<S> {
         }
     }
 
-    /// Velocities that these resistances lead to.
+    /// Velocities to which these resistances lead in an additive step.
     fn turn(&mut self, n: usize, reach: S) {
         let count = self.seats.len();
         self.velocity.copy_from_slice(&self.free);
@@ -169,8 +170,8 @@ impl<S: Scalar> Split<S> {
 }
 
 impl<S: Scalar> Dynamics<S> {
-    /// Writes the rates of an additive step; see [`crate::ode::Ode::additive_rates`]. Lags of ideal drives and memories are taken
-    /// implicitly too, whose laws are linear in their own states.
+    /// Writes the rates of an additive step; see [`crate::ode::Ode::additive_rates`]. Lags of ideal drives and memories
+    /// are taken implicitly too, whose laws are linear in their own states.
     pub(super) fn additive_rates(&mut self, stage: Stage<'_, S>, rates: &mut [S], split: &mut Split<S>) {
         let (n, first) = (self.coordinates(), self.first_memory());
         let (q, v) = stage.explicit[..2 * n].split_at(n);
@@ -190,7 +191,7 @@ impl<S: Scalar> Dynamics<S> {
         self.memories.rates_at_end(&stage.implicit[first..], motion, stage.reach, memories);
     }
 
-    /// Puts the lags to the end of the stage.
+    /// Sets the lags to the end of an additive step's stage.
     fn settle_lags(&self, Stage { implicit, reach, .. }: Stage<'_, S>, state: &mut [S]) {
         let mut place = 2 * self.coordinates();
         for (actuator, &input) in self.actuators.iter().zip(&self.inputs) {
@@ -202,7 +203,8 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// All loads of a stage but for friction that is not linear, and the `damping` of joints that their implicit part amounts to.
+    /// All loads of an additive step's stage but nonlinear friction. Also the `damping` of joints that their implicit
+    /// part amounts to.
     fn push_apart(&mut self, Stage { explicit, implicit, reach }: Stage<'_, S>, coasting: &[S], damping: &mut [S]) {
         let Self { model, data, loads, tensions, connections, efforts, effects, .. } = self;
         let (n, joints) = (model.n_coordinates(), efforts.len());
@@ -225,8 +227,8 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Writes the accelerations under these loads with `M + reach D + reach^2 K` in the place of the mass matrix, and those that a unit of
-    /// effort on each of the `seats` adds.
+    /// Accelerations of an additive step: solves with `M + reach D + reach^2 K` in place of the mass matrix. Also those
+    /// that a unit of effort on each of the `seats` adds.
     fn solve_apart(
         &mut self,
         stage: Stage<'_, S>,

@@ -9,7 +9,7 @@ use crate::scalar::Scalar;
 use crate::spatial::{Pose, Twist};
 
 impl<S: Scalar> Dynamics<S> {
-    /// Accelerations of all coordinates at (q, v) under `efforts` on all coordinates, with all effects, memories as they are.
+    /// Answers with the accelerations of all coordinates at (q, v) under `efforts` on them, with all effects.
     pub fn forward_dynamics(&mut self, q: &[S], v: &[S], efforts: &[S]) -> &[S] {
         let joints = self.joints();
         self.tensions.fill(S::zero());
@@ -20,8 +20,8 @@ impl<S: Scalar> Dynamics<S> {
         &self.data.acceleration
     }
 
-    /// Efforts on all coordinates that give accelerations `a` at (q, v), with the efforts of the effects taken off. On the elastic
-    /// coordinates they vanish in free motion.
+    /// Answers with the efforts on all coordinates that give accelerations `a` at (q, v), less those of effects. On the
+    /// elastic coordinates they vanish in free motion.
     pub fn inverse_dynamics(&mut self, q: &[S], v: &[S], a: &[S], efforts: &mut [S]) {
         self.balance(q, v, a, efforts);
         if !self.connections.is_free() {
@@ -43,8 +43,8 @@ impl<S: Scalar> Dynamics<S> {
         self.follow_load(q, v, efforts);
     }
 
-    /// From efforts r that arrive to efforts u of the actuators, of which effects take a share k of the load:
-    /// `u - k |u| = r`, so `u = r / (1 - k sign(r))`, k the sum of their shares.
+    /// Actuator efforts u in a machine's answer, from efforts r that arrive after load-dependent friction. Effects take
+    /// a share k of the load: `u - k |u| = r`, so `u = r / (1 - k sign(r))`, k the sum of their shares.
     pub(crate) fn follow_load(&self, q: &[S], v: &[S], efforts: &mut [S]) {
         for (joint, effort) in efforts.iter_mut().enumerate().take(self.joints()) {
             let own = |(seat, effect): &&(Seat<S>, JointEffect<S>)| {
@@ -61,7 +61,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Efforts that arrive: those of the tree less those of the effects, whatever follows the load left out.
+    /// Efforts that arrive in a machine's answer: those of the tree less effects, without load-dependent ones.
     fn balance(&mut self, q: &[S], v: &[S], a: &[S], efforts: &mut [S]) {
         let Self { model, data, loads, .. } = self;
         if model.is_recursive() {
@@ -80,7 +80,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Mass matrix at `q` with payloads, n x n.
+    /// Answers with the mass matrix at `q` with payloads, n x n.
     pub fn mass_matrix(&mut self, q: &[S]) -> &[S] {
         let Self { model, data, loads, .. } = self;
         if model.is_recursive() {
@@ -91,8 +91,9 @@ impl<S: Scalar> Dynamics<S> {
         &data.mass_matrix
     }
 
-    /// Kinetic and potential energy in J. The potential is that of gravity, of the beams, of contacts and bushings, of the effects that have
-    /// one, and of springs along lines without command, visco-elastic ones settled.
+    /// Answers with the kinetic and potential energy in J. The potential is that of gravity, of the beams, of contacts
+    /// and bushings, of the effects that have one, and of springs along lines without command, visco-elastic ones
+    /// settled.
     pub fn energy(&mut self, q: &[S], v: &[S]) -> Energy<S> {
         let Self { model, data, effects, connections, .. } = self;
         let mut total = match model.is_recursive() {
@@ -109,7 +110,7 @@ impl<S: Scalar> Dynamics<S> {
         total
     }
 
-    /// The load that the coordinates miss at rest under a share of the weight: `weight bias(q, 0) + K q - effects(q, 0)`.
+    /// Answers with the load that the coordinates miss at rest: `weight bias(q, 0) + K q - effects(q, 0)`.
     pub(crate) fn unbalance(&mut self, q: &[S], weight: S) -> Vec<S> {
         let zero = vec![S::zero(); q.len()];
         self.terms(q, &zero);
@@ -125,7 +126,7 @@ impl<S: Scalar> Dynamics<S> {
         loads
     }
 
-    /// Takes off `loads` what contacts and bushings do, after [`Dynamics::terms`] at the same coordinates and rates.
+    /// Takes the loads of contacts and bushings off `loads` in an answer, after [`Dynamics::terms`] in that state.
     pub(crate) fn subtract_connections(&mut self, loads: &mut [S]) {
         let Self { model, data, loads: own, connections, .. } = self;
         if connections.is_free() {
@@ -137,7 +138,7 @@ impl<S: Scalar> Dynamics<S> {
         loads.iter_mut().zip(&*own).for_each(|(load, &own)| *load -= own);
     }
 
-    /// Energy of the springs along lines, J.
+    /// Answers with the energy of springs in two-point elements, J.
     fn springs(&mut self, q: &[S], v: &[S]) -> S {
         let spring = |drive: &Drive<S>| matches!(drive, Drive::SpringDamper(_) | Drive::Maxwell(_));
         if !self.actuators.iter().any(|actuator| spring(&actuator.drive)) {
@@ -155,12 +156,13 @@ impl<S: Scalar> Dynamics<S> {
         self.actuators.iter().map(potential).sum()
     }
 
-    /// Whether actuators act on lines or shafts.
+    /// Whether actuators act on lines or shafts, so that an answer needs their lever arms.
     pub(crate) fn pulls(&self) -> bool {
         self.pulls
     }
 
-    /// Length of each line per unit of each coordinate at `q`, then angle of each shaft: the lever arms of its force, lines and shafts x n.
+    /// Answers with lever arms at `q`: length of each line, then angle of each shaft, per unit of each coordinate. They
+    /// are lines and shafts x n.
     pub(crate) fn levers(&mut self, q: &[S], levers: &mut [S]) {
         let Self { model, data, loads, .. } = self;
         loads.fill(S::zero());
@@ -174,7 +176,8 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Jacobian of a marker at `q`, 6 x n row by row: angular velocity, then velocity of its origin, in world axes per unit rate.
+    /// Answers with the Jacobian of a marker at `q`, 6 x n row by row. It gives angular velocity, then velocity of its
+    /// origin, in world axes per unit rate.
     ///
     /// Checked: against the derivative of the marker's pose.
     pub fn jacobian(&mut self, q: &[S], marker: usize, jacobian: &mut [S]) {
@@ -192,7 +195,7 @@ impl<S: Scalar> Dynamics<S> {
         });
     }
 
-    /// Poses of all markers at `q`, twelve numbers each: the origin in the world, then the rotation `R_WM` row by row.
+    /// Answers with the poses of all markers at `q`, twelve numbers each: origin, then rotation `R_WM` row by row.
     ///
     /// Checked: against the markers' outputs, and in Python against the chain of textbooks.
     pub fn marker_poses(&mut self, q: &[S], values: &mut [S]) {
@@ -207,14 +210,14 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Pose of a marker in the world at `q`, all frames being where they are then; none if there is no such marker.
+    /// Pose of a marker in the world at `q` for an answer; none if there is no such marker.
     pub(crate) fn located(&mut self, q: &[S], marker: usize) -> Option<Pose<S>> {
         self.place(q);
         let place = self.model.markers().get(marker)?;
         Some(self.data.composite.frames[place.frame].pose * Pose::from_f64(place.pose))
     }
 
-    /// The least time, s, in which an open contact closes at the speeds of a state; infinite where none does.
+    /// Answers with the least time, s, until an open contact closes at the speeds of a state.
     pub(crate) fn time_to_contact(&mut self, state: &[S]) -> f64 {
         let (n, Self { model, data, connections, .. }) = (self.coordinates(), self);
         frames(model, data, &state[..n], &state[n..2 * n]);
@@ -223,7 +226,7 @@ impl<S: Scalar> Dynamics<S> {
         closing.fold(f64::INFINITY, f64::min)
     }
 
-    /// Puts all frames where they are at `q`.
+    /// Places all frames at `q` for an answer.
     fn place(&mut self, q: &[S]) {
         let Self { model, data, loads, .. } = self;
         loads.fill(S::zero());

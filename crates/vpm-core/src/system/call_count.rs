@@ -20,7 +20,7 @@ impl Matrix {
     /// All of them.
     pub(crate) const ALL: [Self; 3] = [Self::Jacobian, Self::Iteration, Self::Elasticity];
 
-    /// Its name among the stages of a step.
+    /// Name of the counted matrix call among the stages of a step.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Jacobian => "Jacobian",
@@ -39,7 +39,7 @@ pub(crate) struct Calls {
 }
 
 impl Calls {
-    /// How often a stage was part of what was asked for.
+    /// Call count of a stage: how often it was part of what a step needed.
     pub(crate) fn of(&self, stage: &str) -> f64 {
         let matrix = Matrix::ALL.into_iter().position(|kind| kind.name() == stage);
         let count = match (matrix, stage) {
@@ -72,7 +72,7 @@ impl Counted<'_> {
         self.calls.matrices[kind as usize] += 1;
     }
 
-    /// A matrix with the rates at the same state, which may be at hand or come with it.
+    /// Counts the call of a matrix with the rates at the same state.
     fn with_rates(&mut self, kind: Matrix) {
         self.matrix(kind);
         self.calls.rates += u64::from(!self.system.is_ready() && !self.system.has_rates_in(kind));
@@ -113,7 +113,7 @@ impl Ode<f64> for Counted<'_> {
         self.system.prepare(x, matrix, rates);
     }
 
-    /// Counts as rates, which is what it costs but for a few back substitutions.
+    /// Counts additive rates as one call of the rates.
     fn additive_rates(&mut self, explicit: &[f64], implicit: &[f64], reach: f64, rates: &mut [f64]) -> bool {
         self.calls.rates += u64::from(reach != 0.0 || !self.system.is_ready());
         self.system.additive_rates(explicit, implicit, reach, rates)

@@ -63,7 +63,7 @@ pub(crate) struct Touch<S> {
 }
 
 impl<S: Scalar> Connections<S> {
-    /// On the attachments of `model`: one for each contact, then two for each bushing.
+    /// Connections on the attachments of `model`: one for each contact, then two for each bushing.
     pub(crate) fn new(
         model: &Model<S>,
         contacts: Vec<(&str, Plane<S>, Contact<S>)>,
@@ -91,14 +91,14 @@ impl<S: Scalar> Connections<S> {
         Ok(Self { contacts, bushings, cells, extra })
     }
 
-    /// Whether there are neither contacts nor bushings.
+    /// Whether a machine has no connections: neither contacts nor bushings.
     #[inline]
     pub(crate) fn is_free(&self) -> bool {
         self.contacts.is_empty() && self.bushings.is_empty()
     }
 
-    /// Adds to `loads` what contacts and bushings do to the coordinates, after [`crate::dynamics::frames`] and the poses; the resistance
-    /// of friction laws is that of `resistance`.
+    /// Adds the loads of the connections, contacts and bushings, to `loads` on the coordinates. It follows
+    /// [`crate::dynamics::frames`] and the poses. The resistance of friction laws is that of `resistance`.
     pub(crate) fn add_loads(
         &self,
         model: &Model<S>,
@@ -109,7 +109,7 @@ impl<S: Scalar> Connections<S> {
         self.for_each_wrench(data, resistance, |frame, wrench| add_wrench(model, data, frame, wrench, loads));
     }
 
-    /// Hands out the wrench on each frame that something acts on, about its origin and in its axes.
+    /// Hands out the wrench of the connections on each frame, about its origin and in its axes.
     #[inline]
     pub(crate) fn for_each_wrench(
         &self,
@@ -134,8 +134,8 @@ impl<S: Scalar> Connections<S> {
         }
     }
 
-    /// Takes what contacts and bushings do off what the frames have to be given otherwise, for reactions; the resistance of friction laws
-    /// is that of `resistance`.
+    /// Takes the wrenches of connections off those of the frames, for reactions. The resistance of friction laws is
+    /// that of `resistance`.
     pub(super) fn take_off(&self, data: &mut Data<S>, resistance: impl Fn(&ContactFriction<S>, S, S) -> S) {
         for contact in &self.contacts {
             let slot = &data.composite.frames[contact.frame];
@@ -152,7 +152,7 @@ impl<S: Scalar> Connections<S> {
         }
     }
 
-    /// Energy in contacts and bushings, J, after the poses of the frames.
+    /// Potential energy of connections, J, after the poses of the frames.
     pub(crate) fn potential(&self, data: &Data<S>) -> S {
         let frames = &data.composite.frames;
         let contact = |contact: &PlacedContact<S>| {
@@ -163,7 +163,7 @@ impl<S: Scalar> Connections<S> {
         self.contacts.iter().map(contact).sum::<S>() + self.bushings.iter().map(bushing).sum::<S>()
     }
 
-    /// Depth, normal force and force of each contact, after the motion and the poses of the frames.
+    /// Observes the contacts among the connections: depth, normal force and force of each.
     pub(crate) fn observe_contacts(&self, data: &Data<S>, outputs: &mut [S]) {
         for (channels, contact) in outputs.chunks_exact_mut(5).zip(&self.contacts) {
             let slot = &data.composite.frames[contact.frame];
@@ -178,7 +178,7 @@ impl<S: Scalar> Connections<S> {
         }
     }
 
-    /// Wrench of each bushing on A, after the motion and the poses of the frames.
+    /// Observes the bushings among the connections: the wrench of each on A.
     pub(crate) fn observe_bushings(&self, data: &Data<S>, outputs: &mut [S]) {
         for (channels, PlacedBushing { a, b, law }) in outputs.chunks_exact_mut(6).zip(&self.bushings) {
             let on_a = wrenches(&data.composite.frames, (a, b), law).on_a;
@@ -189,7 +189,7 @@ impl<S: Scalar> Connections<S> {
 }
 
 impl<S: Scalar> PlacedContact<S> {
-    /// Where the point is, how it moves and what acts on it; none where it is known to be in the open.
+    /// Touch of a contact: its point, motion and force; none where it is known to be open.
     #[inline]
     pub(crate) fn touch(
         &self,
@@ -208,7 +208,7 @@ impl<S: Scalar> PlacedContact<S> {
 }
 
 impl<S: Scalar> PlacedContact<S> {
-    /// The time, s, in which it closes at the speed of now; infinite for one that is closed, or opens.
+    /// Time, s, in which a contact closes at its present speed; infinite if it is closed or opens.
     pub(crate) fn time_to_close(&self, frames: &[FrameSlot<S>]) -> f64 {
         let FrameSlot { pose, velocity, .. } = &frames[self.frame];
         let depth = self.plane.depth(pose.point(self.point)).inspect();
@@ -217,7 +217,7 @@ impl<S: Scalar> PlacedContact<S> {
         if depth < 0.0 && closing > 0.0 { -depth / closing } else { f64::INFINITY }
     }
 
-    /// The force as a wrench on the frame, about its origin and in its axes.
+    /// Wrench of a contact force on the frame, about its origin and in its axes.
     #[inline]
     fn wrench(&self, slot: &FrameSlot<S>, touch: &Touch<S>) -> Wrench<S> {
         let force = slot.pose.rotation.transpose_mul(touch.force);
@@ -225,7 +225,7 @@ impl<S: Scalar> PlacedContact<S> {
     }
 }
 
-/// The pose `X_BA`, and the motion of A against B at A's origin, in A's axes.
+/// Relative pose `X_BA` of a bushing, and motion of A against B at A's origin, in A's axes.
 #[inline]
 fn relative<S: Scalar>(frames: &[FrameSlot<S>], a: &End<S>, b: &End<S>) -> (Pose<S>, Twist<S>) {
     let in_world = |end: &End<S>| {
@@ -243,7 +243,7 @@ fn wrenches<S: Scalar>(frames: &[FrameSlot<S>], (a, b): (&End<S>, &End<S>), law:
     law.wrenches(&pose, motion)
 }
 
-/// A wrench in aligned axes of a joint into the axes of its body.
+/// Wrench of a connection in joint-aligned axes, transformed into the axes of the body.
 pub(super) fn into_body<S: Scalar>(model: &Model<S>, joint: usize, wrench: Wrench<S>) -> Wrench<S> {
     let alignment = model.frames()[joint].joint.alignment();
     in_axes(&Pose::from_f64(Pose::new(alignment.transpose(), Vector3::zero())), wrench)

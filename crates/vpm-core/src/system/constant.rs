@@ -18,20 +18,20 @@ pub(super) struct Constant {
 }
 
 impl Constant {
-    /// Compiles these routines to machine code for the matrices; or says why there is none.
+    /// Compiles routines for constant matrices of linearly implicit steps to machine code, or says why not.
     pub(super) fn new(mut routines: Routines<f64>) -> Result<Self, String> {
         routines.compile(&Kind::Prepared)?;
         let [state, matrix, rates] = [const { Vec::new() }; 3];
         Ok(Self { routines, state, matrix, rates })
     }
 
-    /// Holds input `number` of the machine.
+    /// Holds input `number` of the machine for its constant matrix.
     #[inline]
     pub(super) fn hold(&mut self, number: usize, input: f64) {
         self.routines.hold(number, input);
     }
 
-    /// Writes the matrix at `x`, row by row in `width` columns.
+    /// Writes the constant matrix at `x`, row by row in `width` columns.
     pub(super) fn write<S: Scalar>(&mut self, x: &[S], matrix: &mut [S], width: usize) {
         let Self { routines, state, matrix: values, rates } = self;
         state.clear();

@@ -36,7 +36,7 @@ impl<S: Scalar> Shown<S> {
     }
 }
 
-/// Length or coordinate of what an actuator acts on, and its rate.
+/// Motion of what a drive acts on: length or coordinate, and its rate.
 #[inline]
 pub(super) fn motion<S: Scalar>(on: Target, q: &[S], v: &[S], lines: &[LineSlot<S>]) -> [S; 2] {
     match on {
@@ -46,8 +46,8 @@ pub(super) fn motion<S: Scalar>(on: Target, q: &[S], v: &[S], lines: &[LineSlot<
 }
 
 impl<S: Scalar> Dynamics<S> {
-    /// Forces, joint efforts and tensions of the actuators, and the rates of the states of drives and supplies, at state `x` with the
-    /// lines where they are.
+    /// Efforts and tensions of all drives, and rates of the states of drives and supplies, at state `x`. Lines are
+    /// where they were placed before.
     #[inline]
     pub(super) fn actuate(&mut self, x: &[S], dxdt: &mut [S]) {
         let first = 2 * self.coordinates();
@@ -59,7 +59,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// The rates of the states of drives, supplies and memories at state `x`, written into their place in `dxdt`, with all that they push.
+    /// Rates of the states of drives, supplies and memories at state `x`, written into `dxdt`, and drive efforts.
     pub(crate) fn drive(&mut self, x: &[S], dxdt: &mut [S]) {
         let (q, v) = x[..2 * self.coordinates()].split_at(self.coordinates());
         self.locate(q, v);
@@ -68,7 +68,7 @@ impl<S: Scalar> Dynamics<S> {
         self.memories.rates(&x[first..], v, &mut dxdt[first..]);
     }
 
-    /// Holds what input `number` amounts to, see [`super::System::input`].
+    /// Holds input `number` of the drives, see [`super::System::input`].
     pub fn hold(&mut self, number: usize, input: S) {
         match number.checked_sub(self.inputs.len()) {
             None => self.inputs[number] = input,
@@ -76,17 +76,17 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// How many inputs it holds.
+    /// Number of inputs that the drives hold.
     pub(crate) fn n_inputs(&self) -> usize {
         self.inputs.len()
     }
 
-    /// How many numbers it holds: inputs, then orientations of joints that turn freely.
+    /// Number of held values of the drives: inputs, then orientations of freely turning joints.
     pub(crate) fn n_held(&self) -> usize {
         self.inputs.len() + self.model.n_orientations()
     }
 
-    /// Adds what the drives push to the efforts `loads` on all coordinates, after [`Dynamics::drive`] in the same state.
+    /// Adds the efforts of the drives to `loads` on all coordinates, after [`Dynamics::drive`] in the same state.
     pub(crate) fn add_drives(&self, loads: &mut [S]) {
         for (load, &effort) in loads.iter_mut().zip(&self.efforts) {
             *load += effort;
@@ -96,7 +96,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// As [`Dynamics::actuate`] where all efforts follow from commands alone.
+    /// Efforts of ideal drives, as [`Dynamics::actuate`] where all follow from commands alone.
     #[inline]
     fn actuate_ideal(&mut self, lags: &[S], rates: &mut [S]) {
         self.efforts.fill(S::zero());
@@ -120,7 +120,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// As [`Dynamics::actuate`] for drives of every kind in their `states`, each at the length and rate that `motion` tells.
+    /// Efforts of drives of every kind in their `states`, each at the length and rate that `motion` tells.
     pub(super) fn actuate_moving(
         &mut self,
         states: &[S],
@@ -198,7 +198,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// The pressures of the supplies, nothing drawn yet.
+    /// Pressures of the drives' supplies before any flow is drawn.
     fn feed(&mut self, states: &[S]) {
         let Self { supplies, inputs, shown, actuators, internal, .. } = self;
         let mut logged = inputs[actuators.len()..].iter();
@@ -216,7 +216,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// The rates of the states of supplies.
+    /// Rates of the states of the drives' supplies, whose pressure sags.
     fn sag(&self, rates: &mut [S]) {
         let mut rates = rates.iter_mut();
         for ((supply, &[pressure, flow]), &drop) in
@@ -236,8 +236,8 @@ impl<S: Scalar> Dynamics<S> {
     }
 }
 
-/// What input `number` of a machine with these `actuators` amounts to over the interval that begins at sample `k`: of an actuator after
-/// delay, dead zone and saturation, of a supply as it is.
+/// Input `number` of drives over the interval from sample `k`: after delay, dead zone and saturation. That of a supply
+/// is as it is.
 #[inline]
 pub(super) fn input<S: Scalar>(
     actuators: &[Actuator<S>],

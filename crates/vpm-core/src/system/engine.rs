@@ -23,7 +23,7 @@ pub(crate) enum Engine {
 }
 
 impl Engine {
-    /// A function without derivatives, for so many motions: what `function` gives as machine code, or else the `laws`.
+    /// Engine for a function of many motions without derivatives: machine code if there is some, or the `laws`.
     pub(crate) fn of_values(
         (kind, theta, rows): (&Kind, &[f64], usize),
         function: impl FnOnce() -> Result<Arc<Function>>,
@@ -35,13 +35,13 @@ impl Engine {
         }
     }
 
-    /// A function that gives derivatives too, for so many motions.
+    /// Engine for a function of many motions with derivatives.
     pub(crate) fn of_derivatives(function: &Arc<Function>, theta: &[f64], rows: usize) -> Self {
         let code = Self::code(|| Ok(function.clone()), theta, rows);
         code.unwrap_or_else(|| Self::Blocks(function.blocks(theta)))
     }
 
-    /// Machine code, if that pays and there is any.
+    /// Machine code of an engine, if that pays and there is any.
     fn code(function: impl FnOnce() -> Result<Arc<Function>>, theta: &[f64], rows: usize) -> Option<Self> {
         if !code_pays(rows) {
             return None;
@@ -51,7 +51,7 @@ impl Engine {
         Some(Self::Code(routine))
     }
 
-    /// Outputs of so many rows of inputs, `made` for each.
+    /// Runs an engine: outputs of many rows of inputs, `made` for each.
     pub(crate) fn run(&mut self, places: Places, inputs: &[f64], outputs: &mut [f64], made: usize) {
         let rows = inputs.chunks_exact(places.first_parameter()).zip(outputs.chunks_exact_mut(made.max(1)));
         match self {
@@ -66,7 +66,7 @@ impl Engine {
 }
 
 impl Kind {
-    /// How many numbers a function of a motion gives; none for other functions.
+    /// Number of values that an engine's function of a motion gives; none for other functions.
     pub(crate) fn width<S: Scalar>(&self, dynamics: &Dynamics<S>) -> usize {
         let n = dynamics.coordinates();
         match self {
@@ -82,8 +82,9 @@ impl Kind {
 }
 
 impl<S: Scalar> Dynamics<S> {
-    /// What a function of a motion gives, of coordinates and rates, with which `state` begins and memories, with which it ends. `third`
-    /// are the accelerations, or the efforts where it is these that are given.
+    /// Function of a motion for an engine: its values at coordinates, rates and memories. `state` begins with
+    /// coordinates and rates, and ends with memories. `third` are the accelerations, or the efforts where it is these
+    /// that are given.
     pub(crate) fn answer(&mut self, kind: &Kind, state: &[S], third: &[S], numbers: &mut [S]) {
         let (n, first) = (self.coordinates(), state.len() - self.memories.len());
         let (q, v) = state[..2 * n].split_at(n);
@@ -104,7 +105,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// Pose of a marker in the world at `q`, as a homogeneous matrix, 4 x 4 row by row.
+    /// Pose of a marker at `q` for an engine, as a homogeneous matrix, 4 x 4 row by row.
     ///
     /// Checked: its derivative against the Jacobian, poses of chains against closed forms.
     pub(crate) fn marker_pose(&mut self, q: &[S], marker: usize, matrix: &mut [S]) {

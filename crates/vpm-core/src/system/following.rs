@@ -36,7 +36,7 @@ pub(crate) struct Following<S> {
 }
 
 impl<S: Scalar> Following<S> {
-    /// The `machine` with `interval` (s) between samples, for steps by `method`.
+    /// Following `machine` with `interval` (s) between samples, for steps by `method`.
     ///
     /// # Errors
     /// [`crate::error::Error::Unrecorded`] where a law decides by the value of a state.
@@ -64,7 +64,7 @@ impl<S: Scalar> Following<S> {
         Ok(machine)
     }
 
-    /// Runs samples and steps by `method` as machine code from now on, where they can; or says why they cannot.
+    /// Compiles samples and steps of a following machine to machine code, or says why not.
     pub(crate) fn compile(&mut self, method: Method) -> std::result::Result<(), String> {
         self.routines.compile_all(&[Part::Rates, Part::Sample].map(|part| self.kind(part)))?;
         // A matrix alone that has no code is worked out as before.
@@ -77,7 +77,7 @@ impl<S: Scalar> Following<S> {
         Ok(())
     }
 
-    /// What gives the matrix of steps by `method`, if these need one.
+    /// Kind of matrix that steps of a following machine by `method` need, if any.
     fn matrix_of(&self, method: Method) -> Option<Part> {
         match kind_of(method)? {
             Kind::Elasticity => Some(Part::Elasticity),
@@ -87,17 +87,17 @@ impl<S: Scalar> Following<S> {
         }
     }
 
-    /// Whether a function is worked out by the laws now.
+    /// Whether a function of a following machine is evaluated by its laws now.
     fn by_laws(&mut self, part: Part) -> bool {
         Self::is_direct(part) && self.routines.get(&self.kind(part)).is_none()
     }
 
-    /// Whether the laws themselves give it.
+    /// Whether a function of a following machine comes directly from its laws.
     fn is_direct(part: Part) -> bool {
         part != Part::Linearised && S::plain(&[]).is_some()
     }
 
-    /// What gives the matrix of an implicit step.
+    /// Kind of matrix for an implicit step of a following machine.
     fn prepared(&self) -> Part {
         if self.laws.is_stiff_by_beams_alone() { Part::Prepared } else { Part::Linearised }
     }
@@ -106,17 +106,17 @@ impl<S: Scalar> Following<S> {
         Kind::Guided(self.guidance.clone(), part)
     }
 
-    /// The machine in plain numbers.
+    /// Following machine in plain numbers.
     pub(crate) fn dynamics(&self) -> &Dynamics<f64> {
         &self.laws.dynamics
     }
 
-    /// Free coordinates: passive joints, then elastic ones.
+    /// Free coordinates of a following machine: passive joints, then elastic ones.
     pub(crate) fn free(&self) -> &[usize] {
         &self.laws.free
     }
 
-    /// Where a state stands among those of the whole machine; the time nowhere, for which it gives the last.
+    /// Index of a state of the following machine in the whole machine; the time has none.
     pub(crate) fn place(&self, state: usize) -> usize {
         let (n, count) = (self.laws.dynamics.coordinates(), self.free().len());
         let place = match state.checked_sub(2 * count) {
@@ -127,13 +127,13 @@ impl<S: Scalar> Following<S> {
         place.min(self.laws.dynamics.dim() - 1)
     }
 
-    /// Holds what input `number` amounts to over the interval that begins at sample `k`, see [`super::System::input`].
+    /// Holds command `number` of a following machine over the interval from sample `k`.
     pub(crate) fn command(&mut self, number: usize, k: usize, command: impl Fn(usize) -> S) {
         let input = drives::input(&self.actuators, number, (k, self.interval), command);
         self.hold(number, input);
     }
 
-    /// Takes what is given beside the inputs, see [`Guidance::given`].
+    /// Gives the following machine its motion, see [`Guidance::given`].
     pub(crate) fn give(&mut self, numbers: &[S]) {
         (self.inputs..).zip(numbers).for_each(|(number, &value)| self.hold(number, value));
     }
@@ -144,7 +144,7 @@ impl<S: Scalar> Following<S> {
         self.routines.hold(number, value);
     }
 
-    /// What is seen at `y`, where the next step begins, see [`Guided::sample`].
+    /// Samples a following machine at `y`, where the next step begins, see [`Guided::sample`].
     pub(crate) fn sample(&mut self, y: &[S], seen: &mut [S]) {
         match (S::plain(y), S::plain_mut(seen)) {
             (Some(y), Some(seen)) if self.by_laws(Part::Sample) => {
@@ -155,14 +155,14 @@ impl<S: Scalar> Following<S> {
         }
     }
 
-    /// Evaluates the laws at `y` unless that is where the step begins and was done.
+    /// Begins a step of a following machine at `y`: evaluates the laws unless that was done.
     fn begin(&mut self, y: &[f64]) {
         if !std::mem::take(&mut self.ready) {
             self.laws.evaluate(y);
         }
     }
 
-    /// A recorded matrix in rows of `width` entries, with the rates.
+    /// Recorded matrix of a following machine in rows of `width` entries, with the rates.
     fn matrix(&mut self, part: Part, y: &[S], matrix: &mut [S], width: usize, rates: &mut [S]) {
         self.ready = false;
         let kind = self.kind(part);
@@ -204,7 +204,7 @@ impl<S: Scalar> Ode<S> for Following<S> {
         self.matrix(Part::Linearised, y, jacobian, y.len(), rates);
     }
 
-    /// All that is stiff, see [`Guided::stiff`]; with contacts, bushings or drives the exact derivatives.
+    /// Prepares the matrix of a following machine: all that is stiff, or exact derivatives.
     fn prepare(&mut self, y: &[S], matrix: &mut [S], rates: &mut [S]) {
         let part = self.prepared();
         let plain = (S::plain(y), S::plain_mut(matrix), S::plain_mut(rates));

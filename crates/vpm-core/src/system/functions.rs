@@ -13,7 +13,7 @@ const KEPT: usize = 256;
 
 /// Who can record the functions of a machine.
 pub(crate) trait Recorder: std::fmt::Debug + Send + Sync {
-    /// The function of that kind, its parts built for the checked parameters `theta`.
+    /// Records a function of a machine of that kind, built for the checked parameters `theta`.
     ///
     /// # Errors
     /// [`crate::error::Error::Unrecorded`] where a law decides by the value of a state.
@@ -64,7 +64,7 @@ impl Clone for Cache {
 }
 
 impl Cache {
-    /// The functions of the machine to which the cache belongs.
+    /// Functions of the machine to which the cache belongs.
     pub(crate) fn functions(&self, recorder: impl FnOnce() -> Box<dyn Recorder>) -> Arc<Functions> {
         let new = || Functions { recorder: recorder(), known: Mutex::default() };
         self.0.get_or_init(|| Arc::new(new())).clone()
@@ -72,7 +72,7 @@ impl Cache {
 }
 
 impl Functions {
-    /// The function of that kind, right for the checked parameters `theta`.
+    /// Recorded function of that kind from a machine's functions, for the checked parameters `theta`.
     ///
     /// # Errors
     /// [`crate::error::Error::Unrecorded`] where a law decides by the value of a state.
@@ -91,7 +91,7 @@ impl Functions {
     }
 }
 
-/// The function of that kind, if it is `known` and right for the parameters `theta`.
+/// Recalls a recorded function of that kind if it is `known` and fits the parameters `theta`.
 fn recall(known: &mut [Known], kind: &Kind, theta: &[f64]) -> Option<Arc<Function>> {
     let right = |own: &Known| own.kind == *kind && (!own.function.of_values || own.theta == theta);
     let place = known.iter().position(right)?;
@@ -107,7 +107,7 @@ impl Function {
         Self { places, seldom, often, entries, directions, native: OnceLock::new(), of_values }
     }
 
-    /// Itself for the parameters `theta`, many inputs at once: rows of inputs end before the parameters.
+    /// Recorded function for many inputs at once, with the parameters `theta`.
     pub(crate) fn blocks(&self, theta: &[f64]) -> Evaluator<Lanes> {
         let (first, given) = (self.places.first_parameter(), self.places.count());
         let mut inputs = vec![0.0; self.often.n_inputs()];
@@ -119,7 +119,7 @@ impl Function {
         evaluator
     }
 
-    /// Its machine code, compiled when it is asked for first; or why there is none.
+    /// Machine code of a recorded function, compiled at the first call, or why there is none.
     pub(crate) fn native(&self) -> std::result::Result<&Native, String> {
         if self.directions.is_some() {
             return Err(

@@ -36,19 +36,20 @@ pub enum Part {
 }
 
 impl Guidance {
-    /// How much is given beside the inputs of the machine: the time between samples (s), position, velocity and acceleration of each joint that
-    /// follows at the sample before and after, of each gauge that holds the rate of strain (1/s) at both and its gain (J s).
+    /// Number of values given to a guided machine beside its inputs: interval, joint motion and strain rates. These are
+    /// the time between samples (s), then position, velocity and acceleration of each following joint at both samples.
+    /// Of each gauge that holds there are the rate of strain (1/s) at both samples, and its gain (J s).
     pub(crate) fn given(&self) -> usize {
         self.first_gauge() + 3 * self.gauges.len()
     }
 
-    /// Where the first of the gauges stands among what is given.
+    /// Index of the first gauge among the values given to a guided machine.
     fn first_gauge(&self) -> usize {
         1 + 6 * self.joints.len()
     }
 
-    /// Where the inputs of its programs stand: free coordinates and their rates, states of what drives there are, time since the sample
-    /// before; inputs of the machine, what is given; parameters.
+    /// Places of the inputs of a guided machine's programs. Free coordinates and their rates come first, then states of
+    /// drives, time since the sample before, inputs of the machine, given values and parameters.
     pub(super) fn places(&self, machine: Places) -> Places {
         let coordinates = machine.coordinates - self.joints.len();
         let internal = if self.drives { machine.states - 2 * machine.coordinates } else { 0 };
@@ -121,7 +122,7 @@ impl<S: Scalar> Guided<S> {
         }
     }
 
-    /// Holds what an input of the machine amounts to or, after these, what is given, see [`Guidance::given`].
+    /// Holds an input of a guided machine or, after these, a given value, see [`Guidance::given`].
     pub(super) fn hold(&mut self, number: usize, value: S) {
         let Some(place) = number.checked_sub(self.dynamics.inputs.len()) else {
             return self.dynamics.hold(number, value);
@@ -133,12 +134,12 @@ impl<S: Scalar> Guided<S> {
         }
     }
 
-    /// Whether [`Guided::stiff`] will do for an implicit step.
+    /// Whether [`Guided::stiff`] suffices for an implicit step of a guided machine.
     pub(super) fn is_stiff_by_beams_alone(&self) -> bool {
         !self.guidance.drives && self.dynamics.connections.is_free()
     }
 
-    /// Rates of the state at `y`.
+    /// Evaluates the rates of a guided machine at `y`.
     pub(super) fn evaluate(&mut self, y: &[S]) {
         self.place(y);
         if !self.free.is_empty() {
@@ -147,8 +148,9 @@ impl<S: Scalar> Guided<S> {
         self.collect();
     }
 
-    /// Evaluates the rates at `y`, then fills `seen`: state of the whole machine, all its outputs, efforts of the drives on the joints. The
-    /// outputs `effort` of the joints are what the motion needs; commands are left to the caller.
+    /// Samples a guided machine: the rates at `y`, then state, outputs and drive efforts in `seen`. State and outputs
+    /// are those of the whole machine, efforts those on the joints. The outputs `effort` of the joints are what the
+    /// motion needs; commands are left to the caller.
     pub(super) fn sample(&mut self, y: &[S], seen: &mut [S]) {
         self.place(y);
         self.balance(y);
@@ -172,7 +174,7 @@ impl<S: Scalar> Guided<S> {
         }
     }
 
-    /// Motion of all coordinates, free accelerations apart, and what the drives do in it.
+    /// Places a guided machine: motion of all coordinates without free accelerations, and its drives.
     fn place(&mut self, y: &[S]) {
         let Self { dynamics, guidance, free, ends, interval, x, rate, .. } = self;
         let (n, count, time) = (dynamics.coordinates(), free.len(), y[y.len() - 1]);
@@ -188,7 +190,7 @@ impl<S: Scalar> Guided<S> {
         }
     }
 
-    /// The load on all coordinates without free accelerations, and these.
+    /// Load on all coordinates of a guided machine without free accelerations, and these.
     fn balance(&mut self, y: &[S]) {
         let Self { dynamics, free, holds, interval, x, rate, load, column, mass, factors, .. } = self;
         let (n, share) = (load.len(), y[y.len() - 1] / *interval);
@@ -216,7 +218,7 @@ impl<S: Scalar> Guided<S> {
         free.iter().zip(&*column).for_each(|(&place, &a)| rate[n + place] = a);
     }
 
-    /// The rates of the state from those of the machine.
+    /// Collects the rates of a guided machine's state from those of the whole machine.
     fn collect(&mut self) {
         let Self { free, x, rate, rates, load, .. } = self;
         let (n, count, last) = (load.len(), free.len(), rates.len() - 1);
@@ -228,8 +230,8 @@ impl<S: Scalar> Guided<S> {
         rates[last] = S::one();
     }
 
-    /// Turns the load that is left without the free accelerations into the efforts that the motion needs with them, by the mass matrix of
-    /// the last evaluation.
+    /// Efforts that the motion of a guided machine needs, by the mass matrix of the last evaluation. They come from the
+    /// load that is left without the free accelerations.
     fn require(&mut self) {
         let Self { dynamics, free, x, rate, load, .. } = self;
         let (n, matrix) = (load.len(), dynamics.data.mass_matrix());
@@ -239,8 +241,8 @@ impl<S: Scalar> Guided<S> {
         dynamics.follow_load(&x[..n], &x[n..2 * n], load);
     }
 
-    /// Writes `[0, 1, 0; -M^-1 K, -M^-1 D, t]` from the last evaluation: all that is stiff, for the price of one mass matrix, with the change
-    /// in time of what drives it.
+    /// Writes the stiff matrix `[0, 1, 0; -M^-1 K, -M^-1 D, t]` of a guided machine from the last evaluation. It costs
+    /// one mass matrix, and has the change in time of what drives the machine.
     pub(super) fn stiff(&mut self, matrix: &mut [S]) {
         let (n, dim) = (self.free.len(), self.rates.len());
         matrix.fill(S::zero());
@@ -254,7 +256,7 @@ impl<S: Scalar> Guided<S> {
         self.solve(lower, dim);
     }
 
-    /// Writes `[-M_ff^-1 K, -M_ff^-1 D]` of the beams, and of what holds them, from the last evaluation.
+    /// Writes `[-M_ff^-1 K, -M_ff^-1 D]` of a guided machine's beams from the last evaluation.
     pub(super) fn elasticity(&mut self, block: &mut [S]) {
         let width = 2 * self.free.len();
         block.fill(S::zero());
@@ -262,7 +264,7 @@ impl<S: Scalar> Guided<S> {
         self.solve(block, width);
     }
 
-    /// Adds `-K` and `-D` of the beams, and of what holds them, to rows of `width` entries.
+    /// Adds `-K` and `-D` of a guided machine's beams to rows of `width` entries.
     fn stiffen(&self, rows: &mut [S], width: usize) {
         // The elastic coordinates are the last of all and of the free ones.
         let (count, driven) = (self.free.len(), self.guidance.joints.len());
@@ -283,7 +285,7 @@ impl<S: Scalar> Guided<S> {
         }
     }
 
-    /// Adds slopes of the effects on passive joints, and chords from rest in the place of the tangents of friction.
+    /// Adds slopes of effects on a guided machine's passive joints; chords from rest for friction.
     fn resist(&self, rows: &mut [S], width: usize) {
         let (n, count) = (self.load.len(), self.free.len());
         for (seat, effect) in &self.dynamics.effects {
@@ -301,8 +303,9 @@ impl<S: Scalar> Guided<S> {
         }
     }
 
-    /// Adds the column of the time: what the changing accelerations of the joints that follow, and the rates of strain that hold beams, do
-    /// to the load, as chords over the interval. Without it a stiff mode would lag behind by a share of the step.
+    /// Adds the column of the time to a guided machine's matrix: chords of what changes over the interval. These are
+    /// the load by changing accelerations of the following joints, and by strain rates that hold beams. Without it a
+    /// stiff mode would lag behind by a share of the step.
     fn drift(&self, rows: &mut [S], width: usize) {
         let (n, matrix) = (self.load.len(), self.dynamics.data.mass_matrix());
         for (line, &place) in rows.chunks_exact_mut(width).zip(&self.free) {
@@ -316,7 +319,7 @@ impl<S: Scalar> Guided<S> {
         }
     }
 
-    /// Multiplies rows of `width` entries by `M_ff^-1`.
+    /// Solves for a guided machine: multiplies rows of `width` entries by `M_ff^-1`.
     fn solve(&mut self, rows: &mut [S], width: usize) {
         for place in 0..width {
             let entries = rows.iter_mut().skip(place).step_by(width);
@@ -329,7 +332,7 @@ impl<S: Scalar> Guided<S> {
 }
 
 impl Guided<Recorded> {
-    /// What a program gives at state `y`: numbers, and what matrix follows them.
+    /// Recorded program of a guided machine at state `y`: numbers, and the matrix that follows.
     pub(super) fn recorded(&mut self, part: Part, y: &[Recorded]) -> (Vec<Recorded>, Option<Matrix>) {
         let zeros = |count: usize| vec![Recorded::default(); count];
         if part == Part::Sample {

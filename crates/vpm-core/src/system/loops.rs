@@ -105,7 +105,7 @@ impl<S: Scalar> Moved<S> {
 }
 
 impl<S: Scalar> Loops<S> {
-    /// On their ends in `model`, two for each of the `entries`.
+    /// Closed loops on their ends in `model`, two for each of the `entries`.
     ///
     /// # Errors
     /// [`ConnectionError`] for a loop both of whose ends move as one piece, or whose axes are none.
@@ -139,18 +139,18 @@ impl<S: Scalar> Loops<S> {
         })
     }
 
-    /// Number of loops.
+    /// Number of closed loops.
     pub(crate) fn len(&self) -> usize {
         self.placed.len()
     }
 
-    /// A copy of what the last [`Loops::place`] and [`Loops::choose`] have found.
+    /// State of the closed loops that the last [`Loops::place`] and [`Loops::choose`] found.
     pub(super) fn state(&self) -> LoopState<S> {
         let Self { gap, jacobian, drift, chosen, .. } = self;
         LoopState { gap: gap.clone(), jacobian: jacobian.clone(), drift: drift.clone(), chosen: chosen.clone() }
     }
 
-    /// Gap, its derivative and its second rate, after the motion and the poses of the frames.
+    /// Places the closed loops: gap, its derivative and second rate, after the motion of the frames.
     pub(crate) fn place(&mut self, model: &Model<S>, data: &Data<S>) {
         let Self { placed, jacobian, gap, drift, sizes, .. } = self;
         let (n, Composite { frames, sections, .. }) = (model.n_coordinates(), &data.composite);
@@ -189,8 +189,8 @@ impl<S: Scalar> Loops<S> {
         }
     }
 
-    /// Chooses equations that are independent, after [`Loops::place`]: the one with the largest share that those chosen before leave, until
-    /// nothing is left.
+    /// Chooses independent loop equations, by the largest remaining share, after [`Loops::place`]. The share is what
+    /// those chosen before leave; it ends when nothing is left.
     pub(crate) fn choose(&mut self, n: usize) {
         let Self { jacobian, sizes, chosen, picked, row, gram, .. } = self;
         let rows = chosen.len();
@@ -231,7 +231,7 @@ impl<S: Scalar> Loops<S> {
         }
     }
 
-    /// Factorises `J M^-1 J^T` of the chosen equations, with the factors of M that stand in `data`.
+    /// Factorises `J M^-1 J^T` of the chosen loop equations, with the factors of M in `data`.
     fn factorise(&mut self, data: &Data<S>) {
         let Self { jacobian, ways, chosen, gram, factors, .. } = self;
         let (rows, n) = (chosen.len(), data.acceleration.len());
@@ -247,20 +247,20 @@ impl<S: Scalar> Loops<S> {
         factors.factorise(gram);
     }
 
-    /// Replaces `misses` by what the equations take to mend them.
+    /// Solves the chosen loop equations: replaces `misses` by their multipliers.
     fn solve(&self, misses: &mut [S]) {
         misses.iter_mut().zip(&self.chosen).for_each(|(miss, &counts)| *miss *= counts);
         self.factors.solve(misses);
     }
 
-    /// Moves `numbers` of the coordinates along `M^-1 J^T` by `shares` of the equations.
+    /// Moves `numbers` of the coordinates along `M^-1 J^T` by `shares` of the loop equations.
     fn push(&self, shares: &[S], numbers: &mut [S]) {
         for (way, &share) in self.ways.chunks_exact(numbers.len().max(1)).zip(shares) {
             numbers.iter_mut().zip(way).for_each(|(number, &entry)| *number += entry * share);
         }
     }
 
-    /// Turns the accelerations of the open tree in `data` into those with closed loops, with the factors of M that stand there.
+    /// Turns accelerations of the open tree into those with closed loops. Both stand in `data`, with the factors of M.
     pub(crate) fn constrain(&mut self, model: &Model<S>, data: &mut Data<S>) {
         self.place(model, data);
         self.choose(model.n_coordinates());
@@ -275,9 +275,9 @@ impl<S: Scalar> Loops<S> {
         self.forces = forces;
     }
 
-    /// Brings coordinates `q` onto the closures and rates `v` to where they stay, each the way that moves least in the metric of M. The
-    /// coordinates `held` count as [`HELD`] times as heavy: they stay where they are as far as the loops let them.
-    /// Returns the largest gap that is left, and how many equations count.
+    /// Closes loops: moves coordinates `q` and rates `v` onto the closures, least in the metric of M. The coordinates
+    /// `held` count as [`HELD`] times as heavy: they stay where they are as far as the loops let them. Returns the
+    /// largest gap that is left, and how many equations count.
     pub(crate) fn close(
         &mut self,
         model: &Model<S>,
@@ -321,7 +321,8 @@ impl<S: Scalar> Loops<S> {
         self.gap.iter().fold(S::zero(), |most, gap| most.max(gap.abs()))
     }
 
-    /// Frame and wrench, about its origin and in its axes, of what a loop does to the body of A and to that of B, in the last evaluation.
+    /// Wrenches of a closed loop on the bodies of A and B, with frames, in the last evaluation. Each is about the
+    /// frame's origin and in its axes.
     fn wrenches(
         &self,
         slots: &[FrameSlot<S>],
@@ -340,7 +341,7 @@ impl<S: Scalar> Loops<S> {
         })
     }
 
-    /// Takes what the loops do off what the frames have to be given otherwise, for reactions.
+    /// Takes the wrenches of closed loops off those of the frames, for reactions.
     pub(super) fn take_off(&self, data: &mut Data<S>) {
         for placed in &self.placed {
             for (frame, wrench) in self.wrenches(&data.composite.frames, placed) {
@@ -349,7 +350,7 @@ impl<S: Scalar> Loops<S> {
         }
     }
 
-    /// Wrench of each loop on the body of A, about A's origin and in A's axes, in the last evaluation.
+    /// Observes closed loops: wrench of each on the body of A, about A's origin and in A's axes.
     pub(crate) fn observe(&self, data: &Data<S>, outputs: &mut [S]) {
         for (channels, placed) in outputs.chunks_exact_mut(6).zip(&self.placed) {
             let [(_, on_a), _] = self.wrenches(&data.composite.frames, placed);

@@ -10,7 +10,7 @@ use crate::sensor::Layout;
 use crate::spatial::{Pose, Quaternion};
 
 impl<S: Scalar> Dynamics<S> {
-    /// Where the outputs are.
+    /// Layout of the observed outputs.
     pub fn layout(&self) -> Layout {
         Layout {
             joints: self.model.n_joints(),
@@ -29,8 +29,8 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// All true outputs in the order of [`Layout`], in state `x` with rate `dxdt`, after [`Dynamics::rhs`] in that state. The command of an
-    /// actuator is what enters its lag.
+    /// Observes all true outputs in the order of [`Layout`], in state `x` with rate `dxdt`. The command of an actuator
+    /// is what enters its lag.
     pub fn observe(&mut self, x: &[S], dxdt: &[S], outputs: &mut [S]) {
         self.observe_motion(x, outputs);
         self.observe_efforts(x, dxdt, outputs);
@@ -41,7 +41,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// The outputs that the state alone decides: positions and velocities, lines, strains, markers.
+    /// Observes outputs that the state alone decides: positions and velocities, lines, strains, markers.
     pub fn observe_motion(&mut self, x: &[S], outputs: &mut [S]) {
         let (n, layout) = (self.coordinates(), self.layout());
         self.observe_balls(&x[..n], &x[n..2 * n], &mut outputs[layout.balls()..layout.loops()]);
@@ -80,7 +80,7 @@ impl<S: Scalar> Dynamics<S> {
         connections.observe_bushings(data, &mut outputs[layout.bushings()..layout.load_cells()]);
     }
 
-    /// Orientations of ball joints, and angular velocities of what they carry.
+    /// Observes ball joints: their orientations, and angular velocities of what they carry.
     fn observe_balls(&self, q: &[S], v: &[S], outputs: &mut [S]) {
         for (channels, ball) in outputs.chunks_exact_mut(7).zip(&self.balls) {
             let (angles, rates) = (ball.of(q), ball.of(v));
@@ -90,7 +90,7 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// The reactions at the load cells' joints in the motion `[q, v, a]`, with the forces that stand on the lines.
+    /// Observes the reactions at load cells' joints in the motion `[q, v, a]`, with the forces on lines.
     pub(crate) fn observe_reactions(&mut self, motion: Motion<'_, S>, outputs: &mut [S]) {
         if self.connections.cells.is_empty() {
             return;
@@ -112,7 +112,8 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
-    /// The outputs that follow from the efforts: accelerations, efforts, forces, what drives and supplies show, reactions, in state `x` after [`Dynamics::rhs`].
+    /// Observes outputs that follow from efforts: accelerations, efforts, forces, drives, supplies, reactions. In state
+    /// `x` after [`Dynamics::rhs`].
     pub(crate) fn observe_efforts(&mut self, x: &[S], dxdt: &[S], outputs: &mut [S]) {
         let (n, layout) = (self.coordinates(), self.layout());
         let accelerations = &dxdt[n..2 * n];

@@ -62,7 +62,7 @@ pub struct System<S> {
 }
 
 impl<S: Scalar> System<S> {
-    /// The system of a `machine`.
+    /// Ordinary differential equation (ODE) of a `machine` for the integrators.
     ///
     /// # Errors
     /// [`crate::error::Error::Unrecorded`] where a law decides by the value of a state, in numbers with derivatives.
@@ -94,25 +94,25 @@ impl<S: Scalar> System<S> {
         Ok(system)
     }
 
-    /// This machine with ball joints, each with whether it turns freely.
+    /// ODE of a machine with ball joints, each with whether it turns freely.
     #[must_use]
     pub(crate) fn with_balls<'a>(self, balls: impl Iterator<Item = (&'a Ball, bool)>) -> Self {
         Self { turning: Turning::new(balls), ..self }
     }
 
-    /// This machine, whose samples give only the outputs that the state alone decides.
+    /// ODE of a machine whose samples give only the outputs that the state alone decides.
     #[must_use]
     pub(crate) fn seen_in_motion(self) -> Self {
         Self { seen: Kind::Motion, ..self }
     }
 
-    /// This machine, whose derivatives may be right only to the order of its steps where that takes less time.
+    /// ODE of a machine with derivatives of the order of its steps, where that takes less time.
     #[must_use]
     pub(crate) fn with_approximate_derivatives(self) -> Self {
         Self { approximate: !Self::is_plain(), ..self }
     }
 
-    /// Takes over a state as users know it: brings it into the coordinates in which the machine goes on.
+    /// Enters a user's state: brings it into the coordinates of the ODE.
     pub(crate) fn enter(&mut self, x: &mut [S]) {
         self.turn(|turning, n, hold| turning.enter(x, n, hold));
         if self.dynamics.loops.is_some() {
@@ -123,14 +123,14 @@ impl<S: Scalar> System<S> {
         }
     }
 
-    /// This machine, with coordinates that an observer draws: closing loops leaves them where it has drawn them.
+    /// ODE of a machine with coordinates that an observer draws; closing loops leaves them.
     #[must_use]
     pub(crate) fn drawn_at(mut self, coordinates: Vec<u32>) -> Self {
         self.closings[1] = Kind::Closed(coordinates);
         self
     }
 
-    /// Takes over a state that an observer has moved: loops are closed again, and what it draws stays where it has drawn it.
+    /// Enters a state that an observer corrected: loops are closed again, drawn coordinates stay.
     pub(crate) fn corrected(&mut self, x: &mut [S]) {
         self.ready = false;
         if self.dynamics.loops.is_some() && self.closings[0] != self.closings[1] {
@@ -145,7 +145,8 @@ impl<S: Scalar> System<S> {
         }
     }
 
-    /// Brings the state to where all loops are closed, the way of that number; returns what is left and how many of their equations count.
+    /// Closes all loops of the ODE's state by the way of that number. Returns what is left, and how many of their
+    /// equations count.
     fn close(&mut self, x: &mut [S], way: usize) -> (f64, usize) {
         self.ready = false;
         let moving = self.closed.len() - 2;
@@ -165,7 +166,7 @@ impl<S: Scalar> System<S> {
         (gap, count.round() as usize)
     }
 
-    /// Keeps in mind what became of the loops where this `gap` is left, and so many of their equations count.
+    /// Notes the `gap` that closing loops left in the ODE's state, and the counted equations.
     fn watch(&mut self, gap: f64, count: usize) {
         if count < self.independent {
             self.torn.get_or_insert(Trouble::Dependent(self.independent, count));
@@ -174,24 +175,24 @@ impl<S: Scalar> System<S> {
         }
     }
 
-    /// Writes the state `x` as users know it into `shown`.
+    /// Shows the ODE's state `x` in the coordinates of users.
     pub(crate) fn show(&self, x: &[S], shown: &mut [S]) {
         shown.copy_from_slice(x);
         self.turning.show(x, self.dynamics.coordinates(), shown);
     }
 
-    /// Keeps its coordinates from now on, however far steps lead.
+    /// Rests: the ODE keeps its coordinates, however far steps lead.
     pub(crate) fn rest(&mut self) {
         self.turning.rest();
     }
 
-    /// What became of the coordinates of a ball joint since the last [`System::enter`], if they failed.
+    /// Trouble with the coordinates of a ball joint since the last [`System::enter`], if any.
     #[inline]
     pub(crate) fn trouble(&self) -> Option<Trouble> {
         self.torn.or(self.turning.trouble())
     }
 
-    /// Does something with the ball joints, which may hold other orientations after it.
+    /// Turns ball joints of the ODE's state, which may hold other orientations after it.
     fn turn(&mut self, work: impl FnOnce(&mut Turning<S>, usize, &mut dyn FnMut(usize, S))) {
         if self.turning.is_empty() {
             return;
@@ -205,12 +206,12 @@ impl<S: Scalar> System<S> {
         });
     }
 
-    /// Whether it runs in plain numbers.
+    /// Whether the ODE runs in plain numbers.
     fn is_plain() -> bool {
         S::plain(&[]).is_some()
     }
 
-    /// Makes all that samples and steps by `method` need.
+    /// Makes all functions that samples and steps of the ODE by `method` need.
     ///
     /// # Errors
     /// [`crate::error::Error::Unrecorded`] where a law decides by the value of a state.
@@ -222,14 +223,14 @@ impl<S: Scalar> System<S> {
         Ok(())
     }
 
-    /// The functions by which steps and corrections end that have loops to close.
+    /// Functions that close loops at the end of the ODE's steps and corrections.
     fn closing(&self) -> Vec<Kind> {
         let [plain, drawn] = &self.closings;
         let own = self.dynamics.loops.iter().map(|_| plain);
         own.clone().chain(own.filter(|_| plain != drawn).map(|_| drawn)).cloned().collect()
     }
 
-    /// Whether a function is worked out by the laws themselves.
+    /// Whether a function of the ODE is evaluated by the laws themselves.
     fn is_direct(&self, kind: &Kind) -> bool {
         Self::is_plain()
             && match kind {
@@ -239,7 +240,7 @@ impl<S: Scalar> System<S> {
             }
     }
 
-    /// Runs samples and steps by `method` as machine code from now on, where they can; or says why they cannot.
+    /// Compiles the ODE's samples and steps by `method` to machine code, or says why not.
     pub fn compile(&mut self, method: Method) -> std::result::Result<(), String> {
         self.ready = false;
         if !Self::is_plain() {
@@ -264,7 +265,7 @@ impl<S: Scalar> System<S> {
         Ok(())
     }
 
-    /// The same, for a run whose inputs stand still within steps: these run as a whole where that is worth its code.
+    /// Compiles whole steps of the ODE with constant inputs to machine code, where that pays.
     pub(crate) fn compile_steps(&mut self, method: Method) -> std::result::Result<(), String> {
         if method == Method::LinearlyImplicit && self.dynamics.is_well_scaled() && self.has_small_steps() {
             let made = self.routines.compile_within(&Kind::Step, MOST_OF_STEP);
@@ -278,38 +279,39 @@ impl<S: Scalar> System<S> {
         self.compile(method)
     }
 
-    /// Whether it is worth while to record a whole step: the matrix, which is at hand, tells about how large it is.
+    /// Whether the ODE is small enough to record a whole step. The matrix, which is at hand, shows about how large it
+    /// is.
     fn has_small_steps(&mut self) -> bool {
         let larger = LARGER[usize::from(!Self::is_plain())];
         self.routines.get(&Kind::Prepared).is_some_and(|routine| larger * routine.size() <= MOST_OF_STEP)
     }
 
-    /// Whether its functions run as machine code.
+    /// Whether the ODE's functions run as machine code.
     pub fn has_code(&mut self) -> bool {
         Self::is_plain() && self.routines.get(&Kind::Sample).is_some()
     }
 
-    /// The machine in plain numbers.
+    /// Dynamics of the ODE in plain numbers.
     #[inline]
     pub fn dynamics(&mut self) -> &mut Dynamics<f64> {
         self.ready = false;
         &mut self.dynamics
     }
 
-    /// The actuators.
+    /// Actuators of the ODE's machine.
     pub(crate) fn actuators(&self) -> &[Actuator<S>] {
         &self.actuators
     }
 
-    /// What input `number` amounts to over the interval that begins at sample `k`: of an actuator after delay, dead zone and saturation, of
-    /// a supply as it is.
+    /// Input `number` of the ODE over the interval from sample `k`: after delay, dead zone and saturation. That of a
+    /// supply is as it is.
     #[inline]
     pub fn input(&self, number: usize, k: usize, time_step: f64, command: impl Fn(usize) -> S) -> S {
         drives::input(&self.actuators, number, (k, time_step), command)
     }
 
-    /// Holds what input `number` amounts to, see [`System::input`], from now on: one for each actuator, then the pressures of logged
-    /// supplies.
+    /// Holds input `number` of the ODE, see [`System::input`], from now on. There is one for each actuator, then the
+    /// pressures of logged supplies.
     #[inline]
     pub fn hold(&mut self, number: usize, input: S) {
         self.ready = false;
@@ -317,7 +319,7 @@ impl<S: Scalar> System<S> {
         self.routines.hold(number, input);
     }
 
-    /// dx/dt and all true outputs at `x`; where samples ask for less, no more than that.
+    /// Sample of the ODE: dx/dt and all true outputs at `x`, or those that were asked for.
     pub fn sample(&mut self, x: &[S], dxdt: &mut [S], outputs: &mut [S]) {
         if self.seen == Kind::Motion {
             return self.observe_motion(x, outputs);
@@ -338,7 +340,7 @@ impl<S: Scalar> System<S> {
         self.turning.show_outputs(x, self.dynamics.coordinates(), Some(dxdt), outputs);
     }
 
-    /// The outputs that the state alone decides; others stay or become zero.
+    /// Sample of the ODE's outputs that the state alone decides; others stay or become zero.
     pub(crate) fn observe_motion(&mut self, x: &[S], outputs: &mut [S]) {
         if let Some(routine) = self.routines.get(&Kind::Motion) {
             outputs.copy_from_slice(routine.at(x));
@@ -351,7 +353,7 @@ impl<S: Scalar> System<S> {
         self.turning.show_outputs(x, self.dynamics.coordinates(), None, outputs);
     }
 
-    /// Length of each line per unit of each coordinate at `q`: the lever arms of its force, lines x n.
+    /// Lever arms of the ODE's lines: length per unit of each coordinate at `q`, lines x n.
     pub(crate) fn levers(&mut self, q: &[S], levers: &mut [S]) {
         if let (Some(q), Some(levers)) = (S::plain(q), S::plain_mut(levers)) {
             self.dynamics().levers(q, levers);
@@ -360,7 +362,7 @@ impl<S: Scalar> System<S> {
         }
     }
 
-    /// Efforts that accelerations `a` need at `state` (coordinates, then rates), but for what contacts and bushings do.
+    /// Efforts that accelerations `a` need at the ODE's `state`, without contacts and bushings.
     pub(crate) fn required_of_tree(&mut self, state: &[S], a: &[S], efforts: &mut [S]) {
         if let (Some(state), Some(a), Some(efforts)) = (S::plain(state), S::plain(a), S::plain_mut(efforts)) {
             let (q, v) = state.split_at(a.len());
@@ -370,24 +372,24 @@ impl<S: Scalar> System<S> {
         }
     }
 
-    /// Takes note that the machine, last evaluated with these `rates`, makes its next step from that very state. What is asked of the
-    /// system before makes it forget.
+    /// Departs: the ODE's next step begins at the state last evaluated with these `rates`. What is asked of the system
+    /// before makes it forget.
     pub(crate) fn depart(&mut self, rates: &[S]) {
         self.rates.copy_from_slice(rates);
         self.ready = self.seen == Kind::Sample;
     }
 
-    /// Takes note that the next step begins elsewhere than where the machine was last evaluated.
+    /// Forgets the last evaluation: the ODE's next step begins elsewhere.
     pub(crate) fn forget(&mut self) {
         self.ready = false;
     }
 
-    /// Whether the rates where the next step begins are at hand.
+    /// Whether the ODE has the rates where its next step begins.
     pub(crate) fn is_ready(&self) -> bool {
         self.ready
     }
 
-    /// Rates at `x`: those at hand if a step begins there.
+    /// Begins a step of the ODE: rates at `x`, known ones if there are any.
     fn begin(&mut self, x: &[S], rates: &mut [S]) {
         if std::mem::take(&mut self.ready) {
             rates.copy_from_slice(&self.rates);
@@ -396,7 +398,7 @@ impl<S: Scalar> System<S> {
         }
     }
 
-    /// The same, with the efforts of the drives left there by the laws: friction may follow them.
+    /// Begins a step of the ODE with the drives' efforts evaluated by the laws, for friction.
     fn begin_by_laws(&mut self, x: &[S], rates: &mut [S]) {
         if self.routines.get(&Kind::Rates).is_none() {
             return self.begin(x, rates);
@@ -407,12 +409,12 @@ impl<S: Scalar> System<S> {
         }
     }
 
-    /// The matrix df/dx without the friction of joints and seals, row by row.
+    /// Matrix df/dx of the ODE without friction of joints and seals, row by row.
     pub(crate) fn without_friction(&mut self, x: &[S], matrix: &mut [S]) {
         self.matrix_alone(&Kind::Frictionless, x, matrix);
     }
 
-    /// The matrix df/dx with the linear damping of effects in the place of all friction, row by row.
+    /// Matrix df/dx of the ODE with linear damping in the place of all friction, row by row.
     pub(crate) fn without_dry_friction(&mut self, x: &[S], matrix: &mut [S]) {
         self.matrix_alone(&Kind::LinearFriction, x, matrix);
     }
@@ -424,7 +426,7 @@ impl<S: Scalar> System<S> {
         self.rates = values;
     }
 
-    /// Writes [`Ode::iteration_matrix`] of a machine of which beams are all that is stiff, by its laws.
+    /// Iteration matrix of an ODE whose beams are all that is stiff, by its laws.
     fn prepare_directly(&mut self, x: &[f64], matrix: &mut [f64]) {
         let n = self.dynamics.coordinates();
         let (q, v) = x[..2 * n].split_at(n);
@@ -435,7 +437,7 @@ impl<S: Scalar> System<S> {
         stiff::iteration_matrix(&mut self.dynamics, x, matrix, laws, &mut self.column);
     }
 
-    /// Whether a matrix is part of a recorded function that works the rates out too.
+    /// Whether a matrix of the ODE belongs to a recorded function with the rates.
     pub(crate) fn has_rates_in(&mut self, matrix: Matrix) -> bool {
         match matrix {
             Matrix::Jacobian => true,
@@ -444,7 +446,7 @@ impl<S: Scalar> System<S> {
         }
     }
 
-    /// Whether a function is worked out by the laws now.
+    /// Whether a function of the ODE is evaluated by the laws now.
     fn by_laws(&mut self, kind: &Kind) -> bool {
         self.is_direct(kind) && self.routines.get(kind).is_none()
     }
@@ -518,8 +520,8 @@ impl<S: Scalar> Ode<S> for System<S> {
         self.routines.turned(k, product);
     }
 
-    /// As df/dx, but with chords from rest in the place of the tangents of friction laws; of a machine with elastic beams and ideal drives,
-    /// all that is stiff in it, for the price of one mass matrix.
+    /// Iteration matrix of the ODE: as df/dx, with chords from rest in the place of friction tangents. Of a machine
+    /// with elastic beams and ideal drives it is all that is stiff, for the price of one mass matrix.
     ///
     /// The tangent of dry friction is flat beyond the transition velocity, so that a step which crosses it would not see the friction
     /// turn around, and could keep a joint creeping for ever; the chord sees it. At rest, and for viscous friction, they are the same.
@@ -530,8 +532,9 @@ impl<S: Scalar> Ode<S> for System<S> {
         self.rates = rates;
     }
 
-    /// Beams, springs and linear damping of joints, friction of joints, memories and lags of ideal drives are taken implicitly; springs that
-    /// are not linear by their slope where the stage has come to.
+    /// Additive rates of the ODE: beams, springs, damping, friction, memories and lags are implicit. Springs, damping
+    /// and friction are those of joints, lags those of ideal drives. Springs that are not linear count by their slope
+    /// where the stage has come to.
     fn additive_rates(&mut self, explicit: &[S], implicit: &[S], reach: f64, rates: &mut [S]) -> bool {
         let n = self.coordinates();
         if reach == 0.0 {
@@ -566,7 +569,7 @@ impl<S: Scalar> Ode<S> for System<S> {
         self.dynamics.scales(scales);
     }
 
-    /// By machine code of the whole step, if there is some.
+    /// Linearly implicit step of the ODE by machine code of the whole step, if there is some.
     #[inline]
     fn linearly_implicit_step(&mut self, x: &mut [S], step: f64) -> bool {
         if !self.whole {
@@ -579,13 +582,13 @@ impl<S: Scalar> Ode<S> for System<S> {
         })
     }
 
-    /// Memories move on exactly along the way of their joints.
+    /// Path step of the ODE: memories move exactly along the way of their joints.
     fn along_path(&mut self, x: &[S], step: f64, rates: &mut [S]) {
         let (n, first) = (self.coordinates(), self.dynamics.first_memory());
         self.memories.mean_rates(&x[first..], &x[n..2 * n], step, &mut rates[first..]);
     }
 
-    /// Stiffness and damping of the beams.
+    /// Stiffness and damping of the ODE's beams.
     fn elasticity(&mut self, x: &[S], block: &mut [S]) -> bool {
         let n = self.coordinates();
         if self.dynamics.model.n_elastic() == 0 {

@@ -5,8 +5,8 @@ use crate::scalar::Scalar;
 /// Position, velocity and acceleration of a joint.
 pub(crate) type State<S> = [S; 3];
 
-/// The polynomial of degree 5 through position, velocity and acceleration at both ends of an interval (s), and its derivatives, at
-/// `time` (s) after the begin.
+/// Quintic polynomial between two samples with position, velocity and acceleration, and its derivatives. The interval
+/// is in s, and `time` (s) counts from its begin.
 ///
 /// Law: the quintic Hermite interpolant (Biagiotti & Melchiorri 2008, "Trajectory Planning for Automatic Machines and Robots", section
 /// 2.1.7). Checked: a polynomial of degree 5 is itself.

@@ -31,32 +31,32 @@ pub struct Places {
 }
 
 impl Places {
-    /// The implicit state of an additive step.
+    /// Place of the implicit state of an additive step among the inputs of a recorded program.
     pub fn implicit(&self) -> usize {
         self.states + self.inputs
     }
 
-    /// Accelerations of all coordinates, where a motion is given; they share their room with the implicit state.
+    /// Place of the accelerations among the inputs of a recorded program, where a motion is given.
     pub fn accelerations(&self) -> usize {
         self.implicit()
     }
 
-    /// The reach of an additive step, s.
+    /// Place of an additive step's reach, s, among the inputs of a recorded program.
     pub fn reach(&self) -> usize {
         self.implicit() + self.states
     }
 
-    /// The rates of the coordinates where the stage before ended.
+    /// Place of the rates after the stage before among the inputs of a recorded program.
     pub fn before(&self) -> usize {
         self.reach() + 1
     }
 
-    /// The first parameter.
+    /// Place of the first parameter among the inputs of a recorded program.
     pub fn first_parameter(&self) -> usize {
         self.before() + self.coordinates
     }
 
-    /// How many numbers go into a program.
+    /// Number of inputs of a recorded program.
     pub fn count(&self) -> usize {
         self.first_parameter() + self.parameters
     }
@@ -116,7 +116,7 @@ pub enum Kind {
 }
 
 impl Kind {
-    /// Where the inputs of such a program stand, if those of a free machine stand at `places`.
+    /// Places of the inputs of such a recorded program, from those of a free machine at `places`.
     fn places(&self, places: Places) -> Places {
         match self {
             Self::Unbalance => Places { states: places.coordinates, inputs: 1, ..places },
@@ -164,15 +164,15 @@ pub(super) enum Matrix {
 }
 
 impl Matrix {
-    /// The derivative of `numbers` by the states, of which there are `dim`.
+    /// Recorded derivative of `numbers` by the `dim` states.
     pub(super) fn by_states(numbers: Vec<Recorded>, dim: usize) -> Self {
         Self::Of(numbers, (0..dim as u32).collect())
     }
 }
 
 impl Recording {
-    /// Records a function of the machine that `build` makes with the checked parameters `theta`. Those at the places `free` are its inputs,
-    /// in this order, all others constants.
+    /// Records a machine's function that `build` makes with the checked parameters `theta`. Those at the places `free`
+    /// are its inputs, in this order, all others constants.
     ///
     /// # Errors
     /// [`Error::Unrecorded`] where a law decides by the value of a state: the graph would hold for that state alone.
@@ -199,7 +199,7 @@ impl Recording {
 }
 
 impl Placed {
-    /// Records a function of the machine that `build` makes; `theta` are the parameters, checked, for which its parts are built.
+    /// Records a machine's function that `build` makes; `theta` are the checked parameters of its parts.
     ///
     /// Checked: all programs against the direct evaluation of the same laws, derivatives against dual numbers.
     ///
@@ -239,7 +239,8 @@ impl Placed {
         })
     }
 
-    /// All that it gives, then the entries of the derivatives of that by the inputs at these places; it says so where these are too many.
+    /// Recorded function with the derivatives by the inputs at these places, unless these are too many. All outputs
+    /// come first, then the entries of the derivatives.
     fn derived(self, by: &[u32]) -> Self {
         if self.directions.is_some() {
             return self;
@@ -345,7 +346,7 @@ fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recor
 }
 
 impl Dynamics<Recorded> {
-    /// What `sensors` show at `x` of all outputs, under commands that stand for long; writes the rates.
+    /// Recorded readings of `sensors` at `x` under constant commands; writes the rates.
     fn readings(&mut self, x: &[Recorded], rates: &mut [Recorded], sensors: &[Sensor<Recorded>]) -> Vec<Recorded> {
         let (layout, commands) = (self.layout(), self.inputs.clone());
         for (number, &command) in (0..self.actuators.len()).zip(&commands) {
@@ -371,7 +372,7 @@ impl Dynamics<Recorded> {
         outputs
     }
 
-    /// The rates of a stage of an additive step whose explicit state is `x`.
+    /// Recorded rates of a stage of an additive step whose explicit state is `x`.
     fn additive(&mut self, x: &[Recorded], places: Places) -> Vec<Recorded> {
         let implicit: Vec<Recorded> = (0..x.len()).map(|k| input(places.implicit() + k, 0.0)).collect();
         let reach = input(places.reach(), 0.0);
@@ -383,8 +384,8 @@ impl Dynamics<Recorded> {
         rates
     }
 
-    /// What an iteration matrix is, at the state of the last [`Dynamics::rhs`]: with chords in the place of friction laws; of a machine of
-    /// which beams are all that is stiff, the matrix itself.
+    /// Recorded iteration matrix at the state of the last [`Dynamics::rhs`], with chords for friction laws. Of a
+    /// machine of which beams are all that is stiff, it is the matrix itself.
     pub(super) fn prepared(&mut self, x: &[Recorded]) -> Matrix {
         let (n, dim) = (self.coordinates(), x.len());
         let (q, v) = x[..2 * n].split_at(n);
@@ -402,7 +403,7 @@ impl Dynamics<Recorded> {
         self.chords(x, &resistances, &seals, &memories)
     }
 
-    /// The derivative of the rates at `x` with this resistance of each effect in the place of friction.
+    /// Recorded derivative of the rates at `x` with this resistance of each effect in place of friction.
     fn resisted(&mut self, x: &[Recorded], resistance: impl Fn(&JointEffect<Recorded>) -> Recorded) -> Matrix {
         let zero = Recorded::default();
         let resistances: Vec<_> = self.effects.iter().map(|(_, effect)| resistance(effect)).collect();
@@ -410,8 +411,8 @@ impl Dynamics<Recorded> {
         self.chords(x, &resistances, &seals, &memories)
     }
 
-    /// The derivative of the rates at `x` with these constants in the place of the resistance of effects and `seals` and of what
-    /// remembers, and with the chords of contacts.
+    /// Recorded derivative of the rates at `x` with constant resistances and chords of contacts. The constants stand
+    /// for the resistance of effects, `seals` and memories.
     fn chords(
         &mut self,
         x: &[Recorded],

@@ -71,7 +71,7 @@ struct Directions<S> {
 }
 
 impl<S: Scalar> Routine<S> {
-    /// A function that is right for the parameters `theta`.
+    /// Routine for a machine's function with the parameters `theta`.
     pub(crate) fn new(function: Arc<Function>, theta: &[S]) -> Self {
         let (first, given) = (function.places.first_parameter(), function.places.count());
         let mut inputs = vec![S::zero(); function.often.n_inputs()];
@@ -87,24 +87,24 @@ impl<S: Scalar> Routine<S> {
         Self { function, inputs, outputs, engine: Engine::Operations(engine), directions }
     }
 
-    /// Goes on by machine code, of plain numbers; or says why there is none.
+    /// Compiles a routine to machine code of plain numbers, or says why not.
     pub(crate) fn compile(&mut self) -> std::result::Result<(), String> {
         self.engine = Engine::Code(self.function.native()?.work());
         Ok(())
     }
 
-    /// Goes on by the machine code of a function that gives its derivatives too; or says why there is none.
+    /// Gives a routine machine code of its derivatives, or says why not.
     fn differentiate_by(&mut self, derived: Arc<Function>, by: &[u32]) -> std::result::Result<(), String> {
         self.engine = Engine::Derivatives(Derivatives::new(derived, by, &self.inputs, self.outputs.len())?);
         Ok(())
     }
 
-    /// How many operations an evaluation takes without machine code.
+    /// Number of operations in an evaluation of a routine without machine code.
     pub(crate) fn size(&self) -> usize {
         self.function.often.size()
     }
 
-    /// The inputs that may carry derivatives: all but lengths of steps and parameters, and those of these that do.
+    /// Inputs of a routine that may carry derivatives: all but step lengths and parameters.
     fn moving(&self) -> Vec<u32> {
         let reach = self.function.places.reach();
         let (first, given) = (self.function.places.first_parameter(), self.function.places.count());
@@ -114,25 +114,25 @@ impl<S: Scalar> Routine<S> {
             .collect()
     }
 
-    /// Puts numbers in from place `first` on.
+    /// Puts numbers into a routine from place `first` on.
     #[inline]
     pub(crate) fn put(&mut self, first: usize, numbers: &[S]) {
         self.inputs[first..first + numbers.len()].copy_from_slice(numbers);
     }
 
-    /// Holds input `number` of the machine.
+    /// Holds input `number` of the machine in a routine.
     #[inline]
     pub(crate) fn hold(&mut self, number: usize, input: S) {
         self.inputs[self.function.places.states + number] = input;
     }
 
-    /// Puts in the accelerations of all coordinates.
+    /// Puts the accelerations of all coordinates into a routine.
     #[inline]
     pub(crate) fn put_accelerations(&mut self, a: &[S]) {
         self.put(self.function.places.accelerations(), a);
     }
 
-    /// The state after a whole step of this length from `x`, if that is exact.
+    /// State after a whole step of this length from `x` by a routine, if that is exact.
     #[inline]
     pub(crate) fn step(&mut self, x: &[S], step: f64) -> Option<&[S]> {
         self.put(self.function.places.reach(), &[S::from_f64(step)]);
@@ -140,13 +140,13 @@ impl<S: Scalar> Routine<S> {
         (exact[0].re() == 1.0).then_some(next)
     }
 
-    /// Begins an additive step at the rates `v` of all coordinates.
+    /// Begins an additive step of a routine at the rates `v` of all coordinates.
     #[inline]
     pub(crate) fn depart(&mut self, v: &[S]) {
         self.put(self.function.places.before(), v);
     }
 
-    /// Rates of a stage of an additive step at its explicit and implicit state.
+    /// Rates of an additive step's stage by a routine, at explicit and implicit state.
     #[inline]
     pub(crate) fn additive(&mut self, [explicit, implicit]: [&[S]; 2], reach: S, rates: &mut [S]) {
         let places = self.function.places;
@@ -157,7 +157,7 @@ impl<S: Scalar> Routine<S> {
         self.depart(&rates[..places.coordinates]);
     }
 
-    /// All outputs at state `x`.
+    /// All outputs of a routine at state `x`.
     #[inline]
     pub(crate) fn at(&mut self, x: &[S]) -> &[S] {
         self.put(0, x);
@@ -176,7 +176,8 @@ impl<S: Scalar> Routine<S> {
         &self.outputs
     }
 
-    /// The first outputs, as many as there are states, and the matrix at `x`, row by row in `width` columns.
+    /// Rates and matrix of a routine at `x`, row by row in `width` columns. Rates are the first outputs, as many as
+    /// there are states.
     pub(crate) fn matrix(&mut self, x: &[S], matrix: &mut [S], width: usize, values: &mut [S]) {
         self.at(x);
         let dim = x.len();
@@ -195,12 +196,12 @@ impl<S: Scalar> Routine<S> {
         }
     }
 
-    /// Whether its last matrix lacks derivatives.
+    /// Whether the last matrix of a routine lacks derivatives.
     fn turns(&self) -> bool {
         self.directions.as_ref().is_some_and(|all| all.product.is_some())
     }
 
-    /// What the derivatives that the last matrix lacks make of the values of `k`, see [`crate::ode::Ode::turned`].
+    /// Correction of `k` for derivatives that a routine's last matrix lacks, see [`crate::ode::Ode::turned`].
     fn turned(&mut self, k: &[S], product: &mut [S]) {
         let Some(Along { evaluator, inputs, outputs }) = self.directions.as_mut().and_then(|all| all.product.as_mut())
         else {
@@ -217,7 +218,7 @@ impl<S: Scalar> Routine<S> {
 }
 
 impl Derivatives {
-    /// Of a function of so many `outputs` with derivatives `by` these inputs, at the parameters among `inputs`.
+    /// Derivatives of a routine's function of so many `outputs`, `by` these inputs.
     fn new<S: Scalar>(
         function: Arc<Function>,
         by: &[u32],
@@ -235,7 +236,7 @@ impl Derivatives {
         Ok(Self { inputs: values, outputs: made, function, work, counts, moving })
     }
 
-    /// All outputs at `inputs`, with what their derivatives make of those of the inputs.
+    /// All outputs of a routine at `inputs`, with derivatives along those of the inputs.
     #[inline]
     fn evaluate<S: Scalar>(&mut self, inputs: &[S], outputs: &mut [S]) {
         let moving = self.function.places.first_parameter();
@@ -256,21 +257,21 @@ impl Derivatives {
 }
 
 impl<S: Scalar, const N: usize> Along<S, N> {
-    /// A program at `inputs`.
+    /// Routine's program at `inputs` with derivatives along directions.
     fn new(program: &Program, inputs: &[S]) -> Self {
         let evaluator: Evaluator<Dual<S, N>> = Evaluator::new(program);
         let outputs = vec![Dual::default(); evaluator.n_outputs()];
         Self { evaluator, inputs: inputs.iter().map(|&value| Dual::constant(value)).collect(), outputs }
     }
 
-    /// Puts its first inputs in.
+    /// Puts the first inputs into a routine's program.
     fn place(&mut self, inputs: impl Iterator<Item = S>) {
         self.inputs.iter_mut().zip(inputs).for_each(|(input, value)| *input = Dual::constant(value));
     }
 }
 
 impl Along<f64, LANES> {
-    /// The derivatives by the first `dim` inputs as columns of a matrix stored row by row.
+    /// Derivatives of a routine by the first `dim` inputs as columns of a matrix stored row by row.
     fn matrix<S: Scalar>(&mut self, matrix: &mut [S], dim: usize) {
         for first in (0..dim).step_by(LANES) {
             for (column, input) in self.inputs[..dim].iter_mut().enumerate() {
@@ -300,13 +301,13 @@ pub(crate) struct Routines<S> {
 }
 
 impl<S: Scalar> Routines<S> {
-    /// For the checked parameters `theta`, `inputs` holding at first.
+    /// Routines for the checked parameters `theta`, with `inputs` held at first.
     pub(crate) fn new(functions: Arc<Functions>, theta: &[S], inputs: Vec<S>) -> Self {
         Self { functions, theta: theta.to_vec(), held: inputs, made: Vec::new(), last: None, constant: None }
     }
 
-    /// Leaves the derivatives out of the matrices of linearly implicit steps from now on where there is machine code of these matrices, and
-    /// none of their derivatives; else it says why not, and goes on as before.
+    /// Leaves derivatives out of routines for matrices of linearly implicit steps, or says why not. That holds from now
+    /// on where there is machine code of these matrices, and none of their derivatives. Else it goes on as before.
     pub(crate) fn leave_matrices_constant(&mut self) -> std::result::Result<(), String> {
         if self.has_derivatives_to_compile(&Kind::Prepared) {
             return Err("the derivatives of the matrices have machine code".to_owned());
@@ -318,7 +319,7 @@ impl<S: Scalar> Routines<S> {
         Ok(())
     }
 
-    /// Makes the function of that kind if it is not there yet.
+    /// Makes the routine of that kind if it is not there yet.
     ///
     /// # Errors
     /// As [`Functions::function`].
@@ -332,12 +333,12 @@ impl<S: Scalar> Routines<S> {
         Ok(())
     }
 
-    /// Makes the function of that kind as machine code; or says why there is none.
+    /// Makes the routine of that kind as machine code, or says why not.
     pub(crate) fn compile(&mut self, kind: &Kind) -> std::result::Result<(), String> {
         self.compile_within(kind, usize::MAX)
     }
 
-    /// Makes the function of that kind as machine code, if it has at most `most` operations; or says why there is none.
+    /// Makes the routine of that kind as machine code with at most `most` operations, or says why not.
     pub(crate) fn compile_within(&mut self, kind: &Kind, most: usize) -> std::result::Result<(), String> {
         let words = |error: Error| error.to_string();
         let fits = |function: &Function| match function.often.size() {
@@ -366,7 +367,8 @@ impl<S: Scalar> Routines<S> {
         self.get(kind).map_or(Ok(()), |routine| routine.differentiate_by(derived, &by))
     }
 
-    /// Whether the derivatives of a function by the states alone, those by parameters being few beside, are not too many to compile.
+    /// Whether derivatives of a routine by the states are few enough to compile. Those by parameters are few beside
+    /// these.
     fn has_derivatives_to_compile(&mut self, kind: &Kind) -> bool {
         let Some(states) = self.get(kind).map(|routine| routine.function.places.states as u32) else { return false };
         let values: Vec<f64> = self.theta.iter().map(Scalar::re).collect();
@@ -374,14 +376,14 @@ impl<S: Scalar> Routines<S> {
         derived.is_ok_and(|function| function.directions.is_none() && function.often.size() <= LARGEST)
     }
 
-    /// Makes the functions of these kinds as machine code, all of them or none; or says why there is none.
+    /// Makes the routines of these kinds as machine code, all or none, or says why not.
     pub(crate) fn compile_all(&mut self, kinds: &[Kind]) -> std::result::Result<(), String> {
         kinds.iter().try_for_each(|kind| self.compile(kind)).inspect_err(|_| {
             kinds.iter().for_each(|kind| self.forget(kind));
         })
     }
 
-    /// All outputs at the states that stand first and accelerations `a`; what cannot be made is no number.
+    /// All outputs of a routine at the first states and accelerations `a`; NaN if it cannot be made.
     pub(crate) fn copy(&mut self, kind: &Kind, x: &[S], a: &[S], outputs: &mut [S]) {
         match self.made(kind) {
             Some(routine) => {
@@ -392,7 +394,7 @@ impl<S: Scalar> Routines<S> {
         }
     }
 
-    /// See [`Routine::matrix`]; what cannot be made is no number.
+    /// Matrix by a routine, see [`Routine::matrix`]; NaN if it cannot be made.
     pub(crate) fn matrix(&mut self, kind: &Kind, x: &[S], matrix: &mut [S], width: usize, values: &mut [S]) {
         if let Some(constant) = self.constant.as_deref_mut().filter(|_| *kind == Kind::Prepared) {
             constant.write(x, matrix, width);
@@ -406,38 +408,38 @@ impl<S: Scalar> Routines<S> {
         self.last = self.made.iter().position(|(own, _)| own == kind);
     }
 
-    /// See [`crate::ode::Ode::turns`].
+    /// Whether the routine's last matrix lacks derivatives, see [`crate::ode::Ode::turns`].
     #[inline]
     pub(crate) fn turns(&self) -> bool {
         S::plain(&[]).is_none()
             && self.last.and_then(|last| self.made.get(last)).is_some_and(|(_, routine)| routine.turns())
     }
 
-    /// See [`crate::ode::Ode::turned`].
+    /// Correction by a routine for lacking derivatives, see [`crate::ode::Ode::turned`].
     pub(crate) fn turned(&mut self, k: &[S], product: &mut [S]) {
         if let Some((_, routine)) = self.last.and_then(|last| self.made.get_mut(last)) {
             routine.turned(k, product);
         }
     }
 
-    /// The function of that kind, made now if it was not yet.
+    /// Routine of that kind, made now if it was not yet.
     fn made(&mut self, kind: &Kind) -> Option<&mut Routine<S>> {
         self.make(kind).ok().and_then(|()| self.get(kind))
     }
 
-    /// Forgets the function of that kind.
+    /// Forgets the routine of that kind.
     pub(crate) fn forget(&mut self, kind: &Kind) {
         self.made.retain(|(own, _)| own != kind);
         self.last = None;
     }
 
-    /// The function of that kind, if it was made.
+    /// Routine of that kind, if it was made.
     #[inline]
     pub(crate) fn get(&mut self, kind: &Kind) -> Option<&mut Routine<S>> {
         self.made.iter_mut().find(|(own, _)| own == kind).map(|(_, routine)| routine)
     }
 
-    /// Holds input `number`, see [`super::System::input`].
+    /// Holds input `number` in all routines, see [`super::System::input`].
     #[inline]
     pub(crate) fn hold(&mut self, number: usize, input: S) {
         self.held[number] = input;
@@ -448,17 +450,17 @@ impl<S: Scalar> Routines<S> {
     }
 }
 
-/// Whether machine code pays in a run of so many evaluations of the rates.
+/// Whether machine code of routines pays in a run with so many evaluations of the rates.
 pub(crate) fn code_pays(evaluations: usize) -> bool {
     evaluations >= PAYS
 }
 
-/// Whether machine code pays in a run of so many evaluations that a fit repeats with other parameters.
+/// Whether machine code of routines pays in so many evaluations that a fit repeats.
 pub(crate) fn code_pays_in_fits(evaluations: usize) -> bool {
     code_pays(REPEATS * evaluations)
 }
 
-/// The function that steps by `method` need beside the rates.
+/// Kind of routine that steps by `method` need beside the rates.
 pub(crate) fn kind_of(method: Method) -> Option<Kind> {
     match method {
         Method::Rk4 => None,

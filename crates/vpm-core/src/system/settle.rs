@@ -6,8 +6,9 @@ use crate::actuator::{Actuator, Drive};
 use crate::scalar::Scalar;
 
 impl<S: Scalar> Dynamics<S> {
-    /// Writes the states of drives and supplies of a machine that has stood at `q` without commands: lags, currents and spools 0,
-    /// visco-elastic elements settled, chambers without net force, supplies at their pressure, of which nothing is lost; memories relaxed.
+    /// Settles drives and supplies of a machine at rest at `q` without commands: writes their states. Lags, currents
+    /// and spools are 0, visco-elastic elements settled and memories relaxed. Chambers have no net force, and supplies,
+    /// of which nothing is lost, their pressure.
     pub fn settle_drives(&mut self, q: &[S], states: &mut [S]) {
         let zero = vec![S::zero(); q.len()];
         self.locate(q, &zero);
@@ -37,8 +38,9 @@ impl<S: Scalar> Dynamics<S> {
         at.for_each(|memory| *memory = S::zero());
     }
 
-    /// Number of an actuator whose piston stands beyond its stroke at `q` by more than the stops give way (1 mm or 2 % of the stroke, and
-    /// what they yield under twice the force of the supply), with the piston's place from mid-stroke and half of the stroke, m.
+    /// Actuator whose piston stands beyond its stroke at `q`, so that it cannot settle. Stops give way by 1 mm or 2 %
+    /// of the stroke, and by what they yield under twice the force of the supply. Returns its number, with the piston's
+    /// place from mid-stroke and half of the stroke, m.
     pub(crate) fn piston_outside(&mut self, q: &[S]) -> Option<(usize, f64, f64)> {
         if self.shown.hydraulics.is_empty() {
             return None;
@@ -59,8 +61,7 @@ impl<S: Scalar> Dynamics<S> {
         found
     }
 
-    /// Writes the resistances that stand for the friction of seals and drives in an iteration matrix at (q, v), after [`Dynamics::rhs`]
-    /// there.
+    /// Chords for friction of seals and drives in an iteration matrix at (q, v), after [`Dynamics::rhs`].
     pub(super) fn drive_chords(&self, q: &[S], v: &[S], chords: &mut [Option<S>]) {
         let rubs = |actuator: &Actuator<S>| match &actuator.drive {
             Drive::Hydraulic(law) => actuator.friction.is_some() || law.cylinder.seal.is_there(),
@@ -100,8 +101,8 @@ impl<S: Scalar> Dynamics<S> {
         self.drive_sizes(|[size, _]| scales.next().into_iter().for_each(|scale| *scale = size));
     }
 
-    /// Which of the states of drives, supplies and memories is out of reach in `states`, and how far its law leads at most: none that
-    /// is no more than its natural size beyond, which is what steps may be off.
+    /// State of a drive, supply or memory that is out of reach in `states`, and the limit of its law. It may be no more
+    /// than its natural size beyond: steps may be off by that.
     pub(crate) fn out_of_reach(&self, states: &[f64]) -> Option<(usize, f64)> {
         let (mut states, mut found) = (states.iter().enumerate(), None);
         self.drive_sizes(|[size, reach]| {
@@ -111,8 +112,8 @@ impl<S: Scalar> Dynamics<S> {
         found
     }
 
-    /// Tells `next` the natural size of each state of drives, supplies and memories, in SI units, and how far from zero its law leads at most:
-    /// infinite where commands or motions have the last word.
+    /// Tells `next` the natural size and limit of each state of drives, supplies and memories, in SI units. The limit
+    /// is how far from zero its law leads at most: infinite where commands or motions decide.
     fn drive_sizes(&self, mut next: impl FnMut([f64; 2])) {
         const STRETCH: f64 = 1e-3;
         const PRESSURE: f64 = 1e5;

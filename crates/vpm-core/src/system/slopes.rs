@@ -29,7 +29,7 @@ pub(crate) struct Rubbing {
 }
 
 impl Dynamics<f64> {
-    /// Adds to `stiffness` and `damping` (n x n) those of contacts and bushings, after [`Dynamics::terms`] at the same state.
+    /// Adds slopes of contacts and bushings to `stiffness` and `damping` (n x n), after [`Dynamics::terms`].
     ///
     /// Law: `J^T K J` and `J^T C J` with K and C of each law where it is now, the friction by its chord: what is left out, the change of
     /// J with the state, is small beside it. Checked: against the change of the loads with the state.
@@ -43,7 +43,7 @@ impl Dynamics<f64> {
         }
     }
 
-    /// What rubs at rest and `q`, after [`Dynamics::rhs`] in that state: effects, those that remember, and actuators, in their order.
+    /// Slopes of friction at rest at `q`: of effects, memories and actuators, in their order.
     pub(crate) fn rubbing(&self, q: &[f64]) -> Vec<Rubbing> {
         let zeros = || vec![0.0; self.coordinates()];
         let at = |seat: &Seat<f64>| {

@@ -40,7 +40,7 @@ pub(crate) struct Parts {
 }
 
 impl Parts {
-    /// Part by part, with its name.
+    /// Stages of the rates, part by part with names.
     pub(crate) fn named(&self) -> [(&'static str, f64); 7] {
         [
             ("kinematics", self.kinematics),
@@ -54,7 +54,7 @@ impl Parts {
     }
 }
 
-/// Seconds of one call, the least over some rows of calls.
+/// Seconds of one stage: the least over some rows of calls.
 pub(crate) fn seconds(mut call: impl FnMut()) -> f64 {
     let mut row = |calls: u32| {
         let begin = Instant::now();
@@ -69,7 +69,7 @@ pub(crate) fn seconds(mut call: impl FnMut()) -> f64 {
 }
 
 impl Dynamics<f64> {
-    /// Seconds of each part of the rates at `x`.
+    /// Seconds of each stage of the rates at `x`.
     pub(crate) fn parts(&mut self, x: &[f64]) -> Parts {
         let n = self.coordinates();
         let (q, v) = x[..2 * n].split_at(n);
@@ -144,7 +144,7 @@ impl Dynamics<f64> {
         parts
     }
 
-    /// Seconds of reading all outputs at `x`.
+    /// Seconds of the stage that reads all outputs at `x`.
     pub(crate) fn observing(&mut self, x: &[f64], outputs: &mut [f64]) -> f64 {
         let mut rates = vec![0.0; self.dim()];
         self.rhs(x, &mut rates);
@@ -153,7 +153,7 @@ impl Dynamics<f64> {
 }
 
 impl System<f64> {
-    /// Seconds of the rates that steps by `method` ask for at `x`.
+    /// Seconds of the rates at `x` that steps by `method` need.
     pub(crate) fn rates_seconds(&mut self, method: Method, x: &[f64]) -> f64 {
         let mut rates = vec![0.0; self.dim()];
         match method {
@@ -164,13 +164,13 @@ impl System<f64> {
         }
     }
 
-    /// Seconds of the rates with all outputs at `x`.
+    /// Seconds of the stage of rates with all outputs at `x`.
     pub(crate) fn sample_seconds(&mut self, x: &[f64], outputs: &mut [f64]) -> f64 {
         let mut rates = vec![0.0; self.dim()];
         seconds(|| self.sample(black_box(x), &mut rates, outputs))
     }
 
-    /// Seconds of one matrix of this kind at `x`; the rates there count where they come with it.
+    /// Seconds of the stage of one matrix of this kind at `x`, with rates where they come with it.
     pub(crate) fn matrix_seconds(&mut self, kind: Matrix, x: &[f64]) -> f64 {
         let (dim, n) = (self.dim(), self.coordinates());
         let mut rates = vec![0.0; dim];

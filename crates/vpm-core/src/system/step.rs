@@ -12,14 +12,14 @@ const LANES: usize = 8;
 /// Largest factor of an elimination without row exchanges that counts as exact: of the digits of a number it costs two for each row at most.
 const LARGEST_FACTOR: f64 = 100.0;
 
-/// The state after a step, then one where that is exact, zero where the elimination would have to exchange rows.
+/// Whole linearly implicit step as one function: the state after it, and whether that is exact.
 ///
 /// Law: [`LinearlyImplicit`].
 pub(super) fn linearly_implicit(dynamics: &mut Dynamics<Recorded>, places: Places) -> Vec<Recorded> {
     step::<0>(dynamics, places, &[]).into_iter().map(|number| number.value).collect()
 }
 
-/// The numbers of [`linearly_implicit`], and their derivatives by the inputs at the places `by`.
+/// Whole step of [`linearly_implicit`] with its derivatives by the inputs at the places `by`.
 ///
 /// Law: derivatives of a stage follow from those of its state, and of the solution of a linear system from that system again, see
 /// [`Ode::turned`]: far fewer operations than derivatives of each operation.
@@ -39,7 +39,7 @@ pub(super) fn linearly_implicit_derived(
     (values, Matrix::Entries(matrix, by.len()))
 }
 
-/// A step with at most N derivatives, `by` the inputs at these places.
+/// Whole step with at most N derivatives, `by` the inputs at these places.
 fn step<const N: usize>(dynamics: &mut Dynamics<Recorded>, places: Places, by: &[u32]) -> Vec<Dual<Recorded, N>> {
     let lane = |place: usize| by.iter().position(|&by| by as usize == place).unwrap_or(N);
     let mut x: Vec<_> = (0..places.states).map(|place| Dual::variable(input(place, 0.0), lane(place))).collect();
@@ -63,7 +63,7 @@ struct Machine<'a> {
 }
 
 impl Machine<'_> {
-    /// The inputs by which derivatives are taken.
+    /// Inputs of a whole step by which derivatives are taken.
     fn variables(&self) -> Vec<Recorded> {
         self.by.iter().map(|&place| input(place as usize, 0.0)).collect()
     }
@@ -101,7 +101,7 @@ impl<const N: usize> Ode<Dual<Recorded, N>> for Machine<'_> {
         self.iteration_matrix(x, jacobian);
     }
 
-    /// At the state where the step begins, which are inputs.
+    /// Prepares a whole step at the state where it begins.
     fn prepare(&mut self, x: &[Dual<Recorded, N>], matrix: &mut [Dual<Recorded, N>], rates: &mut [Dual<Recorded, N>]) {
         let state: Vec<Recorded> = x.iter().map(|number| number.value).collect();
         let mut values = vec![Recorded::zero(); x.len()];
@@ -134,7 +134,7 @@ impl<const N: usize> Ode<Dual<Recorded, N>> for Machine<'_> {
 }
 
 impl Matrix {
-    /// Row, column and number of each entry that is not zero, while their recording is under way.
+    /// Nonzero entries of a whole step's matrix: row, column and number of each.
     fn entries(self) -> Vec<((usize, usize), Recorded)> {
         match self {
             Self::Of(numbers, by) => derivatives(&numbers, &by),

@@ -5,8 +5,9 @@ use crate::actuator::{Drive, Target};
 use crate::effect::MemoryChords;
 use crate::scalar::Scalar;
 
-/// `[0, 1; -M^-1 K, -M^-1 D]` with the slopes of the effects in K and their chords, `resistances`, in D, and the columns and rows of
-/// the lags of ideal drives and of memories with their `chords`, for the price of one mass matrix.
+/// Matrix of what is stiff: `[0, 1; -M^-1 K, -M^-1 D]` with beams, effects, lags and memories. K has the slopes of the
+/// effects, and D their chords, `resistances`. Lags of ideal drives and memories with their `chords` have columns and
+/// rows. It costs one mass matrix.
 ///
 /// What it leaves out, the change of gravity, of velocity terms and of levers with the state, is slow beside the vibrations. Checked:
 /// against the exact Jacobian of a beam at rest without gravity, where nothing is left out.
@@ -58,7 +59,7 @@ pub(super) fn iteration_matrix<S: Scalar>(
     remember(dynamics, lower, dim, chords, column);
 }
 
-/// The columns and rows of the memories.
+/// Columns and rows of the memories in the matrix of what is stiff.
 fn remember<S: Scalar>(
     dynamics: &Dynamics<S>,
     rows: &mut [S],
@@ -83,7 +84,7 @@ fn remember<S: Scalar>(
     }
 }
 
-/// `[-M^-1 K, -M^-1 D]` of the beams, added to rows of `width` entries, with the factors of M in the data.
+/// Stiff part `[-M^-1 K, -M^-1 D]` of the beams, added to rows of `width` entries. The factors of M are in the data.
 pub(super) fn elasticity<S: Scalar>(dynamics: &Dynamics<S>, rows: &mut [S], width: usize, column: &mut [S]) {
     let n = dynamics.coordinates();
     for elastic in dynamics.model.beams() {
@@ -102,7 +103,7 @@ pub(super) fn elasticity<S: Scalar>(dynamics: &Dynamics<S>, rows: &mut [S], widt
     }
 }
 
-/// Adds so many times a column.
+/// Adds a multiple of one column to another in the matrix of what is stiff.
 fn add_column<S: Scalar>(rows: &mut [S], width: usize, place: usize, (column, times): (&[S], S)) {
     for (row, &entry) in rows.chunks_exact_mut(width).zip(column) {
         row[place] += entry * times;

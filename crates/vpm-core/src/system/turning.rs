@@ -55,7 +55,7 @@ struct Watched {
 }
 
 impl<S: Scalar> Turning<S> {
-    /// Follows these ball joints, each with whether it turns freely.
+    /// Turning ball joints, each with whether it turns freely.
     pub(super) fn new<'a>(balls: impl Iterator<Item = (&'a Ball, bool)>) -> Self {
         let (mut own, mut watched) = (Vec::new(), Vec::new());
         for (number, (ball, free)) in balls.enumerate() {
@@ -69,18 +69,18 @@ impl<S: Scalar> Turning<S> {
         Self { free: own, watched, trouble: None, rests: false }
     }
 
-    /// Whether there is any joint to take care of.
+    /// Whether there are no turning ball joints.
     #[inline]
     pub(super) fn is_empty(&self) -> bool {
         self.free.is_empty() && self.watched.is_empty()
     }
 
-    /// Stays at the orientations where it is from now on, however steps move the coordinates.
+    /// Rests turning ball joints at their orientations, however steps move the coordinates.
     pub(super) fn rest(&mut self) {
         self.rests = true;
     }
 
-    /// Whether it stays where it is.
+    /// Whether turning ball joints keep their reference orientations.
     pub(super) fn is_resting(&self) -> bool {
         self.rests
     }
@@ -89,7 +89,7 @@ impl<S: Scalar> Turning<S> {
         self.trouble
     }
 
-    /// Takes over a state `x` with `n` coordinates whose angles are those that users know, and holds the orientations by `hold`.
+    /// Enters a state `x` with users' angles of turning ball joints, and holds the orientations by `hold`.
     pub(super) fn enter(&mut self, x: &mut [S], n: usize, mut hold: impl FnMut(usize, S)) {
         self.trouble = None;
         let (q, v) = x.split_at_mut(n);
@@ -106,7 +106,7 @@ impl<S: Scalar> Turning<S> {
         self.watch(x, n, None);
     }
 
-    /// Goes on from where a step has led, see [`crate::ode::Ode::arrive`].
+    /// Arrives after a step: turning ball joints take new orientations, see [`crate::ode::Ode::arrive`].
     pub(super) fn arrive(&mut self, x: &mut [S], n: usize, step: Option<f64>, mut hold: impl FnMut(usize, S)) {
         if self.rests {
             return;
@@ -125,7 +125,7 @@ impl<S: Scalar> Turning<S> {
         }
     }
 
-    /// Takes note of an angle too near to the singularity to be a coordinate.
+    /// Watches for an angle of a turning ball joint that is too near to its singularity.
     fn watch(&mut self, x: &[S], n: usize, step: Option<f64>) {
         for joint in &mut self.watched {
             let (angle, near) = joint.ball.nearness(&x[..n], &x[n..], step);
@@ -135,7 +135,7 @@ impl<S: Scalar> Turning<S> {
         }
     }
 
-    /// Writes angles and their rates at state `x` into `shown`, which holds coordinates and rates of the machine.
+    /// Shows angles and rates of turning ball joints at state `x` in `shown`.
     pub(super) fn show(&self, x: &[S], n: usize, shown: &mut [S]) {
         for joint in &self.free {
             let rates = rates(joint.angles, joint.omega(&x[n..]));
@@ -146,7 +146,8 @@ impl<S: Scalar> Turning<S> {
         }
     }
 
-    /// Writes angles and their rates into the outputs of the joints, their accelerations too where the rates `dxdt` of the state are given.
+    /// Shows angles and rates of turning ball joints in the outputs. Accelerations too where the rates `dxdt` of the
+    /// state are given.
     pub(super) fn show_outputs(&self, x: &[S], n: usize, dxdt: Option<&[S]>, outputs: &mut [S]) {
         for joint in &self.free {
             let omega = joint.omega(&x[n..]);
@@ -169,7 +170,7 @@ impl<S: Scalar> Turning<S> {
 }
 
 impl<S: Scalar> Free<S> {
-    /// Puts the coordinates to zero and their rates to an angular velocity.
+    /// Begins a turning ball joint: zero coordinates, and an angular velocity as their rates.
     fn begin(&self, q: &mut [S], v: &mut [S], omega: Vector3<S>) {
         for (place, rate) in self.places.into_iter().zip(omega.to_array()) {
             (q[place], v[place]) = (S::zero(), rate);
@@ -180,14 +181,14 @@ impl<S: Scalar> Free<S> {
         self.orientation.to_array().into_iter().enumerate().for_each(|(k, number)| hold(4 * place + k, number));
     }
 
-    /// Its three numbers among those of all coordinates.
+    /// Indices of a turning ball joint's three rates among those of all coordinates.
     fn omega(&self, numbers: &[S]) -> Vector3<S> {
         let [x, y, z] = self.places.map(|place| numbers[place]);
         Vector3::new(x, y, z)
     }
 }
 
-/// How many half turns an angle has made from 90 degrees on.
+/// Number of half turns of a ball joint's angle from 90 degrees on.
 fn halves(angle: f64) -> f64 {
     ((angle + FRAC_PI_2) / PI).floor()
 }

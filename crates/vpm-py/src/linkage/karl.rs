@@ -50,7 +50,7 @@ impl Karl {
         Ok(Self { limb: Limb::new(geometry).map_err(|error| exception(py, error, 0, 0))? })
     }
 
-    /// The prototype's dimensions, in the order of the class's arguments.
+    /// Dimensions of the KARL prototype, in the order of the class's arguments.
     #[staticmethod]
     #[expect(clippy::type_complexity, reason = "the arguments of the Python class")]
     fn prototype() -> (f64, f64, f64, [[f64; 2]; 2], [f64; 2], [f64; 2], [f64; 2]) {
@@ -58,50 +58,51 @@ impl Karl {
         (g.medial, g.distal, g.stroke_direction, g.sliders, g.ground_anchor, g.distal_anchor, g.rods)
     }
 
-    /// Joint angles (4, 2) of all assembly modes at two strokes.
+    /// Direct kinematics of KARL: joint angles (4, 2) of all assembly modes at two strokes.
     fn direct<'py>(&self, py: Python<'py>, strokes: [f64; 2]) -> PyResult<Table<'py>> {
         let poses = self.limb.direct(strokes).map_err(|error| exception(py, error, 0, 0))?;
         matrix(py, poses.iter().flat_map(|pose| pose.angles).collect(), [4, 2])
     }
 
-    /// Angles and strokes (8, 4) of all configurations that put the end point at `target`.
+    /// Inverse kinematics of KARL: angles and strokes (8, 4) that put the end point at `target`.
     fn inverse<'py>(&self, py: Python<'py>, target: [f64; 2]) -> PyResult<Table<'py>> {
         let poses = self.limb.inverse(target).map_err(|error| exception(py, error, 0, 0))?;
         matrix(py, poses.iter().flat_map(|pose| [pose.angles, pose.strokes].concat()).collect(), [8, 4])
     }
 
-    /// End points (N, 2) at joint angles (N, 2).
+    /// End points (N, 2) of KARL at joint angles (N, 2).
     fn end_point<'py>(&self, py: Python<'py>, angles: &Any<'_>) -> PyResult<Table<'py>> {
         let angles = Numbers::table("angles", angles)?.rows_of::<2>()?;
         table(py, angles.iter().map(|&q| self.limb.end_point(q)))
     }
 
-    /// Determinants (N,) of the end point's Jacobian at joint angles (N, 2), in m^2.
+    /// Determinants (N,) of KARL's end-point Jacobian at joint angles (N, 2), in m^2.
     fn end_point_determinant<'py>(&self, py: Python<'py>, angles: &Any<'_>) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let angles = Numbers::table("angles", angles)?.rows_of::<2>()?;
         Ok(PyArray1::from_iter(py, angles.iter().map(|&q| self.limb.end_point_determinant(q))))
     }
 
-    /// Diagonals (N, 2) of Lambda in rad/m.
+    /// Diagonals (N, 2) of KARL's Lambda in rad/m.
     fn transmission<'py>(&self, py: Python<'py>, angles: &Any<'_>, strokes: &Any<'_>) -> PyResult<Table<'py>> {
         let poses = poses(angles, strokes)?;
         table(py, poses.iter().map(|pose| self.limb.lambda(pose)))
     }
 
-    /// Determinants (N, 2) of Psi and Omega in m^2.
+    /// Determinants (N, 2) of KARL's Psi and Omega in m^2.
     fn determinants<'py>(&self, py: Python<'py>, angles: &Any<'_>, strokes: &Any<'_>) -> PyResult<Table<'py>> {
         let poses = poses(angles, strokes)?;
         table(py, poses.iter().map(|pose| self.limb.determinants(pose)))
     }
 
-    /// Derivatives (N, 2) of the constraints by the strokes in m, zero where a rod is perpendicular to its stroke.
+    /// Derivatives (N, 2) of KARL's constraints by the strokes in m. They are zero where a rod is perpendicular to its
+    /// stroke.
     fn stroke_slopes<'py>(&self, py: Python<'py>, angles: &Any<'_>, strokes: &Any<'_>) -> PyResult<Table<'py>> {
         let poses = poses(angles, strokes)?;
         let slope = |pose: &KarlPose, k: usize| self.limb.linkages()[k].stroke_slope(pose.strokes[k], pose.angles[k]);
         table(py, poses.iter().map(|pose| [slope(pose, 0), slope(pose, 1)]))
     }
 
-    /// Joint torques (N, 2) of actuator forces (N, 2).
+    /// Joint torques (N, 2) of KARL's actuator forces (N, 2).
     fn torques<'py>(
         &self,
         py: Python<'py>,
@@ -114,7 +115,7 @@ impl Karl {
         table(py, poses.iter().zip(forces).map(|(pose, force)| self.limb.torques(pose, force)))
     }
 
-    /// Rows (stroke, angle, extended) of the strokes of one actuator that lose control of its joint.
+    /// Alignments of KARL: rows (stroke, angle, extended) of one actuator that loses control of its joint.
     fn alignments<'py>(&self, py: Python<'py>, actuator: i64) -> PyResult<Table<'py>> {
         let rows = self.linkage(actuator)?.alignments();
         let shape = [rows.len(), 3];
@@ -122,14 +123,15 @@ impl Karl {
         matrix(py, rows.iter().flat_map(|at| [at.stroke, at.angle, flag(at.extended)]).collect(), shape)
     }
 
-    /// Rows (stroke, angle) at which the rod of one actuator is perpendicular to the stroke.
+    /// Rows (stroke, angle) at which the rod of one KARL actuator is perpendicular to the stroke.
     fn perpendiculars<'py>(&self, py: Python<'py>, actuator: i64) -> PyResult<Table<'py>> {
         let rows = self.linkage(actuator)?.perpendiculars();
         let shape = [rows.len(), 2];
         matrix(py, rows.iter().flat_map(|at| [at.stroke, at.angle]).collect(), shape)
     }
 
-    /// Turn of a joint in rad between the extended and the folded alignment with the larger strokes, in mode +1 or -1.
+    /// Span of a KARL joint in rad between the extended and the folded alignment, in mode +1 or -1. It is that with the
+    /// larger strokes.
     fn span(&self, actuator: i64, mode: f64) -> PyResult<f64> {
         let linkage = self.linkage(actuator)?;
         match linkage.alignments()[..] {
@@ -140,7 +142,7 @@ impl Karl {
         }
     }
 
-    /// Coefficients (5,) of the resultant in s = sin q at one stroke, lowest power first.
+    /// Resultant of KARL at one stroke: coefficients (5,) in s = sin q, lowest power first.
     fn resultant(&self, actuator: i64, stroke: f64) -> PyResult<[f64; 5]> {
         Ok(resultant(&self.linkage(actuator)?.polynomial(stroke), &Conic::CIRCLE))
     }

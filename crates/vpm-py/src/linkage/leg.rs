@@ -88,19 +88,19 @@ impl Leg {
         Ok(Self { limb: Limb::new(parameters).map_err(|error| exception(py, error, 0, 0))? })
     }
 
-    /// Lengths (N, 2) of hip and knee cylinder at joint angles (N, 2).
+    /// Lengths (N, 2) of the leg's hip and knee cylinder at joint angles (N, 2).
     fn strokes<'py>(&self, py: Python<'py>, angles: &Any<'_>) -> PyResult<Table<'py>> {
         let angles = pairs("angles", angles)?;
         table(py, angles.iter().map(|&q| self.limb.strokes(q)))
     }
 
-    /// Lever arms (N, 2) of the cylinders in m/rad at joint angles (N, 2).
+    /// Lever arms (N, 2) of the leg's cylinders in m/rad at joint angles (N, 2).
     fn levers<'py>(&self, py: Python<'py>, angles: &Any<'_>) -> PyResult<Table<'py>> {
         let angles = pairs("angles", angles)?;
         table(py, angles.iter().map(|&q| self.limb.levers(q)))
     }
 
-    /// Points (N, 7, 2): hip, knee, foot, bases of hip and knee cylinder, their tips.
+    /// Points (N, 7, 2) of the leg: hip, knee, foot, bases of hip and knee cylinder, their tips.
     fn points<'py>(&self, py: Python<'py>, angles: &Any<'_>) -> PyResult<Cube<'py>> {
         let angles = pairs("angles", angles)?;
         let row = |q: [f64; 2]| {
@@ -111,7 +111,7 @@ impl Leg {
         cube(py, values, [angles.len(), 7, 2])
     }
 
-    /// Mass matrices (N, 2, 2), velocity terms (N, 2) and gravity terms (N, 2).
+    /// Mass matrices (N, 2, 2), velocity terms (N, 2) and gravity terms (N, 2) of the leg.
     fn terms<'py>(
         &self,
         py: Python<'py>,
@@ -141,7 +141,7 @@ impl Leg {
         ))
     }
 
-    /// Reactions (N, 23): torques, cylinder forces, ground, guide (2), pins (6 x 2), bearings (2 x 2).
+    /// Reactions (N, 23) of the leg: torques, cylinder forces, ground, guide (2), pins (6 x 2), bearings (2 x 2).
     fn reactions<'py>(
         &self,
         py: Python<'py>,
@@ -158,14 +158,14 @@ impl Leg {
         table(py, rows.map_err(|error| exception(py, error, 0, 0))?.into_iter())
     }
 
-    /// Cylinder forces (N, 2) that give joint torques (N, 2).
+    /// Cylinder forces (N, 2) of the leg that give joint torques (N, 2).
     fn cylinder_forces<'py>(&self, py: Python<'py>, angles: &Any<'_>, torques: &Any<'_>) -> PyResult<Table<'py>> {
         let (angles, torques) = (pairs("angles", angles)?, pairs("torques", torques)?);
         same_rows("torques", torques.len(), angles.len())?;
         table(py, angles.iter().zip(torques).map(|(&q, torque)| self.limb.cylinder_forces(q, torque)))
     }
 
-    /// Joint accelerations (N, 2) under joint torques (N, 2).
+    /// Joint accelerations (N, 2) of the leg under joint torques (N, 2).
     fn accelerations<'py>(
         &self,
         py: Python<'py>,
@@ -181,7 +181,8 @@ impl Leg {
         table(py, rows.map_err(|error| exception(py, error, 0, 0))?.into_iter())
     }
 
-    /// Largest shares (N, 3) of inertia, velocity and gravity over all sampled motions at joint angles (N, 2).
+    /// Largest shares (N, 3) of inertia, velocity and gravity in the leg at joint angles (N, 2). They are those over
+    /// all sampled motions.
     fn shares<'py>(
         &self,
         py: Python<'py>,

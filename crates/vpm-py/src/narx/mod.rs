@@ -33,7 +33,7 @@ fn terms(structure: &narx::Structure) -> Terms {
     structure.terms().iter().map(pairs).collect()
 }
 
-/// The exception for an error; a free run that diverged carries its samples.
+/// Python exception for an error of a NARX model; a free run that diverged carries its samples.
 fn raised(py: Python<'_>, error: Error) -> PyErr {
     let Error::Narx(inner) = &error else { return exception(py, error, 0, 0) };
     let NarxError::Diverged { sample, samples, .. } = &**inner else { return exception(py, error, 0, 0) };
@@ -106,19 +106,20 @@ impl Narx {
         Ok(Self { model: model.map_err(|error| raised(py, error))? })
     }
 
-    /// Longest lag in samples.
+    /// Longest lag of a NARX model in samples.
     #[getter]
     fn longest_lag(&self) -> usize {
         self.model.structure().longest_lag()
     }
 
-    /// Terms as they are written.
+    /// Terms of a NARX model as they are written.
     fn texts(&self) -> Vec<String> {
         let structure = self.model.structure();
         structure.terms().iter().map(|term| term.text(structure.signals())).collect()
     }
 
-    /// Output (N,) from the simulated past; of the given output the first samples are the start.
+    /// Free run of a NARX model: output (N,) from the simulated past. Of the given output the first samples are the
+    /// start.
     #[pyo3(signature = (name, output, inputs, limit))]
     fn simulate_free_run<'py>(
         &self,
@@ -133,7 +134,7 @@ impl Narx {
         run.map(|values| PyArray1::from_vec(py, values)).map_err(|error| raised(py, error))
     }
 
-    /// Output (N,) from the measured past.
+    /// One-step prediction of a NARX model: output (N,) from the measured past.
     #[pyo3(signature = (name, output, inputs))]
     fn predict_one_step<'py>(
         &self,
@@ -147,7 +148,7 @@ impl Narx {
         predicted.map(|values| PyArray1::from_vec(py, values)).map_err(|error| raised(py, error))
     }
 
-    /// A simulation that is fed sample by sample.
+    /// Stepper of a NARX model that is fed sample by sample.
     fn stepper(&self) -> NarxStepper {
         NarxStepper { stepper: Mutex::new(self.model.stepper()) }
     }
@@ -168,7 +169,7 @@ impl NarxStepper {
 
 #[pymethods]
 impl NarxStepper {
-    /// Set the past: outputs (L,) and inputs (L, m), oldest first, L the longest lag.
+    /// Starts a NARX stepper with the past: outputs (L,) and inputs (L, m), oldest first, L the longest lag.
     #[pyo3(signature = (output, inputs))]
     fn start(&self, py: Python<'_>, output: Any<'_>, inputs: Any<'_>) -> PyResult<()> {
         let past = Copied::new(&("start".to_owned(), output, inputs))?;
@@ -176,7 +177,7 @@ impl NarxStepper {
         self.stepper()?.start(record.output, record.inputs).map_err(|error| raised(py, error))
     }
 
-    /// Output of this sample from its inputs (m,).
+    /// Output of a NARX stepper at this sample from its inputs (m,).
     fn step(&self, inputs: &Any<'_>) -> PyResult<f64> {
         let inputs = Vector::new("inputs", inputs)?;
         let (mut stepper, inputs) = (self.stepper()?, inputs.values()?);
@@ -190,7 +191,8 @@ impl NarxStepper {
     }
 }
 
-/// All products of at most `degree` lagged signals: factors (signal, lag) of each. `lags` are pairs of a signal and its lags.
+/// Candidate terms of a NARX model of at most `degree` lagged signals: factors (signal, lag) of each. `lags` are pairs
+/// of a signal and its lags.
 #[pyfunction]
 #[pyo3(signature = (lags, degree, constant))]
 pub(crate) fn narx_candidates(lags: Vec<(usize, Vec<usize>)>, degree: usize, constant: bool) -> Terms {
@@ -199,7 +201,7 @@ pub(crate) fn narx_candidates(lags: Vec<(usize, Vec<usize>)>, degree: usize, con
     narx::candidates(&lags, degree, constant).iter().map(pairs).collect()
 }
 
-/// Coefficients of given terms by least squares over all records.
+/// Coefficients of given NARX terms by least squares over all records.
 #[pyfunction]
 #[pyo3(signature = (signals, terms, records))]
 pub(crate) fn narx_fit<'py>(
@@ -221,7 +223,7 @@ pub(crate) fn narx_fit<'py>(
 /// made them so.
 type Selected<'py> = (Terms, Row<'py>, Row<'py>, Row<'py>, Vec<(String, String)>);
 
-/// Terms chosen by their error-reduction ratio.
+/// Terms of a NARX model selected by their error-reduction ratio.
 #[pyfunction]
 #[pyo3(signature = (signals, terms, records, most, stop, value))]
 pub(crate) fn narx_select<'py>(

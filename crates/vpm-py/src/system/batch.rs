@@ -13,7 +13,8 @@ type Answered<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>);
 
 #[pymethods]
 impl System {
-    /// Answers (N, width) at N motions, and their derivatives (N, width, k): by the motion if wanted, then by parameters.
+    /// Batch of answers (N, width) at N motions, and their derivatives (N, width, k). By the motion if wanted, then by
+    /// parameters.
     #[pyo3(signature = (theta, question, marker, motions, by_motion=false, parameters=vec![]))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn answers<'py>(

@@ -19,7 +19,8 @@ type Any<'py> = Bound<'py, PyAny>;
 
 #[pymethods]
 impl System {
-    /// Effort that a motion needs and effort that the actuators deliver, each (N, n), and the derivative of their difference (N, n, k).
+    /// Evaluates inverse dynamics along a motion: efforts needed and delivered, each (N, n). Also the derivative of
+    /// their difference (N, n, k).
     #[pyo3(signature = (theta, position, velocity, acceleration, inputs, time_step, sensitivities=vec![]))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn inverse_dynamics<'py>(
@@ -57,13 +58,13 @@ impl System {
         ))
     }
 
-    /// Complains about parameters with which the machine does not exist.
+    /// Checks before an evaluation whether the machine exists with these parameters.
     fn check(&self, py: Python<'_>, theta: &Any<'_>) -> PyResult<()> {
         let theta = Numbers::vector("theta", theta)?;
         self.checked(py, self.description.check_values(theta.values()))
     }
 
-    /// Effort that a motion needs (N, n) whatever the drives are, and its derivatives (N, n, k).
+    /// Evaluates the effort that a motion needs (N, n) whatever the drives are, and derivatives (N, n, k).
     #[pyo3(signature = (theta, position, velocity, acceleration, time_step, sensitivities=vec![]))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn required<'py>(
@@ -93,7 +94,8 @@ impl System {
         Ok((matrix(py, efforts, [rows, joints])?, cube(py, jacobian, [rows, joints, variables.len()])?))
     }
 
-    /// Effort of ideal drives on the joints (N, n_joints) under `inputs`, and its derivatives (N, n_joints, k).
+    /// Evaluates the effort of ideal drives on the joints (N, n_joints) under `inputs`. Also its derivatives (N,
+    /// n_joints, k).
     #[pyo3(signature = (theta, inputs, time_step, sensitivities=vec![]))]
     fn delivered<'py>(
         &self,
@@ -113,7 +115,7 @@ impl System {
         Ok((matrix(py, efforts, [rows, joints])?, cube(py, jacobian, [rows, joints, variables.len()])?))
     }
 
-    /// Accelerations (n,) of the rigid tree with its effects under efforts on the joints.
+    /// Evaluates accelerations (n,) of the rigid tree with its effects under efforts on the joints.
     fn forward_dynamics<'py>(
         &self,
         py: Python<'py>,
@@ -131,7 +133,7 @@ impl System {
         Ok(PyArray1::from_vec(py, self.checked(py, result)?))
     }
 
-    /// Mass matrix (n, n), payloads included.
+    /// Evaluates the mass matrix (n, n), payloads included.
     fn mass_matrix<'py>(&self, py: Python<'py>, theta: &Any<'py>, position: &Any<'py>) -> PyResult<Table<'py>> {
         let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
         let result = unbroken(|| evaluate::mass_matrix(&self.description, theta.values(), q.values()))?;
@@ -139,7 +141,7 @@ impl System {
         matrix(py, self.checked(py, result)?, [n, n])
     }
 
-    /// Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential.
+    /// Evaluates kinetic and potential energy in J: of bodies in gravity, and of effects with a potential.
     fn energy(&self, py: Python<'_>, theta: &Any<'_>, position: &Any<'_>, velocity: &Any<'_>) -> PyResult<(f64, f64)> {
         let theta = Numbers::vector("theta", theta)?;
         let (q, v) = (Numbers::vector("position", position)?, Numbers::vector("velocity", velocity)?);
@@ -147,7 +149,7 @@ impl System {
         self.checked(py, result)
     }
 
-    /// Exact A (nx, nx), B (nx, nu), C (ny, nx), D (ny, nu) at a state under commands that stand.
+    /// Evaluates exact A (nx, nx), B (nx, nu), C (ny, nx), D (ny, nu) at a state under held commands.
     fn linearize<'py>(
         &self,
         py: Python<'py>,
@@ -168,14 +170,15 @@ impl System {
         ))
     }
 
-    /// States of drives and supplies (n_states - 2 n,) of a machine that has stood at a position (n,) without commands.
+    /// Evaluates states of drives and supplies (n_states - 2 n,) after standing at a position (n,). There are no
+    /// commands.
     fn internal_state<'py>(&self, py: Python<'py>, theta: &Any<'py>, position: &Any<'py>) -> PyResult<Row<'py>> {
         let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
         let result = unbroken(|| evaluate::internal_state(self.description(), theta.values(), q.values()))?;
         Ok(PyArray1::from_vec(py, self.checked(py, result)?))
     }
 
-    /// Memories (N, effects that remember) at every sample of a path of the joints (N, n), relaxed at the first.
+    /// Evaluates memories (N, effects that remember) along a path of the joints (N, n), relaxed at first.
     fn memories<'py>(
         &self,
         py: Python<'py>,
@@ -190,7 +193,7 @@ impl System {
         matrix(py, values, [rows, count])
     }
 
-    /// All coordinates (n,) at rest under gravity with the joints held, and the efforts (n_joints,) that hold them.
+    /// Evaluates equilibrium under gravity with joints held: coordinates (n,), holding efforts (n_joints,).
     fn equilibrium<'py>(
         &self,
         py: Python<'py>,
@@ -203,7 +206,8 @@ impl System {
         Ok((PyArray1::from_vec(py, coordinates), PyArray1::from_vec(py, efforts)))
     }
 
-    /// Natural frequencies (k,) in Hz about rest with the joints locked, slowest first; negative for growth instead of vibration.
+    /// Evaluates natural frequencies (k,) in Hz about rest with the joints locked, slowest first. Negative for growth
+    /// instead of vibration.
     fn natural_frequencies<'py>(&self, py: Python<'py>, theta: &Any<'py>, position: &Any<'py>) -> PyResult<Row<'py>> {
         let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
         let result =
@@ -211,7 +215,7 @@ impl System {
         Ok(PyArray1::from_vec(py, result))
     }
 
-    /// State of the closed loops at a position and a velocity: their gap (m,), its derivative J (m, n) and `J' v` (m,).
+    /// Evaluates closed loops at a position and a velocity: gap (m,), derivative J (m, n) and `J' v` (m,).
     ///
     /// The last array has 1.0 for each equation that is independent of the others (m,).
     fn loops<'py>(
@@ -230,20 +234,22 @@ impl System {
         Ok((gap, jacobian, drift, chosen))
     }
 
-    /// Largest slope in rad of each beam in each of many states (N, n_beams); not a number where the kinematics are exact.
+    /// Evaluates the largest slope in rad of each beam in many states (N, n_beams). It is not a number where the
+    /// kinematics are exact.
     fn slopes<'py>(&self, py: Python<'py>, theta: &Any<'py>, states: &Any<'py>) -> PyResult<Table<'py>> {
         let (theta, states) = (Numbers::vector("theta", theta)?, Numbers::table("states", states)?);
         let slopes = self.compute(py, |_| evaluate::slopes(self.description(), theta.values(), states.as_table()?))?;
         matrix(py, slopes, [states.rows(), self.description().n_beams()])
     }
 
-    /// Slope in rad up to which the kinematics of small slopes are right within 1 %.
+    /// Evaluates the slope in rad up to which the kinematics of small slopes are right within 1 %.
     #[getter]
     fn slope_limit(&self) -> f64 {
         Beam::<f64>::slope_limit()
     }
 
-    /// Jacobian (6, n) of a marker by number: angular velocity, then velocity of its origin, in world axes.
+    /// Evaluates the Jacobian (6, n) of a marker by number. Angular velocity, then velocity of its origin, in world
+    /// axes.
     fn jacobian<'py>(
         &self,
         py: Python<'py>,
@@ -257,7 +263,8 @@ impl System {
         matrix(py, self.checked(py, result)?, [6, self.description().n_coordinates()])
     }
 
-    /// Poses (N, markers, 12) along a motion of all coordinates: origin in the world, then the axes there, row by row.
+    /// Evaluates poses (N, markers, 12) along a motion of all coordinates. Origin in the world, then the axes there,
+    /// row by row.
     fn marker_poses<'py>(&self, py: Python<'py>, theta: &Any<'py>, positions: &Any<'py>) -> PyResult<Cube<'py>> {
         let (theta, positions) = (Numbers::vector("theta", theta)?, Numbers::table("positions", positions)?);
         let poses =

@@ -34,17 +34,17 @@ pub(crate) struct System {
 }
 
 impl System {
-    /// The description, to be shared.
+    /// Description of the system, to be shared.
     pub(crate) fn description(&self) -> &Arc<Description> {
         &self.description
     }
 
-    /// The result, or its error as an exception.
+    /// Checked result for the system, or its error as an exception.
     pub(crate) fn checked<T>(&self, py: Python<'_>, result: Result<T, Error>) -> PyResult<T> {
         checked(py, &self.description, result)
     }
 
-    /// Runs `job` without the interpreter lock.
+    /// Runs `job` of the system without the interpreter lock.
     fn compute<T: Send>(
         &self,
         py: Python<'_>,
@@ -55,7 +55,7 @@ impl System {
     }
 }
 
-/// The result of a computation on the machine of `description`, or its error as an exception.
+/// Checked result on the machine of a system's `description`, or its error as an exception.
 pub(crate) fn checked<T>(py: Python<'_>, description: &Description, result: Result<T, Error>) -> PyResult<T> {
     result.map_err(|error| exception(py, error, description.n_outputs(), description.n_states()))
 }
@@ -68,55 +68,55 @@ impl System {
         Ok(Self { description: Arc::new(description) })
     }
 
-    /// Number of joints.
+    /// Number of joints of the system.
     #[getter]
     fn n_joints(&self) -> usize {
         self.description.n_joints()
     }
 
-    /// Number of coordinates: joints, then the elastic coordinates of the beams.
+    /// Number of coordinates of the system: joints, then the elastic coordinates of the beams.
     #[getter]
     fn n_coordinates(&self) -> usize {
         self.description.n_coordinates()
     }
 
-    /// Number of elastic coordinates.
+    /// Number of elastic coordinates of the system.
     #[getter]
     fn n_elastic(&self) -> usize {
         self.description.n_elastic()
     }
 
-    /// Number of beams.
+    /// Number of beams of the system.
     #[getter]
     fn n_beams(&self) -> usize {
         self.description.n_beams()
     }
 
-    /// Length of the state: positions, velocities, states of the drives, pressures of sagging supplies.
+    /// Length of the system's state: positions, velocities, states of drives, pressures of sagging supplies.
     #[getter]
     fn n_states(&self) -> usize {
         self.description.n_states()
     }
 
-    /// Number of actuators.
+    /// Number of actuators of the system.
     #[getter]
     fn n_actuators(&self) -> usize {
         self.description.n_actuators()
     }
 
-    /// Number of inputs: one command per actuator, then one pressure per logged supply.
+    /// Number of inputs of the system: one command per actuator, one pressure per logged supply.
     #[getter]
     fn n_inputs(&self) -> usize {
         self.description.n_inputs()
     }
 
-    /// Number of output channels.
+    /// Number of output channels of the system.
     #[getter]
     fn n_outputs(&self) -> usize {
         self.description.n_outputs()
     }
 
-    /// Length of theta.
+    /// Length of the system's theta.
     #[getter]
     fn n_parameters(&self) -> usize {
         self.description.n_parameters()

@@ -14,8 +14,8 @@ type Any<'py> = Bound<'py, PyAny>;
 
 #[pymethods]
 impl System {
-    /// Innovations (N, m) of an extended Kalman filter on readings of some channels, their covariances (N, m, m), its gains (N, nx, m),
-    /// the corrected states (N, nx) and their deviations (N, nx).
+    /// Observer by an extended Kalman filter on readings of some channels. Innovations (N, m), their covariances (N, m,
+    /// m), gains (N, nx, m), corrected states (N, nx) and their deviations (N, nx).
     #[pyo3(signature = (theta, initial_state, inputs, channels, readings, noise, time_step, substeps, integrator, hold="zero_order"))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn filter<'py>(

@@ -65,7 +65,7 @@ impl System {
 
 #[pymethods]
 impl System {
-    /// Free run on given commands: outputs (N, ny), states (N, nx), derivatives of the outputs (N, ny, k).
+    /// Simulates a free run on given commands. Outputs (N, ny), states (N, nx), derivatives of the outputs (N, ny, k).
     #[pyo3(signature = (theta, initial_state, inputs, time_step, substeps, integrator, sensitivities=vec![], hold="zero_order"))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn simulate<'py>(
@@ -91,7 +91,7 @@ impl System {
         self.run(py, run, [self.description.n_outputs(), sensitivities.len()])
     }
 
-    /// Makes the machine code of steps, as long runs do; or says why there is none.
+    /// Compiles the steps of a simulation, as long runs do, or says why not.
     fn compile<'py>(&self, py: Python<'py>, theta: &Any<'py>, integrator: &str) -> PyResult<Option<String>> {
         let request = Request::new(self, theta, (1.0, 1, integrator), &[])?;
         self.compute(py, |interrupt| {
@@ -100,8 +100,9 @@ impl System {
         })
     }
 
-    /// What steps do not resolve in a run of `duration` (s) about `state`: the frequency above which vibrations are off by more than a tenth
-    /// (Hz); for each mode that is or that grows (m, 5): frequency, damping ratio, time, share that is left, shift of its frequency.
+    /// Resolution of a simulation's steps in a run of `duration` (s) about `state`. First the frequency above which
+    /// vibrations are off by more than a tenth (Hz). Then for each mode that is or that grows (m, 5): frequency,
+    /// damping ratio, time, share that is left, shift of its frequency.
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn resolution<'py>(
         &self,
@@ -124,8 +125,8 @@ impl System {
         Ok((found.limit, matrix(py, rows, [found.damped.len(), 5])?))
     }
 
-    /// Where dry friction does not bring to rest in these steps what it brakes, at rest about `state` under `commands`: the place in words, and
-    /// the slope of friction at rest times the step over the inertia that it moves.
+    /// Dry friction that a simulation's steps do not bring to rest, about `state` under `commands`. The place in words,
+    /// and the slope of friction at rest times the step over the inertia that it moves.
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn unstuck(
         &self,
@@ -173,7 +174,8 @@ impl System {
         self.run(py, run, [self.description.n_outputs(), sensitivities.len()])
     }
 
-    /// Free runs of `horizon` samples from many samples: outputs (S, horizon, ny), derivatives (S, horizon, ny, k).
+    /// Simulates free runs of `horizon` samples from many samples. Outputs (S, horizon, ny), derivatives (S, horizon,
+    /// ny, k).
     #[pyo3(signature = (theta, initial_states, starts, horizon, inputs, time_step, substeps, integrator, sensitivities=vec![], hold="zero_order"))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn restart<'py>(
@@ -208,9 +210,9 @@ impl System {
         ))
     }
 
-    /// Joints but for `passive` ones follow a motion (N, n_joints), these and beams respond: outputs, states and derivatives
-    /// as in `simulate`. Beams are held to the rates of strain (N, gauges) that gauges of some gain showed. What is free begins at rest,
-    /// or away from it by `departure` (2 n_coordinates,), coordinates then rates.
+    /// Simulates joints that follow a motion (N, n_joints); `passive` ones and beams respond. Outputs, states and
+    /// derivatives as in `simulate`. Beams are held to the rates of strain (N, gauges) that gauges of some gain showed.
+    /// What is free begins at rest, or away from it by `departure` (2 n_coordinates,), coordinates then rates.
     #[pyo3(signature = (theta, position, velocity, acceleration, time_step, substeps, integrator, sensitivities=vec![], passive=vec![], strain_rate=None, strain_gain=None, first=0, departure=None))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn simulate_prescribed<'py>(
@@ -255,9 +257,10 @@ impl System {
         self.run(py, run, [self.description.n_outputs(), sensitivities.len()])
     }
 
-    /// Joints follow a motion (N, n_joints) while drives and supplies answer to it and to `inputs`, from the states `internal`: outputs
-    /// with the effort of the drives on each joint behind them (N, ny + n_joints), states, derivatives of all these. The efforts are those
-    /// in the states of drives that were `seen` (N, len(places)).
+    /// Simulates drives and supplies while joints follow a motion (N, n_joints). They answer to it and to `inputs`,
+    /// from the states `internal`. Outputs with the effort of the drives on each joint behind them (N, ny + n_joints),
+    /// states, derivatives of all these. The efforts are those in the states of drives that were `seen` (N,
+    /// len(places)).
     #[pyo3(signature = (theta, position, velocity, acceleration, inputs, internal, places, seen, time_step, substeps, integrator, sensitivities=vec![]))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn simulate_drives<'py>(

@@ -8,7 +8,8 @@ use crate::arrays::{Numbers, places};
 
 #[pymethods]
 impl System {
-    /// The texts of `NAME.h` and `NAME.c`, with the parameters numbered `free` as arguments and all others as constants.
+    /// C source of the system: texts of `NAME.h` and `NAME.c`. The parameters numbered `free` are arguments, all others
+    /// constants.
     #[pyo3(signature = (theta, name, states, inputs, outputs, free=vec![]))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn c_source(

@@ -17,9 +17,10 @@ type Timed<'py> = (Bound<'py, PyArray1<f64>>, u64, i64, Vec<(&'static str, f64, 
 
 #[pymethods]
 impl System {
-    /// Duration in s of each of `count` steps, on the way through the inputs again and again; how often memory was asked for during
-    /// these steps; the bytes that the simulation holds; and the stages of a step at `states` states: name, seconds of a call, calls.
-    /// Compiled, the steps are made by machine code, where there is any; the last answer says why not.
+    /// Timing of steps: duration in s of each of `count`, on the way through the inputs again and again. Also how often
+    /// memory was asked for during these steps; the bytes that the simulation holds; and the stages of a step at
+    /// `states` states: name, seconds of a call, calls. Compiled, the steps are made by machine code, where there is
+    /// any; the last answer says why not.
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn time_steps<'py>(
         &self,

@@ -50,7 +50,7 @@ class ArrayLog(Log):
         self.units = units
 
     def find(self, column: str) -> str | None:
-        """Name of a column; see `Log.find`."""
+        """Name of a column in arrays; see `Log.find`."""
         place = self._place(column)
         if place is None:
             return None
@@ -108,7 +108,7 @@ class ArrayLog(Log):
 
 
 def shape_of_vector(shape: tuple[int, ...]) -> tuple[int, ...]:
-    """Shape with dimensions of one sample left out where what remains is a vector."""
+    """Shape of an array without dimensions of one sample where a vector remains."""
     long = tuple(size for size in shape if size != 1)
     return long if len(long) == 1 else shape
 

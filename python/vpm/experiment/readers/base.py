@@ -13,7 +13,7 @@ from vpm.experiment.table import Table, missing_column
 
 @contextmanager
 def reading(path: str | PathLike[str]) -> Iterator[None]:
-    """Whatever a parser raises about a broken file becomes one sentence.
+    """Context for every reader's parser: whatever it raises about a broken file becomes one sentence.
 
     Raises
     ------
@@ -65,7 +65,7 @@ class Log(ABC):
         return named[0] if len(named) == 1 else None
 
     def read(self, columns: Sequence[str], clock: str) -> Table:
-        """Columns by their names in the header.
+        """Read columns by their names in the header, the base of every reader.
 
         Parameters
         ----------
@@ -84,10 +84,10 @@ class Log(ABC):
 
     @abstractmethod
     def _read(self, columns: Sequence[str], clock: str) -> Table:
-        """Columns by their names; see `read`."""
+        """Columns by their names, as every reader gives them; see `read`."""
 
     def missing(self, column: str, channel: str = "") -> ExperimentError:
-        """Error for a column that the file does not have, or that is no column of numbers."""
+        """Base error of readers for a column that the file does not have, or that has no numbers."""
         reason = self.refused.get(column)
         if reason is None:
             return missing_column(self.path, column, self.header, channel)
@@ -95,7 +95,7 @@ class Log(ABC):
         return self.error(f'{self.path}: "{column}"{use} {reason}', channel)
 
     def error(self, message: str, channel: str = "") -> ExperimentError:
-        """Error about a log that carries the path of its file."""
+        """Base error of readers about a log, with the path of its file."""
         return ExperimentError(message, path=str(self.path), channel=channel or None)
 
 

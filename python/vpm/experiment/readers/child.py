@@ -22,7 +22,7 @@ Answer = tuple[dict[str, Any], list[NDArray[np.float64]]]
 
 
 def _limit(seconds: int, space: int) -> None:
-    """Limit processor time and memory, where the system can; elsewhere the clock of the other process does."""
+    """Limit processor time and memory of the child process, where the system can."""
     try:
         import resource
     except ImportError:
@@ -64,7 +64,7 @@ def _send(out: BinaryIO, answer: Answer) -> None:
 
 
 def serve(module: str, name: str, path: str, seconds: int, space: int) -> None:
-    """Answer requests until there are no more.
+    """Answer requests in the child process until there are no more.
 
     Parameters
     ----------

@@ -55,7 +55,7 @@ class ClockedLog(Log):
         return column if column in self.clocks else super().find(column)
 
     def _read(self, columns: Sequence[str], clock: str) -> Table:
-        """Columns by name, each with the times of its own group; see `Log.read`."""
+        """Columns by name, each clocked by its own group; see `Log.read`."""
         wanted = [column for column in columns if column != clock]
         for column in wanted:
             if column == TIME or column in self.clocks:
@@ -86,12 +86,12 @@ class ClockedLog(Log):
         return max(names, key=lambda group: self.sizes.get(group, 0))
 
     def held(self) -> AbstractContextManager[None]:
-        """Context in which `times` and `values` are asked for; a reader may keep its file open in it."""
+        """Context in which `times` and `values` of clocked groups are read, with the file kept open."""
         return nullcontext()
 
     @abstractmethod
     def times(self, group: str) -> Array:
-        """Times of a group, s, counted from an instant that is the same for all groups."""
+        """Clock of a group, s, counted from an instant that is the same for all groups."""
 
     @abstractmethod
     def values(self, column: str) -> Array:
@@ -99,7 +99,7 @@ class ClockedLog(Log):
 
 
 def readable_unit(unit: str) -> bool:
-    """Whether a unit that a file states can be converted."""
+    """Whether a unit that a file of clocked groups states can be converted."""
     try:
         parse_unit(unit)
     except UnitError:
@@ -108,7 +108,7 @@ def readable_unit(unit: str) -> bool:
 
 
 def broken(path: str | PathLike[str], kind: str, error: Exception | str) -> ExperimentError:
-    """Error for a file that its parser does not take.
+    """Error for a file of clocked groups that its parser does not take.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def broken(path: str | PathLike[str], kind: str, error: Exception | str) -> Expe
 
 @contextmanager
 def silent(library: str) -> Iterator[None]:
-    """Keep what a library writes to its loggers from the terminal; what matters is in an error or in the history."""
+    """Keep loggers of a clocked file's library from the terminal."""
     names = [name for name in logging.root.manager.loggerDict if name.partition(".")[0] == library]
     loggers = [logging.getLogger(name) for name in names]
     before = [logger.disabled for logger in loggers]

@@ -20,10 +20,10 @@ class Frame(Protocol):
 
     @property
     def columns(self) -> Iterable[Hashable]:
-        """Names of the columns."""
+        """Names of a data frame's columns."""
 
     def __getitem__(self, column: Hashable, /) -> object:
-        """A column by its name, one value per row."""
+        """Column of a data frame by its name, one value per row."""
 
 
 class FrameLog(Log):
@@ -76,7 +76,7 @@ class FrameLog(Log):
         return np.asarray(self._columns[column], dtype=np.float64)
 
     def _seconds(self, column: str) -> Array:
-        """Differences first, in whole ticks: a date in seconds would leave 0.2 us of resolution."""
+        """Seconds of a data frame's dates; differences first, in whole ticks, for the resolution."""
         ticks = self._columns[column]
         if missing := int(np.count_nonzero(np.isnat(ticks))):
             raise self.error(f'{self.path}: {missing} times of the column "{column}" are missing; fill them')
@@ -88,7 +88,7 @@ def _name(column: object) -> str:
 
 
 def _array(values: object) -> NDArray[Any]:
-    """Values of a column; numbers of which some are missing come as objects."""
+    """Values of a data frame's column; numbers of which some are missing come as objects."""
     array, converted = np.asarray(values), getattr(values, "to_numpy", None)
     if array.dtype.kind == "O" and converted is not None:
         with suppress(TypeError, ValueError):

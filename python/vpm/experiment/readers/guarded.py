@@ -73,18 +73,18 @@ class GuardedLog(Log):
         self.units: Mapping[str, str] = told["units"]
 
     def find(self, column: str) -> str | None:
-        """Name of a column as its reader knows it; see `Log.find`."""
+        """Name of a column as the guarded reader knows it; see `Log.find`."""
         told, _ = self._ask({"find": column})
         found: str | None = told["found"]
         return found
 
     def missing(self, column: str, channel: str = "") -> ExperimentError:
-        """What its reader says of a column that is not there; see `Log.missing`."""
+        """Sentence of the guarded reader on a column that is not there; see `Log.missing`."""
         told, _ = self._ask({"missing": column, "channel": channel})
         return self.error(told["message"], channel)
 
     def _read(self, columns: Sequence[str], clock: str) -> Table:
-        """Columns by name from the process that reads the file; see `Log.read`."""
+        """Columns by name from the guarded process; see `Log.read`."""
         told, arrays = self._ask({"read": list(columns), "clock": clock})
         names: list[str] = told["columns"]
         found, own = dict(zip(names, arrays, strict=False)), arrays[len(names) :]
@@ -92,7 +92,7 @@ class GuardedLog(Log):
         return Table(self.header, found, None, frozenset(told["stamps"]), clocks, tuple(told["notes"]))
 
     def _ask(self, request: Answer) -> tuple[Answer, list[Array]]:
-        """Answer of the reader: a line of JSON, then the numbers of its arrays.
+        """Answer of the guarded reader: a line of JSON, then the numbers of its arrays.
 
         Raises
         ------
@@ -113,7 +113,7 @@ class GuardedLog(Log):
         return told, arrays
 
     def _end(self, code: int) -> str:
-        """Sentence on why the process that reads a file ended: out of time, or by a signal."""
+        """Sentence on why the guarded process ended: out of time, or by a signal."""
         if code in {-getattr(signal, "SIGXCPU", 0), -getattr(signal, "SIGKILL", 0)}:
             by_clock = PATIENCE * self._seconds
             return f"reading took more than {self._seconds:.0f} s of processor time, or {by_clock:.0f} s by the clock"
@@ -124,7 +124,7 @@ class GuardedLog(Log):
 def _started(
     path: Path, reader: type[ClockedLog], folder: str, seconds: float, space: float
 ) -> subprocess.Popen[bytes]:
-    """Process of a reader; what its library writes to the disk goes to a folder that is removed after it."""
+    """Guarded process of a reader, with a folder of its own that is removed after it."""
     found = {"PYTHONPATH": os.pathsep.join(filter(None, sys.path)), "TMPDIR": folder, "TEMP": folder, "TMP": folder}
     alone = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "NUMEXPR_MAX_THREADS": "1"}
     command = [sys.executable, "-P", "-m", "vpm.experiment.readers.child", reader.__module__, reader.__name__]
@@ -150,7 +150,7 @@ def _exchange(child: subprocess.Popen[bytes], request: Answer) -> tuple[Answer, 
 
 
 def _ended(child: subprocess.Popen[bytes]) -> int:
-    """Code of a reader whose answer broke off: its pipe may be closed a moment before it has ended."""
+    """Exit code of a guarded reader whose answer broke off."""
     try:
         return child.wait(5.0)
     except subprocess.TimeoutExpired:

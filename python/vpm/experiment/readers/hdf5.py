@@ -56,11 +56,11 @@ class Hdf5Log(ArrayLog):
         self.units = {column: unit for column, unit in stated.items() if unit}
 
     def find(self, column: str) -> str | None:
-        """Name of a column, whose path may begin with a stroke; see `Log.find`."""
+        """Name of a column in HDF5, whose path may begin with a stroke; see `Log.find`."""
         return super().find(column if self._matlab else column.lstrip("/"))
 
     def array(self, name: str) -> Array:
-        """Numbers of a whole data set."""
+        """Numbers of a whole HDF5 data set."""
         place, field = self._places[name]
         with _opened(self.path) as file:
             data = file[place][field] if field else file[place][()]
@@ -98,7 +98,7 @@ def _data_sets(group: h5py.Group, prefix: str) -> Iterator[tuple[str, h5py.Datas
 
 
 def _reason(data: h5py.Dataset, *, matlab: bool) -> str:
-    """Why a data set is no column of numbers, or ""."""
+    """Why an HDF5 data set is no column of numbers, or ""."""
     kind = data.attrs.get("MATLAB_class", b"") if matlab else b""
     label = kind.decode() if isinstance(kind, bytes) else str(kind)
     names = data.dtype.names

@@ -26,17 +26,17 @@ _NAME = re.compile(r"episode_(\d+)")
 
 
 def is_data_set(path: str | PathLike[str]) -> bool:
-    """Whether a folder is a data set."""
+    """Whether a folder is a LeRobot data set."""
     return (Path(path) / "meta" / "info.json").is_file()
 
 
 def is_episode(path: str | PathLike[str]) -> bool:
-    """Whether a path, which is no file, names an episode of a data set: ``FOLDER/episode_000003``."""
+    """Whether a path, which is no file, names a LeRobot episode: ``FOLDER/episode_000003``."""
     return _NAME.fullmatch(Path(path).name) is not None and is_data_set(Path(path).parent)
 
 
 def episodes_of(folder: str | PathLike[str]) -> list[Path]:
-    """Paths of the episodes of a data set, in their order.
+    """Paths of the episodes of a LeRobot data set, in their order.
 
     Raises
     ------
@@ -78,7 +78,7 @@ class EpisodeLog(Log):
         self.header = tuple(self._places)
 
     def _add(self, name: str, kind: Any) -> None:  # noqa: ANN401
-        """Sort a column of the table into numbers, vectors and what is no column."""
+        """Sort a column of a LeRobot table into numbers, vectors and what is no column."""
         import pyarrow as pa
 
         inner = kind.value_type if pa.types.is_list(kind) or pa.types.is_fixed_size_list(kind) else kind
@@ -134,7 +134,7 @@ def _info(folder: Path) -> dict[str, Any]:
 
 
 def _component_names(info: dict[str, Any], name: str) -> list[str]:
-    """Names of the components of a vector: a list, or one in a table such as ``{"motors": [...]}``."""
+    """Component names of a LeRobot vector: a list, or one in a table such as ``{"motors": [...]}``."""
     features = info.get("features")
     feature = features.get(name) if isinstance(features, dict) else None
     names = feature.get("names") if isinstance(feature, dict) else None
@@ -144,7 +144,7 @@ def _component_names(info: dict[str, Any], name: str) -> list[str]:
 
 
 def _table(folder: Path, columns: list[str] | None, episode: int | None = None) -> Any:  # noqa: ANN401
-    """Rows of all files, or those of an episode; files hold one episode each, or several, by version."""
+    """Rows of LeRobot files, or those of an episode; files hold one or several, by version."""
     with needs("pyarrow", "parquet"):
         import pyarrow as pa
         import pyarrow.parquet as pq

@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 
 def open_mat(path: str | PathLike[str]) -> Log:
-    """Reader for a MATLAB file of any version."""
+    """Open the reader for a MATLAB (MAT) file of any version."""
     from scipy.io import loadmat
     from scipy.io.matlab import MatReadError
 
@@ -56,7 +56,7 @@ class MatLog(ArrayLog):
         super().__init__(path, {name: array.shape for name, array in self._arrays.items()}, refused, {})
 
     def array(self, name: str) -> Array:
-        """Numbers of a whole variable."""
+        """Numbers of a whole variable in a MAT file."""
         return self._arrays[name]
 
 

@@ -82,7 +82,7 @@ class JsonLog(ClockedLog):
                     column.append(float(value) if isinstance(value, int | float) else np.nan)
 
     def _begin(self, topic: str, fields: dict[str, Any], schema: bytes) -> None:
-        """Columns of a topic, by its first message."""
+        """Columns of an MCAP topic, by its first JSON message."""
         self._stamps[topic] = []
         self._fields[topic] = {}
         told = json.loads(schema)
@@ -99,9 +99,9 @@ class JsonLog(ClockedLog):
                 self.units[column] = unit
 
     def times(self, group: str) -> Array:
-        """Times of a topic's messages, s; whole nanoseconds are subtracted first."""
+        """Times of an MCAP topic's JSON messages, s; whole nanoseconds are subtracted first."""
         return np.array([stamp - self._start for stamp in self._stamps[group]], dtype=np.float64) * 1e-9
 
     def values(self, column: str) -> Array:
-        """Numbers of a field; NaN where a message does not have it."""
+        """Numbers of a field of JSON messages; NaN where a message does not have it."""
         return np.array(self._columns[column], dtype=np.float64)

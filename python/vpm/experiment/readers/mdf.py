@@ -41,7 +41,7 @@ class _Place(NamedTuple):
 
 
 def open_mdf(path: str | PathLike[str]) -> Log:
-    """Reader that runs in a process of its own."""
+    """MDF reader that runs in a process of its own."""
     return guarded.GuardedLog(path, MdfLog)
 
 
@@ -76,7 +76,7 @@ class MdfLog(ClockedLog):
         self.header = (TIME, *self._places)
 
     def _add(self, file: MDF, place: _Place, name: str, label: str) -> None:
-        """Sort a channel into clocks, columns, and what is no column."""
+        """Sort an MDF channel into clocks, columns, and what is no column."""
         group = file.groups[place.group]
         master = file.masters_db.get(place.group)
         reason = _group_reason(group, master)
@@ -109,7 +109,7 @@ class MdfLog(ClockedLog):
             yield
 
     def times(self, group: str) -> Array:
-        """Times of a group from the start of the measurement, s."""
+        """Times of an MDF group from the start of the measurement, s."""
         return np.array(self._file.get_master(self._numbers[group]), dtype=np.float64)
 
     def values(self, column: str) -> Array:
@@ -126,7 +126,7 @@ class MdfLog(ClockedLog):
         return values
 
     def _formula_reason(self, place: _Place) -> str:
-        """Why the formula of a channel cannot be worked out, or ""."""
+        """Why the formula of an MDF channel cannot be computed, or ""."""
         conversion = self._formulas.get(place)
         if conversion is None:
             return ""
@@ -154,7 +154,7 @@ class MdfLog(ClockedLog):
 
 
 def _stream(path: str | PathLike[str]) -> io.BufferedReader | io.BytesIO:
-    """The file, or a copy in memory of one whose recorder was stopped: the library completes its counts in place."""
+    """MDF file, or a copy in memory of one whose recorder was stopped; the library completes it in place."""
     stream = Path(path).open("rb")  # noqa: SIM115  # closed by whoever asked for it
     if stream.read(len(UNFINISHED)) == UNFINISHED:
         with stream:
@@ -165,7 +165,7 @@ def _stream(path: str | PathLike[str]) -> io.BufferedReader | io.BytesIO:
 
 
 def _check_records(file: MDF) -> None:
-    """Refuse channels that lie outside of their records, which the compiled part of the library does not look for.
+    """Refuse MDF channels that lie outside of their records, which the library does not check.
 
     Raises
     ------
@@ -187,7 +187,7 @@ def _check_records(file: MDF) -> None:
 
 
 def _without_formulas(file: MDF) -> dict[_Place, Any]:
-    """Take formulas off the channels, so that the library does not work them out: it may run what they say as Python.
+    """MDF channels without formulas: the library may run what they say as Python.
 
     Returns
     -------
@@ -212,7 +212,7 @@ def _has_formula(conversion: Any) -> bool:  # noqa: ANN401
 
 
 def _formula(conversion: Any) -> str:  # noqa: ANN401
-    """The formula of a conversion that is one.
+    """Formula of an MDF conversion that is one.
 
     Raises
     ------
@@ -239,7 +239,7 @@ def _by_formula(formula: str, raw: Array) -> Array:
 
 
 def _close_halves(error: Exception) -> None:
-    """Close what the library had half built, which it would complain about on the terminal when it is deleted."""
+    """Close half-built MDF objects of the library, before it complains about them."""
     for frame, _ in traceback.walk_tb(error.__traceback__):
         half: Any = frame.f_locals.get("self")
         if type(half).__module__.startswith("asammdf") and hasattr(half, "close"):
@@ -248,14 +248,14 @@ def _close_halves(error: Exception) -> None:
 
 
 def _labels(file: MDF) -> list[str]:
-    """Names of groups: their own where no other group has it, else their number."""
+    """Names of MDF groups: their own where no other group has it, else their number."""
     own = [str(getattr(group.channel_group, "acq_name", "") or "") for group in file.groups]
     seen = Counter(own)
     return [name if name and seen[name] == 1 else str(at) for at, name in enumerate(own)]
 
 
 def _names(file: MDF, labels: list[str]) -> dict[_Place, str]:
-    """Name of each channel: its own, with its group where another has it, with a number where that has it twice."""
+    """Name of each MDF channel, with its group or a number where the name is not unique."""
     groups: list[Any] = list(file.groups)
     plain = {
         _Place(at, index): str(channel.name)
@@ -276,7 +276,7 @@ def _names(file: MDF, labels: list[str]) -> dict[_Place, str]:
 
 
 def _samples(file: MDF, place: _Place, count: int | None = None) -> tuple[NDArray[Any], NDArray[Any] | None]:
-    """Samples of a channel and which of them are invalid; all of them, because by default invalid ones are dropped."""
+    """Samples of an MDF channel and which of them are invalid."""
     samples, invalid = file.get(
         group=place.group, index=place.channel, samples_only=True, ignore_invalidation_bits=True, record_count=count
     )
@@ -284,7 +284,7 @@ def _samples(file: MDF, place: _Place, count: int | None = None) -> tuple[NDArra
 
 
 def _group_reason(group: Any, master: int | None) -> str:  # noqa: ANN401
-    """Why the channels of a group are no columns, or ""."""
+    """Why the channels of an MDF group are no columns, or ""."""
     if not group.channel_group.cycles_nr:
         return "has no samples; record it, or do not map it"
     if master is None:
@@ -295,7 +295,7 @@ def _group_reason(group: Any, master: int | None) -> str:  # noqa: ANN401
 
 
 def _value_reason(samples: NDArray[Any]) -> str:
-    """Why samples are no numbers, or ""."""
+    """Why samples of an MDF channel are no numbers, or ""."""
     if samples.dtype.names or samples.ndim != 1:
         return "is an array or a structure; record its elements as channels"
     if samples.dtype.kind in "SUO":

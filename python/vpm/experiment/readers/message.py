@@ -91,7 +91,7 @@ def has_stamp(message: Message) -> bool:
 
 
 def stamp_of(message: Message) -> int:
-    """Stamp in the header, ns; zero where there is none."""
+    """Stamp in the header of a message, ns; zero where there is none."""
     stamp = getattr(getattr(message, "header", None), "stamp", None)
     return 0 if stamp is None else int(stamp.sec) * 1_000_000_000 + int(stamp.nanosec)
 
@@ -108,7 +108,7 @@ def _index(text: str, parent: Message, values: Message) -> int | str | None:
 
 
 def _labels(message: Message, count: int) -> list[str]:
-    """Names of the elements of an array of ``count``; none where they are not as many, or one stands twice."""
+    """Names of the elements of a message's array of ``count``; none where they do not match."""
     labels = _all_labels(message)
     return labels if len(labels) == count == len(set(labels)) else []
 

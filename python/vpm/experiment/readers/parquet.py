@@ -67,7 +67,7 @@ class ParquetLog(Log):
         return np.asarray(self._table.column(column).to_numpy(), dtype=np.float64)
 
     def _seconds(self, column: str) -> Array:
-        """Differences first, in whole nanoseconds: a date in seconds would leave 0.2 us of resolution."""
+        """Seconds of Parquet dates; differences first, in whole nanoseconds, for the resolution."""
         import pyarrow as pa
 
         kind = self._table.column(column).type

@@ -72,7 +72,7 @@ class BagLog(Log):
         self.header = ("time", *(f"{name}.{leaf}" for name, found in self._fields.items() for leaf in found))
 
     def find(self, column: str) -> str | None:
-        """Name of a column; see `Log.find`."""
+        """Name of a column in a ROS bag; see `Log.find`."""
         if column == "time":
             return column
         name, _, rest = column.partition(".")
@@ -87,7 +87,7 @@ class BagLog(Log):
         return None if parsed is None else f"{topic.name}.{parsed.text}"
 
     def missing(self, column: str, channel: str = "") -> ExperimentError:
-        """Error for a column that is not there, or whose topic is empty; see `Log.missing`."""
+        """Error for a column that is not in a ROS bag, or whose topic is empty; see `Log.missing`."""
         topic = f"/{column.partition('.')[0].lstrip('/')}"
         return super().missing(topic if topic in self.refused else column, channel)
 
@@ -114,7 +114,7 @@ class BagLog(Log):
         return Table(self.header, {clock: time, **values}, None, frozenset({clock}), clocks, (note,))
 
     def _clock(self, wanted: Sequence[str], clock: str) -> tuple[str, str]:
-        """Topic whose messages are the clock, and which of their two times."""
+        """Topic of a ROS bag whose messages are the clock, and which of their two times."""
         name, _, kind = clock.partition(".")
         if name != "time":
             if kind in {STAMP, RECEIVED}:
@@ -129,7 +129,7 @@ class BagLog(Log):
         return busiest, STAMP if has_stamp(self._topics[busiest].first) else RECEIVED
 
     def _collect(self, columns: Sequence[str], stamped: dict[str, bool]) -> dict[str, _Series]:
-        """One pass over the messages of the topics that are asked for."""
+        """One pass over the messages of a ROS bag's topics that are read."""
         asked: dict[str, list[tuple[str, Field | None]]] = {}
         for column in columns:
             name, _, rest = column.partition(".")
@@ -160,7 +160,7 @@ class BagLog(Log):
             ) from error
 
     def _seconds(self, stamps: Sequence[int], start: int, column: str) -> Array:
-        """Times from ``start``, s; whole nanoseconds are subtracted first, because dates in seconds are too long."""
+        """Times of ROS messages from ``start``, s; whole nanoseconds are subtracted first."""
         time = np.array(stamps, dtype=np.int64)
         back = np.flatnonzero(np.diff(time) <= 0)
         if back.size:

@@ -63,7 +63,7 @@ class TdmsLog(ClockedLog):
         self.header = ((TIME,) if self._waves else ()) + tuple(self._places)
 
     def _add(self, channel: TdmsChannel, name: str, starts: dict[str, int]) -> None:
-        """Sort a channel into columns and what is no column."""
+        """Sort a TDMS channel into columns and what is no column."""
         if not len(channel):
             self.refused[name] = "has no samples; record it, or do not map it"
             return
@@ -87,11 +87,11 @@ class TdmsLog(ClockedLog):
             self.units[name] = unit
 
     def find(self, column: str) -> str | None:
-        """Name of a channel, which may begin with a stroke; see `Log.find`."""
+        """Name of a TDMS channel, which may begin with a stroke; see `Log.find`."""
         return super().find(column.removeprefix("/"))
 
     def _read(self, columns: Sequence[str], clock: str) -> Table:
-        """Columns by name, over a channel or over the wave form of each; see `Log.read`."""
+        """TDMS columns by name, over a channel or over the wave form of each; see `Log.read`."""
         if clock != TIME:
             return self._read_over(columns, clock)
         for column in columns:
@@ -103,7 +103,7 @@ class TdmsLog(ClockedLog):
         return super()._read(columns, clock)
 
     def _read_over(self, columns: Sequence[str], clock: str) -> Table:
-        """Columns that were sampled together, and a channel that holds their times."""
+        """TDMS columns that were sampled together, and a channel that holds their times."""
         for column in columns:
             if column == TIME:
                 raise self.error(f'{self.path}: "{column}" is a clock and no channel; map it to time only')
@@ -123,7 +123,7 @@ class TdmsLog(ClockedLog):
             yield
 
     def times(self, group: str) -> Array:
-        """Times of a channel's wave form, s."""
+        """Times of a TDMS channel's wave form, s."""
         offset, step = self._waves[group]
         return offset + step * np.arange(self.sizes[group], dtype=np.float64)
 

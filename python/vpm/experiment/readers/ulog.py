@@ -63,12 +63,12 @@ class UlogLog(ClockedLog):
             self.remarks += ("The file is damaged in places; messages that could not be read are left out.",)
 
     def missing(self, column: str, channel: str = "") -> ExperimentError:
-        """Error for a column that is not there, or whose topic is empty; see `Log.missing`."""
+        """Error for a column that is not in a ULog, or whose topic is empty; see `Log.missing`."""
         topic = column.partition(".")[0]
         return super().missing(topic if topic in self.refused else column, channel)
 
     def times(self, group: str) -> Array:
-        """Times of a topic's messages, s; whole microseconds are subtracted first."""
+        """Times of a ULog topic's messages, s; whole microseconds are subtracted first."""
         return np.asarray((self._stamps[group] - self._start) * 1e-6, dtype=np.float64)
 
     def values(self, column: str) -> Array:
@@ -77,7 +77,7 @@ class UlogLog(ClockedLog):
 
 
 def _parsed(path: str | PathLike[str]) -> ULog:
-    """All messages of a file; its parser prints what it finds damaged, which the record's history says."""
+    """All messages of a ULog file; damage that its parser prints goes to the record's history."""
     with needs("pyulog", "ulog"):
         from pyulog import ULog
     try:

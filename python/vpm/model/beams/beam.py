@@ -98,22 +98,22 @@ class Beam(Component):
 
     @property
     def curvature(self) -> tuple[Rest, ...]:
-        """Shape at rest: nothing if it is straight, one entry if its curvature is constant."""
+        """Beam's shape at rest: nothing if it is straight, one entry if its curvature is constant."""
         return (self.rests or ()) if self.rest is None else (self.rest,)
 
     @property
     def detail(self) -> Level:
-        """Level of detail of a flexible link."""
+        """Level of detail of a beam."""
         return parse_level(self.level)
 
     @cached_property
     def solid(self) -> ReducedLink | None:
-        """The reduced solid that it is, if it is one."""
+        """Reduced solid that a beam stands for, if it is one."""
         return None if self.reduced is None else link_of(self.reduced)
 
     @property
     def reach(self) -> float:
-        """Its last place: the length (m), or the number of interfaces of a reduced solid."""
+        """Last place on a beam: its length (m), or the number of interfaces of a reduced solid."""
         return (self.length or 0.0) if self.solid is None else float(len(self.solid.interfaces))
 
     @property
@@ -126,7 +126,7 @@ class Beam(Component):
     # ---- checks ------------------------------------------------------------------------------------------------------
 
     def form_problems(self, name: str) -> Iterator[Problem]:
-        """What needs neither other components nor parameter values to be judged."""
+        """Problems of a beam's form, judged without other components and parameter values."""
         keys = ("beams", name)
         if self.solid is not None:
             yield from self._solid_problems(keys, self.solid)
@@ -146,7 +146,7 @@ class Beam(Component):
         yield from self._rest_problems(keys)
 
     def _solid_problems(self, keys: Keys, solid: ReducedLink) -> Iterator[Problem]:
-        """What a link cannot be beside a reduced solid."""
+        """Problems of a beam that is a reduced solid and something else."""
         for key in ("length", "material", "section", "sections", "rest", "rests"):
             if getattr(self, key) is not None:
                 yield Problem(place(*keys, key), "is given, but the reduced solid says it; remove one of the two")
@@ -195,7 +195,7 @@ class Beam(Component):
             yield from _place_problems(keys, "sections", places, self.reach)
 
     def _material_problems(self, keys: Keys) -> Iterator[Problem]:
-        """Materials that are missing, or that nothing is made of."""
+        """Problems of a beam's materials: missing, or nothing is made of them."""
         used = False
         for way, section in self.keyed_sections:
             where = place(*keys, *in_file(way))
@@ -248,7 +248,7 @@ class Beam(Component):
             yield Problem(where, f"{rest}; remove one of the two")
 
     def size_problems(self, name: str, document: Document, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:
-        """Sizes of sections that do not fit into each other, and gauges far outside of their section."""
+        """Problems of a beam's sizes: sections that do not fit, and gauges far outside of their section."""
         gauges = {key: gauge for key, gauge in document.gauges.items() if gauge.beam == name}
         for number, (way, section) in enumerate(self.keyed_sections):
             values = {inside: parameters[section_parameter(name, way, inside)].value for inside in section.numbers}
@@ -261,7 +261,7 @@ class Beam(Component):
                 yield from gauge.reach_problems(key, section, sizes)
 
     def outside_problems(self, keys: Keys, at: float, name: str) -> Iterator[Problem]:
-        """A place before its root or beyond its tip."""
+        """Problem of a place before a beam's root or beyond its tip."""
         solid = self.solid
         if solid is not None:
             if at not in range(len(solid.interfaces) + 1):
@@ -334,18 +334,18 @@ class Beam(Component):
 
 
 def in_file(way: Way) -> Way:
-    """Keys of a section as they stand in a file."""
+    """Keys of a beam's section as they stand in a file."""
     return way if len(way) == 1 else ("sections", *way[1:])
 
 
 def _partial(sections: tuple[Section, ...]) -> list[str]:
-    """Numbers that some sections have and others have not, materials of their own left aside."""
+    """Numbers that some sections of a beam have and others have not, own materials left aside."""
     kinds = [frozenset(way for way in section.numbers if way[0] != "material") for section in sections]
     return sorted(".".join(map(str, way)) for way in frozenset.union(*kinds) - frozenset.intersection(*kinds))
 
 
 def _place_problems(keys: Keys, key: str, places: Sequence[float | None], length: float) -> Iterator[Problem]:
-    """Places of a table along the axis that are missing or do not rise from root to tip."""
+    """Places of a beam's table along the axis that are missing or do not rise from root to tip."""
     if None in places:
         yield Problem(place(*keys, key, places.index(None), "at"), "is missing; add the arc length in m")
         return
@@ -359,7 +359,7 @@ def _place_problems(keys: Keys, key: str, places: Sequence[float | None], length
 
 
 def with_solids(document: Document, folder: Path) -> tuple[Document, list[Problem]]:
-    """Read the files that flexible links name, and tell those that are not there or damaged."""
+    """Read the files that beams name, and tell those that are not there or damaged."""
     beams, problems = dict(document.beams), list[Problem]()
     for name, beam in document.beams.items():
         try:

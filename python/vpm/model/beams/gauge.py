@@ -51,7 +51,7 @@ class Gauge(Component):
             yield Problem(place("gauges", name), rest)
 
     def reach_problems(self, name: str, section: Section, sizes: Mapping[str, float]) -> Iterator[Problem]:
-        """A point far outside of its section."""
+        """Problem of a gauge far outside of its section."""
         for key, value, size in zip("xy", (self.x, self.y), section.across, strict=False):
             reach = 0.5 * sizes[size]
             if abs(value) > REACH * reach:

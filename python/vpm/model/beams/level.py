@@ -87,7 +87,7 @@ class Level:
         return self.number
 
     def coordinates(self, deforms: Sequence[str]) -> tuple[str, ...]:
-        """Names of the coordinates of a beam, in the order of the core: ``bending_x.0``.
+        """Coordinate names of a beam at a level, in the order of the core: ``bending_x.0``.
 
         One component after the other, except for springs between rigid segments: there one segment after the other.
         Modes of a reduced solid are of no component: ``mode.0``.
@@ -145,7 +145,7 @@ def _example(name: str) -> str:
 
 
 def deforms_of(beam: Mapping[str, Any]) -> tuple[str, ...]:
-    """Components in which a beam of a model file deforms; none of a reduced solid, which has modes.
+    """Components in which a beam deforms at its level; none of a reduced solid, which has modes.
 
     Parameters
     ----------

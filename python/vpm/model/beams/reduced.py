@@ -101,12 +101,12 @@ class ReducedLink:
 
     @property
     def frequencies(self) -> Array:
-        """Natural frequencies of the solid held at its root (Hz)."""
+        """Natural frequencies (Hz) of the reduced solid held at its root."""
         return np.sqrt(self.squares) / (2.0 * np.pi)
 
     @property
     def stiffens(self) -> bool:
-        """Whether it knows what is quadratic in its modes, so that tension and spin stiffen it."""
+        """Whether a reduced solid stiffens by tension and spin: it knows terms quadratic in its modes."""
         return bool(self.point_curved.shape[1])
 
     def to_bytes(self) -> bytes:
@@ -118,7 +118,7 @@ class ReducedLink:
 
     @classmethod
     def from_bytes(cls, content: bytes) -> Self:
-        """The solid of a file's content.
+        """Reduced solid from a file's content.
 
         Raises
         ------
@@ -155,7 +155,7 @@ class ReducedLink:
 
     @classmethod
     def load(cls, path: str | PathLike[str]) -> Self:
-        """Read a file that `save` wrote.
+        """Read a reduced solid from a file that `save` wrote.
 
         Raises
         ------
@@ -170,7 +170,7 @@ class ReducedLink:
         return embedded(self.to_bytes())
 
     def content(self) -> Mapping[str, Any]:
-        """Its numbers as the core reads them."""
+        """Numbers of a reduced solid as the core reads them."""
 
         def field(rest: Array, shapes: Array, curved: Array) -> dict[str, Any]:
             return {"rest": rest.tolist(), "shapes": shapes.tolist(), "curved": curved.tolist()}
@@ -188,7 +188,7 @@ _ARRAYS = tuple(field.name for field in fields(ReducedLink) if field.name != "in
 
 
 def read_bytes(path: str | PathLike[str]) -> bytes:
-    """Content of a file of numbers.
+    """Content of a file of a reduced solid.
 
     Raises
     ------
@@ -208,12 +208,12 @@ def read_bytes(path: str | PathLike[str]) -> bytes:
 
 
 def embedded(content: bytes) -> str:
-    """The text that stands for a file's content in a model."""
+    """Text that stands for a reduced solid's file in a model."""
     return EMBEDDED + base64.b64encode(content).decode("ascii")
 
 
 def link_of(text: str) -> ReducedLink:
-    """The solid that a text of `embedded` stands for.
+    """Reduced solid that a text of `embedded` stands for.
 
     Raises
     ------

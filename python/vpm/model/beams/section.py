@@ -35,7 +35,7 @@ class Material(Entry):
     density: Annotated[ParameterValue, Rule("kg/m^3", ABOVE_ZERO)]
 
     def numbers(self, way: Way) -> Numbers:
-        """Parameters and their rules, by the way to each; `way` leads to the material."""
+        """Parameters of a section's material and their rules, by the way to each; `way` leads to the material."""
         return {(*way, key): (getattr(self, key), rule) for key, rule in rules_of(type(self)).items()}
 
 
@@ -57,13 +57,13 @@ class _Section(Entry):
 
     @property
     def numbers(self) -> Numbers:
-        """Parameters and their rules, by the way to each inside of the table."""
+        """Parameters of a section and their rules, by the way to each inside of the table."""
         rules = rules_of(type(self)).items()
         sizes: Numbers = {(key,): (getattr(self, key), rule) for key, rule in rules if getattr(self, key) is not None}
         return sizes | ({} if self.material is None else self.material.numbers(("material",)))
 
     def misfit(self, sizes: Mapping[str, float]) -> str | None:  # noqa: ARG002
-        """Sizes that do not fit into each other, in words."""
+        """Sizes of a section that do not fit into each other, in words."""
         return None
 
     def described(self, places: Mapping[Way, int]) -> Described:
@@ -99,7 +99,7 @@ class Tube(_Section):
     inner: Length
 
     def misfit(self, sizes: Mapping[str, float]) -> str | None:
-        """Sizes that do not fit into each other, in words."""
+        """Sizes of a tube section that do not fit into each other, in words."""
         if sizes["inner"] < sizes["outer"]:
             return None
         rest = f"has inner {sizes['inner']:g} m and outer {sizes['outer']:g} m, but inner has to be below outer"
@@ -117,7 +117,7 @@ class IBeam(_Section):
     web: Length
 
     def misfit(self, sizes: Mapping[str, float]) -> str | None:
-        """Sizes that do not fit into each other, in words."""
+        """Sizes of an I section that do not fit into each other, in words."""
         if sizes["web"] >= sizes["width"]:
             return f"has web {sizes['web']:g} m, which is not below the width {sizes['width']:g} m; correct them"
         if 2.0 * sizes["flange"] >= sizes["height"]:
@@ -144,7 +144,7 @@ class Layer(Material):
     thickness: Length
 
     def numbers(self, way: Way) -> Numbers:
-        """Parameters and their rules, by the way to each; `way` leads to the layer."""
+        """Parameters of a section's layer and their rules, by the way to each; `way` leads to the layer."""
         own = super().numbers(way)
         return {(*way, "thickness"): own.pop((*way, "thickness")), **own}
 
@@ -160,14 +160,14 @@ class Layers(_Section):
 
     @property
     def numbers(self) -> Numbers:
-        """Parameters and their rules, by the way to each inside of the table."""
+        """Parameters of a layered section and their rules, by the way to each inside of the table."""
         found = super().numbers
         for i, layer in enumerate(self.layers):
             found |= layer.numbers(("layers", i))
         return found
 
     def described(self, places: Mapping[Way, int]) -> Described:
-        """What the core reads of a laminate, with the numbers of its parameters by the way to each."""
+        """Laminate section as the core reads it, with the numbers of its parameters by the way to each."""
         described = super().described(places)
         described["shape"]["layers"] = [
             {

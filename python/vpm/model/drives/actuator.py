@@ -57,7 +57,7 @@ ACTUATOR_TYPES: Mapping[str, type[Drive]] = {
 
 
 def with_files(document: Document, folder: Path) -> tuple[Document, list[Problem]]:
-    """Read the files that drives name; tell those that are not there, are no drives, or say what is said already."""
+    """Read the files that actuators name; tell missing ones, other contents, and values said twice."""
     actuators, problems = dict(document.actuators), list[Problem]()
     for name, actuator in document.actuators.items():
         if not isinstance(actuator, Sampled) or actuator.file is None:
@@ -75,7 +75,7 @@ def with_files(document: Document, folder: Path) -> tuple[Document, list[Problem
 
 
 def drive_problems(document: Document, structure: Structure) -> Iterator[Problem]:
-    """Supplies that are not there, drives on what they cannot drive, sizes that are missing or given twice."""
+    """Problems of actuators: missing supplies, wrong targets, sizes missing or given twice."""
     for name, supply in document.supplies.items():
         yield from supply.problems(name, structure)
     for name, actuator in document.actuators.items():
@@ -88,7 +88,7 @@ def drive_problems(document: Document, structure: Structure) -> Iterator[Problem
 
 
 def command_problems(document: Document) -> Iterator[Problem]:
-    """Units of commands that are none."""
+    """Problems of actuators' command units that are no units."""
     for name, actuator in document.actuators.items():
         try:
             parse_unit(actuator.command_unit)
@@ -97,6 +97,6 @@ def command_problems(document: Document) -> Iterator[Problem]:
 
 
 def unit_problems(document: Document) -> Iterator[Problem]:
-    """Commands of the wrong kind, and numbers of a data sheet that cannot be right."""
+    """Problems of actuators' commands of the wrong kind, and impossible data-sheet numbers."""
     for name, actuator in document.actuators.items():
         yield from actuator.unit_problems(name)

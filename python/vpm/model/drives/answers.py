@@ -27,44 +27,44 @@ class DriveComponents:
 
     @property
     def supplies(self) -> tuple[str, ...]:
-        """Hydraulic supplies of a model, by name."""
+        """Answers with the hydraulic supplies of a model, by name."""
         return tuple(self._checked.document.supplies)
 
     @cached_property
     def logged_supplies(self) -> tuple[str, ...]:
-        """Supplies whose pressure is an input, taken from the log."""
+        """Answers with the supplies whose pressure is an input, taken from the log."""
         supplies = self._checked.document.supplies
         return tuple(name for name, supply in supplies.items() if supply.source == "logged")
 
     @property
     def actuators(self) -> tuple[str, ...]:
-        """Actuators; actuator k is input k."""
+        """Answers with the actuators; actuator k is input k."""
         return tuple(self._checked.document.actuators)
 
     @property
     def inputs(self) -> tuple[str, ...]:
-        """Inputs by name: each actuator for its command, then ``pump.pressure`` of each logged supply."""
+        """Answers with input names: each actuator's command, then ``pump.pressure`` of logged supplies."""
         return (*self.actuators, *(f"{name}.pressure" for name in self.logged_supplies))
 
     @cached_property
     def input_channels(self) -> tuple[str, ...]:
-        """Commands, one per actuator, then the pressures of logged supplies."""
+        """Answers with input channels: commands of actuators, then pressures of logged supplies."""
         return (*(f"{name}.command" for name in self.actuators), *self.inputs[len(self.actuators) :])
 
     @cached_property
     def optional_inputs(self) -> frozenset[str]:
-        """Commands that a log need not hold: lengths that are added to those of springs, none by default."""
+        """Answers with commands that a log need not hold: lengths added to springs, none by default."""
         actuators = self._checked.document.actuators
         return frozenset(f"{name}.command" for name, entry in actuators.items() if isinstance(entry, Compliant))
 
     @property
     def is_abrupt(self) -> bool:
-        """Whether contacts or oil can change a motion within a sample, so that its steps need control."""
+        """Answers whether contacts or oil can change a motion within a sample, so that steps need control."""
         document = self._checked.document
         return bool(document.contacts) or any(entry.type == "hydraulic" for entry in document.actuators.values())
 
     def actuator_type(self, actuator: str) -> str:
-        """Type of an actuator of a model.
+        """Answers with the type of an actuator.
 
         "ideal", "dc_motor", "spring_damper", "maxwell", "hydraulic", "table", "narx" or "maxwell_narx".
 
@@ -76,7 +76,7 @@ class DriveComponents:
         return self._drive(actuator).type
 
     def follows_command(self, actuator: str) -> bool:
-        """Whether the effort of an actuator follows from its command alone, sample by sample.
+        """Answers whether an actuator's effort follows from its command alone, sample by sample.
 
         Raises
         ------
@@ -87,7 +87,7 @@ class DriveComponents:
         return entry.type == "ideal" and not entry.rubs(actuator, self._checked.document)
 
     def beyond_tables(self, time: Array, columns: Mapping[str, Array]) -> tuple[str, ...]:
-        """Sentences on where a run left the tables of its drives; none as a rule.
+        """Answers with sentences on where a run left the tables of its drives; none as a rule.
 
         Parameters
         ----------
@@ -109,7 +109,7 @@ class DriveComponents:
         return tuple(found)
 
     def rate_channel(self, actuator: str) -> str:
-        """Channel that tells how fast what an actuator acts on moves.
+        """Answers with the channel of the speed at which an actuator's target moves.
 
         Raises
         ------
@@ -120,7 +120,7 @@ class DriveComponents:
         return f"{entry.line}.rate" if entry.line is not None else f"{entry.joint or entry.transmission}.velocity"
 
     def supply_of_actuator(self, actuator: str) -> str | None:
-        """Supply of a hydraulic actuator; None for the others.
+        """Answers with the supply of a hydraulic actuator; None for the others.
 
         Raises
         ------
@@ -132,12 +132,12 @@ class DriveComponents:
 
     @cached_property
     def driven_joints(self) -> tuple[str, ...]:
-        """Joints on which an actuator has an effect, see `joints_of_actuator`; a balance of effort sees no others."""
+        """Answers with all joints on which an actuator has an effect, see `joints_of_actuator`."""
         driven = {joint for name in self.actuators for joint in self.joints_of_actuator(name)}
         return tuple(joint for joint in self._checked.structure.joints if joint in driven)
 
     def joints_of_actuator(self, actuator: str) -> tuple[str, ...]:
-        """Joints on which an actuator has an effect: its own, those of its transmission, or those that move its line.
+        """Answers with the joints of one actuator: its own, its transmission's, or those of its line.
 
         Raises
         ------
@@ -153,17 +153,17 @@ class DriveComponents:
         return tuple(name for k, name in enumerate(structure.joints) if k in ways[0] ^ ways[1])
 
     def has_lag(self, actuator: str) -> bool:
-        """Whether an actuator follows its command with a lag, which adds a state."""
+        """Answers whether an actuator follows its command with a lag, which adds a state."""
         self._known(actuator, self.actuators, "actuator")
         return any(e.traits.late == "lag" and e.at == actuator for e in self._checked.document.effects)
 
     @cached_property
     def internal_names(self) -> tuple[str, ...]:
-        """States beside coordinates and rates: of actuators (lag, drive), of supplies (pressure, drop), memories."""
+        """Answers with states beside coordinates and rates: of actuators, supplies, and memories."""
         return tuple(self._internal_units)
 
     def internal_unit(self, state: str) -> str:
-        """SI unit of a state of `internal_names`."""
+        """Answers with the SI unit of a state of `internal_names`."""
         return self._internal_units[state]
 
     @cached_property
@@ -190,7 +190,7 @@ class DriveComponents:
 
 
 def _way(structure: Structure, mount: Mount) -> Iterator[int]:
-    """Joints on the way from a mount to the world."""
+    """Joints on the way from a mount to the world, for answers about drives."""
     while mount.kind != "world":
         if mount.kind == "section":
             mount = structure.frames[structure.beams[mount.index]].mount

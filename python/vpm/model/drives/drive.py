@@ -42,14 +42,14 @@ class Drive(Component):
 
     @property
     def acted_on(self) -> str:
-        """Joint, line or transmission in words."""
+        """Target of a drive in words: joint, line or transmission."""
         for what in ("joint", "line"):
             if (name := getattr(self, what)) is not None:
                 return f'the {what} "{name}"'
         return f'the transmission "{self.transmission}"'
 
     def joints_turned(self, document: Document) -> tuple[str, ...]:
-        """Joints that it turns: its own, or those of its transmission; none where it acts along a line."""
+        """Joints that a drive turns: its own, or those of its transmission; none along a line."""
         if self.transmission in document.transmissions:
             return tuple(document.transmissions[self.transmission].ratios)
         return () if self.joint is None else (self.joint,)
@@ -57,7 +57,7 @@ class Drive(Component):
     # ---- checks ------------------------------------------------------------------------------------------------------
 
     def target_problems(self, name: str, structure: Structure) -> Iterator[Problem]:
-        """Nothing to act on, several things, or what is not there."""
+        """Problems of a drive's target: nothing, several things, or what is not there."""
         document, keys = structure.document, ("actuators", name)
         given = [key for key in ("joint", "line", "transmission") if getattr(self, key) is not None]
         if not given:
@@ -79,14 +79,14 @@ class Drive(Component):
                 yield Problem(place(*keys, key), f'is "{other}", which is no {key} of the model; {repair}')
 
     def carrier_problems(self, name: str, structure: Structure) -> Iterator[Problem]:  # noqa: ARG002
-        """A joint, line or transmission that its law does not know."""
+        """Problem of a drive whose law does not know its joint, line or transmission."""
         if self.STRAIGHT and self.transmission is not None:
             rest = f'is a {self.type} on the transmission "{self.transmission}", but its force acts along a line; '
             rest += "give line in place of transmission, or take an ideal actuator or a dc_motor"
             yield Problem(place("actuators", name), rest)
 
     def unit_problems(self, name: str) -> Iterator[Problem]:
-        """A command of the wrong kind."""
+        """Problem of a drive's command of the wrong kind."""
         if self.COMMAND:
             try:
                 require_dimension(self.command_unit, self.COMMAND)
@@ -125,7 +125,7 @@ class Drive(Component):
         }
 
     def rubs(self, name: str, document: Document) -> bool:
-        """Whether it has friction of its own."""
+        """Whether a drive has friction of its own."""
         own = (EFFECTS[effect.type] for effect in document.effects if effect.at == name)
         return any(effect.site == "actuator" and effect.rubs for effect in own)
 
@@ -136,5 +136,5 @@ def group(way: str, keys: tuple[str, ...], index: Index) -> dict[str, int] | Non
 
 
 def numbers(way: str, keys: tuple[str, ...], index: Index) -> dict[str, int | None]:
-    """Parameters of a law by key, as far as they are there."""
+    """Parameters of a drive's law by key, as far as they are there."""
     return {key: index.get(f"{way}.{key}") for key in keys}

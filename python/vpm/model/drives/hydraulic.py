@@ -71,7 +71,7 @@ class Valve(Entry):
     ] = Quantity(value=1e4)
 
     def problems(self, keys: Keys) -> Iterator[Problem]:
-        """A gain that is missing or given twice, a frequency without a spool that moves."""
+        """Problems of a hydraulic valve: gain missing or given twice, frequency without a moving spool."""
         rated = [key for key in _RATED if getattr(self, key) is not None]
         missing = [key for key in _RATED if key not in rated]
         if self.flow_gain is not None and rated:
@@ -92,7 +92,7 @@ class Valve(Entry):
                 yield Problem(place(*keys, key), rest)
 
     def unit_problems(self, keys: Keys, command: str) -> Iterator[Problem]:
-        """Numbers of a data sheet that cannot be right; ``command`` is the SI unit of the command."""
+        """Impossible data-sheet numbers of a hydraulic valve; ``command`` is the command's SI unit."""
         for key, of_key in _RATED.items():
             quantity: Quantity | None = getattr(self, key)
             if quantity is None:
@@ -114,7 +114,7 @@ class Valve(Entry):
             yield from _turns_problems((*keys, "frequency"), self.frequency)
 
     def complete(self, command: str) -> Valve:
-        """The same with its gain, for which the rated flow stands, ``rated_flow / (current sqrt(drop))``, and damping.
+        """Hydraulic valve with gain and damping; rated flow gives ``rated_flow / (current sqrt(drop))``.
 
         A spool that moves has a damping; ``command`` is the SI unit of the command.
         """
@@ -155,7 +155,7 @@ class Cylinder(Entry):
     pressures: Literal["chambers", "load", "quasi_static"] = "chambers"
 
     def problems(self, keys: Keys) -> Iterator[Problem]:
-        """Bore and rod, or area and area ratio: both of a pair, and one pair."""
+        """Problems of a hydraulic cylinder: it needs bore and rod, or area and area ratio."""
         pairs = (("bore", "rod"), ("area", "area_ratio"))
         given = [key for pair in pairs for key in pair if getattr(self, key) is not None]
         if not given:
@@ -184,7 +184,7 @@ class SealFriction(Entry):
 
     @property
     def idle(self) -> set[str]:
-        """Velocities without a law that they shape: nothing depends on them, so that they are no parameters."""
+        """Velocities of hydraulic seals that shape no law; they are no parameters."""
         if self.stribeck is not None:
             return set()
         return {"stribeck_velocity"} if self.coulomb is not None else {"stribeck_velocity", "transition_velocity"}
@@ -223,7 +223,7 @@ class Hydraulic(Drive):
     # ---- checks ------------------------------------------------------------------------------------------------------
 
     def carrier_problems(self, name: str, structure: Structure) -> Iterator[Problem]:
-        """A transmission, or a joint that does not move straight."""
+        """Problem of a hydraulic drive on a transmission, or on a joint that does not move straight."""
         yield from super().carrier_problems(name, structure)
         if self.joint in structure.joints:
             kind = structure.joint_kind(str(self.joint))
@@ -232,7 +232,7 @@ class Hydraulic(Drive):
                 yield Problem(place("actuators", name), f"{rest}put it on a line, or on a prismatic joint")
 
     def problems(self, name: str, structure: Structure) -> Iterator[Problem]:
-        """A supply that is not there, sizes that are missing or given twice, a spool or pressures without states."""
+        """Problems of a hydraulic drive: no supply, sizes missing or given twice, inconsistent states."""
         document, keys = structure.document, ("actuators", name)
         if self.supply not in document.supplies:
             known = document.supplies
@@ -244,7 +244,7 @@ class Hydraulic(Drive):
         yield from self._static_problems(name, document)
 
     def _static_problems(self, name: str, document: Document) -> Iterator[Problem]:
-        """Effects that slow down what follows at once; balances of flows that a valve which shuts does not have."""
+        """Problems of a quasi-static hydraulic drive: effects that slow it down, valves that shut."""
         slower = [e.type for e in document.effects if e.traits.late == "spool" and e.at == name]
         if self.valve.spool == "static" and slower:
             rest = f"is static, but the effect {slower[0]} makes it slower; remove one of them"
@@ -257,15 +257,15 @@ class Hydraulic(Drive):
             yield Problem(place("actuators", name, "valve", "clearance"), rest)
 
     def unit_problems(self, name: str) -> Iterator[Problem]:
-        """Numbers of the data sheet of its valve that cannot be right."""
+        """Impossible data-sheet numbers of a hydraulic drive's valve."""
         yield from self.valve.unit_problems(("actuators", name, "valve"), si_unit(self.command_unit))
 
     def complete(self) -> Self:
-        """The same with what its valve need not give."""
+        """Hydraulic drive with the values that its valve need not give."""
         return self.model_copy(update={"valve": self.valve.complete(si_unit(self.command_unit))})
 
     def value_problems(self, name: str, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:
-        """Rods thicker than their bores, edges that never shut or never open."""
+        """Problems of hydraulic values: rods thicker than bores, edges that never shut or never open."""
 
         def value(key: str) -> float:
             return parameters[f"{name}.{key}"].value
@@ -285,7 +285,7 @@ class Hydraulic(Drive):
     # ---- what the model and the core are told ------------------------------------------------------------------------
 
     def units(self, name: str, structure: Structure) -> Mapping[str, str]:  # noqa: ARG002
-        """SI units that depend on that of the command."""
+        """SI units of a hydraulic drive that depend on that of the command."""
         command = si_unit(self.command_unit)
         return {**dict.fromkeys(("stroke", "overlap", "clearance"), command), "flow_gain": flow_gain_unit(command)}
 
@@ -336,12 +336,12 @@ class Hydraulic(Drive):
 
 
 def flow_gain_unit(command: str) -> str:
-    """SI unit of the gain of a valve whose command has the SI unit ``command``."""
+    """SI unit of a hydraulic valve's gain, whose command has the SI unit ``command``."""
     return si_unit(f"m^3/(s ({command}) Pa^0.5)")
 
 
 def _turns_problems(keys: Keys, frequency: Quantity) -> Iterator[Problem]:
-    """Hz is 1/s: a data sheet's 250 Hz would be read as 250 rad/s."""
+    """Problem of a hydraulic valve's frequency in Hz: 250 Hz would be read as 250 rad/s."""
     try:
         hertz = frequency.unit is not None and "Hz" in dict(parse_unit(frequency.unit).si_terms)
     except UnitError:

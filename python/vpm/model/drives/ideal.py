@@ -29,7 +29,7 @@ class Ideal(Drive):
     command_unit: Text = "1"
 
     def units(self, name: str, structure: Structure) -> Mapping[str, str]:
-        """SI units that depend on the model."""
+        """SI units of an ideal drive that depend on the model."""
         effort = structure.effort_unit(name)
         return {"gain": si_unit(f"{effort}/({self.command_unit})"), "limit": effort}
 

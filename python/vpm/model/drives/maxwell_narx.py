@@ -23,7 +23,7 @@ _SLACK = 1e-9
 
 
 def _as_list(value: object) -> object:
-    """Turn a bare number into the constant of a polynomial."""
+    """Turn a bare number into the constant of a Maxwell element's polynomial."""
     return [value] if isinstance(value, int | float) and not isinstance(value, bool) else value
 
 
@@ -62,7 +62,7 @@ class MaxwellNarx(Sampled):
     command_unit: Text = "1"
 
     def read(self, saved: Mapping[str, Any]) -> dict[str, Any]:
-        """What a saved element says."""
+        """Fields of a Maxwell element from a saved result."""
         given, step = self.sample_time, float(saved["step"])
         if given is not None and abs(given - step) > _SLACK * step:
             raise VpmError(
@@ -74,7 +74,7 @@ class MaxwellNarx(Sampled):
         return {**maps, **numbers, "scheme": saved["scheme"], "sample_time": step}
 
     def problems(self, name: str, structure: Structure) -> Iterator[Problem]:
-        """Numbers that are missing, lags and joints that do not fit."""
+        """Problems of a Maxwell element: missing numbers, lags and joints that do not fit."""
         yield from self.lag_problems(name, structure)
         for key in self.EXAMPLES:
             if getattr(self, key) is None:
@@ -95,5 +95,5 @@ class MaxwellNarx(Sampled):
 
 
 def _short(coefficients: list[float]) -> tuple[float, ...]:
-    """Coefficients without the degrees that are all zero."""
+    """Coefficients of a Maxwell element's map without the degrees that are all zero."""
     return tuple(coefficients[: next(size for size in SIZES if not any(coefficients[size:]))])

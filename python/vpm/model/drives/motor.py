@@ -51,13 +51,13 @@ class DcMotor(Drive):
     command_unit: Text = "V"
 
     def carrier_problems(self, name: str, structure: Structure) -> Iterator[Problem]:  # noqa: ARG002
-        """A line that it cannot turn."""
+        """Problem of a motor on a line that it cannot turn."""
         if self.line is not None:
             rest = f'is a dc_motor on the line "{self.line}", but a motor turns a joint or a transmission; '
             yield Problem(place("actuators", name), f"{rest}give joint or transmission in place of line")
 
     def units(self, name: str, structure: Structure) -> Mapping[str, str]:
-        """SI units that depend on the model."""
+        """SI units of a motor that depend on the model."""
         if structure.driven_kind(name) == "prismatic":
             return {"gear_ratio": "rad/m", "transition_velocity": "m/s"}
         return {"gear_ratio": "1", "transition_velocity": "rad/s"}

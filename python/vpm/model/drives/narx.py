@@ -49,11 +49,11 @@ class Narx(Sampled):
 
     @property
     def signals(self) -> tuple[str, ...]:
-        """Names in its terms: the output, then the inputs."""
+        """Names in a NARX drive's terms: the output, then the inputs."""
         return (OUTPUT, *self.inputs)
 
     def read(self, saved: Mapping[str, Any]) -> dict[str, Any]:
-        """What a saved model says; channels and a limit of the model file take the place of its own."""
+        """Fields of a NARX drive from a saved model; the model file's channels and limit take precedence."""
         if OUTPUT in saved["inputs"]:
             raise VpmError(
                 f'an input of the model is called "{OUTPUT}" like its output; identify it under another name'
@@ -68,7 +68,7 @@ class Narx(Sampled):
         }
 
     def problems(self, name: str, structure: Structure) -> Iterator[Problem]:
-        """Inputs and terms that mean nothing, models that grow without bound, lags that do not fit."""
+        """Problems of a NARX drive: meaningless inputs and terms, unbounded growth, wrong lags."""
         yield from self.lag_problems(name, structure)
         known = _readable(name, structure)
         for key, channel in self.inputs.items():
@@ -140,7 +140,7 @@ def _reading(name: str, channel: str, structure: Structure) -> str | dict[str, i
 
 
 def written(term: Sequence[Factor], names: Sequence[str]) -> str:
-    """Text of a term whose factors are (signal, lag); ``names`` are those of the signals, the output's first."""
+    """Text of a NARX term whose factors are (signal, lag); ``names`` of signals, the output's first."""
     factors = []
     for (signal, lag), same in groupby(sorted(term)):
         count = len(list(same))
@@ -150,7 +150,7 @@ def written(term: Sequence[Factor], names: Sequence[str]) -> str:
 
 
 def factors_of(text: str, names: Sequence[str]) -> tuple[Factor, ...]:
-    """Factors of a written term.
+    """Factors of a written NARX term.
 
     Raises
     ------
@@ -178,7 +178,7 @@ def factors_of(text: str, names: Sequence[str]) -> tuple[Factor, ...]:
 
 
 def poles(terms: Sequence[Sequence[Factor]], coefficients: Sequence[float]) -> np.ndarray | None:
-    """Poles of a model that is linear in its own past: roots of ``z^n - a_1 z^(n-1) - ... - a_n``.
+    """Poles of a NARX model linear in its past: roots of ``z^n - a_1 z^(n-1) - ... - a_n``.
 
     Returns
     -------

@@ -50,11 +50,11 @@ class Sampled(Drive):
 
     @property
     def said_twice(self) -> list[str]:
-        """Keys beside the name of a file that say what the file says."""
+        """Keys of a sampled drive that repeat what its file says."""
         return [key for key in self.SAVED if getattr(self, key) is not None]
 
     def with_file(self, path: Path) -> Self:
-        """The drive with the numbers of a saved result.
+        """Sampled drive with the numbers of a saved result.
 
         Raises
         ------
@@ -68,4 +68,4 @@ class Sampled(Drive):
 
     @abstractmethod
     def read(self, saved: Mapping[str, Any]) -> dict[str, Any]:
-        """Fields of a drive from a saved result, by key."""
+        """Fields of a sampled drive from a saved result, by key."""

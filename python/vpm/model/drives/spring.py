@@ -31,7 +31,7 @@ class Compliant(Drive):
     free_length: Annotated[ParameterValue, Rule("m", NOT_NEGATIVE, LENGTH)]
 
     def carrier_problems(self, name: str, structure: Structure) -> Iterator[Problem]:
-        """A joint or a transmission, along which nothing has a length."""
+        """Problem of a spring on a joint or a transmission, along which nothing has a length."""
         if self.joint is not None:
             rest = f'is a {self.type} on the joint "{self.joint}", but its force acts along a line; '
             rest += "give line in place of joint, or take an effect (spring, viscous_friction) of the joint"
@@ -39,7 +39,7 @@ class Compliant(Drive):
         yield from super().carrier_problems(name, structure)
 
     def law(self, name: str, structure: Structure, index: Index) -> Described:  # noqa: ARG002
-        """What the core reads of the law of an elastic drive along a line."""
+        """Law of a spring along a line, as the core reads it."""
         return {**numbers(name, tuple(rules_of(type(self))), index)}
 
 
@@ -74,5 +74,5 @@ class Maxwell(Compliant):
 
     @property
     def states(self) -> Mapping[str, str]:
-        """State of a Maxwell element with its SI unit."""
+        """State of a Maxwell spring with its SI unit."""
         return {"stretch": "m"}

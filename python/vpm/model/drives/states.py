@@ -42,7 +42,7 @@ def rest(model: Evaluations, theta: Array, coordinates: Array) -> Array:
 
 
 def follow(model: Evaluations, theta: Array, internal: Array, inputs: Array, velocity: Array) -> None:
-    """Let lags, spools and currents settle on held commands, in place.
+    """Let states of lags, spools and currents settle on held commands, in place.
 
     Parameters
     ----------
@@ -75,7 +75,7 @@ def follow(model: Evaluations, theta: Array, internal: Array, inputs: Array, vel
 
 
 def _turning(model: Evaluations, theta: Array, motor: str, velocity: Array) -> float:
-    """How fast the joint or the shaft of a motor turns (rad/s or m/s)."""
+    """Speed of a motor's joint or shaft (rad/s or m/s), for its states."""
     transmission = model.transmission_of_actuator(motor)
     if transmission is None:
         return float(velocity[model.joints.index(model.joint_of_actuator(motor))])
@@ -84,7 +84,7 @@ def _turning(model: Evaluations, theta: Array, motor: str, velocity: Array) -> f
 
 
 def commanded_states(model: Evaluations, theta: Array, inputs: Array, dt: float) -> dict[str, Array]:
-    """Lags, spools and rates of spools at every sample of a record, which begins with them settled.
+    """States of lags and spools at every sample of a record, which begins with them settled.
 
     Parameters
     ----------
@@ -120,7 +120,7 @@ def commanded_states(model: Evaluations, theta: Array, inputs: Array, dt: float)
 
 
 def _through_links(command: Array, name: str, value: Value, dt: float) -> Array:
-    """Command (N,) after delay, dead zone and saturation of a drive."""
+    """Command (N,) after delay, dead zone and saturation of a drive, for its states."""
     samples = np.arange(command.size, dtype=np.float64)
     late = np.interp(samples - value(f"{name}.delay.time", 0.0) / dt, samples, command)
     width = value(f"{name}.dead_zone.width", 0.0)
@@ -129,7 +129,7 @@ def _through_links(command: Array, name: str, value: Value, dt: float) -> Array:
 
 
 def _lagged(held: Array, time_constant: float, dt: float) -> tuple[Array, Array]:
-    """A lag at every sample, and its mean over the interval that follows."""
+    """State of a lag at every sample, and its mean over the interval that follows."""
     from scipy.signal import lfilter  # slow to import, and seldom needed
 
     decay = float(np.exp(-dt / time_constant))
@@ -138,7 +138,7 @@ def _lagged(held: Array, time_constant: float, dt: float) -> tuple[Array, Array]
 
 
 def _spool(held: Array, name: str, value: Value, dt: float) -> tuple[Array, Array]:
-    """Place and rate of a spool at every sample."""
+    """States of a spool at every sample: place and rate."""
     from scipy.signal import cont2discrete, lfilter
 
     frequency = value(f"{name}.valve.frequency", 1.0)

@@ -76,7 +76,7 @@ class Supply(Component):
     oil: Oil
 
     def problems(self, name: str, structure: Structure) -> Iterator[Problem]:  # noqa: ARG002
-        """What makes it sag is missing, or given although it does not."""
+        """Problems of a supply: what makes it sag is missing, or given although it does not."""
         for key, example in _SAGGING.items():
             given = getattr(self, key) is not None
             if self.source == "sagging" and not given:
@@ -87,7 +87,7 @@ class Supply(Component):
                 yield Problem(place("supplies", name, key), rest)
 
     def value_problems(self, name: str, parameters: Mapping[str, Parameter]) -> Iterator[Problem]:
-        """Pumps below their tanks, and tanks in which the oil boils."""
+        """Problems of a supply's values: pumps below their tanks, and tanks in which the oil boils."""
         pump, tank, vapour = (
             parameters[f"{name}.{key}"].value for key in ("pressure", "tank_pressure", "oil.vapour_pressure")
         )

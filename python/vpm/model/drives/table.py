@@ -39,7 +39,7 @@ class Table(Drive):
     command_unit: Text = "1"
 
     def problems(self, name: str, structure: Structure) -> Iterator[Problem]:  # noqa: ARG002
-        """Axes that do not rise, and efforts that are not one for each pair."""
+        """Problems of a drive's table: axes that do not rise, and efforts that are not one for each pair."""
         keys = ("actuators", name)
         for key in ("commands", "velocities"):
             axis = getattr(self, key)

@@ -58,7 +58,7 @@ def _moved(loops: Loops, q: Array, fixed: Mapping[int, float], free: Sequence[in
 
 
 def _put(loops: Loops, q: Array, fixed: Mapping[int, float], free: Sequence[int]) -> Array:
-    """Coordinates with some put where they have to be at once, and the loops closed by the other joints."""
+    """Assembly start: some coordinates put where they have to be, the loops closed by the other joints."""
     q = q.copy()
     for place, value in fixed.items():
         q[place] = value
@@ -66,7 +66,7 @@ def _put(loops: Loops, q: Array, fixed: Mapping[int, float], free: Sequence[int]
 
 
 def _closed(loops: Loops, q: Array, free: Sequence[int]) -> Array:
-    """Newton's method with the smallest steps; one that does not bring the ends together is halved."""
+    """Assembly by Newton's method with the smallest steps; one that does not bring the ends together is halved."""
     state = loops.at(q)
     for _ in range(_STEPS):
         if not free or np.abs(state.gap).max(initial=0.0) < 0.01 * CLOSED:
@@ -90,19 +90,19 @@ def _open(loops: Loops, q: Array) -> float:
 
 
 def least(matrix: Array, right: Array) -> Array:
-    """Smallest solution of least squares; what rounding alone decides is left out."""
+    """Smallest least-squares solution for an assembly step, without what rounding alone decides."""
     return np.asarray(np.linalg.lstsq(matrix, right, rcond=NOTHING)[0])
 
 
 def null_space(jacobian: Array) -> Array:
-    """Orthonormal columns of the motions that loops with this derivative allow."""
+    """Orthonormal columns of the motions that loops with this derivative allow in an assembly."""
     _, sizes, rows = np.linalg.svd(jacobian)
     rank = int((sizes > NOTHING * float(sizes.max(initial=0.0))).sum())
     return np.asarray(rows[rank:].T)
 
 
 def pivots(matrix: Array, rank: int, tiers: Sequence[Sequence[int]]) -> set[int]:
-    """Columns on which all others depend, as many as the rank: pivots of an elimination, tier after tier of columns."""
+    """Pivot columns of an assembly's derivative, on which all others depend: as many as its rank."""
     left, sizes = matrix.copy(), np.linalg.norm(matrix, axis=0)
     found: set[int] = set()
     for tier in tiers:

@@ -70,7 +70,7 @@ class Loops:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Names of the joints that close loops."""
+        """Names of the closures: joints that close loops."""
         return tuple(self._model.loop_entries)
 
     def __len__(self) -> int:
@@ -85,7 +85,7 @@ class Loops:
     # ---- kinematics --------------------------------------------------------------------------------------------------
 
     def at(self, q: ArrayLike, v: ArrayLike | None = None) -> LoopState:
-        """Gap of the loops, its derivatives, and which equations are independent.
+        """Closure gap of the loops, its derivatives, and which equations are independent.
 
         Parameters
         ----------
@@ -100,7 +100,7 @@ class Loops:
         return LoopState(gap, jacobian, drift, chosen > 0.5)
 
     def assembled(self, held: Mapping[str, float] | None = None, guess: Mapping[str, float] | None = None) -> Array:
-        """Coordinates at which all loops are closed.
+        """Coordinates at which all loop closures hold.
 
         Parameters
         ----------
@@ -131,7 +131,7 @@ class Loops:
         return closed
 
     def velocities(self, q: ArrayLike, held: Mapping[str, float]) -> Array:
-        """Rates that keep the loops closed, the smallest ones with those of some coordinates given.
+        """Rates that keep the loop closures, the smallest ones with those of some coordinates given.
 
         Raises
         ------
@@ -158,7 +158,7 @@ class Loops:
         return v
 
     def independent(self, q: ArrayLike, prefer: Iterable[str] = ()) -> tuple[str, ...]:
-        """Coordinates that decide all others near ``q``: as many as there are degrees of freedom.
+        """Independent coordinates near ``q`` under the closures: as many as degrees of freedom.
 
         The dependent ones are the pivots of an elimination of the loops' derivative, sought among joints without an
         actuator first, then among the others, then among those to ``prefer`` and the coordinates of flexible links.
@@ -176,7 +176,7 @@ class Loops:
         return tuple(name for place, name in enumerate(names) if place not in dependent)
 
     def transmission(self, q: ArrayLike, inputs: Sequence[str]) -> Array:
-        """Rates of all coordinates per unit rate of some that are independent, shape (n, len(inputs)).
+        """Rates of all coordinates that closures demand per unit rate of inputs, shape (n, len(inputs)).
 
         Its rows are ratios and levers: rad/m of a joint by a stroke, and the effort on a stroke by one on the joint.
 
@@ -201,7 +201,7 @@ class Loops:
         return whole
 
     def accelerations(self, q: ArrayLike, v: ArrayLike, given: Mapping[str, float]) -> Array:
-        """Accelerations of all coordinates that follow from those of the independent ones, shape (n,)."""
+        """Accelerations of all coordinates that closures demand for independent ones, shape (n,)."""
         state, names = self.at(q, v), tuple(given)
         a: Array = self.transmission(q, names) @ np.array([given[name] for name in names])
         free = [place for place, name in enumerate(self._model.coordinates) if name not in names]
@@ -209,13 +209,13 @@ class Loops:
         return a
 
     def turns(self, coordinate: str) -> bool:
-        """Whether a coordinate is the angle of a joint, so that a whole turn of it changes nothing."""
+        """Whether a closure's coordinate is an angle, so that a whole turn of it changes nothing."""
         return coordinate in self._model.joints and self._model.joint_kind(coordinate) == "revolute"
 
     # ---- what is said of them ----------------------------------------------------------------------------------------
 
     def summary(self, q: ArrayLike | None = None) -> str:
-        """One sentence: equations, those that are redundant, and degrees of freedom."""
+        """Sentence on the closure equations, redundant ones, and degrees of freedom."""
         state = self.at(self.assembled() if q is None else q)
         m, n = state.jacobian.shape
         redundant = m - state.rank
@@ -230,7 +230,7 @@ class Loops:
     def efforts(
         self, q: ArrayLike, v: ArrayLike, a: ArrayLike, joints: Sequence[str] | None = None
     ) -> dict[str, float]:
-        """Efforts (N, N m) of the driven joints that a motion needs: inverse dynamics with closed loops.
+        """Efforts (N, N m) of the driven joints under loop closures: inverse dynamics.
 
         Parameters
         ----------
@@ -272,7 +272,7 @@ class Loops:
         return dict(zip(driven, np.linalg.solve(levers, moves.T @ needed).tolist(), strict=True))
 
     def rest(self, held: Mapping[str, float]) -> tuple[Array, dict[str, float]]:
-        """Rest under gravity with some joints held: the others and flexible links where the loops' forces balance.
+        """Rest of closures under gravity with some joints held, where the loops' forces balance.
 
         Parameters
         ----------
@@ -297,7 +297,7 @@ class Loops:
     def singularities(
         self, coordinate: str, held: Mapping[str, float] | None = None, guess: Mapping[str, float] | None = None
     ) -> tuple[Singularity, ...]:
-        """Singular configurations on the way of one degree of freedom, all others held.
+        """Singular configurations of closures on the way of one degree of freedom, all others held.
 
         Parameters
         ----------
@@ -337,7 +337,7 @@ class Loops:
         return tuple(dict.fromkeys(joint for name in direct for joint in model.joints_of_actuator(name)))
 
     def place(self, name: str) -> int:
-        """Number of a coordinate.
+        """Number of a coordinate in the closure equations.
 
         Raises
         ------

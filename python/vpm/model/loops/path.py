@@ -69,7 +69,7 @@ class Path:
         self._free = [place for place in range(len(names)) if place not in fixed]
 
     def singular(self, start: Array, coordinate: int) -> tuple[Singularity, ...]:
-        """Places at which a coordinate turns round, in the order of the way in both directions from the start."""
+        """Singular places on the path, where a coordinate turns round, in both directions from the start."""
         found: list[Singularity] = []
         for direction in (1.0, -1.0):
             before, closed = None, False
@@ -89,7 +89,7 @@ class Path:
         return tuple(found)
 
     def _tangent(self, q: Array) -> Array:
-        """Unit vector along the way.
+        """Unit vector along the path.
 
         Raises
         ------
@@ -127,7 +127,7 @@ class Path:
             yield q, tangent
 
     def _back(self, q: Array) -> Array | None:
-        """The nearest place on the way; None where none is near."""
+        """Nearest place on the path; None where none is near."""
         for _ in range(_TURNS):
             state = self._loops.at(q)
             if np.abs(state.gap).max(initial=0.0) < 1e-14:
@@ -137,7 +137,7 @@ class Path:
         return q if np.abs(self._loops.at(q).gap).max(initial=0.0) < 1e-12 else None
 
     def _between(self, at: Array, ahead: Array, end: Array, coordinate: int) -> Array:
-        """Where the coordinate stands still between two places on the way."""
+        """Place on the path between two others where the coordinate stands still."""
         low, high = 0.0, float(ahead @ (end - at))
         sign = ahead[coordinate]
         place = end
@@ -152,7 +152,7 @@ class Path:
         return place
 
     def _is_back(self, at: Array, q: Array, start: Array) -> bool:
-        """Whether the way passes its start between two places; whole turns of angles count as none."""
+        """Whether the path passes its start between two places; whole turns of angles count as none."""
         turning = [place for place in self._free if self._loops.turns(self._names[place])]
 
         def apart(other: Array) -> Array:

@@ -28,7 +28,7 @@ _SHIFT = 1e-6
 
 
 def resting(model: Evaluations, position: ArrayLike) -> tuple[Array, Array]:
-    """Coordinates (n,) at rest with the independent joints held where ``position`` has them, and efforts (joints,)."""
+    """State of loops at rest with the independent joints held at ``position``, and efforts (joints,)."""
     joints = model.joints
     at = array_of(position, f"{model.name}: position", ModelError)
     if at.shape != (len(joints),):
@@ -42,7 +42,7 @@ def resting(model: Evaluations, position: ArrayLike) -> tuple[Array, Array]:
 def rest(
     model: Evaluations, held: Mapping[str, float], guess: Mapping[str, float] | None = None
 ) -> tuple[Array, dict[str, float]]:
-    """Pose of rest of closed loops under gravity, and efforts on the held joints; see `Loops.rest`.
+    """State of closed loops at rest under gravity, and efforts on the held joints; see `Loops.rest`.
 
     Notes
     -----
@@ -81,14 +81,14 @@ def rest(
 
 
 def _load(model: Evaluations, q: Array) -> tuple[Array, Array]:
-    """Efforts that hold all coordinates of the open machine at rest, and their derivative by them."""
+    """Efforts that hold the open machine's state at rest, and their derivative by coordinates."""
     zero = np.zeros_like(q)
     found = model.inverse_dynamics_derivatives(q, zero, zero)
     return np.asarray(found.effort), np.asarray(found.by_position)
 
 
 def _turned(loops: Loops, q: Array, chosen: NDArray[np.bool_], forces: Array) -> Array:
-    """Derivative of ``J^T l`` by the coordinates, by central differences: a Newton step needs no more."""
+    """Derivative of ``J^T l`` for the state of loops at rest, by central differences."""
     columns = np.zeros((q.size, q.size))
     for place in range(q.size if forces.any() else 0):
         shift = np.zeros_like(q)
@@ -124,7 +124,7 @@ def kept(model: Evaluations, state: Array) -> None:
 
 
 def measured(model: Evaluations, position: Array, velocity: Array, seen: Sequence[str]) -> tuple[Array, Array]:
-    """Coordinates and rates next to measured ones that leave the loops closed.
+    """State next to a measured one that leaves the loops closed: coordinates and rates.
 
     Of the joints that were ``seen``, as many keep their readings as there are degrees of freedom.
     """

@@ -21,19 +21,19 @@ _LARGE = 500_000
 
 
 def compiler() -> str | None:
-    """The C compiler that is at hand: what ``CC`` names, or ``cc``."""
+    """C compiler for an FMU's binary: what ``CC`` names, or ``cc``."""
     return shutil.which(os.environ.get("CC") or "cc")
 
 
 def platform_name() -> tuple[str, str] | None:
-    """How FMI calls this platform, such as ``"x86_64-linux"``, and how its libraries end; None where it has no name."""
+    """Platform of an FMU's binary, such as ``"x86_64-linux"``, and how its libraries end; or None."""
     system = _SYSTEMS.get(sys.platform)
     processor = _PROCESSORS.get(platform.machine().lower())
     return None if system is None or processor is None else (f"{processor}-{system[0]}", system[1])
 
 
 def shared_library(sources: dict[str, str], files: list[str]) -> bytes:
-    """Compile sources into a shared library.
+    """Compile sources into an FMU's binary, a shared library.
 
     Parameters
     ----------

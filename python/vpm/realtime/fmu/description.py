@@ -94,7 +94,7 @@ def _attributes(variable: Variable) -> dict[str, str]:
 
 
 def _units(root: ET.Element, names: set[str]) -> None:
-    """Units with their powers of base units; fractional powers, which the standard cannot say, are names alone."""
+    """Units in an FMU's description with their powers of base units; fractional powers are names alone."""
     if not names:
         return
     definitions = ET.SubElement(root, "UnitDefinitions")
@@ -122,7 +122,7 @@ def _dependent(structure: ET.Element, what: str, reference: int, knowns: tuple[i
 
 
 def _printable(text: str) -> str:
-    """A text with what XML cannot hold replaced."""
+    """Text in an FMU's description without what XML cannot hold."""
     return re.sub(r"[^\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]", "?", text)
 
 

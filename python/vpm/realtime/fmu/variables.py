@@ -71,7 +71,7 @@ class Variables:
 
     @property
     def all(self) -> tuple[Variable, ...]:
-        """Each of them, in the order of references."""
+        """All variables of an FMU, in the order of references."""
         return (self.time, *self.inputs, *self.states, *self.rates, *self.outputs, *self.parameters)
 
 
@@ -135,7 +135,7 @@ def variables(model: Model, written: CSource, start: NDArray[np.float64]) -> Var
 
 
 def _rate(unit: str) -> str:
-    """Unit of the change of a quantity with time."""
+    """Unit of an FMU variable's change with time."""
     above, _, below = unit.partition("/")
     if not below:
         return f"{above}/s"
@@ -145,7 +145,7 @@ def _rate(unit: str) -> str:
 def _dependencies(
     written: CSource, what: str, first: int, count: int, knowns: Mapping[str, int]
 ) -> dict[int, tuple[tuple[int, ...], tuple[int, ...]]]:
-    """Which knowns change each of the rates or outputs, from the entries of their derivatives."""
+    """Dependencies of an FMU's rates and output variables on knowns, from their derivatives."""
     found: dict[int, tuple[list[int], list[int]]] = {first + row: ([], []) for row in range(count)}
     for kind, begin in knowns.items():
         for row, column in written.entries(what, kind):

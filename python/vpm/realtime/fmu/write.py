@@ -151,7 +151,7 @@ def write_fmu(
 
 
 def _steps(rate: float, integrator: str, substeps: int) -> tuple[str, float]:
-    """Integrator and step length (s) of an FMU."""
+    """Integrator and step length (s) to write into an FMU."""
     if not 0.0 < rate < math.inf:
         raise SimulationError(f"a rate of {rate:g} Hz is not possible; give a positive number")
     if substeps % 1 or not 1 <= substeps <= MOST_STEPS:
@@ -162,7 +162,7 @@ def _steps(rate: float, integrator: str, substeps: int) -> tuple[str, float]:
 
 
 def _sources(written: CSource, found: Variables, method: str, step: float) -> dict[str, str]:
-    """Texts of the sources by file name; the token is not known yet."""
+    """Source texts to write into an FMU, by file name; the token is not known yet."""
     here = files("vpm.realtime.fmu")
     texts = {file: here.joinpath(file).read_text(encoding="utf-8") for file in ("fmi3.h", "fmu.c", *_PARTS)}
     texts = {file: text.replace("NAME", written.name) for file, text in texts.items()}
@@ -197,7 +197,7 @@ def _token(*texts: str) -> str:
 
 
 def _notes(model: Model) -> list[str]:
-    """Notes on what a simulation of the model does and its FMU does not."""
+    """Notes to write with an FMU on what it does not do as a simulation does."""
     notes = []
     if model.is_abrupt:
         notes.append(

@@ -43,7 +43,7 @@ impl<'a, S: Scalar> Balance<'a, S> {
         Self { valve, cylinder, vapour: oil.vapour_pressure, edges: valve.edges(place), supply, tank }
     }
 
-    /// Pressures (Pa) with the piston moving at `v` (m/s).
+    /// Chamber pressures (Pa) by balance of flows, with the piston moving at `v` (m/s).
     #[inline]
     pub fn chambers(&self, v: S) -> Chambers<S> {
         let areas = self.cylinder.areas();
@@ -55,13 +55,14 @@ impl<'a, S: Scalar> Balance<'a, S> {
         Chambers { a: found[0], b: found[1] }
     }
 
-    /// Laminar leakage past the piston, m^3/(s Pa).
+    /// Laminar leakage past the piston in the balance of flows, m^3/(s Pa).
     #[inline]
     fn internal(&self) -> S {
         self.cylinder.worn_leakage.map_or(self.cylinder.internal_leakage, |worn| self.cylinder.internal_leakage + worn)
     }
 
-    /// Both pressures nearly, without derivatives; the piston takes the flows `swept` (m^3/s) from the chambers.
+    /// Search for both balanced pressures, without derivatives. The piston takes the flows `swept` (m^3/s) from the
+    /// chambers.
     fn search(&self, [swept_a, swept_b]: [S; 2]) -> [S; 2] {
         let [forward, backward] = self.edges.map(|opening| self.valve.orifice.gain * opening);
         let (internal, external) = (self.internal(), self.cylinder.external_leakage);
@@ -93,7 +94,8 @@ impl<'a, S: Scalar> Balance<'a, S> {
         [(a + shifts[0]).max(self.vapour), (b + shifts[1]).max(self.vapour)]
     }
 
-    /// What flows into a chamber at pressure `p`, less what is `taken` from it (m^3/s), and how much that falls with the pressure.
+    /// Balance of a chamber's flows at pressure `p`, and how much it falls with the pressure. It is what flows in less
+    /// what is `taken` (m^3/s).
     fn net(&self, p: S, [filling, emptying]: [S; 2], taken: S) -> [S; 2] {
         let (orifice, external) = (&self.valve.orifice, self.cylinder.external_leakage);
         let (in_drop, out_drop) = (self.supply - p, p - self.tank);

@@ -64,7 +64,7 @@ impl<P> Cylinder<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of the cylinder and where each is defined.
     pub fn domains(&self) -> Vec<NamedDomain<'_, P>> {
         let mut domains = self.size.domains();
         domains.extend([
@@ -83,20 +83,21 @@ impl<P> Cylinder<P> {
 }
 
 impl<S: Scalar> Cylinder<S> {
-    /// Areas in m^2 on which the pressures act.
+    /// Piston areas of the cylinder in m^2 on which the pressures act.
     #[inline]
     pub fn areas(&self) -> Chambers<S> {
         self.size.areas()
     }
 
-    /// Pressures in Pa at rest without net force between a supply and a tank (Pa): `A pa = alpha A pb`, `pa + pb = ps + pt`.
+    /// Cylinder pressures in Pa at rest without net force: `A pa = alpha A pb`, `pa + pb = ps + pt`. Supply and tank
+    /// have ps and pt (Pa).
     pub fn rest(&self, supply: S, tank: S) -> Chambers<S> {
         let areas = self.areas();
         let b = (supply + tank) / (areas.b / areas.a + 1.0);
         Chambers { a: areas.b / areas.a * b, b }
     }
 
-    /// Volumes in m^3 with the piston at `x`.
+    /// Chamber volumes of the cylinder in m^3 with the piston at `x`.
     #[inline]
     pub fn volumes(&self, x: S) -> Chambers<S> {
         let (areas, half) = (self.areas(), self.stroke * 0.5);
@@ -106,27 +107,27 @@ impl<S: Scalar> Cylinder<S> {
         }
     }
 
-    /// Volume rates in m^3/s with the piston at `x` and moving with `v`.
+    /// Volume rates of the cylinder's chambers in m^3/s, the piston at `x` moving with `v`.
     #[inline]
     pub fn volume_rates(&self, x: S, v: S) -> Chambers<S> {
         let (areas, half) = (self.areas(), self.stroke * 0.5);
         Chambers { a: x.if_less(-half, S::zero, || areas.a * v), b: half.if_less(x, S::zero, || -(areas.b * v)) }
     }
 
-    /// Force of the oil on the piston in N under `pressures` (Pa).
+    /// Force of the cylinder's oil on the piston in N under `pressures` (Pa).
     #[inline]
     pub fn force(&self, pressures: Chambers<S>) -> S {
         let areas = self.areas();
         areas.a * pressures.a - areas.b * pressures.b
     }
 
-    /// Force of the seals and the stops on the piston in N.
+    /// Force of the cylinder's seals and stops on the piston in N.
     #[inline]
     pub fn resistance(&self, x: S, v: S) -> S {
         self.seal.force(v) + self.stop.force(x, v, self.stroke * 0.5)
     }
 
-    /// What leaves each chamber past piston and rod in m^3/s.
+    /// Leakage of each cylinder chamber past piston and rod in m^3/s.
     #[inline]
     pub fn leakage(&self, pressures: Chambers<S>, tank: S) -> Chambers<S> {
         let laminar = self.worn_leakage.map_or(self.internal_leakage, |worn| self.internal_leakage + worn);
@@ -137,8 +138,8 @@ impl<S: Scalar> Cylinder<S> {
         }
     }
 
-    /// Rates in Pa/s of the chambers' `states` (see [`Fluid`]) with the piston at `x` and moving with `v`, and the flows `inflow`
-    /// (m^3/s) into each from the valve.
+    /// Rates in Pa/s of the cylinder's chamber `states` (see [`Fluid`]), the piston at `x` moving with `v`. The valve
+    /// gives the flows `inflow` (m^3/s) into each.
     #[inline]
     pub fn rates(
         &self,
@@ -156,7 +157,7 @@ impl<S: Scalar> Cylinder<S> {
         }
     }
 
-    /// Stiffness of the enclosed oil in N/m with the piston at `x` and both chambers full.
+    /// Stiffness of the cylinder's oil in N/m with the piston at `x` and both chambers full.
     ///
     /// Law: `beta_a A^2 / va + beta_b (alpha A)^2 / vb`, the factor of the velocity in 4.20 and 4.21.
     #[inline]
@@ -166,7 +167,8 @@ impl<S: Scalar> Cylinder<S> {
             + fluid.effective_bulk_modulus(states.b) * areas.b * areas.b / volumes.b
     }
 
-    /// Rate of the force in N/s, inside the stroke and with both chambers full, in the form without pressure rates.
+    /// Rate of the cylinder's force in N/s, inside the stroke with both chambers full. In the form without pressure
+    /// rates.
     ///
     /// Law: `F' = -K v + A (beta_a (qa - leak_a) / va + alpha beta_b (qb + leak_b) / vb)` with the oil's stiffness K, qa into a and qb
     /// out of b (4.19 with its missing alpha; 4.20 and 4.21 with leakage), a witness of [`Cylinder::rates`].

@@ -55,7 +55,7 @@ impl<P> HydraulicDrive<P> {
         }
     }
 
-    /// Names of its states, in their order.
+    /// Names of the hydraulic drive's states, in their order.
     pub fn states(&self) -> &'static [&'static str] {
         match (self.valve.frequency.is_some(), self.pressures) {
             (true, Pressures::Chambers) => &["spool", "spool_rate", "chamber_a", "chamber_b"],
@@ -67,13 +67,13 @@ impl<P> HydraulicDrive<P> {
         }
     }
 
-    /// Number of states of its spool, which are the first.
+    /// Number of states of the hydraulic drive's spool, which are the first.
     #[inline]
     fn of_spool(&self) -> usize {
         if self.valve.frequency.is_some() { 2 } else { 0 }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of the hydraulic drive and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let parts = [self.valve.domains(), self.cylinder.domains()].concat();
         let mut domains = vec![(&self.retracted_length, Domain::Any)];
@@ -83,14 +83,15 @@ impl<P> HydraulicDrive<P> {
 }
 
 impl<S: Scalar> HydraulicDrive<S> {
-    /// Place of the piston from mid-stroke (m) at a length or coordinate `s` (m).
+    /// Piston place of the hydraulic drive from mid-stroke (m) at a length or coordinate `s` (m).
     #[inline]
     pub fn piston(&self, s: S) -> S {
         s - self.retracted_length - self.cylinder.stroke * 0.5
     }
 
-    /// What it does in its `states` under a `current` (A), with the piston at `x` (m) and moving with `v` (m/s), fed from `supply` at
-    /// `pressure` (Pa); the `rates` of its states are written. The friction of the seals, [`super::SealFriction::force`], is not in it.
+    /// Action of the hydraulic drive in its `states` under a `current` (A); the `rates` are written. The piston is at
+    /// `x` (m) and moves with `v` (m/s); `supply` feeds at `pressure` (Pa). The friction of the seals,
+    /// [`super::SealFriction::force`], is not in it.
     #[inline]
     pub fn action(
         &self,
@@ -131,12 +132,12 @@ impl<S: Scalar> HydraulicDrive<S> {
         DriveAction { force, spool, pressures, flows }
     }
 
-    /// Chambers (Pa) at rest without net force: `A pa = alpha A pb`, `pa + pb = ps + pt`.
+    /// Chambers (Pa) of the hydraulic drive at rest without net force: `A pa = alpha A pb`, `pa + pb = ps + pt`.
     pub fn rest(&self, supply: &Supply<S>) -> Chambers<S> {
         self.cylinder.rest(supply.pressure, supply.tank_pressure)
     }
 
-    /// Writes its states at rest without a command and without net force.
+    /// Settles the hydraulic drive: writes its states at rest without a command and without net force.
     pub fn settle(&self, supply: &Supply<S>, next: &mut impl FnMut(S)) {
         let Chambers { a, b } = self.rest(supply);
         (0..self.of_spool()).for_each(|_| next(S::zero()));

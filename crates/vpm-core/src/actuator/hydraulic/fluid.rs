@@ -19,7 +19,7 @@ pub struct EntrainedAir<P> {
 }
 
 impl<P> EntrainedAir<P> {
-    /// The same air over another number type.
+    /// Air in the fluid over another number type.
     fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> EntrainedAir<T> {
         EntrainedAir {
             fraction: f(&self.fraction),
@@ -30,7 +30,7 @@ impl<P> EntrainedAir<P> {
 }
 
 impl<S: Scalar> EntrainedAir<S> {
-    /// Volume of air per volume of oil at a `pressure` (Pa).
+    /// Volume of air per volume of fluid at a `pressure` (Pa).
     #[inline]
     fn share(&self, pressure: S) -> S {
         self.fraction * ((self.reference_pressure / pressure).ln() / self.exponent).exp()
@@ -62,7 +62,7 @@ pub struct Fluid<P> {
 }
 
 impl<P> Fluid<P> {
-    /// The same oil over another number type.
+    /// Fluid over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> Fluid<T> {
         Fluid {
             bulk_modulus: f(&self.bulk_modulus),
@@ -72,7 +72,7 @@ impl<P> Fluid<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of the fluid and where each is defined.
     pub fn domains(&self) -> Vec<NamedDomain<'_, P>> {
         let mut domains = vec![
             ("fluid.bulk_modulus", &self.bulk_modulus, Domain::Positive),
@@ -88,13 +88,13 @@ impl<P> Fluid<P> {
 }
 
 impl<S: Scalar> Fluid<S> {
-    /// Pressure in Pa of a chamber in a `state` (Pa): never below that of vapour.
+    /// Pressure in Pa of the fluid in a chamber in a `state` (Pa): never below that of vapour.
     #[inline]
     pub fn pressure(&self, state: S) -> S {
         state.max(self.vapour_pressure)
     }
 
-    /// Effective bulk modulus in Pa of a chamber in a `state` (Pa).
+    /// Effective bulk modulus in Pa of the fluid in a chamber in a `state` (Pa).
     #[inline]
     pub fn effective_bulk_modulus(&self, state: S) -> S {
         if self.air.is_none() && self.more_air.is_none() {

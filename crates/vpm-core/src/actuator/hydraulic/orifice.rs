@@ -29,7 +29,7 @@ impl<P> Orifice<P> {
         Orifice { gain: f(&self.gain), transition_pressure: f(&self.transition_pressure) }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of the orifice and where each is defined.
     pub fn domains(&self) -> Vec<NamedDomain<'_, P>> {
         vec![
             ("valve.orifice.gain", &self.gain, Domain::NonNegative),
@@ -39,12 +39,13 @@ impl<P> Orifice<P> {
 }
 
 impl<S: Scalar> Orifice<S> {
-    /// The gain that a data sheet gives by its rated `flow` (m^3/s) at a pressure `drop` (Pa) over one edge and an `opening`.
+    /// Orifice gain by a data sheet's rated `flow` (m^3/s) at a pressure `drop` (Pa) and an `opening`. The drop is that
+    /// over one edge.
     pub fn rated_gain(flow: S, drop: S, opening: S) -> S {
         flow / (opening * drop.sqrt())
     }
 
-    /// Flow in m^3/s through an `opening` under a pressure `drop` (Pa), positive along the drop.
+    /// Flow in m^3/s through the `opening` of an orifice under a pressure `drop` (Pa), positive along the drop.
     #[inline]
     pub fn flow(&self, opening: S, drop: S) -> S {
         self.gain * opening * self.root(drop)
@@ -61,7 +62,7 @@ impl<S: Scalar> Orifice<S> {
         self.gain * opening * size.if_less(self.transition_pressure, laminar, || (size.sqrt() * 2.0).recip())
     }
 
-    /// The signed root of a pressure drop, in sqrt(Pa).
+    /// Signed root of a pressure drop over an orifice, in sqrt(Pa).
     #[inline]
     fn root(&self, drop: S) -> S {
         let size = drop.abs();

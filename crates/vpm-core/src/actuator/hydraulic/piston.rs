@@ -24,7 +24,7 @@ pub struct EndStop<P> {
 }
 
 impl<S: Scalar> EndStop<S> {
-    /// Force at `x` from the middle of a stroke of half length `reach`, moving with `v`.
+    /// Force of a piston's end stop at `x` from mid-stroke, moving with `v`. Half of the stroke is `reach`.
     #[inline]
     pub fn force(&self, x: S, v: S, reach: S) -> S {
         let below = || x.if_less(-reach, || self.push(-x - reach, -v), S::zero);
@@ -55,7 +55,7 @@ pub struct SealFriction<P> {
 }
 
 impl<P> SealFriction<P> {
-    /// The same friction over another number type.
+    /// Seal friction of a piston over another number type.
     pub fn map<T>(&self, f: &mut impl FnMut(&P) -> T) -> SealFriction<T> {
         SealFriction {
             viscous: self.viscous.as_ref().map(|law| law.map(f)),
@@ -64,7 +64,7 @@ impl<P> SealFriction<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of a piston's seal friction and where each is defined.
     pub fn domains(&self) -> Vec<NamedDomain<'_, P>> {
         let viscous = self.viscous.iter().flat_map(ViscousFriction::domains);
         let coulomb = self.coulomb.iter().flat_map(CoulombFriction::domains);
@@ -86,7 +86,7 @@ impl<S: Scalar> SealFriction<S> {
         let coulomb = self.coulomb.map_or(S::zero(), |law| law.effort(S::zero(), v));
         viscous + coulomb + self.stribeck.map_or(S::zero(), |law| law.effort(S::zero(), v))
     }
-    /// Resistance in N s/m at velocity `v` (m/s): the force is `-r v`, the slope of the chord from rest.
+    /// Resistance of a piston's seals in N s/m at velocity `v` (m/s): the chord from rest. The force is `-r v`.
     #[inline]
     pub fn resistance(&self, v: S) -> S {
         let viscous = self.viscous.map_or(S::zero(), |law| law.resistance(S::zero(), v));
@@ -94,7 +94,7 @@ impl<S: Scalar> SealFriction<S> {
         viscous + coulomb + self.stribeck.map_or(S::zero(), |law| law.resistance(S::zero(), v))
     }
 
-    /// Whether there is any.
+    /// Whether a piston has any seal friction.
     #[inline]
     pub fn is_there(&self) -> bool {
         self.viscous.is_some() || self.coulomb.is_some() || self.stribeck.is_some()

@@ -42,13 +42,13 @@ pub struct ServoState<S> {
 }
 
 impl<S: Copy> ServoState<S> {
-    /// The state as numbers: position, spool, velocity, spool rate, chamber a, chamber b.
+    /// Servo-cylinder state as numbers: position, spool, velocity, spool rate, chamber a, chamber b.
     #[inline]
     pub fn to_array(self) -> [S; STATES] {
         [self.position, self.spool, self.velocity, self.spool_rate, self.chambers.a, self.chambers.b]
     }
 
-    /// The state of these numbers.
+    /// Servo-cylinder state of these numbers.
     #[inline]
     pub fn from_array([position, spool, velocity, spool_rate, a, b]: [S; STATES]) -> Self {
         Self { position, spool, velocity, spool_rate, chambers: Chambers { a, b } }
@@ -88,7 +88,7 @@ impl<P> ServoCylinder<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of the servo-cylinder and where each is defined.
     pub fn domains(&self) -> Vec<NamedDomain<'_, P>> {
         let own = [
             ("load.mass", &self.load.mass, Domain::Positive),
@@ -102,27 +102,28 @@ impl<P> ServoCylinder<P> {
 }
 
 impl<S: Scalar> ServoCylinder<S> {
-    /// At rest at mid-stroke with the spool in the middle and no force on the load: `A pa = alpha A pb`, `pa + pb = ps + pt`.
+    /// Servo-cylinder state at rest at mid-stroke, no force on the load: `A pa = alpha A pb`, `pa + pb = ps + pt`. The
+    /// spool is in the middle.
     pub fn rest(&self) -> ServoState<S> {
         let zero = S::zero();
         let chambers = self.cylinder.rest(self.supply_pressure, self.tank_pressure);
         ServoState { position: zero, spool: zero, velocity: zero, spool_rate: zero, chambers }
     }
 
-    /// Pressures of the chambers in Pa.
+    /// Chamber pressures of the servo-cylinder in Pa.
     #[inline]
     pub fn pressures(&self, state: &ServoState<S>) -> Chambers<S> {
         Chambers { a: self.fluid.pressure(state.chambers.a), b: self.fluid.pressure(state.chambers.b) }
     }
 
-    /// Flows through the valve.
+    /// Flows through the servo-cylinder's valve.
     #[inline]
     pub fn flows(&self, state: &ServoState<S>) -> Flows<S> {
         let Chambers { a, b } = self.pressures(state);
         self.valve.flows(state.spool, self.supply_pressure, self.tank_pressure, [a, b])
     }
 
-    /// Rate of the state under a `current` (A) in the valve and a `force` (N) against the rod.
+    /// Rate of the servo-cylinder's state under a `current` (A) in the valve and a `force` (N) against the rod.
     #[inline]
     pub fn rates(&self, state: &ServoState<S>, current: S, force: S) -> ServoState<S> {
         let (x, v, load) = (state.position, state.velocity, &self.load);
@@ -153,7 +154,7 @@ pub struct ServoRig<S> {
 }
 
 impl<S: Scalar> ServoRig<S> {
-    /// The rig without current and force, if its parameters have a meaning.
+    /// Servo rig without current and force, if its parameters have a meaning.
     pub fn new(servo: ServoCylinder<S>) -> Result<Self> {
         for (name, parameter, domain) in servo.domains() {
             let value = parameter.inspect();
@@ -182,7 +183,7 @@ impl<S: Scalar> ServoRig<S> {
     }
 }
 
-/// The state at the front of `x`; the integrators see to it that there is one.
+/// Servo-cylinder state at the front of `x`; the integrators see to it that there is one.
 #[inline]
 fn read<S: Scalar, T: Scalar>(x: &[S], lift: impl Fn(S, usize) -> T) -> ServoState<T> {
     ServoState::from_array(std::array::from_fn(|k| lift(x.get(k).copied().unwrap_or_default(), k)))
@@ -211,7 +212,8 @@ impl<S: Scalar> Ode<S> for ServoRig<S> {
         }
     }
 
-    /// Position 1 cm, velocity 1 m/s, the stroke of the spool and its rate at the natural frequency, pressures 1 bar.
+    /// Scales of the servo-cylinder's states. Position 1 cm, velocity 1 m/s, the stroke of the spool and its rate at
+    /// the natural frequency, pressures 1 bar.
     fn scales(&self, scales: &mut [f64]) {
         let (spool, frequency) =
             (self.servo.valve.stroke.inspect(), self.servo.valve.frequency.map_or(1.0, |own| own.inspect()));

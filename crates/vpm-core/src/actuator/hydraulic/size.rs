@@ -40,7 +40,7 @@ impl<P> PistonSize<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of a piston's size and where each is defined.
     pub fn domains(&self) -> Vec<NamedDomain<'_, P>> {
         match self {
             Self::Diameters { bore, rod } => {
@@ -54,7 +54,7 @@ impl<P> PistonSize<P> {
 }
 
 impl<S: Scalar> PistonSize<S> {
-    /// Areas in m^2 on which the pressures act.
+    /// Areas in m^2 on which the pressures act, from the piston's size.
     #[inline]
     pub fn areas(&self) -> Chambers<S> {
         match *self {

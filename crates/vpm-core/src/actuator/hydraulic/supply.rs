@@ -90,7 +90,7 @@ impl<P> Supply<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of the supply and where each is defined.
     pub fn domains(&self) -> Vec<(&P, Domain)> {
         let mut domains = vec![(&self.pressure, Domain::Positive), (&self.tank_pressure, Domain::Positive)];
         domains.extend(self.oil.domains().into_iter().map(|(_, parameter, domain)| (parameter, domain)));
@@ -103,25 +103,25 @@ impl<P> Supply<P> {
         domains
     }
 
-    /// Names of its states, in their order.
+    /// Names of the supply's states, in their order.
     pub fn states(&self) -> impl Iterator<Item = &'static str> {
         let (sagging, drop) = (self.is_sagging().then_some("pressure"), self.drop.as_ref().map(|_| "drop"));
         sagging.into_iter().chain(drop)
     }
 
-    /// Whether its pressure is an input.
+    /// Whether the supply's pressure is a logged input.
     pub fn is_logged(&self) -> bool {
         matches!(self.source, Source::Logged)
     }
 
-    /// Whether its pressure is a state.
+    /// Whether the supply's pressure is a state.
     pub fn is_sagging(&self) -> bool {
         matches!(self.source, Source::Sagging(_))
     }
 }
 
 impl<S: Scalar> SupplyDrop<S> {
-    /// Change in Pa/s of a `drop` (Pa) with `flow` (m^3/s) drawn.
+    /// Change in Pa/s of a supply's `drop` (Pa) with `flow` (m^3/s) drawn.
     #[inline]
     pub fn rate(&self, drop: S, flow: S) -> S {
         (self.resistance * flow - drop) / self.time_constant
@@ -129,7 +129,7 @@ impl<S: Scalar> SupplyDrop<S> {
 }
 
 impl<S: Scalar> Sagging<S> {
-    /// dp/dt in Pa/s at pressure `p` with `flow` (m^3/s) drawn, from a source of `pressure` (Pa).
+    /// Rate dp/dt in Pa/s of a supply at pressure `p` with `flow` (m^3/s) drawn, from a source of `pressure` (Pa).
     #[inline]
     pub fn rate(&self, p: S, pressure: S, flow: S) -> S {
         ((pressure - p) / self.resistance - flow) / self.capacitance

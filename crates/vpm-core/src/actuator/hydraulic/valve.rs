@@ -76,7 +76,7 @@ impl<P> Valve<P> {
         }
     }
 
-    /// The parameters and where each is defined.
+    /// Parameters of the valve and where each is defined.
     pub fn domains(&self) -> Vec<NamedDomain<'_, P>> {
         let mut domains = vec![
             ("valve.gain", &self.gain, Domain::Any),
@@ -93,20 +93,21 @@ impl<P> Valve<P> {
 }
 
 impl<S: Scalar> Valve<S> {
-    /// Natural frequency of the spool as it is, rad/s; none of one that follows at once.
+    /// Natural frequency of the valve's spool as it is, rad/s; none of one that follows at once.
     #[inline]
     pub fn own_frequency(&self) -> Option<S> {
         let frequency = self.frequency?;
         Some(self.delay.map_or(frequency, |delay| frequency / (frequency * delay + 1.0)))
     }
 
-    /// Where a held `current` (A) leads the spool to, spool units.
+    /// Place to which a held `current` (A) leads the valve's spool, spool units.
     #[inline]
     pub fn target(&self, current: S) -> S {
         Saturation { limit: self.stroke }.apply(self.gain * current)
     }
 
-    /// Acceleration of a spool at `place` with `rate` under a `current` (A), spool unit/s^2; none of one that follows at once.
+    /// Acceleration of a valve's spool at `place` with `rate` under a `current` (A), spool unit/s^2. There is none of
+    /// one that follows at once.
     #[inline]
     pub fn spool_acceleration(&self, place: S, rate: S, current: S) -> Option<S> {
         let frequency = self.own_frequency()?;
@@ -114,7 +115,8 @@ impl<S: Scalar> Valve<S> {
         Some(frequency * frequency * (self.target(current) - place) - resistance)
     }
 
-    /// How far from the middle any command drives the spool at most, and how fast, in spool units and 1/s; infinite without damping.
+    /// Reach of the valve's spool from the middle, and its speed, in spool units and 1/s. It is for any command;
+    /// infinite without damping.
     ///
     /// Law: of `z'' = w^2 (u - z) - 2 D w z'` with `|u| <= stroke`, from rest, the worst command changes its sign with every half swing:
     /// `|z| <= stroke coth(pi D / (2 sqrt(1 - D^2)))` for D < 1, else `|z| <= stroke`. Where the rate is largest, its change vanishes:
@@ -132,14 +134,14 @@ impl<S: Scalar> Valve<S> {
         [place, frequency * (self.stroke + place) / (damping * 2.0)]
     }
 
-    /// What a spool at `place` opens, in spool units: positive from supply to a.
+    /// Opening of a valve with its spool at `place`, in spool units: positive from supply to a.
     #[inline]
     pub fn opening(&self, place: S) -> S {
         self.overlap.apply(Saturation { limit: self.stroke }.apply(place))
     }
 
-    /// How far both edges from the supply to a and from b to the tank are open with the spool at `place`, and how far the two others,
-    /// spool units.
+    /// Openings of the valve's edges with the spool at `place`, spool units. First from the supply to a and from b to
+    /// the tank, then the two others.
     #[inline]
     pub fn edges(&self, place: S) -> [S; 2] {
         match self.clearance {
@@ -160,7 +162,7 @@ impl<S: Scalar> Valve<S> {
         }
     }
 
-    /// Flows with the spool at `place` between the pressures of the `supply`, the `tank` and the ports `[a, b]`, all in Pa.
+    /// Flows of a valve with the spool at `place` between `supply`, `tank` and ports `[a, b]`, all in Pa.
     #[inline]
     pub fn flows(&self, place: S, supply: S, tank: S, [a, b]: [S; 2]) -> Flows<S> {
         if self.clearance.is_some() {

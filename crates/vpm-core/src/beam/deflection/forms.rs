@@ -125,7 +125,7 @@ impl Forms {
         }
     }
 
-    /// What a rotation before the segment displaces over it: `w_2 x k = (w_2y, -w_2x, 0)`.
+    /// Displacement by a rotation before the segment in the quadratic forms: `w_2 x k = (w_2y, -w_2x, 0)`.
     fn lean<S: Scalar>(&self, size: f64, second: &mut Second<S>, slopes: &mut [S]) {
         for (turn, shift, lever) in [(1, 3, size), (0, 4, -size)] {
             let place = |target| self.targets.iter().position(|&own| own == target);
@@ -142,7 +142,7 @@ impl Forms {
 }
 
 impl Segment {
-    /// Leaves out what is zero.
+    /// Quadratic forms without zero entries.
     fn packed(size: f64, local: Vec<usize>, blocks: &[Vec<f64>; 6], targets: &[usize]) -> Self {
         let (m, mut rows, mut entries) = (local.len(), Vec::new(), Vec::new());
         for (form, &target) in targets.iter().enumerate() {
@@ -202,7 +202,7 @@ impl Point {
         Self { weight, lever, theta, kappa, gamma }
     }
 
-    /// Adds what happens at the point: cross products term by term.
+    /// Adds cross products at the point to the quadratic forms, term by term.
     fn add(&self, sums: &mut [Vec<f64>; 6]) {
         let Self { weight, lever, theta, kappa, gamma } = self;
         for (a, b, c) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
@@ -224,7 +224,7 @@ impl Point {
     }
 }
 
-/// Adds `factor left^T right`.
+/// Adds `factor left^T right` to a quadratic form.
 fn outer(matrix: &mut [f64], factor: f64, left: &[f64], right: &[f64]) {
     for (row, &left) in matrix.chunks_exact_mut(right.len().max(1)).zip(left).filter(|(_, left)| **left != 0.0) {
         for (entry, &right) in row.iter_mut().zip(right) {

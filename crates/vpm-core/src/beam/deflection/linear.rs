@@ -27,7 +27,7 @@ pub(in crate::beam) struct LinearAxis {
 }
 
 impl LinearAxis {
-    /// An axis with sections at `places`, ascending.
+    /// Axis of linear deflection with sections at `places`, ascending.
     pub fn new(fields: &Fields, places: &[f64]) -> Self {
         let components: Vec<Component> = fields.components.iter().map(|&component| Component::ALL[component]).collect();
         let tip = fields.list.first().map(|field| field.basis.length());
@@ -43,12 +43,12 @@ impl LinearAxis {
         Self { components, places: places.to_vec(), rows, single }
     }
 
-    /// The largest slope of the axis against its direction at the root, in rad.
+    /// Largest slope of the axis with linear deflection against its root direction, in rad.
     pub fn slope<S: Scalar>(&self, q: &[S]) -> S {
         largest_slope(&self.components, &self.rows, q)
     }
 
-    /// Poses, twists and columns of all sections, and their accelerations if these are asked for.
+    /// Motion of all sections with linear deflection: poses, twists, columns, and accelerations if asked for.
     pub fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>, accelerates: bool) {
         let n = self.components.len();
         let sections = self.places.iter().zip(self.rows.chunks_exact(n.max(1)));
@@ -83,7 +83,8 @@ impl LinearAxis {
         }
     }
 
-    /// The axes of a section, what makes their angular velocity from a rate of `w`, that velocity, and its rate at constant coordinate rates.
+    /// Axes of a section with linear deflection. Also what makes their angular velocity from a rate of `w`, that
+    /// velocity, and its rate at constant coordinate rates.
     #[inline]
     fn turned<S: Scalar>(
         &self,
@@ -112,7 +113,8 @@ fn vector<S: Scalar>(three: &[S]) -> Vector3<S> {
     Vector3::new(three[0], three[1], three[2])
 }
 
-/// Displacement (of torsion: rotation) and its slope at a place, per unit of each coordinate; of strains by integrating them.
+/// Rows of linear deflection: displacement (of torsion: rotation) and slope per unit of each coordinate. Those of
+/// strains come by integrating them.
 fn rows(fields: &Fields, place: f64) -> Vec<[f64; 2]> {
     let pair = |(value, slope)| [value, slope];
     if fields.interpolated == Interpolated::Deflection {

@@ -42,7 +42,7 @@ pub(super) struct Screw<S> {
 }
 
 impl<S: Scalar> Screw<S> {
-    /// The section with this rotation vector and place, and what rates of the two give in its axes.
+    /// Section of a deflected beam with this rotation vector and place, and what their rates give in its axes.
     pub fn section(&self, accelerates: bool) -> (SectionMotion<S>, Rows<S>) {
         let Self { value, rate, second } = self;
         let halves = |six: &[S; 6]| (Vector3::new(six[0], six[1], six[2]), Vector3::new(six[3], six[4], six[5]));
@@ -61,7 +61,7 @@ impl<S: Scalar> Screw<S> {
 }
 
 impl DeflectionAxis {
-    /// An axis with sections at `places`, ascending.
+    /// Deflection axis with sections at `places`, ascending.
     pub fn new(fields: &Fields, places: &[f64]) -> Self {
         let components: Vec<Component> = fields.components.iter().map(|&component| Component::ALL[component]).collect();
         let mut rows = Vec::with_capacity(places.len() * components.len());
@@ -73,12 +73,12 @@ impl DeflectionAxis {
         Self { components, places: places.to_vec(), rows, forms: Forms::new(fields, places) }
     }
 
-    /// Numbers of partial sums that a motion needs.
+    /// Numbers of partial sums that a motion of the deflection axis needs.
     pub fn scratch(&self) -> usize {
         self.forms.slopes()
     }
 
-    /// Poses, twists and columns of all sections, and their accelerations if these are asked for.
+    /// Motion of the deflection axis: poses, twists and columns of all sections, and accelerations if asked for.
     pub fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>, accelerates: bool) {
         out.scratch.fill(S::zero());
         let mut second = Second::zero();
@@ -89,12 +89,12 @@ impl DeflectionAxis {
         }
     }
 
-    /// The largest slope of the axis against its direction at the root, in rad.
+    /// Largest slope of the deflection axis against its direction at the root, in rad.
     pub fn slope<S: Scalar>(&self, q: &[S]) -> S {
         largest_slope(&self.components, &self.rows, q)
     }
 
-    /// Rotation vector and displacement of a section.
+    /// Deflection screw of a section: rotation vector and displacement.
     fn screw<S: Scalar>(&self, station: usize, (q, v): (&[S], &[S]), forms: &Second<S>) -> Screw<S> {
         let n = self.components.len();
         let Second { mut value, mut rate, change: second } = *forms;
@@ -128,7 +128,7 @@ impl DeflectionAxis {
     }
 }
 
-/// The largest slope of an axis with these rows, section by section, in rad.
+/// Largest slope of a deflection axis with these rows, section by section, in rad.
 fn largest_slope<S: Scalar>(components: &[Component], rows: &[[f64; 2]], q: &[S]) -> S {
     let mut most = S::zero();
     for rows in rows.chunks_exact(components.len()) {
@@ -146,7 +146,7 @@ fn largest_slope<S: Scalar>(components: &[Component], rows: &[[f64; 2]], q: &[S]
     most.if_positive(|| most.sqrt(), S::zero)
 }
 
-/// The rows of the first-order fields (rotation vector, displacement) per unit of a coordinate.
+/// Rows of first-order deflection fields (rotation vector, displacement) per unit of a coordinate.
 #[inline]
 fn first_order(component: Component, [value, slope]: [f64; 2]) -> [(usize, f64); 2] {
     match component {
@@ -174,14 +174,14 @@ impl<S: Scalar> Rows<S> {
         }
     }
 
-    /// A twist whose entries are rates of rotation vector and displacement.
+    /// Twist whose entries are rates of the deflection's rotation vector and displacement.
     pub fn turned(&self, rates: Twist<S>) -> Twist<S> {
         let sum = |[a, b, c]: [Vector3<S>; 3], rate: Vector3<S>| a * rate.x + b * rate.y + c * rate.z;
         Twist::new(sum(self.angular, rates.angular), sum(self.linear, rates.linear))
     }
 }
 
-/// Angular velocity in the turned axes and its rate, from the rotation vector as a function of time.
+/// Angular velocity of a deflected section in its axes and its rate, from the rotation vector over time.
 fn turning<S: Scalar>(w: Vector3<S>, rate: Vector3<S>, second: Vector3<S>) -> [Vector3<S>; 2] {
     let join = |value: Vector3<S>, rate: Vector3<S>| {
         let dual = |value, rate| Dual::<S, 1> { value, gradient: [rate] };

@@ -9,7 +9,7 @@ use crate::beam::{Basis, Component};
 use crate::error::Result;
 use crate::scalar::Scalar;
 
-/// The `count` slowest clamped modes of each field, as combinations of its shape functions.
+/// Modal fields: the `count` slowest clamped modes of each, as combinations of its shape functions.
 ///
 /// The shapes are made from the values of the parameters, without their derivatives. That is exact for every parameter that scales
 /// stiffness or mass as a whole (Young's modulus, density, the sizes of a uniform slender beam), because the shapes then do not
@@ -23,7 +23,8 @@ pub(in crate::beam) fn modal<S: Scalar>(profile: &Profile<S>, list: Vec<Field>, 
     list.collect()
 }
 
-/// Modes of one field alone, scaled to 1 at the tip: a coordinate is the deflection (m) or the turn (rad) of the tip.
+/// Modal shapes of one field alone, scaled to 1 at the tip. A coordinate is the deflection (m) or the turn (rad) of the
+/// tip.
 fn shapes<S: Scalar>(profile: &Profile<S>, component: Component, basis: &Basis) -> Result<DMatrix<f64>> {
     let fields = Fields::new(Interpolated::Deflection, vec![Field { component, basis: basis.clone() }]);
     let n = basis.len();

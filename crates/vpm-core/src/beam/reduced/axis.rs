@@ -37,12 +37,12 @@ struct Course<S, const D: usize> {
 }
 
 impl<const D: usize> Fields<D> {
-    /// A place that does not move.
+    /// Fields of a reduced solid's axis at a place that does not move.
     pub fn still(rest: [f64; D], n: usize) -> Self {
         Self { rest, modes: vec![Mode { shape: [0.0; D], curved: Vec::new() }; n] }
     }
 
-    /// The first `n` modes of a field, with or without what is quadratic in them.
+    /// Fields of a reduced solid's axis: the first `n` modes, with or without what is quadratic in them.
     pub fn new(field: &Field<D>, n: usize, quadratic: bool) -> Self {
         let pair = |i: usize, j: usize| {
             let (low, high) = (i.min(j), i.max(j));
@@ -53,7 +53,8 @@ impl<const D: usize> Fields<D> {
         Self { rest: field.rest, modes: (0..n).map(mode).collect() }
     }
 
-    /// The fields at coordinates `q` and rates `v`; `column` is given the derivative of the value by each coordinate.
+    /// Fields of a reduced solid's axis at coordinates `q` and rates `v`. `column` is given the derivative of the value
+    /// by each coordinate.
     #[inline]
     fn course<S: Scalar>(
         &self,
@@ -88,18 +89,18 @@ impl<const D: usize> Fields<D> {
 }
 
 impl ReducedAxis {
-    /// Stations that `n` modes move.
+    /// Axis of a reduced solid: stations that `n` modes move.
     pub fn new(n: usize, points: Vec<Fields<3>>, frames: Vec<Fields<6>>) -> Self {
         Self { n, points, frames }
     }
 
-    /// Where what is mounted as number `i` stands at rest.
+    /// Place on a reduced solid's axis at rest of what is mounted as number `i`.
     pub fn place(&self, i: usize) -> Vector3<f64> {
         let [_, _, _, x, y, z] = self.frames[i].rest;
         Vector3::new(x, y, z)
     }
 
-    /// The largest turn of what is mounted, in rad and to first order.
+    /// Largest turn on a reduced solid's axis of what is mounted, in rad and to first order.
     pub fn slope<S: Scalar>(&self, q: &[S]) -> S {
         let mut most = S::zero();
         for frame in &self.frames {
@@ -115,7 +116,8 @@ impl ReducedAxis {
         most.if_positive(|| most.sqrt(), S::zero)
     }
 
-    /// Places, twists and columns of all stations, and their accelerations if these are asked for.
+    /// Motion along a reduced solid's axis: places, twists and columns of all stations. Accelerations come if these are
+    /// asked for.
     ///
     /// Point masses keep the axes of the root; the axes of a frame are `exp([w]x)`.
     pub fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>, accelerates: bool) {

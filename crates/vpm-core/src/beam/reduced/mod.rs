@@ -54,7 +54,7 @@ pub struct Field<const D: usize> {
 }
 
 impl Reduced {
-    /// A link made of these numbers.
+    /// Reduced solid made of these numbers.
     pub fn new(solid: Solid) -> Self {
         Self(Arc::new(solid))
     }
@@ -64,7 +64,8 @@ impl Reduced {
         &self.0
     }
 
-    /// Whether the numbers fit together: lengths, finite numbers, positive masses and stiffness.
+    /// Checks whether the numbers of a reduced solid fit together. Lengths agree, numbers are finite, masses and
+    /// stiffness positive.
     pub(super) fn check(&self, name: &str) -> Result<()> {
         let Solid { squares, masses, points, interfaces } = self.solid();
         dimension(&format!("{name}.reduced.points"), masses.len(), points.len(), "mass")?;
@@ -82,12 +83,13 @@ impl Reduced {
         Ok(())
     }
 
-    /// The interface at a place: none for the root, which is at 0.
+    /// Interface of a reduced solid at a place: none for the root, which is at 0.
     pub(super) fn interface(&self, at: f64) -> Option<&Field<6>> {
         self.solid().interfaces.iter().zip(1_u32..).find(|(_, number)| f64::from(*number) == at).map(|(field, _)| field)
     }
 
-    /// Kinetic energy (J) if each point moves with its distance from the root times the frequency of the fastest mode.
+    /// Largest kinetic energy (J) of a reduced solid. Each point moves with its distance from the root times the
+    /// frequency of the fastest mode.
     pub(crate) fn largest_energy(&self) -> f64 {
         let Solid { squares, masses, points, .. } = self.solid();
         let reach = |field: &Field<3>| field.rest.iter().map(|x| x * x).sum::<f64>();

@@ -27,7 +27,7 @@ struct Pair {
 type Term = (usize, f64);
 
 impl Angles {
-    /// Pairs the `points`, each a number and a place on an axis of that `length`.
+    /// Angles at pairs of `points`, each a number and a place on an axis of that `length`.
     ///
     /// Entry `number n + i` of `rows` is the derivative of a point's angle by coordinate i.
     pub fn new(points: &[(usize, f64)], length: f64, rows: &[f64], n: usize) -> Self {

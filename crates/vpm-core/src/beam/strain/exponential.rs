@@ -6,7 +6,7 @@ use crate::spatial::{Matrix3, Pose, Twist, Vector3};
 /// Terms of the power series, enough for a full turn.
 const TERMS: usize = 30;
 
-/// How the coefficients of a power series in `-x` come about: `(factor + slope k) / (2 k + first)!`.
+/// Coefficients of a power series in `-x` for the exponential: `(factor + slope k) / (2 k + first)!`.
 const fn series_of(first: usize, factor: f64, slope: f64) -> [f64; TERMS] {
     let mut coefficients = [0.0; TERMS];
     let (mut k, mut inverse, mut done) = (0, 1.0, 0);
@@ -28,7 +28,8 @@ const TURN: [[f64; TERMS]; 3] = [series_of(1, 1.0, 0.0), series_of(2, 1.0, 0.0),
 const TANGENT: [[f64; TERMS]; 4] =
     [series_of(2, 1.0, 0.0), series_of(3, 1.0, 0.0), series_of(4, -1.0, -1.0), series_of(5, -1.0, -1.0)];
 
-/// Power series at `x`, from 0 to about 40; few terms do for the small turns of a piece of a beam, all where x is not known.
+/// Power series for the exponential at `x`, from 0 to about 40. Few terms do for the small turns of a piece of a beam,
+/// all where x is not known.
 fn powers<S: Scalar, const N: usize>(series: &[[f64; TERMS]; N], x: S) -> [S; N] {
     let below = |size: f64| x.known_less(S::from_f64(size)) == Some(true);
     let terms = if below(0.1) {
@@ -41,7 +42,8 @@ fn powers<S: Scalar, const N: usize>(series: &[[f64; TERMS]; N], x: S) -> [S; N]
     series.each_ref().map(|row| row[..terms].iter().rev().fold(S::zero(), |sum, &entry| sum * x + entry))
 }
 
-/// The pose `exp(twist)` that a body reaches after moving with that constant twist, in its own axes, for a unit of time.
+/// Exponential `exp(twist)`: the pose that a body reaches with that constant twist in a unit of time. The twist is in
+/// its own axes.
 ///
 /// Law: with rotation vector w, `phi = |w|` and W the matrix of `w x`: `R = 1 + a W + b W^2`, `t = (1 + b W + c W^2) v`,
 /// `a = sin(phi) / phi`, `b = (1 - cos(phi)) / phi^2`, `c = (phi - sin(phi)) / phi^3`, all three as power series in `phi^2`, so that
@@ -54,7 +56,7 @@ pub fn exponential<S: Scalar>(twist: Twist<S>) -> Pose<S> {
     Pose::new(turn(w, a, b), v + once * b + w.cross(once) * c)
 }
 
-/// `1 + a [w]x + b [w]x^2`, entry by entry.
+/// Matrix of the exponential's turn, `1 + a [w]x + b [w]x^2`, entry by entry.
 fn turn<S: Scalar>(w: Vector3<S>, a: S, b: S) -> Matrix3<S> {
     let (wb, wa) = (w * b, w * a);
     let (xx, yy, zz) = (w.x * wb.x, w.y * wb.y, w.z * wb.z);
@@ -67,8 +69,9 @@ fn turn<S: Scalar>(w: Vector3<S>, a: S, b: S) -> Matrix3<S> {
     )
 }
 
-/// The rotation `exp([w]x)` and the columns of `1 - b [w]x + c [w]x^2`, which makes the angular velocity, in the turned axes, from the
-/// rate of `w` (Murray, Li & Sastry 1994, section 2.2; `b` and `c` of [`exponential`]).
+/// Exponential of a rotation `exp([w]x)`, and the columns of its tangent `1 - b [w]x + c [w]x^2`. The tangent makes the
+/// angular velocity, in the turned axes, from the rate of `w` (Murray, Li & Sastry 1994, section 2.2; `b` and `c` of
+/// [`exponential`]).
 pub(in crate::beam) fn rotation<S: Scalar>(w: Vector3<S>) -> (Matrix3<S>, Matrix3<S>) {
     let [a, b, c] = powers(&TURN, w.dot(w));
     (turn(w, a, b), turn(w, -b, c))
@@ -113,7 +116,8 @@ impl<S: Scalar> Tangent<S> {
     }
 }
 
-/// The twist, in the moved body's axes, of `exp(twist)` when `twist` changes at `rate`.
+/// Tangent of the exponential: the body's twist of `exp(twist)` when `twist` changes at `rate`. It is in the moved
+/// body's axes.
 pub fn tangent<S: Scalar>(twist: Twist<S>, rate: Twist<S>) -> Twist<S> {
     Tangent::new(twist).apply(rate)
 }

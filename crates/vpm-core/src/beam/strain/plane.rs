@@ -58,7 +58,7 @@ struct Section {
 }
 
 impl PlaneAxis {
-    /// An axis with sections at `places`, if the fields are one curvature and nothing else.
+    /// Axis in a plane with sections at `places`, if the fields are one curvature and nothing else.
     pub fn new(fields: &Fields, places: &[f64], rule: Rule) -> Option<Self> {
         let [field] = &fields.list[..] else { return None };
         if !field.component.bends() {
@@ -89,7 +89,7 @@ impl PlaneAxis {
         Some(axis)
     }
 
-    /// Makes zero what is rounding, as at the tip the integral of any Legendre polynomial but the first one.
+    /// Drops rounding errors in the plane axis, as at the tip the integrals of most Legendre polynomials.
     fn drop_rounding(&mut self) {
         for coordinate in 0..self.n {
             let own = self.rows.iter().skip(coordinate).step_by(self.n);
@@ -100,17 +100,18 @@ impl PlaneAxis {
         }
     }
 
-    /// Numbers of partial sums that a motion needs.
+    /// Numbers of partial sums that a motion of the plane axis needs.
     pub fn scratch(&self) -> usize {
         2 * self.n + 4 * self.points
     }
 
-    /// Poses, twists, columns and accelerations of all sections.
+    /// Motion of the plane axis: poses, twists, columns and accelerations of all sections.
     pub fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>) {
         self.run((q, v), out, None);
     }
 
-    /// As [`PlaneAxis::motion`], but of slices of the beam alone only sums, for a root that turns with `turn` about the axis of bending.
+    /// Motion of the plane axis outside of its slices, for a root that turns with `turn` about the bending axis. Of
+    /// slices of the beam there are only sums. Else as [`PlaneAxis::motion`].
     pub fn gather<S: Scalar>(
         &self,
         (q, v): (&[S], &[S]),
@@ -122,7 +123,7 @@ impl PlaneAxis {
         self.run((q, v), out, Some((turn, slices, sums)));
     }
 
-    /// The slices of a beam with this axis and these inertias at its stations.
+    /// Slices of a beam with this plane axis and these inertias at its stations.
     pub fn slices<S: Scalar>(
         &self,
         inertias: &[SpatialInertia<S>],
@@ -136,12 +137,12 @@ impl PlaneAxis {
         Slices::new((inertias, self.about_y), is_slice, &rows, (frame, spatial))
     }
 
-    /// The axis of bending.
+    /// Bending axis normal to the plane.
     pub fn axis(&self) -> Vector3<f64> {
         self.twist(1.0, [0.0; 2]).angular
     }
 
-    /// Along the axis, station by station.
+    /// Runs along the plane axis, station by station.
     ///
     /// With `turn` the rate of the root about the axis of bending, `change` is the acceleration in axes that do not turn. There the tangent
     /// turns with `turn + alpha'`, so that it is `-int_0^mu t (turn + alpha')^2 dmu`.
@@ -150,7 +151,7 @@ impl PlaneAxis {
         if self.n == 2 { self.pass::<S, 2>(motion, out, sums) } else { self.pass::<S, 0>(motion, out, sums) }
     }
 
-    /// The same for N coordinates, or with 0 for any number.
+    /// Runs along the plane axis for N coordinates, or with 0 for any number.
     fn pass<S: Scalar, const N: usize>(
         &self,
         (q, v): (&[S], &[S]),
@@ -206,13 +207,13 @@ impl PlaneAxis {
         out.scratch = scratch;
     }
 
-    /// Derivatives of the angle at a point or section by the coordinates.
+    /// Row of the plane axis: derivatives of the angle at a point or section by the coordinates.
     #[inline]
     fn row(&self, number: usize) -> &[f64] {
         &self.rows[number * self.n..(number + 1) * self.n]
     }
 
-    /// Writes one section from the sums up to it.
+    /// Writes one section of the plane axis from the sums up to it.
     fn section<S: Scalar>(
         &self,
         row: &[f64],
@@ -272,7 +273,7 @@ struct Grid<'a> {
 }
 
 impl Grid<'_> {
-    /// A rule between neighbouring sections and all breaks between them.
+    /// Rule on the plane axis between neighbouring sections and all breaks between them.
     fn between(&mut self, places: &[f64]) -> (Vec<Section>, Vec<(usize, f64)>) {
         let (mut begin, mut angle) = (0.0, vec![0.0; self.fields.len()]);
         let (mut ends, mut terms, mut own) = (Vec::new(), Vec::new(), Vec::<f64>::new());
@@ -298,7 +299,7 @@ impl Grid<'_> {
         (sections, terms)
     }
 
-    /// A rule over each element, with points at its ends besides.
+    /// Rule on the plane axis over each element, with points at its ends besides.
     fn over(&mut self, places: &[f64]) -> (Vec<Section>, Vec<(usize, f64)>) {
         let (breaks, last) = (self.fields.breaks(), places.last().copied().unwrap_or(0.0));
         let (mut angle, mut sections, mut terms) = (vec![0.0; self.fields.len()], Vec::new(), Vec::new());
@@ -343,14 +344,15 @@ impl Grid<'_> {
     }
 }
 
-/// The integral from `from` to `to` of the polynomial that is 1 at this of the `nodes` and 0 at the others.
+/// Integral on the plane axis of a node's polynomial, from `from` to `to`. It is 1 at this of the `nodes` and 0 at the
+/// others.
 fn integral(nodes: &[f64], node: usize, from: f64, to: f64) -> f64 {
     let others = || nodes.iter().enumerate().filter(|&(other, _)| other != node).map(|(_, at)| at);
     let value = |x: f64| others().map(|at| (x - at) / (nodes[node] - at)).product::<f64>();
     composite(POINTS, &[from, to]).into_iter().map(|point| point.weight * value(point.place)).sum()
 }
 
-/// The derivative of the angle at `to` by the coordinates, from that at `begin`.
+/// Derivative of the plane axis' angle at `to` by the coordinates, from that at `begin`.
 fn turned(fields: &Fields, angle: &[f64], begin: f64, to: f64) -> Vec<f64> {
     let mut turned = angle.to_vec();
     for point in composite(fields.points(), &[begin, to]) {

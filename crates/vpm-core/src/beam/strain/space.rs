@@ -40,7 +40,8 @@ pub(in crate::beam) struct Crossing<S> {
 }
 
 impl SpaceAxis {
-    /// An axis with sections at `places`, ascending, cut there and at the breaks of the shape functions and of the shape at rest.
+    /// Axis in space with sections at `places`, ascending, cut there and at all breaks. Breaks are those of the shape
+    /// functions and of the shape at rest.
     pub fn new(fields: &Fields, places: &[f64], rest: &Rest) -> Self {
         let (mut pieces, mut rows, mut begin) = (Vec::new(), Vec::new(), 0.0);
         for &place in places {
@@ -57,18 +58,18 @@ impl SpaceAxis {
         Self { components: fields.components.clone(), pieces, rows }
     }
 
-    /// How many pieces there are.
+    /// Number of pieces of the axis in space.
     pub fn pieces(&self) -> usize {
         self.pieces.len()
     }
 
-    /// Integrals and first moments of the shape functions over a piece.
+    /// Rows of the axis in space: integrals and first moments of the shape functions over a piece.
     fn rows(&self, piece: usize) -> [&[f64]; 2] {
         let n = self.components.len();
         [2 * piece, 2 * piece + 1].map(|row| &self.rows[row * n..(row + 1) * n])
     }
 
-    /// Crosses a piece with coordinates `c` and rates `rates`.
+    /// Crosses a piece of the axis in space with coordinates `c` and rates `rates`.
     ///
     /// Law: fourth-order Magnus step with exact moments (Iserles et al. 2000, section 5.3): `Omega = A + A x B`, `A = int e dmu`,
     /// `B = 1/h int (mu - m) e dmu` with m the middle; the sign of the bracket is that of a strain that multiplies from the right.
@@ -76,7 +77,7 @@ impl SpaceAxis {
         self.cross_as_asked(piece, (c, rates), true)
     }
 
-    /// As [`SpaceAxis::cross`], but the acceleration only if it is asked for.
+    /// Crosses a piece of the axis in space as [`SpaceAxis::cross`], the acceleration only if it is asked for.
     fn cross_as_asked<S: Scalar>(&self, piece: usize, (c, rates): (&[S], &[S]), accelerates: bool) -> Crossing<S> {
         let (Piece { size, rest, .. }, rows) = (self.pieces[piece], self.rows(piece));
         let [mut whole, mut moment] = rows.map(|row| self.sum(row, c));
@@ -104,7 +105,8 @@ impl SpaceAxis {
         }
     }
 
-    /// The twist of the end of a piece relative to its begin, per unit rate of coordinate `k`; none where it does nothing.
+    /// Column of the axis in space: twist of a piece's end per unit rate of coordinate `k`. It is relative to the
+    /// begin; none where the coordinate does nothing.
     pub(in crate::beam) fn column<S: Scalar>(
         &self,
         piece: usize,
@@ -121,7 +123,7 @@ impl SpaceAxis {
         Some(crossing.tangent.apply(change))
     }
 
-    /// Poses, twists and columns of all sections, and their accelerations if these are asked for.
+    /// Motion of the axis in space: poses, twists and columns of all sections, and accelerations if asked for.
     pub fn motion<S: Scalar>(&self, q: &[S], v: &[S], out: &mut Sections<S>, accelerates: bool) {
         let (n, mut station) = (self.components.len(), 0);
         let mut moving = out.begin(station, n);
@@ -154,7 +156,8 @@ impl SpaceAxis {
     }
 }
 
-/// Integral and first moment about the middle, per size, of the shape functions between two places.
+/// Moments of shape functions on the axis in space: integral and first moment about the middle, per size. They lie
+/// between two places.
 fn moments(fields: &Fields, begin: f64, end: f64) -> [Vec<f64>; 2] {
     let mut sums = [vec![0.0; fields.len()], vec![0.0; fields.len()]];
     let (middle, size) = (0.5 * (begin + end), end - begin);
@@ -174,7 +177,7 @@ fn unit<S: Scalar>(component: usize) -> Twist<S> {
     Twist::new(Vector3::from_f64([a, b, c]), Vector3::from_f64([d, e, f]))
 }
 
-/// A twist as a function of time: value and rate.
+/// Twist of the axis in space as a function of time: value and rate.
 fn along<S: Scalar>(value: Twist<S>, rate: Twist<S>) -> Twist<Dual<S, 1>> {
     let join = |v: Vector3<S>, r: Vector3<S>| {
         let dual = |value, rate| Dual { value, gradient: [rate] };
@@ -183,12 +186,12 @@ fn along<S: Scalar>(value: Twist<S>, rate: Twist<S>) -> Twist<Dual<S, 1>> {
     Twist::new(join(value.angular, rate.angular), join(value.linear, rate.linear))
 }
 
-/// A matrix without its rate.
+/// Matrix of the axis in space without its rate.
 fn value<S: Scalar>(matrix: Matrix3<Dual<S, 1>>) -> Matrix3<S> {
     Matrix3 { columns: matrix.columns.map(|column| Vector3::from(column.to_array().map(|number| number.value))) }
 }
 
-/// One part of a twist over dual numbers.
+/// One part of a twist in space over dual numbers.
 fn part<S: Scalar>(twist: Twist<Dual<S, 1>>, pick: impl Fn(Dual<S, 1>) -> S) -> Twist<S> {
     let vector = |v: Vector3<Dual<S, 1>>| Vector3::from(v.to_array().map(&pick));
     Twist::new(vector(twist.angular), vector(twist.linear))

@@ -79,7 +79,8 @@ pub(super) struct Passing<'a, S> {
 }
 
 impl<S: Scalar> Slices<S> {
-    /// The slices of a beam: the stations that `is_slice` names, with the beam's inertias and the derivatives of its angle (`rows`) there.
+    /// Slices for sums over a beam: the stations that `is_slice` names. They have the beam's inertias and the
+    /// derivatives of its angle (`rows`) there.
     pub(super) fn new(
         (inertias, about_y): (&[SpatialInertia<S>], bool),
         is_slice: impl Fn(usize) -> bool,
@@ -128,7 +129,7 @@ impl<S: Scalar> Slices<S> {
         }
     }
 
-    /// Inertia of all slices where they are, about the root and in axes across, of bending and along.
+    /// Sum of the inertia of all slices where they are, about the root. It is in axes across, of bending and along.
     ///
     /// Law: `I = sum m (|r|^2 1 - r r^T) + R diag(I_b) R^T`. A root that turns about the axis of bending alone asks only for the moment about
     /// that.
@@ -159,7 +160,7 @@ impl<S: Scalar> Sums<S> {
         self.block.fill(zero);
     }
 
-    /// Adds a slice to what does not depend on how the root moves, for N coordinates or with 0 for any number.
+    /// Adds a slice to the sums that do not depend on the root's motion, for N coordinates or with 0 for any number.
     #[inline]
     pub(super) fn add<const N: usize>(&mut self, slice: &Slice<S>, at: &Passing<'_, S>) {
         let n = if N == 0 { self.columns.len() } else { N };
@@ -184,7 +185,7 @@ impl<S: Scalar> Sums<S> {
         }
     }
 
-    /// Adds what a root needs that moves in space, of a slice turned by an angle of this sine and cosine.
+    /// Adds a slice to the sums for a root that moves in space. It is turned by an angle of this sine and cosine.
     ///
     /// Law: `R diag(a, b, c) R^T` has `a + d s s`, `c - d s s` and `d s c` in the plane, `d = c - a`; its derivative by the angle is
     /// `2 d s c`, its opposite and `d (c c - s s)`.

@@ -63,7 +63,8 @@ struct Fields {
 }
 
 impl LinearBeam {
-    /// A beam whose deflection `basis` must be clamped at the root: in value and slope if shear-rigid, in value otherwise.
+    /// Linear beam whose deflection `basis` is clamped at the root. It has to be in value and slope if shear-rigid, in
+    /// value otherwise.
     pub fn new(section: &Section, plane: Plane, basis: Basis, theory: Theory, tip: TipBody) -> Result<Self> {
         not_negative("tip.mass", tip.mass)?;
         not_negative("tip.inertia", tip.inertia)?;
@@ -97,17 +98,17 @@ impl LinearBeam {
         Err(Error::Setting { setting: "the shape functions of a beam", condition, value: loose, repair })
     }
 
-    /// How many coordinates there are.
+    /// Number of coordinates of the linear beam.
     pub fn len(&self) -> usize {
         self.deflection.len() + if let Theory::Timoshenko(rotation) = &self.theory { rotation.len() } else { 0 }
     }
 
-    /// Whether there is no coordinate at all.
+    /// Whether the linear beam has no coordinate at all.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// The fields at `mu`; differentiated once more where the theory asks.
+    /// Fields of the linear beam at `mu`; differentiated once more where the theory asks.
     fn fields(&self, mu: f64, weight: f64) -> Fields {
         let n = self.len();
         let lead = |order| DVector::from_vec(self.deflection.evaluate(mu, order)).resize_vertically(n, 0.0);
@@ -125,14 +126,14 @@ impl LinearBeam {
         Fields { weight, mu, deflection: lead(0), slope: lead(1), rotation, curvature }
     }
 
-    /// Gauss stations that integrate products of two fields exactly.
+    /// Gauss stations that integrate products of two fields of the linear beam exactly.
     fn stations(&self) -> Vec<Fields> {
         let other = if let Theory::Timoshenko(rotation) = &self.theory { rotation.points() } else { 0 };
         let points = self.deflection.points().max(other) + 1;
         composite(points, &self.deflection.breaks()).into_iter().map(|s| self.fields(s.place, s.weight)).collect()
     }
 
-    /// Mass matrix, tip body included.
+    /// Mass matrix of the linear beam, tip body included.
     pub fn mass(&self) -> DMatrix<f64> {
         let rotary = if self.theory == Theory::EulerBernoulli { 0.0 } else { self.rotary };
         let mut mass = DMatrix::zeros(self.len(), self.len());
@@ -146,7 +147,7 @@ impl LinearBeam {
         mass
     }
 
-    /// Elastic stiffness matrix.
+    /// Elastic stiffness matrix of the linear beam.
     pub fn stiffness(&self) -> DMatrix<f64> {
         let mut stiffness = DMatrix::zeros(self.len(), self.len());
         for at in self.stations() {
@@ -158,7 +159,7 @@ impl LinearBeam {
         stiffness
     }
 
-    /// The quadratic form of the second-order shortening: `v_z(mu) = -1/2 int_0^mu v'^2 = -1/2 q^T S(mu) q`.
+    /// Second-order shortening of the linear beam: `v_z(mu) = -1/2 int_0^mu v'^2 = -1/2 q^T S(mu) q`.
     ///
     /// Source: Kane, Ryan & Banerjee 1987, "Dynamics of a cantilever beam attached to a moving base", J. Guidance 10(2).
     pub fn shortening(&self, mu: f64) -> DMatrix<f64> {
@@ -171,7 +172,7 @@ impl LinearBeam {
         form
     }
 
-    /// Geometric stiffness of an axial `tension(mu)` in N: `int tension v'^2 dmu`.
+    /// Geometric stiffness of the linear beam under axial `tension(mu)` in N: `int tension v'^2 dmu`.
     pub fn geometric_stiffness(&self, tension: impl Fn(f64) -> f64) -> DMatrix<f64> {
         let mut stiffness = DMatrix::zeros(self.len(), self.len());
         for at in self.stations() {
@@ -180,7 +181,8 @@ impl LinearBeam {
         stiffness
     }
 
-    /// Geometric stiffness per squared speed of a beam that turns about an axis across it, `hub` (m) before the root; in kg.
+    /// Centrifugal stiffness of the linear beam per squared speed, in kg; `hub` (m) before the root. It turns about an
+    /// axis across it.
     ///
     /// Multiplied with `Omega^2` it is what the shortening does against the centrifugal force: `int rhoA (hub + mu) S(mu) dmu`, tip
     /// included. Deflection along the axis of rotation (flap) has this stiffness in addition to the elastic one, deflection in the
@@ -191,7 +193,7 @@ impl LinearBeam {
         self.geometric_stiffness(|mu| tip + self.line * (length - mu) * (hub + 0.5 * (length + mu)))
     }
 
-    /// Natural frequencies and modes, with an `extra` stiffness (N/m) if one is given.
+    /// Natural frequencies and modes of the linear beam, with an `extra` stiffness (N/m) if one is given.
     pub fn modes(&self, extra: Option<&DMatrix<f64>>) -> Result<Modes> {
         let mut stiffness = self.stiffness();
         if let Some(extra) = extra {
@@ -202,13 +204,13 @@ impl LinearBeam {
         eigen::modes(&stiffness, &self.mass())
     }
 
-    /// Coordinates at rest under a `force` (N) across the tip and a `moment` (N m) on it.
+    /// Static deflection of the linear beam under a `force` (N) across the tip and a `moment` (N m) on it.
     pub fn static_deflection(&self, force: f64, moment: f64) -> Result<DVector<f64>> {
         let tip = self.fields(self.deflection.length(), 1.0);
         eigen::solve(&self.stiffness(), &(tip.deflection * force + tip.rotation * moment))
     }
 
-    /// Deflection (m), rotation (rad) and curvature (1/m) at `mu`.
+    /// Deflection (m), rotation (rad) and curvature (1/m) of the linear beam at `mu`.
     ///
     /// The strain of the surface at distance z from the neutral axis is z times the curvature.
     pub fn at(&self, mu: f64, coordinates: &DVector<f64>) -> [f64; 3] {
@@ -216,7 +218,7 @@ impl LinearBeam {
         [at.deflection.dot(coordinates), at.rotation.dot(coordinates), at.curvature.dot(coordinates)]
     }
 
-    /// The basis of the deflection that consists of the `count` slowest modes of a shear-rigid beam.
+    /// Modal basis of the linear beam: the `count` slowest modes of a shear-rigid beam.
     pub fn modal_basis(&self, count: usize) -> Result<Basis> {
         if matches!(self.theory, Theory::Timoshenko(_)) || count == 0 || count > self.len() {
             let condition = format!("lie between 1 and {}, on a shear-rigid beam", self.len());
@@ -227,7 +229,7 @@ impl LinearBeam {
     }
 }
 
-/// Adds `factor row row^T`.
+/// Adds `factor row row^T` to a matrix of the linear beam.
 fn add_square(matrix: &mut DMatrix<f64>, factor: f64, row: &DVector<f64>) {
     matrix.ger(factor, row, row, 1.0);
 }

@@ -75,7 +75,7 @@ fn sum_up<S: Scalar>(
     (frame.inertia(inertia), frame.wrench(own.cross_wrench(inertia.apply(own)) + extra))
 }
 
-/// Adds the inertia of one section to what is felt of the coordinates.
+/// Adds the inertia of one section of a segment to what is felt of the coordinates.
 #[inline]
 fn add<S: Scalar>(
     (columns, matrix, efforts): (&mut [Wrench<S>], &mut [S], &mut [S]),
@@ -94,7 +94,8 @@ fn add<S: Scalar>(
     }
 }
 
-/// Adds what a section carries: an articulated inertia and the wrench on it, where `drift` is the acceleration by rates alone.
+/// Attaches to a segment what a section carries: articulated inertia and wrench. `drift` is the acceleration by rates
+/// alone.
 pub(super) fn attach<S: Scalar>(
     slot: &mut SegmentSlot<S>,
     section: usize,
@@ -110,7 +111,7 @@ pub(super) fn attach<S: Scalar>(
     slot.wrench += pose.wrench(load);
 }
 
-/// Adds a wrench on a section alone.
+/// Adds a wrench on a segment's section alone.
 pub(super) fn load<S: Scalar>(slot: &mut SegmentSlot<S>, section: usize, wrench: Wrench<S>) {
     let SegmentSlot { sections, efforts, .. } = slot;
     let n = efforts.len();
@@ -175,7 +176,8 @@ pub(super) fn eliminate<S: Scalar>(
     }
 }
 
-/// What other efforts `tau` leave of wrench and efforts, once [`eliminate`] has worked out the inertias.
+/// Releases a segment under other efforts `tau`, once [`eliminate`] has worked out the inertias. Wrench and efforts
+/// remain.
 pub(super) fn release<S: Scalar>(segment: &Segment, slot: &mut SegmentSlot<S>, tau: &[S]) {
     let n = segment.len();
     let SegmentSlot { wrench, columns, matrix, efforts, inverses, .. } = slot;
@@ -188,7 +190,7 @@ pub(super) fn release<S: Scalar>(segment: &Segment, slot: &mut SegmentSlot<S>, t
     }
 }
 
-/// Adds `g D + g^2 K` to the row of a coordinate.
+/// Adds `g D + g^2 K` to a segment's row of a coordinate.
 fn stiffen<S: Scalar>(beam: &Beam<S>, segment: &Segment, (own, row): (usize, &mut [S]), reach: S) {
     let coordinate = segment.coordinates[own];
     let coupled = beam.couplings(coordinate);
@@ -224,7 +226,7 @@ pub(super) fn accelerate<S: Scalar>(
 }
 
 impl<S: Scalar> SegmentSlot<S> {
-    /// A of a section, where `drift` is its acceleration by rates alone, after [`accelerate`].
+    /// Acceleration A of a segment's section after [`accelerate`], where `drift` is that by rates alone.
     #[inline]
     pub(super) fn section(&self, number: usize, drift: Twist<S>) -> Twist<S> {
         let n = self.accelerations.len();

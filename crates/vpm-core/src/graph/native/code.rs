@@ -143,7 +143,7 @@ fn module() -> Result<JITModule, Unavailable> {
     }))
 }
 
-/// The processor that this process runs on, with all that it can do.
+/// Processor for machine code: the one that this process runs on, with all that it can do.
 fn processor() -> Result<OwnedTargetIsa, Unavailable> {
     let unknown = |message: String| Unavailable::Processor { message };
     let builder = cranelift_native::builder().map_err(|message| unknown(message.into()))?;
@@ -158,7 +158,8 @@ fn processor() -> Result<OwnedTargetIsa, Unavailable> {
     Ok(processor)
 }
 
-/// Without the generator's own optimisation: it would merge the loads that the plan wants apart, and takes three times as long.
+/// Flags for machine code without the generator's own optimisation. It would merge the loads that the plan wants apart,
+/// and takes three times as long.
 fn flags() -> Result<settings::Flags, SetError> {
     let mut flags = settings::builder();
     flags.set("opt_level", "none")?;
@@ -169,7 +170,7 @@ fn flags() -> Result<settings::Flags, SetError> {
     Ok(settings::Flags::new(flags))
 }
 
-/// The functions of [`CALLED`], and the one that calls a search.
+/// Declares for machine code the functions of [`CALLED`], and the one that calls a search.
 fn declare(module: &mut JITModule) -> Result<(Vec<FuncId>, FuncId), Unavailable> {
     let of_search = signature(module, 2, types::I64, Some(types::F64));
     let signature = signature(module, 1, types::F64, Some(types::F64));
@@ -202,7 +203,7 @@ fn signature(module: &JITModule, count: usize, of: Type, result: Option<Type>) -
     signature
 }
 
-/// Fills a function's one block; `None` if that fails.
+/// Fills the one block of a function's machine code; `None` if that fails.
 fn emit(context: &mut Context, fill: impl FnOnce(FuncCursor<'_>, Arrays) -> bool) -> Option<()> {
     let mut code = FuncCursor::new(&mut context.func);
     let block = code.func.dfg.make_block();

@@ -50,7 +50,7 @@ pub(super) struct Emitter<'a> {
 }
 
 impl Emitter<'_> {
-    /// Appends one step; `None` if the plan is not sound.
+    /// Emits one step; `None` if the plan is not sound.
     pub fn step(&mut self, step: &Step) -> Option<()> {
         match *step {
             Step::Store { from, to } => {
@@ -76,7 +76,8 @@ impl Emitter<'_> {
         Some(())
     }
 
-    /// A number; one in memory is loaded for this use only, so that it becomes an operand of the instruction.
+    /// Emits the read of a number; one in memory is loaded for this use only. So it becomes an operand of the
+    /// instruction.
     fn read(&mut self, place: Place) -> Option<Value> {
         let (array, place) = match place {
             Place::Register(node) => return *self.registers.get(node as usize)?,
@@ -88,7 +89,7 @@ impl Emitter<'_> {
         Some(self.code.ins().load(types::F64, MemFlagsData::trusted(), array, offset(place)?))
     }
 
-    /// A constant, from memory: cheaper than to make it from its bits.
+    /// Emits a constant, from memory: cheaper than to make it from its bits.
     pub fn constant(&mut self, value: f64) -> Option<Value> {
         let place = self.pool.place(value);
         Some(self.code.ins().load(types::F64, MemFlagsData::trusted(), self.arrays.constants, offset(place)?))
@@ -136,7 +137,7 @@ impl Emitter<'_> {
         self.code.func.dfg.inst_results(call).first().copied()
     }
 
-    /// a < b ? yes : no, without a branch: the comparison makes a mask.
+    /// Emits a < b ? yes : no, without a branch: the comparison makes a mask.
     fn select(&mut self, [a, b, yes, no]: [Value; 4]) -> Value {
         let [a, b, yes, no] = [a, b, yes, no].map(|value| self.wide(value));
         let mask = self.code.ins().fcmp(FloatCC::LessThan, a, b);
@@ -145,17 +146,17 @@ impl Emitter<'_> {
         self.narrow(chosen)
     }
 
-    /// A number in the first lane of a vector.
+    /// Emits a number in the first lane of a vector.
     pub fn wide(&mut self, value: Value) -> Value {
         self.code.ins().scalar_to_vector(types::F64X2, value)
     }
 
-    /// The first lane of a vector of numbers.
+    /// Emits the first lane of a vector of numbers.
     pub fn narrow(&mut self, value: Value) -> Value {
         self.code.ins().extractlane(value, 0)
     }
 
-    /// Reads the bits of `value` as the type `to`, without changing them.
+    /// Emits the bits of `value` as the type `to`, without changing them.
     pub fn seen_as(&mut self, to: Type, value: Value) -> Value {
         self.code.ins().bitcast(to, MemFlagsData::new(), value)
     }

@@ -57,7 +57,7 @@ pub struct Native {
 pub struct Work(Box<[f64]>);
 
 impl Native {
-    /// Compiles `program`.
+    /// Compiles `program` to native machine code.
     ///
     /// # Errors
     /// [`Unavailable`], with the reason.
@@ -76,22 +76,22 @@ impl Native {
         Ok(Self { code: Code::new(&plan, program.operations().len(), lengths)? })
     }
 
-    /// How many numbers go in.
+    /// Number of inputs of native code.
     pub fn n_inputs(&self) -> usize {
         self.code.inputs
     }
 
-    /// How many numbers come out.
+    /// Number of outputs of native code.
     pub fn n_outputs(&self) -> usize {
         self.code.outputs
     }
 
-    /// The memory that one caller needs.
+    /// Working memory that one caller of native code needs.
     pub fn work(&self) -> Work {
         Work(vec![0.0; self.code.work].into())
     }
 
-    /// Works the outputs out at `inputs`. Allocates nothing.
+    /// Calls native code for the outputs at `inputs`. Allocates nothing.
     ///
     /// # Errors
     /// [`Error::Dimension`] if an array has the wrong length.

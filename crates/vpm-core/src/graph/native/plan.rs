@@ -129,7 +129,7 @@ impl Planner {
         self.fates[node as usize].stored.filter(|_| !held).unwrap_or(Place::Register(node))
     }
 
-    /// Gives registers up until at most `count` are taken.
+    /// Plans to give registers up until at most `count` are taken.
     fn leave(&mut self, count: usize) {
         while self.registers.len() > count {
             let next = |&(_, &node): &(usize, &Node)| self.fates[node as usize].uses.last().copied();
@@ -150,7 +150,7 @@ impl Planner {
         self.fates[node as usize].stored = Some(to);
     }
 
-    /// The places of arguments that nothing needs any more are free from here on.
+    /// Plans to free the places of arguments that nothing needs any more.
     fn release(&mut self, task: &Task) {
         for argument in task.arguments() {
             let fate = &mut self.fates[argument as usize];
@@ -161,7 +161,7 @@ impl Planner {
         }
     }
 
-    /// Takes in a number that has just been made: an output goes to its place at once.
+    /// Plans the place of a number that has just been made: an output goes to its place at once.
     fn receive(&mut self, node: Node) {
         for output in std::mem::take(&mut self.fates[node as usize].outputs) {
             self.store(node, Place::Output(output));
@@ -171,7 +171,7 @@ impl Planner {
         }
     }
 
-    /// Outputs that are constants or inputs.
+    /// Plans outputs that are constants or inputs.
     fn pass_outputs(&mut self, program: &Program) {
         for &node in program.outputs() {
             for output in std::mem::take(&mut self.fates[node as usize].outputs) {

@@ -52,17 +52,17 @@ impl Task {
         task
     }
 
-    /// The numbers that it needs.
+    /// Arguments of a task: the numbers that it needs.
     pub fn arguments(&self) -> impl Iterator<Item = Node> + Clone + use<> {
         self.arguments.into_iter().take_while(|&node| node != NONE)
     }
 
-    /// The numbers that it makes, in their places: sine, then cosine; `NONE` where nobody asked.
+    /// Results of a task in their places: sine, then cosine; `NONE` where nobody asked.
     pub fn results(&self) -> [Node; 2] {
         self.results
     }
 
-    /// The numbers that it makes.
+    /// Numbers that a task makes.
     pub fn made(&self) -> impl Iterator<Item = Node> + use<> {
         self.results.into_iter().filter(|&node| node != NONE)
     }
@@ -123,7 +123,8 @@ struct Fusing {
     absorbed: bool,
 }
 
-/// A product that only one sum or difference needs becomes part of it; of two such products the later one.
+/// Fuses a product into the only sum or difference that needs it, as one task. Of two such products it is the later
+/// one.
 fn fused(program: &Program) -> Vec<Fusing> {
     let operations = program.operations();
     let mut uses = vec![0_u32; operations.len()];
@@ -149,7 +150,7 @@ fn product(operations: &[Operation], node: Node) -> Option<[Node; 2]> {
     }
 }
 
-/// The sine and the cosine of each argument that has one.
+/// Pairs the sine and the cosine of each argument that has both, as one task.
 fn pairs(operations: &[Operation]) -> HashMap<Node, [Node; 2]> {
     let mut pairs = HashMap::new();
     for (node, operation) in operations.iter().enumerate() {

@@ -37,7 +37,8 @@ const COSINE: [f64; 6] = [
 ];
 
 impl Emitter<'_> {
-    /// Sine and cosine. Not a number from 2^50 on, where neighbouring arguments lie more than 0.1 apart.
+    /// Emits the trigonometry of one argument: sine and cosine. Not a number from 2^50 on, where neighbouring arguments
+    /// lie more than 0.1 apart.
     pub(super) fn sine_cosine(&mut self, x: Value) -> Option<[Value; 2]> {
         let (per_quarter, to_integer) = (self.constant(FRAC_2_PI)?, self.constant(TO_INTEGER)?);
         let marked = self.code.ins().fma(x, per_quarter, to_integer);
@@ -57,7 +58,7 @@ impl Emitter<'_> {
         Some(self.in_quadrant(marked, sine, cosine))
     }
 
-    /// x - k pi/2.
+    /// Reduced argument of trigonometry: x - k pi/2.
     fn reduced(&mut self, x: Value, k: Value) -> Option<Value> {
         let less = self.code.ins().fneg(k);
         let [first, second, third] = QUARTER;
@@ -76,7 +77,7 @@ impl Emitter<'_> {
         Some(self.code.ins().fadd(r, rest))
     }
 
-    /// c0 + c1 z + .. + c5 z^5.
+    /// Polynomial for trigonometry: c0 + c1 z + .. + c5 z^5.
     fn polynomial(&mut self, [c0, c1, c2, c3, c4, c5]: [f64; 6], z: Value, z_squared: Value) -> Option<Value> {
         let mut pair = |low: f64, high: f64| {
             let (low, high) = (self.constant(low)?, self.constant(high)?);
@@ -87,7 +88,7 @@ impl Emitter<'_> {
         Some(self.code.ins().fma(sum, z_squared, first))
     }
 
-    /// Sine and cosine of r + k pi/2, where the last two bits of `marked` are those of k.
+    /// Trigonometry in a quadrant: sine and cosine of r + k pi/2. The last two bits of `marked` are those of k.
     fn in_quadrant(&mut self, marked: Value, sine: Value, cosine: Value) -> [Value; 2] {
         let one = self.mask(1);
         let marked = self.wide(marked);
@@ -112,7 +113,7 @@ impl Emitter<'_> {
         [signed(turned[0], k), signed(turned[1], next)]
     }
 
-    /// Both lanes with these bits.
+    /// Mask of both lanes with these bits, for trigonometry.
     fn mask(&mut self, bits: u64) -> Value {
         let lane = bits.to_le_bytes();
         let both: Vec<u8> = lane.into_iter().chain(lane).collect();

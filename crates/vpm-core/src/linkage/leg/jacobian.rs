@@ -17,7 +17,7 @@ struct Kinematics<S> {
 }
 
 impl Leg {
-    /// M (kg m^2), V and G (N m) at angles `q` (rad) and rates `v` (rad/s), by virtual work.
+    /// Terms M (kg m^2), V and G (N m) of the leg at `q` (rad) and `v` (rad/s), by body Jacobians.
     ///
     /// Law: [`virtual_work`] with the coordinates (q1, q2, s1, s2) of eq 2.92 and `Psi = d(q1, q2, s1, s2)/d(q1, q2)`;
     /// the Jacobians are written out below, their time derivatives come exact from dual numbers. Allocates nothing.
@@ -34,7 +34,8 @@ impl Leg {
         virtual_work(&carried, &psi, &v, [0.0, -self.parameters.gravity, 0.0])
     }
 
-    /// Lever arms ds1/dq1 and ds2/dq2 of the cylinders (m/rad) at angles `q` (rad). The other two derivatives are zero.
+    /// Jacobian of the leg's cylinders: lever arms ds1/dq1 and ds2/dq2 (m/rad) at angles `q` (rad). The other two
+    /// derivatives are zero.
     pub fn levers<S: Scalar>(&self, q: [S; 2]) -> [S; 2] {
         let psi = self.kinematics(q).psi;
         [psi[2][0], psi[3][1]]
@@ -73,7 +74,7 @@ impl Leg {
 }
 
 impl<S: Scalar> Points<S> {
-    /// A point that moves with the slider: up and down with the hip, since the foot stays on the ground.
+    /// Jacobian of a point on the leg's slider: up and down with the hip, since the foot stays on the ground.
     fn on_slider(&self, place: Vector2<S>) -> PointMotion<S, DEPENDENT> {
         let zero = S::zero();
         // y_A = L_UL cos q1 + L_LL cos(q1 + q2).
@@ -82,14 +83,14 @@ impl<S: Scalar> Points<S> {
         PointMotion { place, columns: [first, second, Vector2::zero(), Vector2::zero()] }
     }
 
-    /// A point that also turns about the hip.
+    /// Jacobian of a point of the leg that also turns about the hip.
     fn on_upper(&self, place: Vector2<S>) -> PointMotion<S, DEPENDENT> {
         let mut point = self.on_slider(place);
         point.columns[0] = point.columns[0] + (place - self.hip).perpendicular();
         point
     }
 
-    /// A point that also turns about the knee.
+    /// Jacobian of a point of the leg that also turns about the knee.
     fn on_lower(&self, place: Vector2<S>) -> PointMotion<S, DEPENDENT> {
         let mut point = self.on_upper(place);
         point.columns[1] = point.columns[1] + (place - self.knee).perpendicular();

@@ -9,7 +9,7 @@ use crate::spatial::Vector2;
 type Second = Dual<Dual<f64, 4>, 4>;
 
 impl Leg {
-    /// M (kg m^2), V and G (N m) at angles `q` (rad) and rates `v` (rad/s), from the energies alone.
+    /// Lagrange terms M (kg m^2), V and G (N m) of the leg at `q` (rad) and `v` (rad/s), from energies alone.
     ///
     /// Law: `M = d^2T/dv^2`, `V = (d^2T/dv dq) v - dT/dq`, `G = dU/dq`, exact by nested dual numbers. Source: eqs 2.54
     /// to 2.60, with `U = -sum m g . r` (2.56 corrected).
@@ -27,8 +27,8 @@ impl Leg {
         }
     }
 
-    /// Kinetic energy in J: `1/2 sum (m |c_dot|^2 + I w^2)`, with the rates of places by dual numbers along `v`.
-    /// Source: eq 2.55.
+    /// Kinetic energy of the leg in J for Lagrange: `1/2 sum (m |c_dot|^2 + I w^2)`. Rates of places come by dual
+    /// numbers along `v`. Source: eq 2.55.
     pub fn kinetic_energy<S: Scalar>(&self, q: [S; 2], v: [S; 2]) -> S {
         let moving: [Dual<S, 1>; 2] = std::array::from_fn(|k| Dual { value: q[k], gradient: [v[k]] });
         let energy = |(place, (mass, inertia)): (super::Place<Dual<S, 1>>, (f64, f64))| {
@@ -39,14 +39,15 @@ impl Leg {
         self.places(moving).into_iter().zip(self.masses()).map(energy).sum()
     }
 
-    /// Potential energy in J, zero with all centres of mass at the height of the foot: `sum m g y`.
+    /// Potential energy of the leg in J for Lagrange, `sum m g y`. It is zero with all centres of mass at the height of
+    /// the foot.
     pub fn potential_energy<S: Scalar>(&self, q: [S; 2]) -> S {
         let weights = self.masses().map(|(mass, _)| mass * self.parameters.gravity);
         self.places(q).into_iter().zip(weights).map(|(place, weight)| place.center.y * weight).sum()
     }
 }
 
-/// A vector and its time derivative.
+/// Vector and its time derivative for Lagrange's equations.
 fn split<S: Scalar>(vector: Vector2<Dual<S, 1>>) -> (Vector2<S>, Vector2<S>) {
     (Vector2::new(vector.x.value, vector.y.value), Vector2::new(vector.x.gradient[0], vector.y.gradient[0]))
 }

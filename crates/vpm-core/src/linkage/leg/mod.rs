@@ -38,14 +38,14 @@ pub use shares::{DutyCycle, ShareDefinition, ShareStudy, Shares};
 pub const BODIES: [&str; 7] = ["slider", "upper leg", "lower leg", "hip barrel", "hip rod", "knee barrel", "knee rod"];
 
 impl Leg {
-    /// Joint accelerations (rad/s^2) for joint torques (N m) at angles `q` (rad) and rates `v` (rad/s).
+    /// Joint accelerations of the leg (rad/s^2) for joint torques (N m) at `q` (rad) and `v` (rad/s).
     pub fn acceleration(&self, q: [f64; 2], v: [f64; 2], torques: [f64; 2]) -> Result<[f64; 2]> {
         let Terms { mass_matrix, velocity, gravity } = self.terms(q, v);
         let right = std::array::from_fn(|k| torques[k] - velocity[k] - gravity[k]);
         Ok(solve(mass_matrix, right).map_err(|pivot| self.singular(q, pivot))?)
     }
 
-    /// Cylinder forces (N, positive when extending) that give the joint torques (N m): `F = tau / (ds/dq)`.
+    /// Cylinder forces of the leg (N, positive when extending) for joint torques (N m): `F = tau / (ds/dq)`.
     pub fn cylinder_forces(&self, q: [f64; 2], torques: [f64; 2]) -> [f64; 2] {
         let levers = self.levers(q);
         std::array::from_fn(|k| torques[k] / levers[k])

@@ -38,7 +38,7 @@ struct Balances {
 }
 
 impl Leg {
-    /// All reactions at angles `q` (rad), rates `v` (rad/s) and accelerations `a` (rad/s^2).
+    /// Newton-Euler reactions of the leg at `q` (rad), rates `v` (rad/s) and accelerations `a` (rad/s^2).
     ///
     /// Law: for each body `sum f = m (c_ddot - g)` and `sum (r x f + n) = I w_dot` about its centre of mass, 21
     /// equations for 21 reactions; accelerations by differentiating the places twice in time. No friction. Source: eqs
@@ -76,7 +76,7 @@ impl Leg {
         }
     }
 
-    /// The order of the columns is that of [`Leg::named`].
+    /// Adds reactions to the Newton-Euler balances; the order of the columns is that of [`Leg::named`].
     fn add_reactions(&self, balances: &mut Balances, points: &Points<f64>) {
         const SLIDER: usize = 0;
         const UPPER: usize = 1;
@@ -124,7 +124,8 @@ impl Leg {
 }
 
 impl Balances {
-    /// A force of unknown size along `direction`, at `place`, on one body and against another (or the world).
+    /// Unknown force in the Newton-Euler balances along `direction`, at `place`, on one body and against another. The
+    /// other may be the world.
     fn force(&mut self, on: usize, from: Option<usize>, place: Vector2<f64>, direction: Vector2<f64>) {
         for (body, sign) in [(Some(on), 1.0), (from, -1.0)] {
             if let Some(body) = body {
@@ -138,7 +139,7 @@ impl Balances {
         self.column += 1;
     }
 
-    /// A moment of unknown size on one body and against another (or the world).
+    /// Unknown moment in the Newton-Euler balances on one body and against another (or the world).
     fn moment(&mut self, on: usize, from: Option<usize>) {
         self.matrix[3 * on + 2][self.column] = 1.0;
         if let Some(body) = from {

@@ -64,7 +64,8 @@ pub struct Leg {
 }
 
 impl LegParameters {
-    /// The leg of HyQ; `shank` is the distance from knee to foot in m (0.341, or 0.375 to meet the published shares).
+    /// Parameters of the HyQ leg; `shank` is the distance from knee to foot in m. It is 0.341, or 0.375 to meet the
+    /// published shares.
     ///
     /// Geometry: "HyQ-Robot: Standard definition for joint angles and kinematic parameters", V4.0, 2017. Masses: Table
     /// 5.1 of the thesis, which lists one inertia per actuator: it is divided between barrel and rod by mass, or
@@ -110,7 +111,7 @@ impl LegParameters {
         }
     }
 
-    /// Every number with its name, whether it has to be positive, and whether zero will do.
+    /// Every parameter of the leg with its name, whether it has to be positive, and whether zero will do.
     fn named(&self) -> Vec<(String, f64, Sign)> {
         let mut list = vec![("slider.mass".to_owned(), self.slider_mass, Sign::NotNegative)];
         list.push(("gravity".to_owned(), self.gravity, Sign::Any));
@@ -166,7 +167,7 @@ impl Leg {
         Ok(Self { parameters })
     }
 
-    /// The numbers it was made of.
+    /// Parameters of which the leg was made.
     pub fn parameters(&self) -> &LegParameters {
         &self.parameters
     }

@@ -31,7 +31,7 @@ pub struct Place<S> {
 }
 
 impl Leg {
-    /// All points at angles `q` (rad). Source: eqs 2.85 to 2.91.
+    /// Places of all points of the leg at angles `q` (rad). Source: eqs 2.85 to 2.91.
     pub fn points<S: Scalar>(&self, q: [S; 2]) -> Points<S> {
         let p = &self.parameters;
         let along = |angle: S| {
@@ -54,7 +54,7 @@ impl Leg {
         }
     }
 
-    /// Lengths of hip and knee cylinder (m) at angles `q` (rad). Source: eqs 2.88 and 2.90.
+    /// Lengths of the leg's hip and knee cylinder (m) from their places at angles `q` (rad). Source: eqs 2.88 and 2.90.
     pub fn strokes<S: Scalar>(&self, q: [S; 2]) -> [S; 2] {
         let points = self.points(q);
         std::array::from_fn(|k| (points.tips[k] - points.bases[k]).length())
@@ -82,7 +82,7 @@ impl Leg {
         [slider, upper, lower, hip_barrel, hip_rod, knee_barrel, knee_rod]
     }
 
-    /// Mass (kg) and planar inertia (kg m^2) of the seven bodies. The slider does not turn.
+    /// Mass (kg) and planar inertia (kg m^2) of the leg's seven bodies. The slider does not turn.
     pub fn masses(&self) -> [(f64, f64); 7] {
         let p = &self.parameters;
         let [hip, knee] = &p.actuators;
@@ -91,12 +91,12 @@ impl Leg {
     }
 }
 
-/// The base of a cylinder from its joint, ahead of the direction `zero`.
+/// Place of a cylinder's base in the leg from its joint, ahead of the direction `zero`.
 fn base<S: Scalar>(place: &Attachment, zero: Vector2<S>) -> Vector2<S> {
     turned(zero, place.base_angle) * S::from_f64(place.base)
 }
 
-/// The tip of a cylinder from its joint, behind the direction `zero`.
+/// Place of a cylinder's tip in the leg from its joint, behind the direction `zero`.
 fn tip<S: Scalar>(place: &Attachment, zero: Vector2<S>) -> Vector2<S> {
     turned(zero, -place.tip_angle) * S::from_f64(place.tip)
 }

@@ -56,7 +56,8 @@ pub struct ShareStudy {
 }
 
 impl ShareStudy {
-    /// The study of the thesis: six values of each rate and acceleration, angles every 10 deg in -40..60 and -140..-20 deg.
+    /// Study of the thesis for the leg's shares: six values of each rate and acceleration. Angles are every 10 deg in
+    /// -40..60 and -140..-20 deg.
     pub fn of(duty: DutyCycle) -> Self {
         let ranges = [[-40.0_f64, 60.0], [-140.0, -20.0]].map(|range| range.map(f64::to_radians));
         Self { definition: ShareDefinition::default(), duty, samples: 6, ranges, counts: [11, 13] }
@@ -139,7 +140,7 @@ fn norm([x, y]: [f64; 2]) -> f64 {
     x.hypot(y)
 }
 
-/// Value number `k` of `count` equispaced ones over a range, ends included.
+/// Value number `k` of `count` equispaced ones over a range for shares, ends included.
 fn spread([low, high]: [f64; 2], count: usize, k: usize) -> f64 {
     low + (high - low) * k as f64 / (count - 1) as f64
 }

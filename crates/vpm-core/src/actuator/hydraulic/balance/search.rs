@@ -66,7 +66,8 @@ struct Side {
 }
 
 impl Side {
-    /// Pressure (Pa) where `taken` (m^3/s) leaves the chamber beside the leakage to the tank, and how it changes with that.
+    /// Pressure (Pa) in the search where `taken` (m^3/s) leaves the chamber, and its change with that. Leakage to the
+    /// tank leaves the chamber too.
     fn pressure(&self, taken: f64) -> (f64, f64) {
         let Shared { external, supply, tank, vapour, transition } = self.shared;
         let net = |p: f64| {
@@ -87,7 +88,7 @@ impl Side {
         (found, 1.0 / net(found).1)
     }
 
-    /// Signed root of a drop and its slope, see [`super::Orifice`].
+    /// Signed root of a pressure drop in the search and its slope, see [`super::Orifice`].
     fn root(&self, drop: f64) -> (f64, f64) {
         let (size, transition) = (drop.abs(), self.shared.transition);
         if size < transition {
@@ -98,7 +99,7 @@ impl Side {
         (root.copysign(drop), 0.5 / root)
     }
 
-    /// Pressure that lets `taken` (m^3/s) pass in closed form, without leakage and with turbulent edges.
+    /// Pressure in the search that lets `taken` (m^3/s) pass, in closed form without leakage, with turbulent edges.
     ///
     /// Law: `f sqrt(ps - p) - e sqrt(p - pt) = taken` with f and e of both edges. Between the two pressures `p = pt + (ps - pt) s^2` gives
     /// `f sqrt(1 - s^2) = c + e s`, `c = taken / sqrt(ps - pt)`; beyond, both edges flow the same way.
@@ -123,8 +124,9 @@ impl Side {
     }
 }
 
-/// Zero of a falling function between `low` and `high`, from `start`: Newton's steps, and halves of the bracket where those leave it or do
-/// not shrink, as around the root of a root, which they would jump across for ever (Press et al. 2007, "Numerical Recipes", section 9.4).
+/// Search for the zero of a falling function between `low` and `high`, from `start`. Newton's steps, and halves of the
+/// bracket where those leave it or do not shrink, as around the root of a root, which they would jump across for ever
+/// (Press et al. 2007, "Numerical Recipes", section 9.4).
 fn falling_zero(start: f64, [mut low, mut high]: [f64; 2], near: f64, f: impl Fn(f64) -> (f64, f64)) -> f64 {
     let mut at = if start >= low && start <= high { start } else { 0.5 * (low + high) };
     let mut before = high - low;

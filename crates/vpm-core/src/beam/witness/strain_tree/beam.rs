@@ -58,27 +58,27 @@ impl StrainBeam {
         self.fields.len()
     }
 
-    /// Whether it has none.
+    /// Whether the strain beam has no coordinates.
     pub fn is_empty(&self) -> bool {
         self.fields.components.is_empty()
     }
 
-    /// How many pieces it has.
+    /// Number of pieces of the strain beam.
     pub(super) fn pieces(&self) -> usize {
         self.axis.pieces()
     }
 
-    /// The inertia at the end of a piece.
+    /// Inertia at the end of a piece of the strain beam.
     pub(super) fn inertia(&self, piece: usize) -> SpatialInertia<f64> {
         self.inertia[piece]
     }
 
-    /// Kelvin-Voigt damping in s.
+    /// Kelvin-Voigt damping of the strain beam in s.
     pub fn damping(&self) -> f64 {
         self.damping
     }
 
-    /// Elastic stiffness `int Phi^T K Phi`, row by row; different strains do not couple.
+    /// Elastic stiffness of the strain beam, `int Phi^T K Phi`, row by row; different strains do not couple.
     pub fn stiffness(&self) -> Vec<f64> {
         let (n, components) = (self.len(), &self.fields.components);
         let mut stiffness = vec![0.0; n * n];
@@ -93,8 +93,8 @@ impl StrainBeam {
         stiffness
     }
 
-    /// The strain at `mu` (m) for coordinates `c`, in the order of [`Component`]. The strain of the surface at distance z from the
-    /// neutral axis is z times the curvature.
+    /// Strain of the strain beam at `mu` (m) for coordinates `c`, in the order of [`Component`]. The strain of the
+    /// surface at distance z from the neutral axis is z times the curvature.
     pub fn strain(&self, mu: f64, c: &[f64]) -> [f64; 6] {
         let mut strain = [0.0; 6];
         for ((value, &component), c) in self.fields.strain_row(mu).iter().zip(&self.fields.components).zip(c) {
@@ -103,18 +103,18 @@ impl StrainBeam {
         strain
     }
 
-    /// Crosses a piece with coordinates `c` and rates `rates`.
+    /// Crosses a piece of the strain beam with coordinates `c` and rates `rates`.
     pub(super) fn cross<S: Scalar>(&self, piece: usize, c: &[S], rates: &[S]) -> Crossing<S> {
         self.axis.cross(piece, c, rates)
     }
 
-    /// The twist of the end of a piece relative to its begin, per unit rate of coordinate `k`.
+    /// Twist of the end of a strain beam's piece relative to its begin, per unit rate of coordinate `k`.
     pub(super) fn column<S: Scalar>(&self, piece: usize, crossing: &Crossing<S>, k: usize) -> Twist<S> {
         self.axis.column(piece, crossing, k).unwrap_or_else(Twist::zero)
     }
 }
 
-/// The inertia of a slice of that length, its centre in the origin.
+/// Inertia of a strain beam's slice of that length, its centre in the origin.
 fn slice(section: &Section, length: f64) -> SpatialInertia<f64> {
     let [x, y, z, mass, ..] = section.inertia.map(|density| density * length);
     SpatialInertia::new(mass, Vector3::zero(), Symmetric3::from_array([x, y, z, 0.0, 0.0, 0.0]))

@@ -12,7 +12,7 @@ const LANES: usize = 8;
 
 /// A motion that a joint is made to follow.
 pub trait Drive {
-    /// Position (rad or m), rate and acceleration at time `t` (s).
+    /// Motion of a driven joint of a flexible tree: position (rad or m), rate and acceleration at time `t` (s).
     fn motion<S: Scalar>(&self, t: S) -> [S; 3];
 }
 
@@ -47,7 +47,7 @@ impl<S: Scalar> Buffers<S> {
         Self { workspace: tree.workspace(), q, v, rates, load: vec![zero; free], lu: Lu::new(free) }
     }
 
-    /// Writes the time derivative of `x` into `rates` and leaves the factors of `M_ff` in `lu`.
+    /// Motion of a flexible tree: writes the time derivative of `x`, and leaves the factors of `M_ff` in `lu`.
     fn evaluate<D: Drive>(&mut self, tree: &FlexibleTree, drive: Option<&D>, free: &[usize], x: &[S]) {
         let (count, n) = (free.len(), tree.len());
         let driven = drive.map(|drive| drive.motion(x[2 * count]));
@@ -89,12 +89,12 @@ impl<'a, D: Drive> TreeMotion<'a, D> {
         Ok(Self { tree, drive, free, values, duals })
     }
 
-    /// The workspace of the last evaluation of the right-hand side: tips, mass matrix, bias.
+    /// Workspace of the flexible tree's last motion: tips, mass matrix, bias.
     pub fn workspace(&self) -> &TreeWorkspace<f64> {
         &self.values.workspace
     }
 
-    /// Writes `[-M^-1 K, -M^-1 D]` of the last evaluation into the first columns of rows of `width`.
+    /// Writes `[-M^-1 K, -M^-1 D]` of the flexible tree's last motion into rows of `width`.
     fn elastic(&mut self, rows: &mut [f64], width: usize) {
         let (count, all) = (self.free.len(), self.tree.len());
         for (block, stiff) in [(0, self.tree.stiffness()), (count, self.tree.damping())] {
@@ -125,7 +125,7 @@ impl<D: Drive> Ode<f64> for TreeMotion<'_, D> {
         dxdt.copy_from_slice(&self.values.rates);
     }
 
-    /// Exact, by dual numbers.
+    /// Jacobian of a flexible tree's motion, exact by dual numbers.
     fn jacobian(&mut self, x: &[f64], jacobian: &mut [f64]) {
         let n = self.dim();
         let all: Vec<usize> = (0..n).collect();
@@ -139,7 +139,8 @@ impl<D: Drive> Ode<f64> for TreeMotion<'_, D> {
         }
     }
 
-    /// `[0, 1; -M^-1 K, -M^-1 D]`: all that is stiff in a beam, for the price of one mass matrix.
+    /// Iteration matrix of a flexible tree's motion: `[0, 1; -M^-1 K, -M^-1 D]`. It is all that is stiff in a beam, for
+    /// the price of one mass matrix.
     fn iteration_matrix(&mut self, x: &[f64], matrix: &mut [f64]) {
         let (n, count) = (self.dim(), self.free.len());
         self.values.evaluate(self.tree, self.drive.as_ref(), &self.free, x);

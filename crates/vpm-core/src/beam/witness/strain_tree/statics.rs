@@ -25,7 +25,8 @@ pub struct TipLoad {
 }
 
 impl FlexibleTree {
-    /// Coordinates at rest under gravity and `loads`, joints held as in `start`, which also begins the search.
+    /// Static equilibrium of a flexible tree under gravity and `loads`, joints held as in `start`. `start` also begins
+    /// the search.
     ///
     /// Law: `bias(q, 0) + K q = 0` by Newton's method with exact derivatives (dual numbers). Checked: converged to rounding.
     /// A large load is best reached in a few stages, each starting from the one before.
@@ -50,7 +51,7 @@ impl FlexibleTree {
         Err(Error::Setting { setting: "the unbalanced load of the tree", condition, value, repair })
     }
 
-    /// Residual and its derivative; the rows of the joints only hold them.
+    /// Static residual of a flexible tree and its derivative; the rows of the joints only hold them.
     fn unbalance(&self, q: &[f64], loads: &[TipLoad]) -> (DVector<f64>, DMatrix<f64>) {
         let n = self.len();
         let mut workspace = self.workspace::<Dual<f64, LANES>>();

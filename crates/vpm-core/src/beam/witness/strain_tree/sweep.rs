@@ -42,7 +42,8 @@ impl<S: Scalar> Frame<S> {
         self.jacobian.copy_from_slice(&other.jacobian);
     }
 
-    /// Goes on to a frame at `across`, which moves relative to this one with `twist` and, at constant rates, `acceleration`.
+    /// Sweeps on to a frame at `across`. It moves relative to this one with `twist` and, at constant rates,
+    /// `acceleration`.
     ///
     /// Law: `V = Ad V + v`, `A = Ad A + V x v + dv/dt`, Ad the transport into the new frame.
     fn advance(&mut self, across: &Pose<S>, twist: Twist<S>, acceleration: Twist<S>, support: &[usize]) {
@@ -56,7 +57,7 @@ impl<S: Scalar> Frame<S> {
 }
 
 impl FlexibleTree {
-    /// Buffers for this tree.
+    /// Buffers for the sweep over this tree.
     pub fn workspace<S: Scalar>(&self) -> TreeWorkspace<S> {
         let (n, zero) = (self.len(), S::zero());
         let moving = Frame::at_base(n, self.gravity);
@@ -64,7 +65,7 @@ impl FlexibleTree {
         TreeWorkspace { mass: vec![zero; n * n], bias: vec![zero; n], tips, moving }
     }
 
-    /// Mass matrix and bias at coordinates `q` and rates `v`: `M a + bias + K q + D v = efforts`.
+    /// Sweep at coordinates `q` and rates `v`: mass matrix and bias of `M a + bias + K q + D v = efforts`.
     ///
     /// Law: `M = sum J^T m J`, `bias = sum J^T (m A + V x* m V) - J^T load`, over hubs, Gauss stations and tip bodies.
     pub fn terms<S: Scalar>(&self, q: &[S], v: &[S], loads: &[TipLoad], workspace: &mut TreeWorkspace<S>) {
@@ -109,7 +110,7 @@ impl<S: Scalar> TreeWorkspace<S> {
         }
     }
 
-    /// Runs along a beam whose first coordinate is number `first`.
+    /// Sweeps along a beam whose first coordinate is number `first`.
     fn along(&mut self, beam: &StrainBeam, first: usize, (q, v): (&[S], &[S]), support: &[usize]) {
         let own = first..first + beam.len();
         for piece in 0..beam.pieces() {
@@ -122,7 +123,7 @@ impl<S: Scalar> TreeWorkspace<S> {
         }
     }
 
-    /// Adds an inertia that moves with the frame; of the mass matrix only the lower triangle.
+    /// Adds an inertia that moves with the frame of the sweep; of the mass matrix only the lower triangle.
     fn add(&mut self, inertia: SpatialInertia<f64>, support: &[usize]) {
         if inertia == SpatialInertia::zero() {
             return;

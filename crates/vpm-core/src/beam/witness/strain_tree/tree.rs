@@ -21,7 +21,7 @@ pub struct FlexibleLink {
 }
 
 impl FlexibleLink {
-    /// A link of nothing, welded to the world.
+    /// Root of a flexible tree: a link of nothing, welded to the world.
     pub fn welded() -> Self {
         Self { parent: None, joint: None, hub: SpatialInertia::zero(), beam: None, tip: SpatialInertia::zero() }
     }
@@ -84,27 +84,27 @@ impl FlexibleTree {
         }
     }
 
-    /// How many coordinates there are.
+    /// Number of coordinates of the flexible tree.
     pub fn len(&self) -> usize {
         self.offsets[self.links.len()]
     }
 
-    /// Whether there are none.
+    /// Whether the flexible tree has no coordinates.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Place of the joint coordinate of link `link`, if it has a joint.
+    /// Place of the joint coordinate of link `link` in the tree, if it has a joint.
     pub fn joint_coordinate(&self, link: usize) -> Option<usize> {
         self.links.get(link)?.joint.as_ref().map(|_| self.offsets[link])
     }
 
-    /// Elastic stiffness, row by row.
+    /// Elastic stiffness of the flexible tree, row by row.
     pub fn stiffness(&self) -> &[f64] {
         &self.stiffness
     }
 
-    /// Kelvin-Voigt damping, row by row.
+    /// Kelvin-Voigt damping of the flexible tree, row by row.
     pub fn damping(&self) -> &[f64] {
         &self.damping
     }

@@ -30,7 +30,7 @@ pub struct TwoNodeChain {
 }
 
 impl TwoNodeChain {
-    /// A beam of that section and `length` (m), cut into `count` elements.
+    /// Chain of `count` two-node elements: a beam of that section and `length` (m).
     pub fn new(section: &Section, length: f64, count: usize) -> Result<Self> {
         if count == 0 {
             let condition = "be at least 1".to_owned();
@@ -40,12 +40,12 @@ impl TwoNodeChain {
         Ok(Self { element: TwoNode::new(section, length / count as f64)?, count })
     }
 
-    /// Coordinates of all nodes but the clamped one, undeformed, node after node.
+    /// Coordinates of all nodes of the straight chain but the clamped one, node after node.
     pub fn straight(&self) -> Vec<f64> {
         (1..=self.count).flat_map(|k| [0.0, 0.0, k as f64 * self.element.length(), 1.0, 0.0, 0.0, 0.0]).collect()
     }
 
-    /// Coordinates at rest under `load` on the last node; `start` begins the search.
+    /// Static equilibrium of the chain under `load` on the last node; `start` begins the search.
     ///
     /// Law: `dU/dx - Q + l dg/dx = 0`, `g = (|parameters|^2 - 1) / 2 = 0`, by Newton's method with the exact Jacobian from nested dual
     /// numbers. A moment m does `Q = 2 E^T m` on Euler parameters, as the spin is `2 E` times their rates (Nikravesh 1988,
@@ -97,7 +97,7 @@ impl TwoNodeChain {
         (residual, jacobian)
     }
 
-    /// Adds what element `k` contributes; its first node is the clamp for k = 0.
+    /// Adds what element `k` of the chain contributes; its first node is the clamp for k = 0.
     fn add_element(&self, k: usize, unknowns: &[f64], residual: &mut DVector<f64>, jacobian: &mut DMatrix<f64>) {
         const CLAMP: [f64; NODE] = [0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0];
         // Where each coordinate of the element stands among the unknowns.
@@ -116,7 +116,7 @@ impl TwoNodeChain {
     }
 }
 
-/// Subtracts the load on the node whose unknowns begin at `first`.
+/// Subtracts the load on the chain's node whose unknowns begin at `first`.
 fn add_load(first: usize, unknowns: &[f64], load: &NodeLoad, residual: &mut DVector<f64>, jacobian: &mut DMatrix<f64>) {
     for (k, force) in load.force.iter().enumerate() {
         residual[first + k] -= force;
@@ -134,7 +134,7 @@ fn add_load(first: usize, unknowns: &[f64], load: &NodeLoad, residual: &mut DVec
     }
 }
 
-/// `2 E^T m`: what a moment does on Euler parameters.
+/// Moment on the Euler parameters of a chain's node: `2 E^T m`.
 fn moment_on([a, b, c, d]: [f64; 4], [x, y, z]: [f64; 3]) -> [f64; 4] {
     [-(b * x + c * y + d * z), a * x + (y * d - z * c), a * y + (z * b - x * d), a * z + (x * c - y * b)]
         .map(|entry| 2.0 * entry)

@@ -31,7 +31,7 @@ pub struct TwoNode {
     stiffness: [[f64; 6]; 6],
 }
 
-/// Rotation matrix of Euler parameters (the first one the scalar) of length 1.
+/// Rotation matrix of a node's Euler parameters (the first one the scalar) of length 1.
 ///
 /// Law: equation 3.2, with `2 (l1 l2 + l0 l3)`, `2 (l1 l3 - l0 l2)` and `2 (l2 l3 + l0 l1)` below the diagonal.
 pub fn rotation<S: Scalar>([a, b, c, d]: [S; 4]) -> Matrix3<S> {
@@ -45,7 +45,7 @@ pub fn rotation<S: Scalar>([a, b, c, d]: [S; 4]) -> Matrix3<S> {
 }
 
 impl TwoNode {
-    /// An element of that section and length (m), whose shear follows from bending (Timoshenko).
+    /// Two-node element of that section and length (m), whose shear follows from bending (Timoshenko).
     ///
     /// Law: `EA / l` for the elongation, `GJ / l^3` for the twist, `EJ / (l^3 (1 + f)) [4 + f, f - 2; f - 2, 4 + f]` for both pairs of
     /// bending measures, `f = 12 EJ / (aGA l^2)`.
@@ -65,7 +65,7 @@ impl TwoNode {
         Ok(Self { length, stiffness })
     }
 
-    /// Length while undeformed, in m.
+    /// Length of an undeformed two-node element, in m.
     pub fn length(&self) -> f64 {
         self.length
     }
@@ -82,7 +82,7 @@ impl TwoNode {
         [distance - self.length, twist, -along(p[1]), along(q[1]), along(p[0]), -along(q[0])]
     }
 
-    /// Elastic energy in J.
+    /// Elastic energy of a two-node element in J.
     pub fn energy<S: Scalar>(&self, x: &[S; ELEMENT]) -> S {
         let measures = self.deformation(x);
         let mut energy = S::zero();
@@ -96,7 +96,7 @@ impl TwoNode {
         energy
     }
 
-    /// Generalised forces that hold the element in this shape: the derivative of the energy by the coordinates, exact.
+    /// Forces that hold a two-node element in this shape: the exact derivative of the energy.
     pub fn forces<S: Scalar>(&self, x: &[S; ELEMENT]) -> [S; ELEMENT] {
         self.energy(&std::array::from_fn(|k| Dual::variable(x[k], k))).gradient
     }

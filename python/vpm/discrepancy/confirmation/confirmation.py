@@ -1,0 +1,498 @@
+"""Confirmation of a short-listed effect: refit the model with it, then predict validation records."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.discrepancy.confirmation.delay_in_closed_loop import gain_in_closed_loop, timed_in_closed_loop
+from vpm.discrepancy.confirmation.delay_in_motion import CREEPING, Timed, is_dry, is_late
+from vpm.discrepancy.confirmation.low_frequency import has_impacts, low_frequency
+from vpm.discrepancy.confirmation.refit_start import nearer_start
+from vpm.discrepancy.confirmation.whittle_likelihood import ClosedLoopPrediction
+from vpm.discrepancy.screening.candidates import joint_at
+from vpm.discrepancy.screening.compliance_and_stop_start import ends_apart
+from vpm.discrepancy.screening.probe import Alias, Baseline, Probe, size_is_clear
+from vpm.errors import DivergedError
+from vpm.identify import (
+    Estimate,
+    Gain,
+    InverseDynamicsProblem,
+    OutputErrorProblem,
+    Problem,
+    Worth,
+    estimate,
+    gain,
+    gaps,
+    segments,
+)
+from vpm.identify.estimation import MOST_EVALUATIONS, standing
+from vpm.identify.identifiability import COPY_SHARE, closest_column, explained_share, is_alias
+from vpm.identify.response_along_motion import bends
+from vpm.identify.tangent import Tangent, drives_on_tangent, estimate_on_tangent, has_tangent
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+#: A refit stops when the sum of squares changes by less than this share: far below what a verdict rests on.
+TOLERANCE = 1e-6
+#: So many ranges of what the data reach, a place is nowhere.
+FAR_AWAY = 1e3
+#: Evaluations for a spring more where links bend already: each is a simulation with a dozen derivatives, and one that
+#: is there gains most in the first.
+FEW_EVALUATIONS = 6
+#: A refit that has lowered the training error by less than this share of its mean square in so many evaluations, and
+#: hardly goes on, ends early: validation data have to show ten times as much.
+SLOW_GAIN, SLOW_EVALUATIONS = 0.01, 10
+#: Of two candidates, one that leaves so many times what the other leaves is not the one that comes in.
+HOPELESS = 10.0
+
+
+@dataclass(frozen=True)
+class Data:
+    """Records of a diagnosis as problems for refits and their confirmation, set up once.
+
+    Attributes
+    ----------
+    training, validation : InverseDynamicsProblem
+        Inverse-dynamics residual on the records that are fitted and on those that are not.
+    simulation : OutputErrorProblem or None
+        Simulation of the validation records, the second criterion.
+    """
+
+    training: InverseDynamicsProblem
+    validation: InverseDynamicsProblem
+    simulation: OutputErrorProblem | None
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Fitted model with its residuals on training and validation data, and bounds of its shapes."""
+
+    model: Model
+    free: tuple[str, ...]
+    fit: Estimate
+    validation: Array
+    simulated: Array | None
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def baseline(self) -> Baseline:
+        """Baseline for the next screening round, from a judged model of the confirmation."""
+        pushed = {}
+        for name in self.fit.at_bounds:
+            parameter = self.model.parameters[name]
+            low, high = self.bounds.get(name, (parameter.minimum, parameter.maximum))
+            pushed[name] = 1 if high - parameter.value < parameter.value - low else -1
+        return Baseline(self.model, self.free, self.fit.residual, self.fit.jacobian, pushed)
+
+
+@dataclass(frozen=True)
+class Trial:
+    """Trial of a candidate: its refit, and its gain on training and validation records.
+
+    Attributes
+    ----------
+    probe : Probe
+    judged : Judged
+        The refitted model and its residuals.
+    parameters : tuple of str
+        The effect's own fitted parameters.
+    held : tuple of Alias
+    training, validation : Gain
+        Against the model without the effect.
+    simulated : Gain or None
+        The same by simulation of the validation records, if there is one.
+    away : Gain or None
+        The validation gain away from reversals, for an effect of a drive or an instrument, or a compliant joint, on
+        a machine with dry friction.
+    low_frequency : Gain or None
+        The validation gain of the low-frequency part, where a backlash is in the model already; None elsewhere.
+    diverged : str
+        Why the simulation of the validation records stopped, or "".
+    clear : bool
+        Whether the effect's size differs from zero on the training data.
+    from_prediction : bool
+        Whether the gains are those of closed-loop predictions, where the residual hardly shows them.
+    error : float
+        Largest share of its signal that the model without the effect leaves of a validation channel.
+    supported : bool
+        Whether closed-loop predictions support it too, so that little that is sure is enough.
+    here : Gain or None
+        The validation gain of the effort on the joint where the effect acts, if nothing is lost elsewhere.
+    """
+
+    probe: Probe
+    judged: Judged
+    parameters: tuple[str, ...]
+    held: tuple[Alias, ...]
+    training: Gain
+    validation: Gain
+    simulated: Gain | None
+    away: Gain | None
+    diverged: str
+    clear: bool
+    low_frequency: Gain | None = None
+    from_prediction: bool = False
+    error: float = 0.0
+    supported: bool = False
+    here: Gain | None = None
+
+    @property
+    def there(self) -> Gain:
+        """Validation gain of a confirmation trial on the joint where the effect acts most."""
+        return self.validation if self.here is None else max(self.validation, self.here, key=lambda one: one.relative)
+
+    @property
+    def score(self) -> float:
+        """Validation gain of a confirmation trial per fitted number."""
+        return self.validation.relative / max(1, len(self.parameters))
+
+
+def judge(
+    model: Model,
+    free: tuple[str, ...],
+    data: Data,
+    bounds: dict[str, tuple[float, float]],
+    origin: Array | None = None,
+    worth: Worth | None = None,
+) -> Judged:
+    """Confirmation's judgement: fit ``free`` on training records, predict validation records.
+
+    For ``origin`` see `vpm.identify.tangent`. Where links bend and nothing else is worked out, the tangent at the start
+    is taken if none is given. A fit that is not on a tangent of links ends early if it is not ``worth`` its time.
+
+    Raises
+    ------
+    DivergedError
+        The fitted model cannot simulate the validation records.
+    """
+    bounds = ends_apart(model, free, bounds)
+    if origin is None and has_tangent(model, data.training):
+        origin = model.theta
+    if origin is None:
+        most = FEW_EVALUATIONS if bends(model) and model.added_joints else MOST_EVALUATIONS
+        fit = estimate(
+            model, data.training, free, bounds=bounds, tolerance=TOLERANCE, most_evaluations=most, worth=worth
+        )
+    else:
+        fit = estimate_on_tangent(model, data.training, free, origin, bounds=bounds, tolerance=TOLERANCE, worth=worth)
+    fitted = model.with_parameters(dict(zip(free, map(float, fit.values), strict=True)))
+    validation, _ = data.validation.evaluate(fitted, fitted.theta)
+    simulated = None if data.simulation is None else data.simulation.evaluate(fitted, fitted.theta)[0]
+    return Judged(fitted, free, fit, validation, simulated, bounds)
+
+
+def unmoved(
+    model: Model, free: tuple[str, ...], data: Data, bounds: dict[str, tuple[float, float]]
+) -> tuple[Judged, str]:
+    """Confirmation's judgement without a fit: parameter uncertainty, and why it cannot simulate, or ""."""
+    fit = standing(model, data.training, free)
+    validation, _ = data.validation.evaluate(model, model.theta)
+    simulated, stopped = None, ""
+    try:
+        simulated = None if data.simulation is None else data.simulation.evaluate(model, model.theta)[0]
+    except DivergedError as error:
+        stopped = str(error)
+    return Judged(model, free, fit, validation, simulated, bounds), stopped
+
+
+def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) -> Trial:
+    """Confirm a candidate: refit with it, release parameters that became visible, measure the validation gain.
+
+    ``rival`` is the sum of squares that another candidate leaves of the training records. A refit above ``HOPELESS``
+    times that may end early.
+    """
+    bounds = {**current.bounds, **_bounds(probe)}
+    start = probe.model.with_parameters(_inside(probe, bounds))
+    start = nearer_start(start, probe.free, current.free, data.training)
+    free = (*current.free, *probe.free)
+    held: tuple[Alias, ...] = ()
+    origin, still = _origin(data.training, probe, start), _still(data.training, probe)
+    if probe.invisible:
+        near: Problem = data.training if origin is None else Tangent(data.training, origin)
+        rough = estimate(start, near, free, bounds=bounds, linear_only=True)
+        moved = origin is not None and probe.candidate.effect.site not in still
+        released, held = _release(start, data.training if moved else near, free, rough, probe)
+        start = start.with_parameters(dict(zip(free, map(float, rough.values), strict=True)))
+        free = (*free, *released)
+        origin = start.theta if moved else origin
+    cost = float(current.fit.residual @ current.fit.residual)
+    worth = Worth(min((1.0 - SLOW_GAIN) * cost, HOPELESS * rival), SLOW_EVALUATIONS)
+    judged, diverged = judged_anyhow(start, free, data, bounds, origin, worth)
+    doubtful = probe.held
+    if seen := _visible_now(judged, data, probe):
+        free, doubtful = (*free, *seen), tuple(alias for alias in doubtful if alias.parameter not in seen)
+        origin = None if origin is None else judged.model.theta
+        judged, diverged = judged_anyhow(judged.model, free, data, bounds, origin, worth)
+    own = free[len(current.free) :]
+    timed, prediction = _timed(current, judged, data, probe)
+    if timed is not None:
+        judged, diverged = judged_anyhow(judged.model, free, data, {**bounds, **timed.bounds}, origin)
+    trial = measured(current, data, probe, judged, own, (*doubtful, *held), timed, diverged)
+    return _checked_by_prediction(trial, current, prediction, data)
+
+
+def finished(current: Judged, data: Data, trial: Trial) -> Trial:
+    """Confirmation trial whose refit ended early, fitted to the end; any other trial unchanged."""
+    if not trial.judged.fit.early:
+        return trial
+    known = trial.judged
+    judged, diverged = judged_anyhow(known.model, known.free, data, dict(known.bounds))
+    return measured(current, data, trial.probe, judged, trial.parameters, trial.held, None, diverged)
+
+
+def measured(
+    current: Judged,
+    data: Data,
+    probe: Probe,
+    judged: Judged,
+    own: tuple[str, ...],
+    held: tuple[Alias, ...],
+    timed: Timed | None,
+    diverged: str,
+) -> Trial:
+    """Confirmed gain of a refit on all data; a delay fitted in motion counts by its gain in motion."""
+    fitted = judged.fit.residual * shrinkage(data.training, current, judged)
+    validation = judged.validation * shrinkage(data.validation, current, judged)
+    return Trial(
+        probe,
+        judged,
+        own,
+        held,
+        gain(current.fit.residual, fitted, segments(data.training)),
+        gain(current.validation, validation, segments(data.validation)),
+        _simulated_gain(current, judged, data),
+        timed.validation if timed is not None else _away_gain(current, judged, data.validation, probe),
+        diverged,
+        is_clear(judged, own),
+        _low_frequency_gain(current, validation, data.validation),
+        error=max(share for _, share, _ in gaps(data.validation, current.validation).values()),
+        here=_where_it_acts(current, validation, data.validation, probe.candidate.site),
+    )
+
+
+def judged_anyhow(
+    start: Model,
+    free: tuple[str, ...],
+    data: Data,
+    bounds: dict[str, tuple[float, float]],
+    origin: Array | None = None,
+    worth: Worth | None = None,
+) -> tuple[Judged, str]:
+    """Confirmation's judgement by the residual alone where a fit cannot simulate, with the reason.
+
+    One that Ctrl-C ended says nothing of a candidate.
+    """
+    reason = ""
+    try:
+        judged = judge(start, free, data, bounds, origin, worth)
+    except DivergedError as error:
+        judged, reason = judge(start, free, replace(data, simulation=None), bounds, origin, worth), str(error)
+    if judged.fit.interrupted:
+        raise KeyboardInterrupt
+    return judged, reason
+
+
+def _visible_now(judged: Judged, data: Data, probe: Probe) -> tuple[str, ...]:
+    """Held parameters of a confirmation trial that became identifiable during the refit.
+
+    A stiffness looks like the inertia behind it as long as neither is near its value. A doubtful parameter of an effect
+    that does nothing at its start may stay there. Any other start is a guess, so it moves if the data show it at all.
+    """
+    names = [alias.parameter for alias in probe.held]
+    if not names:
+        return ()
+    model = judged.model
+    _, columns = data.training.evaluate(model, model.theta, [model.index(name) for name in names])
+    known, seen = judged.fit.jacobian, []
+    for name, column in zip(names, columns.T, strict=True):
+        if probe.candidate.neutral:
+            alike = is_alias(column, known, judged.fit.residual)
+        else:
+            alike = explained_share(column, known) > COPY_SHARE
+        if np.any(column) and not alike:
+            seen.append(name)
+            known = np.column_stack([known, column])
+    return tuple(seen)
+
+
+def _still(data: InverseDynamicsProblem, probe: Probe) -> frozenset[str]:
+    """Kinds of sites where a candidate to confirm moves nothing that a refit on a tangent uses."""
+    return frozenset({"joint"} if drives_on_tangent(probe.model, data) else {"joint", "actuator"})
+
+
+def _origin(data: InverseDynamicsProblem, probe: Probe, start: Model) -> Array | None:
+    """Origin for a confirmation refit on a tangent: link deflections without the candidate, where valid.
+
+    Drives are taken as without it where it is none of theirs, and else as where the fit starts.
+    """
+    if not has_tangent(probe.model, data):
+        return None
+    alike = probe.candidate.effect.site in _still(data, probe)
+    if drives_on_tangent(probe.model, data):
+        return probe.model.theta if alike else start.theta
+    return probe.model.theta if alike or probe.candidate.neutral else None
+
+
+def weaker(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> Array:
+    """Factors, at least 1, by which a confirmation refit weakened the actuators of each joint (joints,).
+
+    An effect that suppresses the command, or a gain that shrinks, leaves a small difference of two small efforts. So
+    errors are compared relative to the effort. One drive may do so where others are stronger.
+    """
+    after, before = (problem.strengths(one.model) for one in (judged, current))
+    return np.asarray(np.maximum(1.0, before / np.maximum(after, np.maximum(1e-6 * before, 1e-300))))
+
+
+def shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> Array:
+    """Factor by which a confirmation refit weakened the actuators behind each residual, see `weaker` (n,)."""
+    factors_of_joints = weaker(problem, current, judged)
+    # What else is logged is shown by the machine as a whole.
+    factors = np.full(max(block.samples.stop for block in problem.blocks), np.max(factors_of_joints))
+    for record in range(len(problem.motions)):
+        for block, factor in zip(problem.efforts(record), factors_of_joints, strict=True):
+            factors[block.samples] = factor
+    return factors
+
+
+def _where_it_acts(current: Judged, validation: Array, problem: InverseDynamicsProblem, site: str) -> Gain | None:
+    """Confirmed gain in the effort at the joint where the effect acts; None without one."""
+    joint, lost = (
+        joint_at(current.model, site),
+        float(validation @ validation) > float(current.validation @ current.validation),
+    )
+    if len(problem.joints) == 1 or joint not in problem.joints or lost:
+        return None
+    here = np.zeros(len(validation))
+    for record in range(len(problem.motions)):
+        here[problem.efforts(record)[problem.joints.index(joint)].samples] = 1.0
+    return gain(here * current.validation, here * validation, segments(problem))
+
+
+def _simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:
+    if data.simulation is None or current.simulated is None or judged.simulated is None:
+        return None
+    return gain(current.simulated, judged.simulated, segments(data.simulation))
+
+
+def _low_frequency_gain(current: Judged, validation: Array, data: InverseDynamicsProblem) -> Gain | None:
+    if not has_impacts(current.model):
+        return None
+    return gain(low_frequency(data, current.validation), low_frequency(data, validation), segments(data))
+
+
+def _timed(
+    current: Judged, judged: Judged, data: Data, probe: Probe
+) -> tuple[Timed | None, ClosedLoopPrediction | None]:
+    """Confirmation of a delay beside dry friction: fitted in motion, with its closed-loop prediction if any."""
+    if not is_late(probe.candidate.effect, current.model) or has_tangent(probe.model, data.training):
+        return None, None
+    before, late = (current.model, current.free), (judged.model, judged.free)
+    return timed_in_closed_loop(before, late, data.training, data.validation, data.simulation, judged.bounds)
+
+
+def _checked_by_prediction(trial: Trial, current: Judged, prediction: ClosedLoopPrediction | None, data: Data) -> Trial:
+    """Confirmation trial of a delay that worsens simulations, judged by closed-loop predictions."""
+    if prediction is None or data.simulation is None or trial.simulated is None or trial.simulated.relative >= 0.0:
+        return trial
+    gained = gain_in_closed_loop(current.model, current.free, prediction, data.simulation)
+    return trial if gained is None else replace(trial, simulated=gained)
+
+
+def _away_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem, probe: Probe) -> Gain | None:
+    """Confirmed gain on samples at which every joint is clearly in motion.
+
+    At a reversal a joint with dry friction sticks for a while, which no smooth law follows. A delay or a joint
+    compliance imitates that there, and nowhere else.
+    """
+    imitates = probe.candidate.effect.site in {"actuator", "sensor"} or probe.candidate.effect.winds_up
+    if not is_dry(current.model) or not imitates:
+        return None
+    counted = np.ones(current.validation.size)
+    speeds = [np.abs(data.state(record)[1]) for record in range(len(data.motions))]
+    largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
+    for record, speed in enumerate(speeds):
+        creeping = (speed < CREEPING * largest).any(axis=1)
+        near = creeping | np.append(creeping[1:], False) | np.insert(creeping[:-1], 0, False)
+        for block in data.efforts(record):
+            counted[block.samples] = ~near
+    return gain(current.validation * counted, judged.validation * counted, segments(data))
+
+
+def _bounds(probe: Probe) -> dict[str, tuple[float, float]]:
+    """Bounds of a candidate's shape from the data, by dotted name, for its confirmation."""
+    given, short = probe.candidate.bounds, _short_names(probe)
+    away = _out_of_reach(probe)
+    return {dotted: given[s] for s, dotted in short.items() if s in given and dotted not in away}
+
+
+def _out_of_reach(probe: Probe) -> set[str]:
+    """Start positions in a confirmation that no joint reaches in the records, such as another end stop.
+
+    Moved to the rim of what was seen they would stand where no sample of the training contradicts them.
+    """
+    given, values = probe.candidate.bounds, probe.model.parameters
+    bounded = {dotted: given[short] for short, dotted in _short_names(probe).items() if short in given}
+    return {dotted for dotted, (low, high) in bounded.items() if abs(values[dotted].value) >= FAR_AWAY * (high - low)}
+
+
+def _short_names(probe: Probe) -> dict[str, str]:
+    mine = (dict(e.parameter_names) for e in probe.model.effects if e.key == probe.candidate.key)
+    return next(mine, {})
+
+
+def _inside(probe: Probe, bounds: dict[str, tuple[float, float]]) -> dict[str, float]:
+    """Linearised estimates of a probe, moved into the bounds as start values of the confirmation."""
+    values = {}
+    for name in probe.free:
+        parameter = probe.model.parameters[name]
+        low, high = bounds.get(name, (parameter.minimum, parameter.maximum))
+        values[name] = float(np.clip(probe.values[name], low, high))
+    return values
+
+
+def _release(
+    model: Model, data: Problem, free: tuple[str, ...], fit: Estimate, probe: Probe
+) -> tuple[tuple[str, ...], tuple[Alias, ...]]:
+    """Parameters to release in a second confirmation refit: they matter once the size is not zero."""
+    fixed = {dotted for short, dotted in _short_names(probe).items() if short in probe.candidate.fixed}
+    asleep = [name for name in probe.invisible if name not in fixed | _out_of_reach(probe)]
+    theta = model.theta.copy()
+    theta[[model.index(name) for name in free]] = fit.values
+    _, fresh = data.evaluate(model, theta, [model.index(name) for name in asleep])
+    released: list[str] = []
+    held: list[Alias] = []
+    known, names = fit.jacobian, list(free)
+    for name, column in zip(asleep, fresh.T, strict=True):
+        if not np.any(column):
+            continue
+        if is_alias(column, known, fit.residual):
+            held.append(Alias(name, names[closest_column(column, known)]))
+            continue
+        released.append(name)
+        known, names = np.column_stack([known, column]), [*names, name]
+    return tuple(released), tuple(held)
+
+
+def is_clear(judged: Judged, own: tuple[str, ...]) -> bool:
+    """Whether the size of a confirmed effect differs from zero: a Wald test of its linear parameters together.
+
+    Size and shape of a law often compensate each other, such as a higher friction close to rest that fades sooner. A
+    law without size has no uncertain shape. The size of a backlash is its width, however hard its contacts are. Of
+    nearly rigid contacts no data bound the stiffness from above.
+    """
+    widths = {effect.parameter_names["gap"] for effect in judged.model.effects if effect.type.has_play}
+    size = [n for n in own if n in widths]
+    size = size or [n for n in own if judged.model.parameters[n].kind == "linear"] or list(own)
+    shape = [judged.free.index(name) for name in own if name not in size]
+    index = [judged.free.index(name) for name in size]
+    full = judged.fit.covariance
+    covariance = full[np.ix_(index, index)]
+    if shape and np.all(np.isfinite(full[np.ix_(index + shape, index + shape)])):
+        across = full[np.ix_(index, shape)]
+        covariance = covariance - across @ np.linalg.pinv(full[np.ix_(shape, shape)], hermitian=True) @ across.T
+    return size_is_clear(size, judged.fit.values[index], covariance)

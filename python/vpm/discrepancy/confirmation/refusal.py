@@ -1,0 +1,370 @@
+"""Refusal of a candidate: the reason in words with numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+from scipy.special import stdtrit
+
+from vpm.discrepancy.confirmation.confirmation import Trial
+from vpm.discrepancy.screening.compliance_and_stop_start import coupled, moved
+from vpm.discrepancy.screening.probe import Probe, impossible_values
+from vpm.identify import Gain
+from vpm.model import Model
+from vpm.numbers import NORMAL_95, percent, short
+
+#: Probability of accepting any effect by chance, shared among all candidates that are tried.
+FALSE_ALARM_LEVEL = 0.01
+#: Drop of the validation mean square below which an effect is not worth its name.
+LEAST_GAIN = 0.02
+#: The same for an effect that is to be accepted: what sticks and creeps leaves more than that to imitate.
+WORTH_A_NAME = 0.1
+#: Below this drop most of the residual is something else, which the effect might merely imitate: the evidence then has
+#: to be this many times as strong.
+MODEST_GAIN, MODEST_FACTOR = 0.3, 3.0
+#: From this drop on, the inverse-dynamics residual decides alone on a machine of several joints. With two effects
+#: missing, adding one may worsen the simulation, because errors of coupled joints had cancelled.
+CLEAR_GAIN = 0.5
+#: A delay or lag that the times of samples leave open is named from this drop on: it matters whether the delay is that
+#: of the drive or of the record. Below it, sampling explains it as well.
+MOST_OF_IT = 0.5
+#: Neither a residual nor an error of an instrument's gain means anything below this share of the signal: links are
+#: cut into pieces and gauges calibrated to no better.
+NEGLIGIBLE = 0.005
+#: An error of an instrument shows so many times as large in the residual that it is more than an error of the model
+#: there.
+MAGNIFIED = 4.0
+#: One-sided 95 % quantile of the normal distribution: a simulation that is worse by less is worse by chance.
+NORMAL_95_ONE_SIDED = 1.6448536269514722
+#: Damping ratio from which on a spring in series is none.
+CREEPS = 5.0
+#: Samples that what builds up over a way has to last, to be seen to build up.
+SAMPLED = 2.0
+#: Drop of the training mean square below which a candidate is not refitted at all.
+LEAST_SCREENED = 0.005
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """Thresholds below which an effect is refused.
+
+    Attributes
+    ----------
+    candidates : int
+        Number of candidates tried in the whole diagnosis; the false-alarm level is divided by it (Bonferroni).
+    interval : float
+        Sampling interval of the coarsest record, s; delays and lags below it that explain little are part of sampling.
+    """
+
+    candidates: int
+    interval: float
+
+    def score(self, pieces: int) -> float:
+        """Threshold of the validation gain, in standard deviations by Student's t for so few pieces."""
+        return float(stdtrit(max(1, pieces - 1), 1.0 - FALSE_ALARM_LEVEL / max(1, self.candidates)))
+
+    def needed(self, validation: Gain, *, supported: bool = False) -> float:
+        """Standard deviations of gain below which an effect is refused; more where most of the residual stays."""
+        modest = validation.relative < MODEST_GAIN and not supported
+        return self.score(validation.pieces) * (MODEST_FACTOR if modest else 1.0)
+
+    def met(self, validation: Gain) -> bool:
+        """Whether a gain meets the thresholds: it is large enough and sure."""
+        return validation.relative >= WORTH_A_NAME and validation.score >= self.needed(validation)
+
+
+def refuse_probe(probe: Probe) -> str:
+    """Reason of refusal after screening, or ""."""
+    if not probe.free:
+        if probe.held:
+            partners = ", ".join(dict.fromkeys(alias.partner for alias in probe.held))
+            return f"these data do not discriminate it from {partners}"
+        return "it has no influence on these data"
+    if probe.drop < 0.0:
+        return "it would make the training error larger wherever it was tried"
+    if probe.drop < LEAST_SCREENED:
+        return f"it would lower the training error by only {percent(probe.drop)} of its mean square"
+    outside = impossible_values(probe)
+    if outside:
+        return _impossible(probe, outside[0])
+    return ""
+
+
+def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
+    """Reason of refusal of a refitted candidate, or ""."""
+    reasons = (
+        _too_short(trial, thresholds.interval),
+        _no_way(trial),
+        _creeps(trial),
+        _trifling_gain(trial),
+        _only_training(trial),
+        _not_clear(trial),
+        worse_in_simulation(trial),
+        _too_little(trial, thresholds),
+        _only_reversals(trial),
+        _only_impacts(trial),
+    )
+    return next(filter(None, reasons), "")
+
+
+def impossible_trial(trial: Trial, interval: float) -> str:
+    """Reason of refusal of an effect whose estimates are physically impossible, whatever its gain, or ""."""
+    return _too_short(trial, interval) or _no_way(trial) or _creeps(trial) or _trifling_size(trial)
+
+
+def refuse_ringing(share: float, trial: Trial) -> str:
+    """Reason of refusal of a candidate that only lowers the ringing of links with measurement noise, or "".
+
+    ``share`` of the mean square of noise alone goes with that, by simulation.
+    """
+    rest = trial.validation.relative - max(share, 0.0)
+    if rest >= WORTH_A_NAME:
+        return ""
+    noise = "lower" if share >= 0.0 else "raise"
+    return (
+        f"it {_moves('the validation error', trial.validation)}; it would {noise} noise of the measured motion alone, "
+        f"which rings in the links, by {percent(abs(share))} of its mean square"
+    )
+
+
+def explains_most(trial: Trial) -> bool:
+    """Whether a delay explains so much that uncertain sample times are no reason of refusal.
+
+    Where there are peers on its clock, a shift of all commands tells what is physics.
+    """
+    candidate = trial.probe.candidate
+    late = bool(candidate.effect.late) and not has_peers(trial.judged.model, candidate.site)
+    return late and trial.validation.relative >= MOST_OF_IT
+
+
+def refuse_timing(timed: Gain, shift: float, thresholds: Thresholds, *, beside: float) -> str:
+    """Reason of refusal of a candidate that does no more than shifted commands within a sampling interval.
+
+    Parameters
+    ----------
+    timed : Gain
+        Of the candidate, with a shift before and after.
+    shift : float
+        How much later commands hold without the candidate, in sampling intervals.
+    thresholds : Thresholds
+    beside : float
+        The same with it. The shift and the candidate are one finding with two names if beside the candidate no shift
+        matters, and beside the shift the candidate does. That is one question, and the data answer it if they are
+        clear.
+    """
+    encompasses = beside == 0.0 and timed.relative >= LEAST_GAIN
+    if thresholds.met(timed) or (encompasses and timed.score >= replace(thresholds, candidates=1).score(timed.pieces)):
+        return ""
+    return (
+        f"beside a shift of the commands by {1e3 * shift * thresholds.interval:.2g} ms, within the sampling interval, "
+        f"it {_moves('the validation error', timed, 'only ')}"
+    )
+
+
+def _impossible(probe: Probe, name: str) -> str:
+    parameter = probe.model.parameters[name]
+    value = f"{probe.values[name]:.3g} ± {probe.std[name]:.2g} {parameter.unit}"
+    sign = "negative" if probe.values[name] < 0.0 <= parameter.minimum else "outside its physical range"
+    return f"its coefficient {name} comes out {sign} ({value}): {probe.candidate.effect.impossible}"
+
+
+def _too_short(trial: Trial, interval: float) -> str:
+    """Refusal of a delay or lag below one sampling interval: how commands are logged may explain it.
+
+    The hold is that of all commands. One of several drives or instruments may have a delay and the others none.
+    `refuse_timing` then judges it beside a shift of them all, if it explains more than an imitation would. The time of
+    a lossy link is no delay: it is a share of its stiffness.
+    """
+    model = trial.judged.model
+    site = trial.probe.candidate.effect.site
+    peers = has_peers(model, trial.probe.candidate.site) and trial.validation.relative >= MODEST_GAIN
+    if site in {"link", "body", "beam"} or peers or explains_most(trial):
+        return ""
+    for name in trial.parameters:
+        parameter = model.parameters[name]
+        if parameter.unit == "s" and parameter.value < interval:
+            return (
+                f"{name} comes out as {1e3 * parameter.value:.3g} ms, less than the sampling interval of "
+                f"{1e3 * interval:.3g} ms, and {_moves('the validation error', trial.validation)}: "
+                "so little is not discriminated from the sampling itself"
+            )
+    return ""
+
+
+def has_peers(model: Model, site: str) -> bool:
+    """Whether several drives, or several position sensors, share one clock, so that a delay of one is no refusal."""
+    encoders = {model.sensor_of(f"{joint}.position") for joint in model.joints} - {None}
+    return any(site in group and len(group) > 1 for group in (set(model.actuators), encoders))
+
+
+def _no_way(trial: Trial) -> str:
+    """Refusal of a hysteresis that turns round within the way of one sample: it is dry friction.
+
+    So is one within the way of two, unless its way is clearly longer than that of one. It may explain most of the
+    remaining error beside fitted dry friction. Then the data discriminate the two: joints reverse slowly, over many
+    samples.
+    """
+    candidate, bounds = trial.probe.candidate, trial.judged.bounds
+    way = next((tried.parameter for tried in candidate.effect.tried if tried.sampled), None)
+    if way is None:
+        return ""
+    name = trial.judged.model.effect(*candidate.key).parameter_names[way]
+    parameter = trial.judged.model.parameters[name]
+    least = bounds[name][0]
+    fit = trial.judged.fit
+    std = float(fit.std[fit.names.index(name)]) if name in fit.names else 0.0
+    clear = parameter.value - NORMAL_95_ONE_SIDED * std > 1.001 * least
+    beside_dry = f"{candidate.site}.friction.coulomb" in trial.judged.free and trial.validation.relative >= CLEAR_GAIN
+    if clear or parameter.value > (1.001 if beside_dry else SAMPLED) * least:
+        return ""
+    return (
+        f"{parameter_text(trial.judged.model, name, std)}, and the joint passes {least:.3g} "
+        f"{parameter.unit} between two samples: what builds up within two of them is like dry friction"
+    )
+
+
+def _creeps(trial: Trial) -> str:
+    """Refusal of a spring in series whose damper holds it: it creeps as a fluid coupling does."""
+    candidate, model = trial.probe.candidate, trial.judged.model
+    if not candidate.effect.winds_up:
+        return ""
+    names = model.effect(*candidate.key).parameter_names
+    stiffness, damping = (model.parameters[names[name]].value for name in ("stiffness", "damping"))
+    ratio = damping / (2.0 * math.sqrt(max(stiffness, 1e-300) * moved(trial.judged.model, candidate.site)))
+    if ratio <= CREEPS:
+        return ""
+    return (
+        f"its damping is {ratio:.3g} times the critical one, and it needs {damping / stiffness:.3g} s to come back: "
+        "that is no compliant spring"
+    )
+
+
+def _trifling_gain(trial: Trial) -> str:
+    """Refusal of a sensor error that is smaller than any sensor or link model is accurate to.
+
+    A gain scales whatever else of its signal the model has not quite right, and imitates some of it.
+    """
+    if not trial.probe.candidate.effect.scales:
+        return ""
+    name, drop = trial.parameters[0], trial.validation.relative
+    value = trial.judged.model.parameters[name].value
+    if reason := _trifling_size(trial):
+        return reason
+    if trial.low_frequency is None and 0.0 <= drop < MODEST_GAIN:
+        return (
+            f"{name} comes out as {value:.4g} and {_moves('the validation error', trial.validation, 'only ')}: "
+            "an instrument is blamed where it explains more than an imitation would"
+        )
+    return ""
+
+
+def _trifling_size(trial: Trial) -> str:
+    """Refusal of a sensor gain that is nearly one.
+
+    An effort may be the small difference of large readings, as of the pressures on both sides of a piston. A small
+    error of a gain then leaves a large error of the effort; a gain that explains most of it is accepted.
+    """
+    if not trial.probe.candidate.effect.scales:
+        return ""
+    name = trial.parameters[0]
+    value = trial.judged.model.parameters[name].value
+    magnified = trial.validation.relative >= CLEAR_GAIN and trial.error > MAGNIFIED * abs(value - 1.0)
+    if abs(value - 1.0) >= NEGLIGIBLE or magnified:
+        return ""
+    return (
+        f"{name} comes out as {value:.4g}: less than {percent(NEGLIGIBLE)} of the signal is no more "
+        "than an error of the model"
+    )
+
+
+def _only_training(trial: Trial) -> str:
+    seen, validation = trial.training, trial.validation
+    if validation.relative >= 0.0:
+        return ""
+    joined = "and" if seen.relative < 0.0 else "but"
+    return f"it {_moves('the training error', seen)}, {joined} {_moves('the validation error', validation)}"
+
+
+def _not_clear(trial: Trial) -> str:
+    if trial.clear:
+        return ""
+    model, fit = trial.judged.model, trial.judged.fit
+    worst = trial.parameters[0]
+    std = float(fit.std[fit.names.index(worst)])
+    value = model.parameters[worst].value
+    low, high = value - NORMAL_95 * std, value + NORMAL_95 * std
+    return f"the 95 % interval of {worst} covers zero ({low:.3g} to {high:.3g} {model.parameters[worst].unit})"
+
+
+def _only_impacts(trial: Trial) -> str:
+    """Refusal beside a backlash of an effect that does not help at low frequencies, without impacts."""
+    if trial.low_frequency is None or trial.low_frequency.relative >= -LEAST_GAIN:
+        return ""
+    return (
+        f"it {_moves('the validation error', trial.validation)} and "
+        f"{_moves('its low-frequency part', trial.low_frequency)}: it makes up for single impacts of the backlash"
+    )
+
+
+def low_frequency_shows_it(trial: Trial, thresholds: Thresholds) -> bool:
+    """Whether low frequencies support an effect that impacts of a backlash hide, which would be refused."""
+    validation, sure = trial.validation, NORMAL_95_ONE_SIDED
+    whole = validation.relative >= LEAST_GAIN and validation.score >= sure
+    return trial.low_frequency is not None and whole and thresholds.met(trial.low_frequency)
+
+
+def _too_little(trial: Trial, thresholds: Thresholds) -> str:
+    validation = trial.there
+    if low_frequency_shows_it(trial, thresholds):
+        return ""
+    if validation.relative < WORTH_A_NAME:
+        return f"it {_moves('the validation error', validation, 'only ')}"
+    needed = thresholds.needed(validation, supported=trial.supported)
+    if validation.score < needed:
+        return (
+            f"its gain of {percent(validation.relative)} on validation data is {validation.score:.1f} standard "
+            f"deviations over {validation.pieces} independent pieces, and {needed:.1f} are needed "
+            f"when {thresholds.candidates} candidates are tried"
+        )
+    return ""
+
+
+def _only_reversals(trial: Trial) -> str:
+    if trial.away is None or trial.away.relative >= LEAST_GAIN:
+        return ""
+    return (
+        "it lowers the validation error only where a joint with dry friction turns round and sticks for a while; "
+        f"elsewhere it {_moves('that', trial.away, 'only ')}"
+    )
+
+
+def worse_in_simulation(trial: Trial) -> str:
+    """Reason of refusal by the simulation: the trial predicts it worse; or ""."""
+    if trial.diverged:
+        return f"with it the simulation of the validation record fails: {trial.diverged}"
+    simulated = trial.simulated
+    decided = coupled(trial.judged.model) and trial.validation.relative >= CLEAR_GAIN
+    if simulated is None or decided or simulated.harm <= NORMAL_95_ONE_SIDED:
+        return ""
+    if simulated.relative < -LEAST_GAIN:
+        joined = "and" if trial.validation.relative < 0.0 else "but"
+        return (
+            f"it {_moves('the validation error of the inverse-dynamics residual', trial.validation)}, {joined} "
+            f"{_moves('that of the simulation', simulated)}, {simulated.harm:.1f} standard deviations"
+        )
+    return ""
+
+
+def parameter_text(model: Model, name: str, std: float) -> str:
+    """Parameter in the text of a refusal: ``name = value ± std unit``."""
+    parameter = model.parameters[name]
+    return f"{name} = {parameter.value:.5g} ± {std:.2g} {parameter.unit}"
+
+
+def _moves(what: str, change: Gain, little: str = "") -> str:
+    """Text of a refusal: ``lowers the validation error by 3.00 % of its mean square (0.2 to 0.197)``, or raises it."""
+    numbers = f"of its mean square ({short(change.before)} to {short(change.after)})"
+    if change.relative < 0.0:
+        return f"raises {what} by {percent(-change.relative)} {numbers}"
+    return f"lowers {what} by {little}{percent(change.relative)} {numbers}"

@@ -1,0 +1,176 @@
+"""Fields of a diagnosis, computed after the search: channel errors at all stages, accepted effects, rivals, steps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, is_clear, weaker
+from vpm.discrepancy.diagnosis import (
+    AcceptedEffect,
+    ChannelGap,
+    Diagnosis,
+    EffectParameterEstimate,
+    Step,
+)
+from vpm.discrepancy.noise.noise_floor import noise_floor
+from vpm.discrepancy.noise.residual_structure import Structure, structure
+from vpm.discrepancy.noise.sample_timing import in_time
+from vpm.discrepancy.preparation import Records
+from vpm.discrepancy.rivals.ambiguity import Rivals
+from vpm.discrepancy.search.backward_elimination import Stage
+from vpm.discrepancy.search.candidate_choice import Accepted
+from vpm.discrepancy.search.search import Search
+from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, Problem, gaps
+from vpm.identify.fit_result import fit_of
+from vpm.model import Model
+from vpm.simulate import Setup
+
+#: Said of what would do in the place of an effect.
+ALIKE = "predicts the validation data as well"
+
+
+def of_search(
+    model: Model, records: Records, start: Judged, found: Search, fitted: Problem, seconds: float
+) -> Diagnosis:
+    """Diagnosis with the fields of the search alone, where nothing after it could be computed.
+
+    Parameters
+    ----------
+    model : Model
+    records : tuple
+    start : Judged
+        What the last fit is compared with.
+    found : Search
+    fitted : problem
+        What was fitted.
+    seconds : float
+        Time it took.
+    """
+    training, validation, notes = records
+    names = ", ".join(entry.label for entry in found.accepted) or "no effect"
+    return Diagnosis(
+        "effect_found" if found.accepted else "unexplained",
+        f"The search accepts {names} in {model.name}; what is left on validation records could not be computed.",
+        tuple(accepted_effect(entry, found.final) for entry in found.accepted),
+        {},
+        found.refused,
+        found.ranking,
+        (),
+        {},
+        (),
+        tuple(e.name for e in training),
+        tuple(e.name for e in validation),
+        tuple(notes),
+        found.final.model,
+        fit_of(
+            found.final.model,
+            fitted,
+            found.final.fit,
+            start.fit.residual,
+            [e.name for e in training],
+        ),
+        (),
+        seconds,
+        found.interrupted,
+    )
+
+
+def gaps_of(
+    data: Data, nominal: Judged, recalibrated: Judged, final: Judged, floor: dict[str, float]
+) -> dict[str, ChannelGap]:
+    """Field of a diagnosis: error and noise floor of each channel, of residual and simulation, at three stages."""
+    judged = (nominal, recalibrated, final)
+    stages = [gaps(data.validation, stage.validation) for stage in judged]
+    # Of efforts as the drives of the nominal model give them: no drive may shrink them together with its error.
+    shrunk = (weaker(data.validation, nominal, stage) for stage in (recalibrated, final))
+    factors = np.array([np.ones(len(data.validation.joints)), *shrunk])
+    by_channel = {f"{joint}.effort": own for joint, own in zip(data.validation.joints, factors.T, strict=True)}
+    result = {}
+    for channel, (_, _, unit) in stages[0].items():
+        own = by_channel.get(channel, np.ones(len(judged)))
+        before, known, after = (float(stage[channel][0] * factor) for stage, factor in zip(stages, own, strict=True))
+        signal, noise = _signal(data.validation, channel), float(floor.get(channel, np.nan) * own[-1])
+        result[channel] = ChannelGap(before, known, after, noise, unit, signal, data.validation.mode)
+    simulation = data.simulation
+    simulated = [] if simulation is None else [gaps(simulation, j.simulated) for j in judged if j.simulated is not None]
+    # A stage that ran away from the records has nothing to be compared.
+    if simulation is not None and len(simulated) == len(judged):
+        for channel, (_, _, unit) in simulated[0].items():
+            before, known, after = (stage[channel][0] for stage in simulated)
+            signal = _signal(simulation, channel)
+            key = f"{channel} ({simulation.mode})"
+            result[key] = ChannelGap(before, known, after, np.nan, unit, signal, simulation.mode)
+    return result
+
+
+def examined(
+    nominal: Judged, recalibrated: Judged, data: Data, mode: str, setup: Setup, final: Judged
+) -> tuple[dict[str, float], dict[str, ChannelGap], Structure]:
+    """Noise floor, errors at all stages and residual structure of the final model: fields of a diagnosis."""
+    floor = noise_floor(final.model, data.validation, final.validation, mode, setup)
+    timed = in_time(final, data)
+    left = structure(final.model, data.training, data.validation, timed.fitted, timed.validation)
+    return floor, gaps_of(data, nominal, recalibrated, final, floor), left
+
+
+def _signal(problem: InverseDynamicsProblem | OutputErrorProblem, channel: str) -> float:
+    mine = [block for block in problem.blocks if block.channel == channel]
+    return float(np.sqrt(np.average([b.scale**2 for b in mine], weights=[b.moving.sum() for b in mine])))
+
+
+def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
+    """Field of a diagnosis: an accepted effect with its estimates in the final model, and its evidence."""
+    candidate = entry.trial.probe.candidate
+    effect = final.model.effect(*candidate.key, entry.side)
+    estimates = []
+    for short, dotted in effect.parameter_names.items():
+        parameter = final.model.parameters[dotted]
+        std = float(final.fit.std[final.free.index(dotted)]) if dotted in final.free else 0.0
+        estimates.append(EffectParameterEstimate(short, dotted, parameter.value, parameter.unit, std))
+    texts = {e.name: f"{e.value:.4g} {e.unit}" for e in estimates}
+    notes = [f"{alias.parameter} held: not discriminated from {alias.partner}" for alias in entry.trial.held]
+    if entry.trial.from_prediction:
+        notes.append("shown by closed-loop predictions; the inverse-dynamics residual hardly shows it")
+    elif not entry.ranked and not is_clear(final, tuple(e.dotted for e in estimates if e.std > 0.0)):
+        notes.append("beside the effects that came later, its interval covers zero: one of them may be enough")
+    return AcceptedEffect(
+        candidate.effect.name,
+        candidate.site,
+        candidate.effect.sentence.format(at=candidate.site, **texts),
+        tuple(estimates),
+        entry.trial.validation.relative,
+        entry.trial.validation.score,
+        (*notes, *(f"{'not discriminated from it' if entry.ranked else ALIKE}: {rival}" for rival in entry.rivals)),
+        entry.probability,
+        entry.evidence,
+        entry.class_probability,
+    )
+
+
+def classes(accepted: Sequence[Accepted], ambiguous: Sequence[Rivals]) -> tuple[tuple[str, ...], ...]:
+    """Field of a diagnosis: classes of an accepted effect and its rivals that predict as well."""
+    beside = {(rivals.effect, rivals.site): rivals.trials for rivals in ambiguous}
+    found = []
+    for entry in accepted:
+        others = (*entry.rivals, *(trial.probe.candidate.label for trial in beside.get(entry.key, ())))
+        if others:
+            found.append(tuple(dict.fromkeys((entry.label, *others))))
+    return tuple(found)
+
+
+def step(training: Problem, validation: Problem, stage: Stage) -> Step:
+    """Field of a diagnosis: one stage of the search with its parameter values and its largest channel errors."""
+    fit, model = stage.judged.fit, stage.judged.model
+    names = stage.judged.free
+    return Step(
+        stage.change,
+        stage.effect,
+        stage.site,
+        {name: model.parameters[name].value for name in names},
+        dict(zip(names, map(float, fit.std), strict=True)),
+        {name: model.parameters[name].unit for name in names},
+        max(share for _, share, _ in gaps(training, fit.residual).values()),
+        max(share for _, share, _ in gaps(validation, stage.judged.validation).values()),
+    )

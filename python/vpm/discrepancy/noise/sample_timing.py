@@ -1,0 +1,71 @@
+"""Timing of samples is uncertain: commands may hold up to one sampling interval earlier or later than stated.
+
+A logged command may hold from its sample on, until its sample, or as the mean over the interval; the log does not tell.
+What a shift within one interval explains is therefore no missing physics.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.discrepancy.confirmation.confirmation import Data, Judged
+from vpm.identify import gain, segments
+from vpm.identify.identifiability import column_lengths
+
+Array = NDArray[np.float64]
+
+#: A shift matters if it takes so much of the mean square of the residual, on training and on validation records.
+MATTERS = 0.02
+
+
+@dataclass(frozen=True)
+class InTime:
+    """Residuals of a fitted model with the best shift in the timing of all commands, within one interval.
+
+    Attributes
+    ----------
+    fitted, validation : ndarray
+        Residuals on training and validation records.
+    shift : float
+        How much later the commands hold, in sampling intervals; 0 where a shift does not matter.
+    """
+
+    fitted: Array
+    validation: Array
+    shift: float
+
+
+def in_time(judged: Judged, data: Data) -> InTime:
+    """Residuals after the best shift of command timing, to first order; free parameters move with it."""
+    predict = InTime(judged.fit.residual, judged.validation, 0.0)
+    model = judged.model
+    later, _ = data.training.later().evaluate(model, model.theta)
+    own = judged.fit.residual
+    change, known = later - own, judged.fit.jacobian
+    # Free parameters give way to the shift and do nothing else: one that its bounds hold has to stay where it is.
+    step = _step(known, change)
+    rest = change + known @ step
+    power = float(rest @ rest)
+    if power <= 1e-20 * float(change @ change):
+        return predict
+    shift = float(np.clip(-(rest @ own) / power, -1.0, 1.0))
+    fitted = own + shift * rest
+    if gain(own, fitted, segments(data.training)).relative < MATTERS:
+        return predict
+    columns = [model.index(name) for name in judged.free]
+    own_validation, slopes = data.validation.evaluate(model, model.theta, columns)
+    later_validation, _ = data.validation.later().evaluate(model, model.theta)
+    validation = own_validation + shift * (later_validation - own_validation + slopes @ step)
+    if gain(own_validation, validation, segments(data.validation)).relative < MATTERS:
+        return predict
+    return InTime(fitted, validation, shift)
+
+
+def _step(jacobian: Array, residual: Array) -> Array:
+    if not jacobian.shape[1]:
+        return np.zeros(0)
+    lengths = column_lengths(jacobian)
+    return np.asarray(np.linalg.lstsq(jacobian / lengths, -residual, rcond=1e-10)[0] / lengths)

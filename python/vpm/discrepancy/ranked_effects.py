@@ -1,0 +1,423 @@
+"""Effects that a ranking names: refitted to the inverse-dynamics residual, and measured on validation records.
+
+A ranking names what is missing, in order. This module changes none of its names, except on machines whose inverse
+dynamics cannot be computed with an effect. Reported values are those of the residual wherever it shows them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import compress
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.catalogue import EFFECTS
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, judged_anyhow, measured, unmoved
+from vpm.discrepancy.confirmation.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED
+from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RankedCandidate, RefusedEffect
+from vpm.discrepancy.rivals.ambiguity import Rivals
+from vpm.discrepancy.screening.candidates import Candidate, Key, asked_for, candidates
+from vpm.discrepancy.screening.probe import Probe, sort_columns
+from vpm.discrepancy.search.backward_elimination import Stage
+from vpm.discrepancy.search.candidate_choice import Accepted
+from vpm.discrepancy.search.search import Search
+from vpm.errors import VpmError
+from vpm.experiment import Experiment
+from vpm.identify import gain, segments
+from vpm.identify.response_along_motion import bends
+from vpm.model import Effect, Model
+
+if TYPE_CHECKING:
+    from vpm.ranking import Ranked, Ranking
+    from vpm.ranking import Settings as RankingSettings
+
+Array = NDArray[np.float64]
+#: Part of the name of a parameter that acts behind a joint that is split.
+BEHIND = ".link."
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """Settings by which a diagnosis takes names from a ranking and refits them.
+
+    Attributes
+    ----------
+    joints : int
+        Most joints of a machine that a ranking covers, beside those that effects split off.
+    worse : float
+        Share of the mean square of a simulation that a refit may add to that of the values of the ranking.
+    sure : float
+        Standard deviations by which it has to be worse to count as worse.
+    """
+
+    joints: int = 3
+    worse: float = LEAST_GAIN
+    sure: float = NORMAL_95_ONE_SIDED
+
+
+SETTINGS = Settings()
+
+
+def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
+    """Why names do not come from a ranking, or "": it covers up to three joints, rigid links, and drives without oil.
+
+    It covers oil where a joint has no drive, for no search sees that. A deflection that a log holds is compared by a
+    ranking, but on a log of a real arm a search names its friction more plausibly.
+    """
+    if bends(model):
+        return "links bend"
+    oil = [name for name in model.actuators if model.actuator_type(name) == "hydraulic"]
+    if oil and not free_joints(model):
+        return f"the actuator {oil[0]} has type hydraulic"
+    own = set(model.joints) - set(model.added_joints)
+    if len(own) > SETTINGS.joints:
+        return f"there are {len(own)} joints, more than {SETTINGS.joints}"
+    held = [channel for channel in model.deflections if any(channel in record for record in experiments)]
+    return f"records hold {held[0]}" if held else ""
+
+
+def free_joints(model: Model) -> tuple[str, ...]:
+    """Joints without a drive: only the tracker of a ranking measures effects there, no inverse-dynamics residual."""
+    return tuple(name for name in model.joints if name not in {*model.driven_joints, *model.added_joints})
+
+
+def tracker_gaps(ranking: Ranking, balanced: Sequence[str] | None) -> dict[str, ChannelGap]:
+    """Errors of the ranking's tracker on validation records at joints without an inverse-dynamics residual.
+
+    Of all channels where there is no such residual, and so no joint of which the efforts are ``balanced``.
+    """
+    joints = set(ranking.recalibrated.joints) - set(balanced or ())
+    return {
+        f"{channel} ({OBSERVED})": ChannelGap(
+            gap.before, gap.recalibrated, gap.after, gap.noise, gap.unit, gap.signal, OBSERVED
+        )
+        for channel, gap in ranking.gaps.items()
+        if balanced is None or channel.rpartition(".")[0] in joints
+    }
+
+
+def searched(
+    ranking: Ranking,
+    recalibrated: Judged,
+    data: Data,
+    settings: RankingSettings,
+    effects: Sequence[str] | None = None,
+) -> tuple[Search, tuple[Rivals, ...]]:
+    """Outcome of a ranking in the form of a search, with rivals of each ranked effect.
+
+    Parameters
+    ----------
+    ranking : Ranking
+        Of the training records.
+    recalibrated : Judged
+        The model without effects.
+    data : Data
+    settings : vpm.ranking.Settings
+        Of the ranking.
+
+    Ctrl-C gives the effects that were refitted until then.
+    """
+    known: tuple[Rivals, ...] = ()
+
+    def offered(final: Judged) -> tuple[Candidate, ...]:
+        return candidates(final.model, data.training, final.fit.residual, asked_for(effects), simulated=True)
+
+    def beside(current: Judged, model: Model, one: Ranked) -> Trial:
+        return _beside(current, model, one, data)
+
+    found = staged(ranking, recalibrated, beside, offered, settings)
+    try:
+        if found.interrupted == ranking.interrupted:
+            known = _rivals(ranking, found.final, found.accepted, data)
+    except KeyboardInterrupt:
+        found = replace(found, interrupted=True)
+    return found, known
+
+
+def staged(
+    ranking: Ranking,
+    recalibrated: Judged,
+    beside: Callable[[Judged, Model, Ranked], Trial],
+    offered: Callable[[Judged], tuple[Candidate, ...]],
+    settings: RankingSettings,
+) -> Search:
+    """Stages of a search from a ranking: its effects are added and refitted one by one.
+
+    Parameters
+    ----------
+    ranking : Ranking
+    recalibrated : Judged
+        The model without effects.
+    beside : callable
+        Measures an effect: of a model without it, the model with it, and the effect.
+    offered : callable
+        All that could still be missing of a model.
+    settings : vpm.ranking.Settings
+        Of the ranking.
+
+    Ctrl-C gives the effects that were measured until then.
+    """
+    stages, accepted = [Stage("recalibrated", "", "", recalibrated)], list[Accepted]()
+    outside: dict[Key, str] = {}
+    interrupted = ranking.interrupted or recalibrated.fit.interrupted
+    try:
+        for place, one in enumerate(ranking.effects):
+            gone = [other for other in ranking.effects if other.key in outside] + list(ranking.effects[place + 1 :])
+            try:
+                trial = beside(stages[-1].judged, _without(ranking.model, gone), one)
+            except VpmError as error:
+                outside[one.key] = f"it {_removes(one)}, but no residual can be computed: {error}"
+                continue
+            accepted.append(Accepted(trial, one.rivals, one.evidence, one.probability, one.side, one.class_probability))
+            stages.append(Stage("added", *one.key, trial.judged))
+    except KeyboardInterrupt:
+        interrupted = True
+    gains = {entry.key: entry.trial.validation.relative for entry in accepted}
+    if ranking.rounds:
+        outside |= _unpromising(ranking, offered(stages[-1].judged))
+    refused, tried = _refused(ranking, outside, settings), _candidates(ranking, gains, settings)
+    return Search(
+        tuple(stages),
+        tuple(accepted),
+        refused,
+        tried,
+        interrupted,
+        left=ranking.left,
+        ranked=ranking.model,
+        within_laws=ranking.is_within_laws(settings),
+    )
+
+
+def _without(model: Model, gone: Sequence[Ranked]) -> Model:
+    """Model without some ranked effects; the last ones go first, because they may rest on earlier ones."""
+    for one in reversed(gone):
+        model = model.without_effect(*one.key, one.side)
+    return model
+
+
+def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
+    """Model with one more ranked effect, refitted as far as the inverse-dynamics residual shows its parameters.
+
+    A parameter moves if the residual tells it from all others at these values, and stays where it is if not. The refit
+    counts if the training records are left no more and the validation ones are simulated no worse than by those values.
+
+    Raises
+    ------
+    VpmError
+        Efforts cannot be balanced in this model.
+    """
+    candidate = _candidate(current, one, data)
+    known, own = fitted_in(current, model, one)
+    residual, columns = data.training.evaluate(model, model.theta, [model.index(name) for name in (*known, *own)])
+    visible = _has_derivatives(columns)
+    beside, fresh = columns[:, : len(known)][:, visible[: len(known)]], np.where(visible, columns, 0.0)[:, len(known) :]
+    known = tuple(compress(known, visible))
+    split = len(known)
+    sizes = np.array([abs(model.parameters[name].value) or 1.0 for name in (*known, *own)])
+    keep, held, blind = sort_columns(own, fresh, beside, known, residual, (sizes[:split], sizes[split:]))
+    moving = tuple(own[place] for place in keep)
+    values = {name: model.parameters[name].value for name in own}
+    probe = Probe(candidate, model, moving, held, blind, values, dict.fromkeys(own, np.nan), np.nan)
+    free = (*known, *moving)
+    judged, diverged = _refitted(current, model, candidate, one, free, data)
+    return measured(current, data, probe, judged, moving, held, None, diverged)
+
+
+def _has_derivatives(columns: Array) -> NDArray[np.bool_]:
+    """Whether the residual has finite derivatives by each parameter of a ranked model."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.asarray(np.isfinite(np.sum(columns**2, axis=0)))
+
+
+def _refitted(
+    current: Judged, model: Model, candidate: Candidate, one: Ranked, free: tuple[str, ...], data: Data
+) -> tuple[Judged, str]:
+    """Refit of ranked effects, or the ranking's own values where these predict better."""
+    bounds = _bounds(current, model, candidate, one)
+    still, stopped = unmoved(model, free, data, bounds)
+    judged, diverged = judged_anyhow(model, free, data, bounds)
+    if judged.simulated is None and still.simulated is not None:
+        return still, stopped
+    if _power(judged) > _power(still):
+        return still, stopped
+    if data.simulation is not None and judged.simulated is not None and still.simulated is not None:
+        gained = gain(still.simulated, judged.simulated, segments(data.simulation))
+        if gained.relative < -SETTINGS.worse and gained.harm > SETTINGS.sure:
+            return still, stopped
+    return judged, diverged
+
+
+def _candidate(current: Judged, one: Ranked, data: Data) -> Candidate:
+    """Candidate of the search for a ranked effect, with the bounds that data give its shape, or None."""
+    listed = candidates(current.model, data.training, current.fit.residual, [one.effect], simulated=True)
+    plain = Candidate(EFFECTS[one.effect], one.site, ({},))
+    return next((each for each in listed if each.key == one.key), plain)
+
+
+def fitted_in(current: Judged, model: Model, one: Ranked) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """Parameters to refit without a ranked effect, and those that it adds, by their dotted names."""
+    renamed = _renamed(current.model, model)
+    known = (renamed.get(name, name) for name in current.free)
+    fitted = {_anywhere(name) for name in one.values}
+    names = model.effect(*one.key, one.side).parameter_names.values()
+    own = tuple(name for name in names if _anywhere(name) in fitted)
+    return tuple(name for name in known if name in model.parameters), own
+
+
+def _anywhere(name: str) -> str:
+    """Dotted name of a ranked effect's parameter on either side of a joint."""
+    return name.replace(BEHIND, ".")
+
+
+def _renamed(old: Model, new: Model) -> dict[str, str]:
+    """New parameter names of ranked effects that are on the other side of their joint in another model."""
+    names: dict[str, str] = {}
+    there: dict[Key, list[Effect]] = {}
+    for effect in new.effects:
+        there.setdefault((effect.name, effect.at), []).append(effect)
+    for effect in old.effects:
+        places = there.get((effect.name, effect.at), [])
+        same = next((one for one in places if one.side == effect.side), next(iter(places), None))
+        if same is not None:
+            names.update({dotted: same.parameter_names[short] for short, dotted in effect.parameter_names.items()})
+    return names
+
+
+def _bounds(current: Judged, model: Model, candidate: Candidate, one: Ranked) -> dict[str, tuple[float, float]]:
+    """Bounds of a ranked effect's shape from the data, wide enough for the values of the ranking."""
+    renamed = _renamed(current.model, model)
+    given = {renamed.get(name, name): pair for name, pair in current.bounds.items()}
+    names = model.effect(*one.key, one.side).parameter_names
+    given.update({names[short]: pair for short, pair in candidate.bounds.items() if short in names})
+    found = {}
+    for name, (low, high) in given.items():
+        if name in model.parameters:
+            value = model.parameters[name].value
+            found[name] = min(low, value), max(high, value)
+    return found
+
+
+def _power(judged: Judged) -> float:
+    return float(judged.fit.residual @ judged.fit.residual)
+
+
+# ---- what else would do ----------------------------------------------------------------------------------------------
+
+
+def _rivals(ranking: Ranking, final: Judged, accepted: Sequence[Accepted], data: Data) -> tuple[Rivals, ...]:
+    """Ranked effects that have rivals in the ranking, with the models in which these take their place."""
+    found = []
+    for entry in accepted:
+        trials = []
+        for label in entry.rivals:
+            try:
+                trials.append(_placed(_tried(ranking, entry.key, label), final, entry, data))
+            except (VpmError, StopIteration):
+                continue  # it is said, but there is no residual to plan an experiment by
+        if trials:
+            found.append(Rivals(*entry.key, tuple(trials)))
+    return tuple(found)
+
+
+def _tried(ranking: Ranking, key: Key, label: str) -> Ranked:
+    """Trial of a rival as the ranking tried it in the round in which an effect came in."""
+    several = next(listed for listed in ranking.rounds if listed and listed[0].key == key)
+    return next(one for one in several if f"{one.effect} at {one.site}" == label)
+
+
+def _placed(rival: Ranked, final: Judged, entry: Accepted, data: Data) -> Trial:
+    """Model with a rival in the place of a ranked effect, beside all others.
+
+    Raises
+    ------
+    VpmError
+        It cannot stand there.
+    """
+    model = final.model.without_effect(*entry.key, entry.side)
+    free = tuple(name for name in final.free if name in model.parameters)
+    bounds = {name: pair for name, pair in final.bounds.items() if name in free}
+    without, _ = judged_anyhow(model, free, replace(data, simulation=None), bounds)
+    model = without.model.with_effect(*rival.key, side=rival.side)
+    names = {_anywhere(name): name for name in model.effect(*rival.key, rival.side).parameter_names.values()}
+    values = {names[_anywhere(name)]: value for name, value in rival.values.items() if _anywhere(name) in names}
+    return _beside(without, model.with_parameters(values), rival, data)
+
+
+# ---- what was tried --------------------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Last:
+    """Last trial of an effect in a ranking: what it added, and which effect came in then."""
+
+    one: Ranked
+    winner: Ranked | None
+    came_in: bool
+
+
+def _refused(ranking: Ranking, outside: Mapping[Key, str], settings: RankingSettings) -> tuple[RefusedEffect, ...]:
+    """Effects that a ranking refused or removed again, with the reason; the most hopeful of its last round first."""
+    last: dict[Key, _Last] = {}
+    for several in ranking.rounds:
+        for one in several:
+            winner = several[0] if _accepts(several, settings) else None
+            last[one.key] = _Last(one, winner, winner is one)
+    kept = {one.key for one in ranking.effects}
+    reasons = {**{key: _reason(entry, settings) for key, entry in last.items() if key not in kept}, **outside}
+    return tuple(RefusedEffect(*key, reason) for key, reason in reasons.items())
+
+
+def _unpromising(ranking: Ranking, offered: Sequence[Candidate]) -> dict[Key, str]:
+    """Effects that no round of a ranking fitted, with the reason."""
+    tried = {one.key for several in ranking.rounds for one in several}
+    reason = "the first step of a fit predicted less evidence than others did, or too little for a fit"
+    return {candidate.key: reason for candidate in offered if candidate.key not in tried}
+
+
+def _accepts(several: Sequence[Ranked], settings: RankingSettings) -> bool:
+    """Whether the first effect of a ranking's round came in: only accepted effects have evidence."""
+    return bool(several) and several[0].evidence > settings.odds
+
+
+def _removes(one: Ranked) -> str:
+    return one.judgement.words
+
+
+def _reason(entry: _Last, settings: RankingSettings) -> str:
+    one, winner = entry.one, entry.winner
+    if entry.came_in:
+        return "it is not needed any more beside what came in after it"
+    if lacks := one.judgement.lacks(settings):
+        return lacks
+    if one.evidence <= settings.odds:
+        return f"it {_removes(one)}, but adds {one.evidence:.3g} nats to the evidence; {settings.odds:g} are needed"
+    if winner is None:
+        return f"it {_removes(one)}, but its shape ends where the records do"
+    return (
+        f"it {_removes(one)} where {winner.effect} at {winner.site} {_removes(winner)}, "
+        "and was not tried again beside that"
+    )
+
+
+def _candidates(ranking: Ranking, gains: Mapping[Key, float], settings: RankingSettings) -> tuple[RankedCandidate, ...]:
+    """Candidates of all rounds of a ranking for the result, the most probable first."""
+    found = []
+    for number, several in enumerate(ranking.rounds):
+        for place, one in enumerate(several):
+            accepted = place == 0 and _accepts(several, settings) and one.key in gains
+            validation = gains[one.key] if accepted else np.nan
+            found.append(
+                RankedCandidate(
+                    *one.key, number + 1, one.judgement.removed, validation, accepted, one.evidence, one.probability
+                )
+            )
+    return tuple(found)
+
+
+def notes(accepted: Sequence[Accepted]) -> list[str]:
+    """Notes on parameters that only the ranking could estimate."""
+    blind = [", ".join(entry.trial.probe.invisible) for entry in accepted if entry.trial.probe.invisible]
+    return [f"{names}: as the ranking fitted it, for the inverse-dynamics residual does not show it" for names in blind]

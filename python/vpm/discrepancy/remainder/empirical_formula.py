@@ -1,0 +1,265 @@
+"""Empirical formula for a residual that no effect explains, and the states that it depends on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.linalg import block_diag
+
+from vpm.catalogue import without_law
+from vpm.catalogue.empirical import TERMS
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge
+from vpm.discrepancy.diagnosis import Empirical, EmpiricalTerm
+from vpm.discrepancy.remainder.sparse_formula import Formula, select
+from vpm.discrepancy.remainder.state_dependence import Rhythm, Shares, busiest_joint, rhythm, shares
+from vpm.errors import DivergedError
+from vpm.identify import gain, segments
+from vpm.model import Model
+
+#: Share of the validation mean square that a formula has to take away to be put into the model.
+LEAST_GAIN = 0.1
+#: Time has to predict this much more of the residual than any state of the machine before it is named in its place.
+TIME_AHEAD = 0.1
+#: Least share of the residual that a state has to predict to be named, and most states that are.
+NAMED = 0.1
+MOST_NAMED = 4
+#: Share of the weightiest term below which a term is left out.
+SMALL = 0.03
+#: A period may move by this factor when the formula is fitted.
+PERIOD_RANGE = 1.15
+
+
+def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
+    """Describe a residual: the states that it depends on, and an empirical formula if one predicts validation data.
+
+    A drift or a rhythm depends on the time of the record and is described in words. As a force of the machine's state
+    it would be wrong in the next record.
+
+    Returns
+    -------
+    Empirical
+    Judged
+        With the formula in the model, or ``final`` as it was.
+    """
+    joint = busiest_joint(data, final)
+    channel = data.validation.efforts(0)[joint].channel
+    states, beat = shares(data, final, joint), rhythm(data, final, joint)
+    formula = select(final, data)
+    fitted = None
+    if formula is not None:
+        fitted = _fit(formula, final, data)
+        if (shorter := _without_small(formula, fitted)) != formula:
+            formula, fitted = shorter, _fit(shorter, final, data)
+    gained = gain(
+        final.validation, final.validation if fitted is None else fitted.validation, segments(data.validation)
+    )
+    remark, share = _in_time(states.of, beat, gained.relative)
+    if remark or formula is None or fitted is None or gained.relative < LEAST_GAIN:
+        sentence = _say_without(channel, states, remark)
+        left = gained.before
+        return Empirical(channel, states.of, remark, "", (), left, left, sentence, states.alike, share), final
+    text = "; ".join(_text(formula, fitted.model, at) for at in formula.terms)
+    sentence, terms = _say(channel, states, text, gained.after / gained.before), _terms(formula, fitted)
+    return (
+        Empirical(
+            channel,
+            states.of,
+            "",
+            text,
+            terms,
+            gained.before,
+            gained.after,
+            sentence,
+            states.alike,
+            gained.relative,
+        ),
+        fitted,
+    )
+
+
+def beside(base: Judged, described: Empirical, joint_fit: Judged, data: Data) -> tuple[Empirical, Judged]:
+    """Empirical formula fitted beside accepted effects, whose parameters stay.
+
+    What is no physics takes nothing from what is.
+
+    Parameters
+    ----------
+    base : Judged
+        With the effects, without the formula.
+    described : Empirical
+    joint_fit : Judged
+        With the formula, all parameters fitted together.
+    data : Data
+    """
+    if not described.terms:
+        return described, base
+    own = tuple(term.dotted for term in described.terms)
+    start = joint_fit.model.with_parameters({name: base.model.parameters[name].value for name in base.free})
+    fitted = _judge(start, own, data, {})
+    better = gain(base.validation, fitted.validation, segments(data.validation))
+    states = Shares(described.states, described.alike)
+    if better.relative < LEAST_GAIN:
+        sentence = _say_without(described.channel, states, "")
+        return replace(described, formula="", terms=(), after=described.before, sentence=sentence, predicted=0.0), base
+    fit = replace(
+        fitted.fit,
+        names=(*base.free, *own),
+        values=np.concatenate([base.fit.values, fitted.fit.values]),
+        jacobian=np.column_stack([base.fit.jacobian, fitted.fit.jacobian]),
+        covariance=block_diag(base.fit.covariance, fitted.fit.covariance),
+    )
+    judged = replace(fitted, free=fit.names, fit=fit, bounds=base.bounds)
+    formula = _formula_of(judged.model, own)
+    text = "; ".join(_text(formula, judged.model, at) for at in formula.terms)
+    sentence = _say(described.channel, states, text, better.after / better.before)
+    terms = _terms(formula, judged)
+    return replace(
+        described, formula=text, terms=terms, after=better.after, sentence=sentence, predicted=better.relative
+    ), judged
+
+
+def _formula_of(model: Model, own: Sequence[str]) -> Formula:
+    """Terms and shapes of the empirical formula that a model holds."""
+    terms: dict[str, tuple[str, ...]] = {}
+    for dotted in own:
+        joint, _, term = dotted.partition(".empirical.")
+        terms[joint] = (*terms.get(joint, ()), term)
+    shapes = {
+        joint: {
+            name.removeprefix(f"{joint}.empirical."): model.parameters[name].value
+            for name in model.parameters
+            if name.startswith(f"{joint}.empirical.") and name not in own
+        }
+        for joint in terms
+    }
+    return Formula(terms, shapes)
+
+
+def _fit(formula: Formula, final: Judged, data: Data) -> Judged:
+    """Fit of the empirical formula: coefficients, periods of harmonic terms, and free parameters."""
+    model = formula.add_to(final.model)
+    own = [f"{joint}.empirical.{term}" for joint, terms in formula.terms.items() for term in terms]
+    # In a first step the sizes alone: a period has no meaning while they are zero.
+    sized = _judge(model, (*final.free, *own), data, dict(final.bounds))
+    periods = [f"{joint}.empirical.period" for joint, shapes in formula.shapes.items() if "period" in shapes]
+    if not periods:
+        return sized
+    bounds = dict(final.bounds)
+    for name in periods:
+        value = model.parameters[name].value
+        bounds[name] = (value / PERIOD_RANGE, value * PERIOD_RANGE)
+    return _judge(sized.model, (*final.free, *own, *periods), data, bounds)
+
+
+def _without_small(formula: Formula, fitted: Judged) -> Formula:
+    """Empirical formula without its small terms; sine and cosine of one wave go together."""
+    weight = {}
+    for joint, terms in formula.terms.items():
+        for term in terms:
+            place = fitted.free.index(f"{joint}.empirical.{term}")
+            weight[joint, term] = float(np.linalg.norm(fitted.fit.jacobian[:, place]) * abs(fitted.fit.values[place]))
+    least = SMALL * max(weight.values())
+    kept = {}
+    for joint, terms in formula.terms.items():
+        pairs = {term: term.replace("cosine", "sine") for term in terms}
+        heavy = {pairs[term] for term in terms if weight[joint, term] >= least}
+        kept[joint] = tuple(term for term in terms if pairs[term] in heavy)
+    shapes = {joint: dict(formula.shapes[joint]) for joint, terms in kept.items() if terms}
+    for joint, own in shapes.items():
+        if not any("sine" in term for term in kept[joint]):
+            own.pop("period", None)
+    return Formula({joint: terms for joint, terms in kept.items() if terms}, shapes)
+
+
+def _judge(model: Model, free: tuple[str, ...], data: Data, bounds: dict[str, tuple[float, float]]) -> Judged:
+    try:
+        return judge(model, free, data, bounds)
+    except DivergedError:
+        return judge(model, free, replace(data, simulation=None), bounds)
+
+
+def _terms(formula: Formula, fitted: Judged) -> tuple[EmpiricalTerm, ...]:
+    found = []
+    for joint, terms in formula.terms.items():
+        for term in terms:
+            name = f"{joint}.empirical.{term}"
+            parameter = fitted.model.parameters[name]
+            std = float(fitted.fit.std[fitted.free.index(name)])
+            found.append(EmpiricalTerm(joint, TERMS[term], name, parameter.value, std, parameter.unit))
+    return tuple(found)
+
+
+def _text(formula: Formula, model: Model, joint: str) -> str:
+    """Text of an empirical formula: ``tau = -(0.31 s + 0.12 s x) N at axis, with x = (q - 0.2 m)/0.5 m``."""
+    value = {name: model.parameters[f"{joint}.empirical.{name}"] for name in formula.shapes[joint]}
+    terms = formula.terms[joint]
+
+    def written(name: str) -> str:
+        return f"{value[name].value:.4g} {value[name].unit}"
+
+    sums = [f"{model.parameters[f'{joint}.empirical.{t}'].value:+.3g} {TERMS[t]}" for t in terms]
+    unit = next((model.parameters[f"{joint}.empirical.{t}"].unit for t in terms if not t.startswith("load")), "")
+    used = " ".join(TERMS[t] for t in terms)
+    meanings = {
+        "x": f"x = (q - {written('middle')})/({written('reach')})",
+        "y": f"y = v/({written('speed')})",
+        "s": f"s = tanh(v/({written('transition_velocity')}))",
+        "phi": f"phi = 2 pi q/({written('period')})" if "period" in value else "",
+        "|u|": "u the effort of the actuators",
+    }
+    words = set(used.replace("cos(phi)", "phi").replace("sin(phi)", "phi").replace("^2", "").replace("^3", "").split())
+    words |= {"y"} if "y|y|" in words else set()
+    with_what = ", ".join(text for word, text in meanings.items() if word in words and text)
+    body = " ".join(sums).removeprefix("+")
+    return f"tau = -({body}) {unit}".rstrip() + f" at {joint}" + (f", with {with_what}" if with_what else "")
+
+
+def _in_time(states: dict[str, float], beat: Rhythm | None, formula_share: float) -> tuple[str, float]:
+    """Sentence on a rhythm in time of the residual and its share; empty if formula or state explain it as well."""
+    time = max((share for name, share in states.items() if name.startswith("time")), default=0.0)
+    machine = max((formula_share, *(share for name, share in states.items() if not name.startswith("time"))))
+    if beat is not None and beat.share > max(machine, time) + TIME_AHEAD:
+        return (
+            f"it repeats every {beat.period:.3g} s whatever the machine does ({100 * beat.share:.0f} % of it), so that "
+            "something outside of the machine, or its controller, disturbs it"
+        ), beat.share
+    if time > machine + TIME_AHEAD:
+        return (
+            f"it changes with the time in the record ({100 * time:.0f} % of it), not with the state of the machine: "
+            "something drifts, as friction does while a machine warms up"
+        ), time
+    return "", 0.0
+
+
+def _depends(states: Shares) -> str:
+    """States for the empirical description: the best one, those not discriminated from it, and clearly worse ones."""
+    named = [name for name, share in states.of.items() if share >= NAMED][:MOST_NAMED]
+    if not named or not states.alike:
+        return "no single state of the machine predicts it"
+
+    def listed(names: list[str]) -> str:
+        return ", ".join(f"{name} ({100 * states.of[name]:.0f} %)" for name in names)
+
+    alike = [name for name in named[1:] if name in states.alike]
+    less = [name for name in named[1:] if name not in states.alike]
+    sentence = f"it follows {listed(named[:1])}"
+    if alike:
+        sentence += f", which these data do not discriminate from {listed(alike)}"
+    if less:
+        sentence += f"{';' if alike else ','} less {listed(less)}"
+    return sentence
+
+
+def _say(channel: str, states: Shares, text: str, ratio: float) -> str:
+    return (
+        f"Of the residual of {channel}: {_depends(states)}. A fit, which is no physics, brings it down to "
+        f"{100 * ratio:.0f} % on validation data and stands in the repaired model as {without_law().name}: {text}."
+    )
+
+
+def _say_without(channel: str, states: Shares, remark: str) -> str:
+    if remark:
+        return f"Of the residual of {channel}: {remark}; no force law was made of it."
+    return f"Of the residual of {channel}: {_depends(states)}, and no short formula predicts it on validation data."

@@ -1,0 +1,159 @@
+"""Remainder of the residual after all effects: whether it repeats, and the share that effects explain.
+
+The noise floor is an estimate, and a residual close to it may still not be noise. So an empirical fit is compared with
+the effects: what it predicts of validation records, the right physics would predict too. Effects that leave much of
+what such a fit explains were only the nearest ones of the catalogue.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.discrepancy.confirmation.confirmation import Data, Judged
+from vpm.discrepancy.confirmation.refusal import WORTH_A_NAME, Thresholds
+from vpm.discrepancy.diagnosis import Empirical
+from vpm.discrepancy.noise.motion_band import below, motion_band
+from vpm.discrepancy.noise.sample_timing import in_time
+from vpm.discrepancy.remainder.empirical_formula import describe
+from vpm.discrepancy.remainder.seal_friction import Seals, seals
+from vpm.identify import gain, segments
+from vpm.identify.parallel import in_order
+
+Array = NDArray[np.float64]
+
+#: A later description has to leave less than this share of what an earlier one leaves to be taken in its place.
+CLEARLY = 0.9
+#: Share of what effects leave, below which a fit with no more numbers is not a matter of chance or of a rough law.
+HALF = 0.5
+#: Models that are described: that with the effects, and that without.
+DESCRIBED = 2
+
+
+@dataclass(frozen=True)
+class Described:
+    """Description of a remainder: a model, a remark on its residual, and the model with a formula for it."""
+
+    base: Judged
+    empirical: Empirical
+    judged: Judged
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """Remainder of validation records under the model with all accepted effects.
+
+    Attributes
+    ----------
+    choices : tuple of Described
+        The model with the effects, and the recalibrated one where there are effects.
+    repeats : bool
+        Whether a fit without physics predicts a part of it that is worth a name.
+    open : float
+        Share that the effects leave of the mean square that a fit finds in the recalibrated residual; 0 where nothing
+        repeats.
+    instead : bool
+        Whether a fit in the place of the effects, with no more numbers, leaves less than ``HALF`` of their error. Also
+        true if friction of seals, a single number, clearly leaves less.
+    seals : Seals or None
+        That friction, if it does.
+    """
+
+    choices: tuple[Described, ...]
+    repeats: bool
+    open: float
+    instead: bool
+    seals: Seals | None = None
+
+    @property
+    def best(self) -> Described:
+        """Best description of the remainder, with fewer effects if that is hardly worse."""
+        *first, last = self.choices
+        return first[0] if first and last.empirical.after >= CLEARLY * first[0].empirical.after else last
+
+
+def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float, workers: int = 1) -> Remainder:
+    """Describe the remainder of the final model, and that of the model before effects.
+
+    Parameters
+    ----------
+    recalibrated, final : Judged
+        Without and with the accepted effects; the same one if there is none.
+    data : Data
+    interval : float
+        Sampling interval, s.
+    workers : int
+        Models that are described at a time; the result does not depend on it.
+    """
+    bases = [final] if recalibrated is final else [recalibrated, final]
+    choices = tuple(in_order([partial(_described, base, data) for base in bases], workers))
+    view = _View(data, motion_band(data.training, final.model), Thresholds(DESCRIBED, interval))
+    left = view(final)
+    clear = [view.clearly_better(choice, left) for choice in choices]
+    pressed = None if recalibrated is final else view.pressed(recalibrated, left)
+    if not any(clear):
+        return Remainder(choices, repeats=pressed is not None, open=0.0, instead=pressed is not None, seals=pressed)
+    power, whole = _power(in_time(final, data).validation), _power(_before(recalibrated, final, data))
+    least = min(view.leaves(choice) for choice, better in zip(choices, clear, strict=True) if better)
+    share = np.clip((power - least) / max(whole - least, 1e-300), 0.0, 1.0)
+    plain = len(choices[0].judged.free) <= len(final.free)
+    instead = recalibrated is not final and clear[0] and plain and not choices[0].empirical.remark
+    instead = instead and _power(view(choices[0].judged)) < HALF * _power(left)
+    instead = instead or pressed is not None
+    return Remainder(choices, repeats=True, open=float(share), instead=instead, seals=pressed)
+
+
+def _described(base: Judged, data: Data) -> Described:
+    return Described(base, *describe(base, data))
+
+
+def _before(recalibrated: Judged, final: Judged, data: Data) -> Array:
+    """Residual of the recalibrated model, to which the remainder is compared; less a shift of commands."""
+    known = {effect.key for effect in recalibrated.model.effects}
+    late = any(effect.type.shifts and effect.key not in known for effect in final.model.effects)
+    return recalibrated.validation if late else in_time(recalibrated, data).validation
+
+
+def _power(values: Array) -> float:
+    return float(values @ values)
+
+
+@dataclass(frozen=True)
+class _View:
+    """Validation residuals in the motion band, with uncertain sample times removed, for the remainder."""
+
+    data: Data
+    frequency: float
+    thresholds: Thresholds
+
+    def __call__(self, judged: Judged) -> Array:
+        """Validation residual of a model as the remainder sees it."""
+        return below(self.data.validation, in_time(judged, self.data).validation, self.frequency)
+
+    def clearly_better(self, choice: Described, left: Array) -> bool:
+        """Whether a description of the remainder predicts surely more than the effects do."""
+        if choice.empirical.remark:
+            own = self(choice.base)
+            return _power(own) - self._said(choice, own) < (1.0 - WORTH_A_NAME) * _power(left)
+        return self.thresholds.met(gain(left, self(choice.judged), segments(self.data.validation)))
+
+    def pressed(self, recalibrated: Judged, left: Array) -> Seals | None:
+        """Friction of seals that predicts surely more than the effects, in their place."""
+        found = seals(recalibrated, self.data)
+        if found is None:
+            return None
+        alone = below(self.data.validation, found.validation, self.frequency)
+        return found if self.thresholds.met(gain(left, alone, segments(self.data.validation))) else None
+
+    def leaves(self, choice: Described) -> float:
+        """Sum of squares that a description of the remainder leaves at all frequencies."""
+        own = in_time(choice.judged, self.data).validation
+        return _power(own) - self._said(choice, own) if choice.empirical.remark else _power(own)
+
+    def _said(self, choice: Described, own: Array) -> float:
+        """Sum of squares that a remark on the remainder predicts, at the effort that it names."""
+        blocks = (block for block in self.data.validation.blocks if block.channel == choice.empirical.channel)
+        return choice.empirical.predicted * sum(_power(own[block.samples]) for block in blocks)

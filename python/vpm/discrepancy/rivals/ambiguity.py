@@ -1,0 +1,205 @@
+"""Ambiguity: rival effects that predict the validation records as well as an accepted effect."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confirm, judge
+from vpm.discrepancy.confirmation.refusal import LEAST_GAIN
+from vpm.discrepancy.diagnosis import Ambiguity
+from vpm.discrepancy.parallel_candidates import Failure, SideBySide
+from vpm.discrepancy.rivals.nested_model import probe_beside
+from vpm.discrepancy.screening.candidates import Candidate, Key, candidates
+from vpm.discrepancy.screening.probe import Probe, impossible_values, probe, refit_effort, screening_effort
+from vpm.discrepancy.search.candidate_choice import Accepted, alike
+from vpm.discrepancy.search.search import Tried
+from vpm.identify import gain, segments
+from vpm.identify.response_along_motion import bends
+from vpm.model import Model
+
+#: Rivals that are refitted in the place of an effect, and how many of the others that may refine it.
+SHORT_LIST, NESTED = 3, 2
+#: A rival that takes less than this share of what the effect takes from the training residual is none.
+LEAST_SHARE = 0.8
+#: A rival that leaves up to this share more of the validation mean square predicts as well.
+AS_GOOD = 0.05
+
+
+@dataclass(frozen=True)
+class Rivals:
+    """Rivals of an accepted effect: trials in its place that predict the validation records as well.
+
+    Attributes
+    ----------
+    effect, site : str
+    trials : tuple of Trial
+        Those that predict the validation data as well.
+    tried : tuple of Trial
+        All that were refitted in its place.
+    without : Judged or None
+        The model without it; None where that cannot be computed.
+    """
+
+    effect: str
+    site: str
+    trials: tuple[Trial, ...]
+    tried: tuple[Trial, ...] = ()
+    without: Judged | None = None
+
+    @property
+    def label(self) -> str:
+        """Label of the ambiguous effect that rivals compete with: ``effect at site``."""
+        return f"{self.effect} at {self.site}"
+
+
+def listed(known: Sequence[Ambiguity], found: Sequence[Rivals]) -> tuple[Ambiguity, ...]:
+    """Ambiguities for the result: those that the search saw, and rivals found afterwards, each named once."""
+    said = {(a.name, a.site, other) for a in known for other in a.others}
+    more = []
+    for entry in found:
+        labels = (trial.probe.candidate.label for trial in entry.trials)
+        names = tuple(label for label in labels if (entry.effect, entry.site, label) not in said)
+        if names:
+            reason = "put in its place and fitted, it predicts the validation data as well"
+            more.append(Ambiguity(entry.effect, entry.site, names, reason))
+    return (*known, *more)
+
+
+def rivals(
+    final: Judged,
+    data: Data,
+    accepted: Sequence[Accepted],
+    effects: Sequence[str] | None = None,
+    each: SideBySide | None = None,
+    last: Tried | None = None,
+) -> tuple[Rivals, ...]:
+    """Ambiguity of each accepted effect: rivals in its place that predict the validation data as well.
+
+    All rivals are screened on the model without the effect; the few with nearly the same share of the training residual
+    are refitted. They have to predict the validation records as well as the effect. What the ``last`` effect competed
+    with when it came in is not worked out again.
+    """
+    each = each or SideBySide(1)
+    known = {last.key: last} if last is not None else {}
+    left = each("what each adds: refitting without", partial(_without, final, data, known), accepted, _label)
+    bases = [None if isinstance(one, Failure) else one for one in left]
+    jobs = [
+        _Job(entry, without, candidate)
+        for entry, without in zip(accepted, bases, strict=True)
+        if without is not None and entry.key not in known
+        for candidate in _others(without, data, entry, effects)
+    ]
+    probes = each(
+        "what else would do: screening",
+        lambda job: probe(job.base.baseline, data.training, job.candidate),
+        jobs,
+        lambda job: job.label,
+        lambda job: screening_effort(job.candidate),
+    )
+    seen = [(job.entry, p) for job, p in zip(jobs, probes, strict=True) if isinstance(p, Probe)]
+    if last is not None:
+        seen += [(e, p) for e in accepted if e.key == last.key for p in _beside(last, e)]
+    places = {entry.key: without for entry, without in zip(accepted, bases, strict=True) if without is not None}
+    seen = [(e, probe_beside(final, places[e.key], data.training, e, p)) for e, p in seen if e.key in places]
+    refits, tried = [], list[tuple[Accepted, Trial]]()
+    for entry, without in zip(accepted, bases, strict=True):
+        done = {t.probe.candidate.key: t for t in known[entry.key].trials} if entry.key in known else {}
+        for p in _short_list(final, without, entry, [p for owner, p in seen if owner is entry]):
+            if p.candidate.key in done:
+                tried.append((entry, done[p.candidate.key]))
+            elif without is not None:
+                refits.append((_Job(entry, without, p.candidate), p))
+    trials = each(
+        "what else would do: refitting",
+        lambda job: confirm(job[0].base, data, job[1]),
+        refits,
+        lambda job: job[0].label,
+        lambda job: refit_effort(job[1]),
+    )
+    tried += [(job.entry, t) for (job, _), t in zip(refits, trials, strict=True) if isinstance(t, Trial)]
+    found = []
+    for entry, without in zip(accepted, bases, strict=True):
+        mine = tuple(t for owner, t in tried if owner is entry)
+        found.append(Rivals(*entry.key, tuple(t for t in mine if as_good(final, t, data)), mine, without))
+    return tuple(found)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """Screening job for rivals: a candidate for the place of an accepted effect, and the model without that effect."""
+
+    entry: Accepted
+    base: Judged
+    candidate: Candidate
+
+    @property
+    def label(self) -> str:
+        """Label of a rival's screening for ambiguity in progress reports."""
+        return f"{self.candidate.label} for {_label(self.entry)}"
+
+
+def _label(entry: Accepted) -> str:
+    return entry.trial.probe.candidate.label
+
+
+def _beside(last: Tried, entry: Accepted) -> list[Probe]:
+    """Probes for ambiguity from the round in which an effect came in."""
+    return [p for p in last.probes if _could_do(last.without.model, entry, p.candidate)]
+
+
+def _without(final: Judged, data: Data, known: Mapping[Key, Tried], entry: Accepted) -> Judged:
+    """Model without one accepted effect, all else fitted again; ambiguity is judged on it."""
+    if entry.key in known:
+        return known[entry.key].without
+    model = final.model.without_effect(*entry.key)
+    free = tuple(n for n in final.free if n in model.parameters)
+    return judge(model, free, data, {n: pair for n, pair in final.bounds.items() if n in free})
+
+
+def _others(without: Judged, data: Data, entry: Accepted, effects: Sequence[str] | None) -> list[Candidate]:
+    """Possible rivals of an accepted effect among all candidates, for its ambiguity."""
+    offered = candidates(without.model, data.training, without.fit.residual, effects)
+    return [c for c in offered if _could_do(without.model, entry, c)]
+
+
+def _could_do(model: Model, entry: Accepted, candidate: Candidate) -> bool:
+    """Whether a candidate acts near enough to an accepted effect to make it ambiguous."""
+    heavier = bool(candidate.effect.motion) and not entry.effect.motion
+    return _near(candidate, entry) and not (heavier and bends(model))
+
+
+def _short_list(final: Judged, without: Judged | None, entry: Accepted, probes: Sequence[Probe]) -> list[Probe]:
+    """Short list of ambiguous rivals to refit: the largest predicted gains per number, and nested laws."""
+    if without is None:
+        return []
+    taken = _power(without) - _power(final)
+    good = [
+        p for p in probes if p.free and not impossible_values(p) and p.drop * _power(without) >= LEAST_SHARE * taken
+    ]
+    good.sort(key=lambda p: -p.score)
+    own = entry.trial.probe.candidate
+    nested = [p for p in good[SHORT_LIST:] if alike(p.candidate, own)]
+    return good[:SHORT_LIST] + sorted(nested, key=lambda p: -p.drop)[:NESTED]
+
+
+def _near(candidate: Candidate, entry: Accepted) -> bool:
+    """Whether a rival acts on the joint of an effect, or is confusable with it, so that it is ambiguous."""
+    name, site = entry.key
+    if candidate.key == (name, site):
+        return False
+    own = entry.trial.probe.candidate.effect
+    return candidate.site == site or candidate.effect.name in own.confused_with or candidate.effect.site == "actuator"
+
+
+def as_good(final: Judged, trial: Trial, data: Data) -> bool:
+    """Whether an effect is ambiguous: a rival in its place predicts the validation data as well."""
+    if not trial.clear:
+        return False
+    change = gain(final.validation, trial.judged.validation, segments(data.validation)).relative
+    return change > -max(AS_GOOD, LEAST_GAIN)
+
+
+def _power(judged: Judged) -> float:
+    return float(judged.fit.residual @ judged.fit.residual)

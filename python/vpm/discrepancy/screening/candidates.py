@@ -1,0 +1,332 @@
+"""Candidates: every effect of the catalogue at every possible site, with start values from the data."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.catalogue import EFFECTS, EffectType
+from vpm.catalogue.shared import SLOW
+from vpm.catalogue.traits import Seen
+from vpm.discrepancy.screening.compliance_and_stop_start import (
+    beyond,
+    logged_swing,
+    sites_worth_trying,
+    softest,
+    stop_starts,
+    structural_starts,
+)
+from vpm.discrepancy.screening.drive_limit_start import limit_start
+from vpm.errors import DiagnosisError, near_match
+from vpm.identify import InverseDynamicsProblem
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+#: Name of an effect and where it sits.
+Key = tuple[str, str]
+
+#: Short name of the speed at which a friction law bends; where it is fixed, it is that of the dry friction beside.
+TRANSITION = "transition_velocity"
+#: Number of ripple periods proposed by the periodogram.
+PERIODS = 3
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """Candidate of the screening: one effect at one site, with its start values and bounds.
+
+    Attributes
+    ----------
+    effect : EffectType
+    site : str
+    starts : tuple of dict
+        Start values by short parameter name; several where the effect has a shape to be searched.
+    bounds : dict
+        Data-driven bounds of shape parameters by short name, within the physical range.
+    fixed : tuple of str
+        Short names of shape parameters that stay at their start.
+    neutral : bool
+        Whether the effect does nothing at its start values, so that the current residual still holds.
+    """
+
+    effect: EffectType
+    site: str
+    starts: tuple[Mapping[str, float], ...]
+    bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    fixed: tuple[str, ...] = ()
+    neutral: bool = True
+
+    @property
+    def key(self) -> Key:
+        """Effect and site of a candidate."""
+        return self.effect.name, self.site
+
+    @property
+    def label(self) -> str:
+        """Label of a candidate: ``effect at site``."""
+        return f"{self.effect.name} at {self.site}"
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """Excitation of one joint or actuator by the records, from which candidates take their start values."""
+
+    speed: float
+    middle: float
+    travel: float
+    interval: float
+    command: float
+    input: int
+    record: float
+
+    def multiple(self, of: Seen, share: float) -> float:
+        """Start value of a candidate as a multiple of the excitation's speed, way or time."""
+        if of == "way":
+            return self.middle + share * self.travel
+        scales: dict[Seen, float] = {
+            "speed": self.speed,
+            "travel": self.travel,
+            "interval": self.interval,
+            "command": self.command,
+            "record": self.record,
+            "one": 1.0,
+        }
+        return share * scales[of]
+
+
+def asked_for(effects: Sequence[str] | None) -> tuple[str, ...]:
+    """Names of effects that may become candidates: the given ones, or all with a law.
+
+    Raises
+    ------
+    DiagnosisError
+        The catalogue has no such effect, or it has no law.
+    """
+    laws = tuple(name for name, effect in EFFECTS.items() if effect.has_law)
+    for name in effects or ():
+        if name not in EFFECTS:
+            raise DiagnosisError(f'the catalogue has no effect "{name}"; {near_match(name, EFFECTS)}')
+        if name not in laws:
+            raise DiagnosisError(
+                f'"{name}" is not among the effects that are tried, for it has no law of its own: it describes what no '
+                "effect explains; leave it out of effects="
+            )
+    return laws if effects is None else tuple(effects)
+
+
+def candidates(
+    model: Model,
+    data: InverseDynamicsProblem,
+    residual: Array,
+    effects: Sequence[str] | None = None,
+    *,
+    simulated: bool = False,
+) -> tuple[Candidate, ...]:
+    """List the candidates: all effects that could be missing from ``model``, at each site.
+
+    Parameters
+    ----------
+    model : Model
+        Effects that it already has are left out.
+    data : InverseDynamicsProblem
+        Gives speeds, travel and commands for the start values.
+    residual : ndarray
+        Residual of ``model`` on ``data``; periods of a ripple are read from it.
+    effects : sequence of str, optional
+        Restrict the search to these; to those that a diagnosis tries if not given.
+    simulated : bool
+        Whether motion that no channel measures is simulated with the memories of effects.
+    """
+    return tuple(
+        _candidate(effect, site, model, data, residual)
+        for effect, site in _absent(model, effects)
+        if not beyond(effect, site, model, data.joints, simulated=simulated)
+    )
+
+
+def left_out(model: Model, data: InverseDynamicsProblem, effects: Sequence[str] | None = None) -> dict[Key, str]:
+    """Reasons why some effects are not among the `candidates` of ``model``."""
+    reasons = {
+        (effect.name, site): beyond(effect, site, model, data.joints) for effect, site in _absent(model, effects)
+    }
+    return {key: reason for key, reason in reasons.items() if reason}
+
+
+def _absent(model: Model, effects: Sequence[str] | None) -> list[tuple[EffectType, str]]:
+    """Effects of the catalogue that ``model`` does not have, with each possible site, before they become candidates."""
+    present, by_key = {(effect.name, effect.at) for effect in model.effects}, {effect.key for effect in model.effects}
+    tried = {effect.name for effect in EFFECTS.values() if effect.screened} if effects is None else set(effects)
+    found = []
+    for effect in EFFECTS.values():
+        if effect.name not in tried:
+            continue
+        for site in sites_worth_trying(effect, model):
+            needed = effect.requires is None or (effect.requires, site) in by_key
+            if (effect.name, site) not in present and needed:
+                found.append((effect, site))
+    return found
+
+
+def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamicsProblem, residual: Array) -> Candidate:
+    seen = _excitation(data, model, site, site if effect.site in {"actuator", "cylinder"} else None)
+    if effect.motion:
+        found = structural_starts(effect, site, model, seen.travel, logged_swing(data, model, site))
+        return Candidate(effect, site, *found, effect.fixed, neutral=False)
+    if effect.stops:
+        where, _, values = _over_way(data, model, site, residual)
+        return Candidate(effect, site, *stop_starts(where, values, seen.middle, seen.travel, softest(model, site)))
+    if any(parameter.name == "period" and not parameter.optional for parameter in effect.parameters):
+        return _periodic(effect, site, data, model, residual)
+    if effect.site == "body":
+        return Candidate(effect, site, _payload_places(model, site))
+    return _tried(effect, site, model, seen, partial(limit_start, data, residual=residual))
+
+
+def _tried(
+    effect: EffectType, site: str, model: Model, seen: Excitation, limit: Callable[[str, int], float | None]
+) -> Candidate:
+    """Candidate with start values and bounds of the catalogue; a ``limit`` of commands starts from data."""
+    # A way that is passed between two samples is like dry friction.
+    least = min(seen.speed * seen.interval, 0.5 * seen.travel)
+    grids, bounds = list[list[tuple[str, float]]](), dict[str, tuple[float, float]]()
+    for tried in effect.tried:
+        values = [seen.multiple(tried.of, share) for share in tried.shares]
+        low, high = (seen.multiple(tried.of, share) for share in tried.within)
+        if tried.sampled:
+            low, values = max(low, least), [max(value, least) for value in values]
+        if tried.of == "command":
+            guessed = limit(joint_at(model, site) or model.joints[0], seen.input)
+            values += [] if guessed is None else [guessed]
+        bounds[tried.parameter] = low, high
+        if values:
+            grids.append([(tried.parameter, value) for value in values])
+    starts = tuple(dict(start) for start in product(*grids))
+    if TRANSITION in effect.fixed:
+        # What was fitted of the dry friction without it may be far too wide: it makes up for what is missing.
+        velocities = {_known_transition(model, site, seen), *(() if effect.tried else slow_speeds(seen.speed)[:1])}
+        bends = sorted(velocities, reverse=True)
+        starts = tuple({**start, TRANSITION: velocity} for start in starts for velocity in bends)
+        bounds[TRANSITION] = slow_speeds(seen.speed)
+    neutral = all(effect.parameter(name).shape for start in starts for name in start)
+    return Candidate(effect, site, starts, bounds, effect.fixed, neutral)
+
+
+def _periodic(effect: EffectType, site: str, data: InverseDynamicsProblem, model: Model, residual: Array) -> Candidate:
+    """Candidate that is periodic in position, such as a ripple, with the periods that the residual shows."""
+    where, rate, values = _over_way(data, model, site, residual)
+    if effect.rubs or effect.takes_effort:
+        values = values * (np.sign(rate) if effect.rubs else _applied(data, site))
+    periods = _ripple_periods(where, values, 0.5 if effect.rubs else 2.0)
+    bounds = {"period": (min(periods) / 1.5, max(periods) * 1.5)}
+    return Candidate(effect, site, tuple({"period": p} for p in periods), bounds)
+
+
+def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
+    """Start positions of a candidate payload: origin of the body, its centre of mass, and twice as far out."""
+    if body in model.beams:  # in the frame of its tip
+        return ({},)
+    centre = {axis: model.parameters[f"{body}.center_of_mass.{axis}"].value for axis in "xyz"}
+    factors = (0.0, 1.0, 2.0) if any(centre.values()) else (0.0,)
+    return tuple({axis: factor * value for axis, value in centre.items()} for factor in factors)
+
+
+def slow_speeds(fastest: float) -> tuple[float, float]:
+    """Bounds of a candidate's transition velocity: between 1/5000 and 1/10 of the largest speed."""
+    return SLOW[0] * fastest, SLOW[1] * fastest
+
+
+def _known_transition(model: Model, site: str, seen: Excitation) -> float:
+    """Transition velocity for a candidate: that of the model's Coulomb friction, else a hundredth of the speed."""
+    name = f"{site}.friction.transition_velocity"
+    return model.parameters[name].value if name in model.parameters else 0.01 * seen.speed
+
+
+def joint_at(model: Model, site: str) -> str:
+    """Joint on which a candidate acts, through its drive or sensor too; "" for bodies and for several joints."""
+    if site in model.joints:
+        return site
+    if site in model.actuators:
+        return model.joints_of_actuator(site)[0]
+    read = (name.rpartition(".")[0] for name in model.output_channels if model.sensor_of(name) == site)
+    return next((owner for owner in read if owner in model.joints), "")
+
+
+def shares_at(model: Model, site: str, joints: Sequence[str]) -> Array:
+    """Share of each joint in the coordinate at a candidate's site, shape (n,).
+
+    At a transmission these are its ratios, elsewhere 1 of the joint there, or of the first one.
+    """
+    if site in model.transmissions:
+        ratios = model.ratios(site)
+        return np.array([model.parameters[ratios[name]].value if name in ratios else 0.0 for name in joints])
+    joint = joint_at(model, site) or model.joints[0]
+    shares = np.zeros(len(joints))
+    shares[list(joints).index(joint) if joint in joints else 0] = 1.0
+    return shares
+
+
+def _excitation(data: InverseDynamicsProblem, model: Model, site: str, actuator: str | None) -> Excitation:
+    """Excitation of one joint: its largest speed (99.9 % quantile), middle and half range, sampling time, command."""
+    shares = shares_at(model, site, data.motions[0].joints)
+    position = np.concatenate([m.position @ shares for m in data.motions])
+    velocity = np.concatenate([m.velocity @ shares for m in data.motions])
+    column = model.actuators.index(actuator) if actuator is not None else 0
+    command = max((float(np.abs(m.inputs[:, column]).max()) for m in data.motions if m.inputs.size), default=1.0)
+    low, high = float(position.min()), float(position.max())
+    return Excitation(
+        max(float(np.quantile(np.abs(velocity), 0.999)), 1e-12),
+        0.5 * (low + high),
+        max(0.5 * (high - low), 1e-12),
+        min(m.dt for m in data.motions),
+        max(command, 1e-12),
+        column,
+        max(m.dt * len(m.time) for m in data.motions),
+    )
+
+
+def _ripple_periods(position: Array, values: Array, fewest: float) -> list[float]:
+    """Start periods of candidates in position: peaks of the residual's least-squares periodogram.
+
+    Evenly spaced frequencies up to what the decimated samples resolve, from ``fewest`` periods per travel; friction
+    changes its sign with the motion, and half a period suffices for it; N. Lomb, *Astrophysics and Space Science* 39,
+    1976.
+    """
+    thin = max(1, len(values) // 4000)
+    position, values = position[::thin], values[::thin]
+    travel = max(float(np.ptp(position)), 1e-12)
+    step = float(np.median(np.abs(np.diff(position)))) or travel / 1e3
+    highest = min(1.0 / (2.5 * step), 400.0 / travel)
+    frequencies = np.arange(fewest, max(highest * travel, 4.0), 0.25) / travel
+    phase = 2.0 * np.pi * np.outer(frequencies, position - position.mean())
+    centred = values - values.mean()
+    power = (np.cos(phase) @ centred) ** 2 + (np.sin(phase) @ centred) ** 2
+    peaks = [i for i in range(1, len(power) - 1) if power[i] >= power[i - 1] and power[i] > power[i + 1]]
+    best = sorted(peaks or [int(np.argmax(power))], key=lambda i: -power[i])[:PERIODS]
+    return [float(1.0 / frequencies[i]) for i in best]
+
+
+def _over_way(data: InverseDynamicsProblem, model: Model, site: str, residual: Array) -> tuple[Array, Array, Array]:
+    """Position, velocity and residual of one joint at all samples, for start values of candidates.
+
+    At a transmission it is the effort on the shaft that leaves least of the residual of its joints.
+    """
+    shares, records = shares_at(model, site, data.joints), range(len(data.motions))
+    position, velocity = (np.concatenate([data.state(r)[which] @ shares for r in records]) for which in (0, 1))
+    efforts = [np.column_stack([residual[block.samples] for block in data.efforts(r)]) for r in records]
+    return position, velocity, np.concatenate(efforts) @ (shares / max(float(shares @ shares), 1e-300))
+
+
+def _applied(data: InverseDynamicsProblem, joint: str) -> Array:
+    """Effort that the model's drives apply at a candidate's site, at all samples."""
+    model, column = data.nominal, _column(data, joint)
+    return np.concatenate([data.effort(model, model.theta, r)[1][:, column] for r in range(len(data.motions))])
+
+
+def _column(data: InverseDynamicsProblem, joint: str) -> int:
+    return data.joints.index(joint) if joint in data.joints else 0

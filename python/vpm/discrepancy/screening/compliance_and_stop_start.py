@@ -1,0 +1,270 @@
+"""Start values of effects that add compliance, backlash or end stops to rigid and free parts.
+
+A spring between two masses shows by its resonance, so stiffnesses are tried at a grid of frequencies.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.catalogue import EFFECTS, EffectType
+from vpm.experiment.signal import differentiate
+from vpm.identify import InverseDynamicsProblem
+from vpm.identify.response_along_motion import has_own_drives
+from vpm.model import Model
+from vpm.model.splitting import name_behind
+
+Array = NDArray[np.float64]
+
+#: Springs in series with a motion of their own, which lie between motor and link, so that a softer one does more.
+SERIES = "stiffness"
+#: What of these springs turns motion into heat, by short names.
+LOSSES = ("damping", "time")
+#: Frequencies at which a spring lets the link swing behind a motor that stands still, Hz, and damping ratios there.
+FREQUENCIES = (3.0, 8.0, 20.0, 50.0)
+LOOSE, CONTACT = 0.05, 0.1
+#: Slowest of these in a fit, Hz: a softer spring holds nothing.
+SLOWEST = 0.5
+#: Frequency of the contacts of backlash, Hz, and widths of it tried, as shares of the half travel.
+CONTACT_FREQUENCY = 50.0
+GAP_SHARES = (5e-4, 3e-3, 1.5e-2)
+#: Places of a stop, as shares of the half travel from its middle.
+STOP_SHARES = (0.6, 0.8, 0.95)
+#: Places of a stop compared on either side, the largest share of the samples that may lie beyond one, and the fewest.
+STOP_PLACES, BEYOND_MOST, BEYOND_LEAST = 30, 0.3, 3
+
+#: Least inertia on the side of the drive, as a share of what the joint moves.
+LEAST_DRIVEN = 1e-4
+
+Starts = tuple[Mapping[str, float], ...]
+Bounds = Mapping[str, tuple[float, float]]
+
+
+def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
+    """Sites where compliance, stops or other effects can show: no links that bend already, no damping if rigid.
+
+    A backlash is tried where an actuator drives the joint; elsewhere it needs a joint of its own. Effects of joints may
+    be on the motor side of a transmission too, but for those of links.
+    """
+    sites = model.sites(effect.site)
+    if effect.has_sides and not effect.link_side_alone:
+        # What sits on a shaft that one joint alone turns is the same at the joint.
+        sites = (*sites, *(name for name in model.transmissions if len(model.ratios(name)) > 1))
+    if effect.beside_others:
+        moved = {name: set(model.joints_of_actuator(name)) for name in model.actuators}
+        shared = {site for site in sites if any(moved[site] & moved[name] for name in moved if name != site)}
+        return tuple(site for site in sites if site in shared or model.line_of_actuator(site) is not None)
+    if effect.motion == "bending":
+        stiff = tuple(site for site in sites if model.levels.get(site, "rigid") == "rigid")
+        if not model.core.n_elastic:
+            return stiff
+        # Beside links that bend, the spring at the root of a body is that of the joint before it, which is tried.
+        springs = (one for one in EFFECTS.values() if one.winds_up)
+        wound = {site for one in springs for site in sites_worth_trying(one, model)}
+        return tuple(site for site in stiff if site in model.beams or model.joint_before(site) not in wound)
+    if effect.damps:
+        return tuple(site for site in sites if model.levels[site] != "rigid")
+    if effect.splits:
+        return tuple(site for site in sites if site in model.driven_joints and not model.joint_behind(site))
+    return sites
+
+
+def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str], *, simulated: bool = False) -> str:
+    """Why a model with one more compliance or effect cannot be built or computed along the ``measured`` joints.
+
+    A motion with joints that no channel measures is integrated, and there effects with a memory are refused. They work
+    on the motor side of a split joint where that is measured, see `vpm.identify.parts.bending`, and where all is
+    ``simulated``.
+    """
+    remembering = [f"{entry.type.title} at {entry.at}" for entry in model.effects if entry.type.memory]
+    split_off = {model.joint_behind(entry.at) for entry in model.effects if entry.type.splits}
+    alone = tuple(joint for joint in model.joints if joint not in split_off) == tuple(measured)
+    lone = alone and not has_own_drives(model) and not any(entry.type.rotor for entry in model.effects)
+    known = simulated or lone
+    if effect.memory and tuple(model.joints) != tuple(measured) and not known:
+        return "its memory cannot be balanced beside joints in this model that no channel measures"
+    if not effect.motion:
+        return ""
+    if remembering and not (known and effect.splits):
+        return f"a joint that no channel measures cannot be balanced beside the memory of the {remembering[0]}"
+    split = [(entry.name, entry.at) for entry in model.effects if entry.type.motion]
+    whole = model
+    for key in split:
+        whole = whole.without_effect(*key)
+    for name, at in split:
+        if _joint(whole, at) == _joint(whole, site):
+            return f"the joint is split already by {name} at {at}, and no inertia is between"
+    return ""
+
+
+def in_series(effect: EffectType) -> tuple[str, ...]:
+    """Short names of compliance parameters in series: the larger they are, the less they do."""
+    return (SERIES,) if effect.motion else ()
+
+
+def coupled(model: Model) -> bool:
+    """Whether a model has several joints without those that added compliance split off, so that errors cancel."""
+    return len(set(model.joints) - set(model.added_joints)) > 1
+
+
+def _joint(model: Model, site: str) -> str:
+    """Joint of a compliance or stop: the site itself, or the joint before a body or beam."""
+    return site if site in model.joints else model.joint_before(site)
+
+
+def logged_swing(data: InverseDynamicsProblem, model: Model, site: str) -> tuple[float, float] | None:
+    """Stiffness and damping of a compliance per inertia, 1/s^2 and 1/s, where logs hold its deflection.
+
+    What hangs on the spring obeys ``a + d'' = -(k/J) d - (c/J) d'``, ``a`` the acceleration of the joint before it.
+    Two numbers by linear least squares, without gravity and the motion of other joints, so good for a start only.
+    """
+    logged = [c for c in data.shown if c in {f"{site}_bending.position", f"{name_behind(site)}.position"}]
+    if not logged:
+        return None
+    column = data.motions[0].joints.index(_joint(model, site))
+    columns, wanted = [], []
+    for m, experiment in zip(data.motions, data.experiments, strict=True):
+        bent = experiment[logged[0]]
+        rate = differentiate(bent, m.dt)
+        whole = m.acceleration[:, column] + differentiate(rate, m.dt)
+        kept = m.parallel(np.column_stack([bent - bent.mean(), rate, whole]))
+        columns.append(kept[:, :2])
+        wanted.append(-kept[:, 2])
+    stiffness, damping = np.linalg.lstsq(np.vstack(columns), np.concatenate(wanted), rcond=None)[0]
+    return (float(stiffness), max(float(damping), 0.0)) if stiffness > (2.0 * math.pi * SLOWEST) ** 2 else None
+
+
+def structural_starts(
+    effect: EffectType, site: str, model: Model, travel: float, swing: tuple[float, float] | None = None
+) -> tuple[Starts, Bounds]:
+    """Start values and bounds of a compliance, backlash or stop by short name.
+
+    Parameters
+    ----------
+    effect : EffectType
+        With a motion of its own.
+    site : str
+    model : Model
+    travel : float
+        Half range of the joint's travel in the data.
+    swing : tuple of float, optional
+        What the logs say of the spring, see `logged_swing`; it is tried beside the grid of frequencies.
+    """
+    inertia = moved(model, site)
+    held = (softest(model, site), math.inf)
+    share = (LEAST_DRIVEN * inertia, math.inf)  # without any inertia before it a spring has nothing to swing against
+    if effect.has_play:
+        stiffness = inertia * (2.0 * math.pi * CONTACT_FREQUENCY) ** 2
+        damping = 2.0 * CONTACT * math.sqrt(stiffness * inertia)
+        common = {"stiffness": stiffness, "damping": damping}
+        gaps = [share * travel for share in GAP_SHARES]
+        bounds = {
+            "stiffness": held,
+            "gap": (0.0, 0.5 * travel),
+            "width": (1e-7 * travel, 0.1 * travel),
+            "inertia": share,
+        }
+        return tuple({**common, "gap": gap, "width": 0.05 * gap} for gap in gaps), bounds
+    stiffnesses = [inertia * (2.0 * math.pi * frequency) ** 2 for frequency in FREQUENCIES]
+    known = [(swing[0] * inertia, swing[1] * inertia)] if swing is not None else []
+    if effect.motion == "bending":
+        read = tuple({"stiffness": k, "time": c / k} for k, c in known)
+        times = [LOOSE / (math.pi * frequency) for frequency in FREQUENCIES]
+        return (*read, *({"stiffness": k, "time": t} for k, t in zip(stiffnesses, times, strict=True))), {
+            "stiffness": held,
+            "inertia": share,
+        }
+    starts = tuple({"stiffness": k, "damping": 2.0 * LOOSE * math.sqrt(k * inertia)} for k in stiffnesses)
+    return (*({"stiffness": k, "damping": c} for k, c in known), *starts), {"stiffness": held, "inertia": share}
+
+
+def softest(model: Model, site: str) -> float:
+    """Least start stiffness of a compliance that holds what the joint moves, N/m or N m/rad."""
+    return moved(model, site) * (2.0 * math.pi * SLOWEST) ** 2
+
+
+def stop_starts(position: Array, residual: Array, middle: float, travel: float, least: float) -> tuple[Starts, Bounds]:
+    """Start values and bounds of end stops: one end, or both where either side looks like one.
+
+    A stop pushes back over the last part of the travel, so the residual (applied - required) grows outwards from its
+    position. The positions on either side are those at which such a ramp explains most of it.
+
+    Parameters
+    ----------
+    position, residual : ndarray, shape (n,)
+        Of the joint, at the same samples.
+    middle, travel : float
+        Middle and half range of the joint's travel in the data.
+    least : float
+        Stiffness of the softest stop.
+    """
+    ends: dict[str, list[float]] = {}
+    for name, side in (("high", 1.0), ("low", -1.0)):
+        found = _ramp(side * (position - middle), side * residual)
+        shares = [share * travel for share in STOP_SHARES]
+        ends[name] = [middle + side * place for place in (*found, *shares)]
+        if found:
+            ends[f"{name} seen"] = [middle + side * found[0]]
+    both = [{"low": low, "high": high} for low in ends.get("low seen", []) for high in ends.get("high seen", [])]
+    reach = (middle - 1.2 * travel, middle + 1.2 * travel)
+    one = [{name: place} for name in ("high", "low") for place in ends[name]]
+    width = (1e-6 * travel, 0.05 * travel)
+    return (*one, *both), {"low": reach, "high": reach, "width": width, "stiffness": (least, math.inf)}
+
+
+def _ramp(outwards: Array, push: Array) -> tuple[float, ...]:
+    """Start position of an end stop: a ramp outwards from there explains the residual best; None without one."""
+    order = np.sort(outwards)
+    most = int(BEYOND_MOST * order.size)
+    if most <= BEYOND_LEAST:
+        return ()
+    counts = np.unique(np.geomspace(BEYOND_LEAST, most, STOP_PLACES).astype(np.int64))
+    best, place = 0.0, None
+    for start in order[-counts - 1]:
+        ramp = np.maximum(outwards - start, 0.0)
+        along = float(ramp @ push)
+        power = float(ramp @ ramp)
+        if along > 0.0 and power > 0.0 and along**2 / power > best:
+            best, place = along**2 / power, float(start)
+    return () if place is None else (place,)
+
+
+def moved(model: Model, site: str) -> float:
+    """Inertia behind a compliance at a joint, body or beam when all joints are at zero."""
+    joint = model.joint_before(site)
+    place = model.joints.index(joint)
+    whole = float(model.masses_at_zero[place])
+    rotor = sum(
+        model.parameters[name].value
+        for name in (f"{joint}.rotor_inertia", f"{joint}.rotor.inertia")
+        if name in model.parameters
+    )
+    shafts = (
+        name for name in model.transmissions if joint in model.ratios(name) and f"{name}.inertia" in model.parameters
+    )
+    for name in shafts:
+        ratio, inertia = (model.parameters[one].value for one in (model.ratios(name)[joint], f"{name}.inertia"))
+        rotor += ratio**2 * inertia
+    return max(whole - rotor, 1e-3 * whole)
+
+
+def ends_apart(
+    model: Model, free: Sequence[str], bounds: Mapping[str, tuple[float, float]]
+) -> dict[str, tuple[float, float]]:
+    """Bounds that keep both ends of a stop on their sides of its middle."""
+    apart = dict(bounds)
+    for stop in (effect.parameter_names for effect in model.effects if effect.type.stops):
+        low, high = stop["low"], stop["high"]
+        if low not in free or high not in free:
+            continue
+        lower, upper = model.parameters[low], model.parameters[high]
+        middle = 0.5 * (lower.value + upper.value)
+        least, most = apart.get(low, (lower.minimum, lower.maximum))
+        apart[low] = least, min(most, middle)
+        least, most = apart.get(high, (upper.minimum, upper.maximum))
+        apart[high] = max(least, middle), most
+    return apart

@@ -1,0 +1,72 @@
+"""Start value of a joint compliance: a search over stiffness, along the measured motion.
+
+The residual depends on the stiffness only within a few per cent of the true value, where the resonance is. A softer
+spring responds to other frequencies of the measured motion, and a stiffer one does nothing. A linearised step from
+elsewhere predicts a gain that is not there, and a refit from it ends at a rigid spring. So stiffnesses a fifth apart
+are tried, and the refit begins at the one with the least residual.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.discrepancy.screening.candidates import Candidate
+from vpm.discrepancy.screening.compliance_and_stop_start import moved
+from vpm.errors import DivergedError
+from vpm.identify import InverseDynamicsProblem
+from vpm.identify.response_along_motion import bends, has_own_drives
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+#: Frequencies at which what a joint moves swings on the spring while the motor stands, Hz, and damping ratios.
+FREQUENCIES = np.geomspace(4.0, 64.0, 16)
+DAMPINGS = (0.1, 0.3)
+
+
+def is_searched(model: Model, data: InverseDynamicsProblem, candidate: Candidate) -> bool:
+    """Whether the stiffness of a joint compliance is searched: between an ideal drive and rigid links."""
+    measured = candidate.site in data.motions[0].joints
+    return candidate.effect.winds_up and measured and not (bends(model) or has_own_drives(model))
+
+
+def best_start(
+    model: Model, jacobian: Array, data: InverseDynamicsProblem, candidate: Candidate
+) -> Mapping[str, float] | None:
+    """Start stiffness of a joint compliance with the least residual, or None if none improves it.
+
+    Parameters
+    ----------
+    model : Model
+        Without the spring.
+    jacobian : ndarray, shape (n, free)
+        Regressor of its free parameters.
+    data : InverseDynamicsProblem
+    candidate : Candidate
+        A spring in series.
+    """
+    lengths = np.linalg.norm(jacobian, axis=0)
+    known = np.linalg.qr(jacobian[:, lengths > 0.0] / lengths[lengths > 0.0])[0]
+
+    def left(one: Model) -> float:
+        try:
+            residual, _ = data.evaluate(one, one.theta)
+        except DivergedError:
+            return math.inf
+        rest = residual - known @ (known.T @ residual)
+        power = float(rest @ rest)
+        return power if math.isfinite(power) else math.inf
+
+    inertia, least, best = moved(model, candidate.site), left(model), None
+    for frequency in FREQUENCIES:
+        stiffness = inertia * (2.0 * math.pi * float(frequency)) ** 2
+        for ratio in DAMPINGS:
+            values = {"stiffness": stiffness, "damping": 2.0 * ratio * math.sqrt(stiffness * inertia)}
+            power = left(model.with_effect(candidate.effect.name, at=candidate.site, **values))
+            if power < least:
+                least, best = power, values
+    return best

@@ -1,0 +1,305 @@
+"""Probe of a candidate: the share of the training residual that its regressor explains in one linear step.
+
+For each candidate one linearised step moves the free parameters and the new ones together. So a candidate gains nothing
+that a better value of a known parameter would explain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from vpm.discrepancy.screening.backlash_start import is_read_off, near_prior, read_off
+from vpm.discrepancy.screening.candidates import Candidate
+from vpm.discrepancy.screening.compliance_and_stop_start import LOSSES, in_series
+from vpm.discrepancy.screening.joint_compliance_start import best_start, is_searched
+from vpm.discrepancy.screening.linear_step import is_outside, linear_step, softened, step_without
+from vpm.discrepancy.screening.location_parameter import free_location
+from vpm.identify import InverseDynamicsProblem
+from vpm.identify.identifiability import closest_column, is_alias
+from vpm.identify.response_along_motion import bends
+from vpm.identify.tangent import has_tangent
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+#: Significance asked of an effect's size on the training data.
+SIZE_LEVEL = 0.05
+
+
+@dataclass(frozen=True)
+class Alias:
+    """Alias in a probe: a parameter held at its start because data show it only together with another one."""
+
+    parameter: str
+    partner: str
+
+
+@dataclass(frozen=True)
+class Probe:
+    """Probe of a candidate: estimates and gain of one linearised step.
+
+    Attributes
+    ----------
+    candidate : Candidate
+    model : Model
+        The model with the effect at the start values of the best shape tried.
+    free : tuple of str
+        Dotted names of the effect's parameters that the data can see.
+    held : tuple of Alias
+        Those that they do not discriminate from others.
+    invisible : tuple of str
+        Those without any influence at the start values.
+    values, std : dict
+        Linearised estimate by dotted name, unbounded.
+    drop : float
+        Share of the training residual's mean square that would go.
+    """
+
+    candidate: Candidate
+    model: Model
+    free: tuple[str, ...]
+    held: tuple[Alias, ...]
+    invisible: tuple[str, ...]
+    values: Mapping[str, float]
+    std: Mapping[str, float]
+    drop: float
+
+    @property
+    def score(self) -> float:
+        """Score of a probe: predicted gain per root of the fitted numbers, so that richer effects pay for them."""
+        return self.drop / float(np.sqrt(max(1, len(self.free))))
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """Baseline of probes: the model to which candidates are added, with its training residual and regressor.
+
+    ``pushed`` says of parameters that a bound holds on which side: 1 at the upper one, -1 at the lower one.
+    """
+
+    model: Model
+    free: tuple[str, ...]
+    residual: Array
+    jacobian: Array
+    pushed: Mapping[str, int] = field(default_factory=dict)
+
+
+def prepare(base: Baseline, data: InverseDynamicsProblem, listed: Sequence[Candidate]) -> Baseline:
+    """Prepare probes: simulate together all candidates that move links and do nothing at their start values.
+
+    They all share one motion there, and its derivatives by many parameters take little longer than by one. Shapes of
+    what has no size have no influence. The baseline comes back with its regressor at its own values.
+    """
+    if not bends(base.model) or not has_tangent(base.model, data):
+        return base
+    pool = [c for c in listed if c.neutral and len(c.starts) == 1 and c.effect.site not in {"joint", "actuator"}]
+    models = [base.model.with_effect(c.effect.name, at=c.site, **c.starts[0]) for c in pool]
+    whole = base.model
+    for c in pool:
+        whole = whole.with_effect(c.effect.name, at=c.site, **c.starts[0])
+    sizes = [
+        name
+        for c, model in zip(pool, models, strict=True)
+        for name in _added(model, c)
+        if not c.effect.parameter(_short(model, c, name)).shape
+    ]
+    residual, jacobian = data.evaluate(whole, whole.theta, [whole.index(name) for name in (*base.free, *sizes)])
+    own = [_added(model, c) for c, model in zip(pool, models, strict=True)]
+    data.share(whole, [(base.model, ()), *zip(models, own, strict=True)])
+    return replace(base, residual=residual, jacobian=jacobian[:, : len(base.free)])
+
+
+def _short(model: Model, candidate: Candidate, name: str) -> str:
+    """Short name of a candidate's parameter in a probe."""
+    effect = model.effect(*candidate.key)
+    return next(short for short, dotted in effect.parameter_names.items() if dotted == name)
+
+
+def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *, hard: bool = False) -> Probe:
+    """Probe a candidate from all its start values; the best step counts, possible estimates before impossible ones.
+
+    A backlash that is read off the motion has one start, with the contacts that suit it or ``hard`` ones.
+    """
+    if is_read_off(base.model, data, candidate):
+        base = replace(base, model=near_prior(base.model, data.nominal, base.free))
+        start = read_off(base.model, base.free, data, candidate, hard=hard)
+        return _probe_start(base, data, start, still=True)
+    if (found := _searched(base, data, candidate)) is not None:
+        return found
+    probes = [_probe_start(base, data, candidate, start) for start in candidate.starts]
+    best = max(probes, key=lambda p: p.drop)
+    possible = [p for p in probes if not impossible_values(p)]
+    if possible:
+        runner_up = max(possible, key=lambda p: p.drop)
+        if runner_up.drop >= 0.5 * best.drop:
+            return runner_up
+    return best
+
+
+def _searched(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe | None:
+    """Probe of a joint compliance at its best start value; None where none lowers the residual."""
+    if not is_searched(base.model, data, candidate):
+        return None
+    start = best_start(base.model, base.jacobian, data, candidate)
+    found = None if start is None else _probe_start(base, data, candidate, start, still=True)
+    return found if found is not None and found.free and found.drop > 0.0 else None
+
+
+def screening_effort(candidate: Candidate) -> float:
+    """Time estimate of a `probe`, in starts that do nothing: a backlash is searched by its flights."""
+    searched = 50.0 if candidate.effect.has_play else 0.0
+    return searched + len(candidate.starts) * (1.0 if candidate.neutral else 2.0)
+
+
+def refit_effort(probe: Probe) -> float:
+    """Time estimate of a refit after its probe: shapes take longer than linear parameters."""
+    own = (*probe.free, *probe.invisible)
+    return float(sum(probe.model.parameters[name].kind != "linear" for name in own))
+
+
+def impossible_values(probe: Probe) -> list[str]:
+    """Parameters whose estimate in a probe is outside the physical range by more than one standard deviation."""
+    known = probe.model.parameters
+    return [name for name in probe.free if is_outside(known[name], probe.values[name], probe.std[name])]
+
+
+def size_is_clear(names: Sequence[str], values: Array, covariance: Array) -> bool:
+    """Wald test of a probe that the parameters ``names`` are not all zero, at the level ``SIZE_LEVEL``."""
+    if not names:
+        return False
+    if not np.all(np.isfinite(covariance)):
+        return False
+    statistic = float(values @ np.linalg.pinv(covariance, hermitian=True) @ values)
+    return statistic > float(chdtri(len(names), SIZE_LEVEL))
+
+
+def _probe_start(
+    base: Baseline,
+    data: InverseDynamicsProblem,
+    candidate: Candidate,
+    start: Mapping[str, float] | None = None,
+    *,
+    still: bool = False,
+) -> Probe:
+    """Probe from one start value; a ``still`` start moves the known parameters alone."""
+    start = candidate.starts[0] if start is None else start
+    model = base.model.with_effect(candidate.effect.name, at=candidate.site, **start)
+    added = _added(model, candidate)
+    if not candidate.neutral:
+        added = tuple(name for name in added if _short(model, candidate, name) not in candidate.fixed)
+    columns = [model.index(name) for name in added]
+    if candidate.neutral or has_tangent(base.model, data):
+        # Where links bend or drives answer, each known column costs a simulation: they are taken as before it.
+        residual, fresh = data.evaluate(model, model.theta, columns)
+        known = base.jacobian
+    else:
+        all_columns = [model.index(name) for name in base.free] + columns
+        residual, jacobian = data.evaluate(model, model.theta, all_columns)
+        known, fresh = jacobian[:, : len(base.free)], jacobian[:, len(base.free) :]
+    place = free_location(data, model, candidate, added, fresh)
+    if place is not None:
+        fresh[:, place.where] = place.column
+    keep, held, invisible = sort_columns(
+        added, fresh, known, base.free, residual, _sizes(model, candidate, base.free, added)
+    )
+    if place is not None and place.where in keep and place.size not in keep:
+        keep.remove(place.where)
+        invisible = (*invisible, added[place.where])
+    chosen = np.column_stack([known, fresh[:, keep]])
+    names = (*base.free, *(added[i] for i in keep))
+    start_values = np.concatenate([np.zeros(len(base.free)), model.theta[[columns[i] for i in keep]]])
+    values, std, left = _stepped(base, data, chosen, residual, start_values, _losses(model, candidate, names))
+    if still:
+        values, (_, _, left) = np.zeros_like(values), linear_step(data, known, residual)
+    power = float(base.residual @ base.residual)
+    free = names[len(base.free) :]
+    estimates = dict(zip(free, (values + start_values)[len(base.free) :].tolist(), strict=True))
+    deviations = dict(zip(free, std[len(base.free) :].tolist(), strict=True))
+    drop = 1.0 - left / power if power > 0.0 and free else 0.0
+    if place is not None and place.where in keep:
+        size, where = added[place.size], added[place.where]
+        if estimates[size] <= model.parameters[size].minimum:
+            free, invisible = tuple(name for name in free if name != where), (*invisible, where)
+        else:
+            first = model.parameters[where].value
+            estimates[where] = first + (estimates[where] - first) / estimates[size]
+            deviations[where] /= abs(estimates[size])
+    for name in free:
+        if _short(model, candidate, name) in in_series(candidate.effect):
+            estimates[name], deviations[name] = softened(
+                model.parameters[name].value, estimates[name], deviations[name]
+            )
+    return Probe(candidate, model, free, held, invisible, estimates, deviations, drop)
+
+
+def _stepped(
+    base: Baseline, data: InverseDynamicsProblem, jacobian: Array, residual: Array, start: Array, losses: Sequence[int]
+) -> tuple[Array, Array, float]:
+    """Linear step of a probe in known and new parameters, see `linear_step`; some of them stay.
+
+    What a bound holds stays there: beyond it, it would seem to explain what no fit can. A negative loss of a spring in
+    series stays at its ``start``. It depends on the square of the compliance, so a step from a clearly stiffer or
+    softer start gives a wrong value, even a wrong sign. A refit finds it; whether there is a spring at all, its
+    stiffness tells.
+    """
+    values, std, left = linear_step(data, jacobian, residual)
+    held = [i for i, name in enumerate(base.free) if base.pushed.get(name, 0) * values[i] > 0.0]
+    if held:
+        values, std, left = step_without(data, jacobian, residual, held)
+    negative = [i for i in losses if start[i] + values[i] + std[i] < 0.0]
+    if negative:
+        values, std, left = step_without(data, jacobian, residual, (*held, *negative))
+        std[negative] = np.inf
+    return values, std, left
+
+
+def _losses(model: Model, candidate: Candidate, names: Sequence[str]) -> list[int]:
+    """Indices of the loss parameters of a spring in series in a probe."""
+    own = set(_added(model, candidate)) if in_series(candidate.effect) else set()
+    return [i for i, name in enumerate(names) if name in own and _short(model, candidate, name) in LOSSES]
+
+
+def _sizes(model: Model, candidate: Candidate, known: Sequence[str], added: Sequence[str]) -> tuple[Array, Array]:
+    """Orders of magnitude of known and new parameters in a probe."""
+    values = np.array([abs(model.parameters[name].value) or 1.0 for name in known])
+    own = [candidate.effect.parameter(_short(model, candidate, name)) for name in added]
+    return values, np.array([parameter.typical for parameter in own])
+
+
+def _added(model: Model, candidate: Candidate) -> tuple[str, ...]:
+    for effect in model.effects:
+        if effect.key == candidate.key:
+            return tuple(effect.parameter_names.values())
+    return ()
+
+
+def sort_columns(
+    added: Sequence[str],
+    fresh: Array,
+    known: Array,
+    known_names: Sequence[str],
+    residual: Array,
+    sizes: tuple[Array, Array],
+) -> tuple[list[int], tuple[Alias, ...], tuple[str, ...]]:
+    """Sort the new columns of a probe: identifiable, confused with others, and without influence.
+
+    The first come by their places, the others by name. ``sizes`` are those of known and fresh parameters, without which
+    SI units would decide what is small.
+    """
+    lengths = np.linalg.norm(fresh, axis=0) * sizes[1]
+    largest = float(np.max([*(np.linalg.norm(known, axis=0) * sizes[0]), *lengths], initial=0.0))
+    visible = [i for i in range(len(added)) if lengths[i] > 1e-12 * largest]
+    invisible = tuple(added[i] for i in range(len(added)) if i not in visible)
+    keep, held = list(visible), []
+    for i in visible:
+        others = np.column_stack([known, fresh[:, [j for j in keep if j != i]]])
+        names = [*known_names, *(added[j] for j in keep if j != i)]
+        if is_alias(fresh[:, i], others, residual):
+            held.append(Alias(added[i], names[closest_column(fresh[:, i], others)]))
+            keep.remove(i)
+    return keep, tuple(held), invisible

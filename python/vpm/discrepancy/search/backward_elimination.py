@@ -1,0 +1,132 @@
+"""Backward elimination: drops effects that later ones replace, and frees parameters that were held."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge
+from vpm.discrepancy.confirmation.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED
+from vpm.discrepancy.screening.backlash_start import is_read_off, only_compliant
+from vpm.discrepancy.screening.candidates import Key
+from vpm.discrepancy.search.candidate_choice import Accepted
+from vpm.errors import DivergedError, ModelError
+from vpm.identify import gain, segments
+from vpm.model import Model
+
+#: Factor by which the last fit may exceed the bound of a transition velocity.
+MORE_ROOM = 3.0
+
+
+@dataclass(frozen=True)
+class Stage:
+    """Stage of the search, with its model; ``change`` is "recalibrated", "added" or "removed"."""
+
+    change: str
+    effect: str
+    site: str
+    judged: Judged
+
+
+def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
+    """Backward elimination of each earlier effect without which the model predicts validation data as well.
+
+    A parameter of a later effect may have been held because the data show it only together with the earlier effect. It
+    is set free for the trial: a spring that may rest elsewhere needs no constant force beside it. One name for what two
+    would say is the shorter answer. The same holds for a size, such as a difference of dry friction beside a constant
+    force, which are one effect in motion. Where neither size has work to do beside it, these data do not tell, and both
+    names stay. What closed-loop predictions show is not judged by the residual, which hardly shows it.
+    """
+    newest = accepted[-1]
+    for entry in (one for one in accepted[:-1] if not one.trial.from_prediction):
+        current = stages[-1].judged
+        own = set(entry.trial.parameters)
+        freed = {alias.parameter for other in accepted for alias in other.trial.held if alias.partner in own}
+        renamed = any(current.model.parameters[name].kind == "linear" for name in freed)
+        try:
+            model = current.model.without_effect(*entry.key)
+            known = tuple(name for name in current.free if name in model.parameters)
+            free = (*known, *sorted(name for name in freed - set(known) if name in model.parameters))
+            bounds = {name: pair for name, pair in current.bounds.items() if name in free}
+            reduced = judge(model, free, data, bounds)
+        except (DivergedError, ModelError):
+            continue  # without it the model cannot follow the validation data at all, or another effect cannot stand
+        loss = gain(reduced.validation, current.validation, segments(data.validation))
+        if loss.relative < LEAST_GAIN and (not renamed or _renamed(current, reduced, model, known, data)):
+            accepted.remove(entry)
+            accepted[:] = [_released(other, freed) for other in accepted]
+            stages.append(Stage("removed", *entry.key, reduced))
+            dropped[entry.key] = f"it is not needed any more beside {newest.trial.probe.candidate.label}"
+
+
+def _renamed(current: Judged, reduced: Judged, model: Model, free: tuple[str, ...], data: Data) -> bool:
+    """Whether released parameters only take over the work of an effect that elimination dropped.
+
+    Without them, and without the effect, ``model`` with ``free`` fitted predicts the validation data worse. With them
+    it simulates the validation records as well. Where there is none, as many numbers as before would tell nothing.
+    """
+    if current.simulated is not None and reduced.simulated is not None and data.simulation is not None:
+        simulated = gain(current.simulated, reduced.simulated, segments(data.simulation))
+        if simulated.relative < -LEAST_GAIN and simulated.harm > NORMAL_95_ONE_SIDED:
+            return False
+    bounds = {name: pair for name, pair in current.bounds.items() if name in free}
+    bare = judge(model, free, replace(data, simulation=None), bounds)
+    work = gain(bare.validation, reduced.validation, segments(data.validation))
+    return work.relative >= LEAST_GAIN and work.score >= NORMAL_95_ONE_SIDED
+
+
+def without_tight_bounds(final: Judged, data: Data) -> Judged:
+    """Refit after elimination with wider bounds where a transition velocity stands at its upper bound.
+
+    The bound keeps dry friction apart from viscous friction while candidates compete; once the names stand, it need not
+    cut the fit short. The training records decide, and the validation ones may not be predicted worse for it.
+    """
+    bounds = dict(final.bounds)
+    for name, (low, high) in final.bounds.items():
+        shape = name.endswith("transition_velocity") and name in final.free
+        if shape and final.model.parameters[name].value > 0.999 * high:
+            bounds[name] = low, MORE_ROOM * high
+    if bounds == final.bounds:
+        return final
+    try:
+        refitted = judge(final.model, final.free, data, bounds)
+    except DivergedError:
+        return final
+    better = gain(final.fit.residual, refitted.fit.residual, segments(data.training)).relative > LEAST_GAIN
+    kept = gain(final.validation, refitted.validation, segments(data.validation)).harm <= NORMAL_95_ONE_SIDED
+    return refitted if better and kept else final
+
+
+def _released(entry: Accepted, freed: set[str]) -> Accepted:
+    """Accepted effect whose held parameters are released during elimination."""
+    trial = entry.trial
+    mine = tuple(alias.parameter for alias in trial.held if alias.parameter in freed)
+    if not mine:
+        return entry
+    held = tuple(alias for alias in trial.held if alias.parameter not in freed)
+    return replace(entry, trial=replace(trial, held=held, parameters=(*trial.parameters, *mine)))
+
+
+def refitted(best: Accepted, data: Data) -> Accepted:
+    """Refit before elimination, to the end, of a model that was fitted on a tangent."""
+    judged = best.trial.judged
+    try:
+        exact = judge(judged.model, judged.free, data, dict(judged.bounds))
+    except DivergedError:
+        return best
+    return replace(best, trial=replace(best.trial, judged=exact))
+
+
+def drop_springs(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
+    """Elimination of backlashes that a later effect has reduced to a spring."""
+    for entry in accepted[:]:
+        current = stages[-1].judged
+        name, site = entry.key
+        if not is_read_off(current.model, data.training, entry.trial.probe.candidate):
+            continue
+        if reason := only_compliant(current.model, site, data.training):
+            model = current.model.without_effect(name, site)
+            free = tuple(each for each in current.free if each in model.parameters)
+            bounds = {each: pair for each, pair in current.bounds.items() if each in free}
+            stages.append(Stage("removed", name, site, judge(model, free, data, bounds)))
+            accepted.remove(entry)
+            dropped[entry.key] = reason

@@ -1,0 +1,172 @@
+"""Choice among candidates that validation data support: least residual, fewest numbers, the machine before sensors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from vpm.catalogue import EFFECTS, EffectType
+from vpm.catalogue.kinds import Side
+from vpm.catalogue.traits import Late
+from vpm.discrepancy.confirmation.confirmation import Data, Trial
+from vpm.discrepancy.confirmation.reference_response import ODDS, Runs, compare_driven
+from vpm.discrepancy.confirmation.refusal import LEAST_GAIN
+from vpm.discrepancy.confirmation.sensor_prediction import preferred_sensor
+from vpm.discrepancy.screening.candidates import Candidate, Key
+from vpm.discrepancy.screening.compliance_and_stop_start import coupled
+from vpm.identify import Gain
+
+#: Kinds of delay: pure delays, lags of drives, slow spools.
+KINDS: tuple[Late, ...] = ("delay", "lag", "spool")
+#: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
+SENSOR_SHARE = 0.25
+#: What leaves up to so many times as much as the best explains the data as well, if it is also little of the whole gap.
+SAME = 1.5
+#: Difference of two logarithms of evidence that says nothing.
+TIE = 0.01
+#: A refinement leaves less than this share of the mean square that the plainer effect leaves.
+REFINED = 0.5
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """Accepted effect: the trial that was chosen, and rivals that would do as well.
+
+    Where a ranking named it, with its evidence in nats, its probability and its side of a joint that is split.
+    """
+
+    trial: Trial
+    rivals: tuple[str, ...]
+    evidence: float = float("nan")
+    probability: float = float("nan")
+    side: Side = "motor"
+    class_probability: float = float("nan")
+
+    @property
+    def key(self) -> Key:
+        """Effect and site of an accepted candidate."""
+        return self.trial.probe.candidate.key
+
+    @property
+    def effect(self) -> EffectType:
+        """Catalogue entry of an accepted candidate."""
+        return self.trial.probe.candidate.effect
+
+    @property
+    def label(self) -> str:
+        """Label of an accepted candidate: ``effect at site``."""
+        return self.trial.probe.candidate.label
+
+    @property
+    def ranked(self) -> bool:
+        """Whether a ranking named the chosen candidate."""
+        return bool(np.isfinite(self.evidence))
+
+
+def choose(supported: Sequence[Trial], data: Data) -> Accepted:
+    """Choose the candidate with the least criterion; of equally good ones the one whose simulation is best.
+
+    One that refines another only takes its place if it leaves less than ``REFINED`` of what that leaves.
+    """
+    first = min(supported, key=cost)
+    plain = [t for t in supported if _plainer(t, first)]
+    first = min(plain, key=cost) if plain else first
+    equals = [t for t in supported if _as_good(t, first)]
+    chosen = _delay_or_lag(preferred_sensor(_first_named(equals), equals, data), supported, data)
+    return Accepted(chosen, tuple(t.probe.candidate.label for t in equals if t is not chosen))
+
+
+def _delay_or_lag(chosen: Trial, supported: Sequence[Trial], data: Data) -> Trial:
+    """Choice among delay, lag and valve dynamics by the response to the reference.
+
+    A delay shifts in time; a lag also weakens high frequencies, which has to show. Without a result it is the delay.
+    """
+    if not _kind_of_delay(chosen):
+        return chosen
+    alike = [t for t in supported if _left(t) <= SAME * _left(chosen)]
+    kinds = [[t for t in alike if _kind_of_delay(t) == kind] for kind in KINDS]
+    rest = [min(kind, key=_evidence) for kind in kinds if kind]
+    best, runs = rest.pop(0), Runs(data)
+    for rival in rest:
+        response = compare_driven(rival.judged, best.judged, data, runs)
+        if response is None:
+            return chosen
+        if response.prefers_first(ODDS if _kind_of_delay(best) == "delay" else 1.0):
+            best = rival
+    return best
+
+
+def _kind_of_delay(trial: Trial) -> Late:
+    return trial.probe.candidate.effect.late
+
+
+def _first_named(equals: Sequence[Trial]) -> Trial:
+    """Choice by evidence; of several identical models, the first in the catalogue.
+
+    On a single link, joint compliance of the drive and a link that bends at its root are the same model. Rounding would
+    decide between them.
+    """
+    best = min(map(_evidence, equals))
+    tied = [t for t in equals if _evidence(t) <= best + TIE]
+    return min(tied, key=lambda t: list(EFFECTS).index(t.probe.candidate.effect.name))
+
+
+def _left(trial: Trial) -> float:
+    """Share of the validation mean square that a candidate leaves."""
+    return _share(trial.validation)
+
+
+def _share(gained: Gain) -> float:
+    return max(1.0 - gained.relative, 1e-12)
+
+
+def cost(trial: Trial) -> float:
+    """Cost of a candidate in the choice: information criterion of the validation data, see `schwarz`."""
+    return schwarz(trial.validation, len(trial.parameters))
+
+
+def schwarz(gained: Gain, numbers: int) -> float:
+    """Criterion to choose a candidate by G. Schwarz (*Annals of Statistics* 6, 1978) per independent piece.
+
+    It is 0 for no change.
+
+    Parameters
+    ----------
+    gained : Gain
+        What the numbers gain.
+    numbers : int
+        How many are fitted.
+    """
+    pieces = max(gained.pieces, 3)
+    return float(np.log(_share(gained)) + numbers * np.log(pieces) / pieces)
+
+
+def _plainer(trial: Trial, first: Trial) -> bool:
+    """Whether a candidate explains nearly as much as ``first`` with fewer numbers, at the same site and confusable."""
+    fewer = len(trial.parameters) < len(first.parameters)
+    return alike(trial.probe.candidate, first.probe.candidate) and fewer and REFINED * _left(trial) <= _left(first)
+
+
+def alike(one: Candidate, other: Candidate) -> bool:
+    """Whether two candidates act at the same site and the catalogue calls them confusable."""
+    confused = other.effect.name in one.effect.confused_with or one.effect.name in other.effect.confused_with
+    return one.site == other.site and confused
+
+
+def _as_good(trial: Trial, first: Trial) -> bool:
+    """Whether a candidate explains the validation data as well as the first one, with no more numbers."""
+    close = trial.validation.relative >= first.validation.relative - LEAST_GAIN and _left(trial) <= SAME * _left(first)
+    return close and len(trial.parameters) <= len(first.parameters)
+
+
+def _evidence(trial: Trial) -> float:
+    """Evidence for the choice: logarithm of the error left in both views, with a preference for the machine."""
+    left = np.log(max(trial.validation.after, 1e-300) / trial.validation.before)
+    if trial.probe.candidate.effect.site == "sensor":
+        left -= np.log(SENSOR_SHARE)
+    # Errors of coupled joints cancel; see refusal.CLEAR_GAIN.
+    if trial.simulated is not None and trial.simulated.before > 0.0 and not coupled(trial.judged.model):
+        left += np.log(max(trial.simulated.after, 1e-300) / trial.simulated.before)
+    return float(left)

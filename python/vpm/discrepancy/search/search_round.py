@@ -1,0 +1,359 @@
+"""Round of the search: screen every candidate, refit with the most promising, accept or refuse each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from functools import cached_property, partial
+
+import numpy as np
+
+from vpm.catalogue import EFFECTS
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confirm, finished
+from vpm.discrepancy.confirmation.delay_in_motion import in_motion, is_late
+from vpm.discrepancy.confirmation.friction_near_rest import (
+    is_supported,
+    judged_by_prediction,
+    needs_prediction,
+    prediction_without,
+)
+from vpm.discrepancy.confirmation.low_frequency import low_frequency
+from vpm.discrepancy.confirmation.refusal import (
+    CLEAR_GAIN,
+    Thresholds,
+    explains_most,
+    low_frequency_shows_it,
+    refuse_probe,
+    refuse_timing,
+    refuse_trial,
+    worse_in_simulation,
+)
+from vpm.discrepancy.confirmation.whittle_likelihood import ClosedLoopPrediction
+from vpm.discrepancy.diagnosis import RankedCandidate
+from vpm.discrepancy.noise.link_ringing import NOISE_ONLY, noise_alone, only_ringing
+from vpm.discrepancy.noise.residual_structure import structure
+from vpm.discrepancy.noise.sample_timing import InTime, in_time
+from vpm.discrepancy.parallel_candidates import Failure, SideBySide
+from vpm.discrepancy.screening.backlash_start import is_read_off, only_compliant
+from vpm.discrepancy.screening.candidates import Candidate, Key, candidates, joint_at, left_out
+from vpm.discrepancy.screening.probe import Probe, prepare, probe, refit_effort, screening_effort
+from vpm.discrepancy.screening.short_list import SHORT_LIST, most_promising, same_models
+from vpm.discrepancy.search.candidate_choice import Accepted, choose
+from vpm.identify import gain, segments
+from vpm.identify.response_along_motion import bends, has_own_drives
+from vpm.identify.tangent import drives_on_tangent
+
+#: Where links bend already, the noise of the measured motion rings in them: another spring needs this predicted gain as
+#: a share of the residual. Only the best is refitted.
+RINGING, FEW = 0.2, 1
+
+#: Called with a sentence on what is being done.
+Tell = Callable[[str], None]
+
+
+class Round:
+    """One round of the search."""
+
+    def __init__(self, current: Judged, data: Data, number: int, tell: Tell, each: SideBySide, tried: int = 0) -> None:
+        self.current, self.data, self.number, self.tell, self.each = current, data, number, tell, each
+        self._chosen_from = tried
+        self.refused: dict[Key, str] = {}
+        self._ranking: dict[Key, RankedCandidate] = {}
+        self._promising: list[Probe] = []
+        self._supported: list[Trial] = []
+        self.probes: list[Probe] = []
+        self.trials: list[Trial] = []
+
+    def done(self) -> bool:
+        """Whether a round has nothing to explain: the residual is noise, as far as links ring by it."""
+        return noise_alone(self.current.model, self.data, self.timed.validation)
+
+    def light(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
+        """Best candidate of the round among those whose regressor needs the measured motion alone."""
+        self.screen(effects, without, heavy=False)
+        if self._promising and self._promising[0].candidate.effect.has_play:
+            # What is compliant passes for backlash, and has to compete with it.
+            light = self._promising
+            self.screen(effects, without, heavy=True)
+            self._promising = sorted((*light, *self._promising), key=lambda p: -p.score)
+        self.confirm()
+        return self.best()
+
+    def heavy(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
+        """Best candidate of the round among those with a motion of their own, if more than noise is left.
+
+        A spring that swings within the whole band leaves a residual as white as noise. On rigid machines, one with a
+        large predicted gain is refitted all the same.
+        """
+        model = self.current.model
+        left = structure(model, self.data.training, self.data.validation, self.timed.fitted, self.timed.validation)
+        quiet = not left.present and left.above_white <= NOISE_ONLY
+        if (quiet and self._takes_long()) or self.done():
+            return None
+        self.screen(effects, without, heavy=True)
+        if quiet:
+            self._promising = [one for one in self._promising if one.drop >= RINGING]
+        self.confirm()
+        return self.best()
+
+    def by_prediction(self, without: set[Key]) -> Accepted | None:
+        """Best friction near rest of the round, which only closed-loop predictions show."""
+        tried = [
+            p for p in self.probes if p.candidate.key not in without and needs_prediction(self.current, self.data, p)
+        ]
+        before = self.prediction if tried else None
+        if before is None:
+            return None
+        self.tell(f"round {self.number}: running with {', '.join(p.candidate.label for p in tried)}")
+        ask = partial(judged_by_prediction, self.current, self.data, before, self.thresholds())
+        answers = self.each(f"round {self.number}: running", ask, tried, lambda p: p.candidate.label, refit_effort)
+        for one, answer in zip(tried, answers, strict=True):
+            if not isinstance(answer, Trial):
+                self.refused[one.candidate.key] = answer.reason if isinstance(answer, Failure) else answer
+        supported = [answer for answer in answers if isinstance(answer, Trial)]
+        if not supported:
+            return None
+        best = Accepted(max(supported, key=lambda trial: trial.validation.score), ())
+        self.refused.pop(best.key, None)
+        self._ranking[best.key] = replace(self._ranking[best.key], unseen=best.trial.validation.relative)
+        self.mark(best.key)
+        return best
+
+    def again(self, several: set[Key]) -> Accepted | None:
+        """Best of the round's earlier accepted candidates, judged again after another effect came in."""
+        self.screen([name for name, _ in several], set(), heavy=False, only=several)
+        self.confirm()
+        return self.best()
+
+    @property
+    def tried(self) -> int:
+        """Candidates of the round from which those to refit were chosen."""
+        return max(len(self._ranking), self._chosen_from)
+
+    def elsewhere(self, best: Accepted) -> set[Key]:
+        """Candidates of the round that are accepted at other joints too and have no motion of their own."""
+        model = self.current.model
+        here = joint_at(model, best.key[1])
+        supported = [trial.probe.candidate for trial in self._supported]
+        light = [one for one in supported if not self._is_heavy(one) and joint_at(model, one.site)]
+        return {one.key for one in light if here and joint_at(model, one.site) != here}
+
+    def weak(self, best: Accepted) -> bool:
+        """Whether the best candidate of the round leaves most of the error, so that a hidden motion is tried too.
+
+        An unmeasured motion shows in the efforts of all joints, in part as several lighter effects would. So an effect
+        that explains little has to compete with it. Where links bend already, or drives have states, its probes take
+        long, and come after all others.
+        """
+        tried = any(EFFECTS[name].winds_up for name, _ in self._ranking)
+        return best.trial.there.relative < CLEAR_GAIN and not tried and not self._takes_long()
+
+    def _takes_long(self) -> bool:
+        """Whether probes of candidates with a motion of their own take long in this round."""
+        return bends(self.current.model) or has_own_drives(self.current.model)
+
+    def screen(
+        self, effects: Sequence[str] | None, without: set[Key], *, heavy: bool, only: set[Key] | None = None
+    ) -> None:
+        """Screen all or some candidates of the round, and set aside impossible ones."""
+        current, data = self.current, self.data
+        self._promising = []
+        found = candidates(current.model, data.training, current.fit.residual, effects)
+        self.refused.update(left_out(current.model, data.training, effects))
+        listed = [c for c in found if c.key not in without and self._is_heavy(c) == heavy]
+        listed = listed if only is None else [c for c in listed if c.key in only]
+        self.tell(f"round {self.number}: screening {len(listed)} candidates")
+        screen = partial(probe, prepare(current.baseline, data.training, listed), data.training)
+        results = self.each(f"round {self.number}: screening", screen, listed, lambda c: c.label, screening_effort)
+        for candidate, result in zip(listed, results, strict=True):
+            key = candidate.key
+            if isinstance(result, Failure):
+                self._ranking[key] = RankedCandidate(*key, self.number, 0.0, float("nan"), accepted=False)
+                self.refused[key] = result.reason
+                continue
+            self._ranking[key] = RankedCandidate(*key, self.number, result.drop, float("nan"), accepted=False)
+            self.probes.append(result)
+            if reason := refuse_probe(result):
+                self.refused[key] = reason
+            else:
+                self._promising.append(result)
+        self._promising.sort(key=lambda p: -p.score)
+        if heavy and bends(current.model):
+            for one in self._promising:
+                if one.drop < RINGING:
+                    self.refused[one.candidate.key] = (
+                        f"it would lower the training error by {100.0 * one.drop:.2g} % of its mean square, which "
+                        "links that ring along a noisy motion leave as well"
+                    )
+            self._promising = [one for one in self._promising if one.drop >= RINGING][:FEW]
+
+    def _is_heavy(self, candidate: Candidate) -> bool:
+        """Whether a candidate of the round adds an unmeasured motion, simulated for every probe.
+
+        Where the log holds that motion, it is evidence like any. The same holds for bending of a rigid beam beside
+        flexible ones, and for a backlash between rigid links. Light effects would only imitate them.
+        """
+        model, motion = self.current.model, candidate.effect.motion
+        if bends(model) and motion == "bending" and candidate.site in model.beams:
+            return False
+        if is_read_off(model, self.data.training, candidate):
+            return False
+        logged = {f"{candidate.site}_{suffix}.position" for suffix in ("bending", "deflection")}
+        return bool(motion) and not logged & set(self.data.training.shown)
+
+    def confirm(self) -> None:
+        """Refit with the most promising candidates of the round and judge them on validation data."""
+        short_list = most_promising(self._promising)
+        if short_list:
+            self.tell(f"round {self.number}: refitting with {', '.join(p.candidate.label for p in short_list)}")
+        twins = same_models(short_list)
+        self._refit([one for one in short_list if one.candidate.key not in twins])
+        supported = {trial.probe.candidate.key for trial in self._supported}
+        again = [one for one in short_list if twins.get(one.candidate.key) in supported]
+        self._refit(again)
+        if any(EFFECTS[name].late for name, _ in supported):
+            # Predicted gains do not discriminate delays, so that all of them compete.
+            kin = [one for one in self._promising if one.candidate.effect.late]
+            kin = [one for one in kin if one not in short_list]
+            self._refit(kin)
+            short_list = [*short_list, *kin]
+        for one in short_list:
+            key = one.candidate.key
+            if key in twins and one not in again:
+                effect, site = twins[key]
+                self.refused[key] = f"it is {effect} at {site} by another name here: {self.refused[twins[key]]}"
+        tried = {one.candidate.key for one in short_list}
+        for key in (p.candidate.key for p in self._promising if p.candidate.key not in tried):
+            self.refused[key] = (
+                f"{SHORT_LIST} candidates explain more of the training residual, and none of them was enough"
+            )
+
+    def _refit(self, short_list: Sequence[Probe]) -> None:
+        """Refit with each of some candidates of the round, and accept or refuse it."""
+        if drives_on_tangent(self.current.model, self.data.training) and len(short_list) > 1:
+            # What one of them explains tells which of the others are worth a refit.
+            first = max(short_list, key=lambda p: p.drop)
+            supported = len(self._supported)
+            self._tried([first], np.inf)
+            rest = [one for one in short_list if one is not first]
+            left = [float(t.judged.fit.residual @ t.judged.fit.residual) for t in self._supported[supported:]]
+            self._tried(rest, min(left, default=np.inf))
+        else:
+            self._tried(short_list, np.inf)
+
+    def _tried(self, short_list: Sequence[Probe], rival: float) -> None:
+        """Trials of some candidates of the round side by side; ``rival`` is the residual of another, see `confirm`."""
+        thresholds = self.thresholds()
+        what = f"round {self.number}: refitting"
+        confirmed = partial(self._confirmed, rival=rival)
+        trials = self.each(what, confirmed, short_list, lambda p: p.candidate.label, refit_effort)
+        for tried_one, trial in zip(short_list, trials, strict=True):
+            key = tried_one.candidate.key
+            if isinstance(trial, Failure):
+                self.refused[key] = trial.reason
+                continue
+            self._ranking[key] = replace(self._ranking[key], unseen=trial.validation.relative)
+            self.trials.append(trial)
+            if reason := self._refused(trial, thresholds):
+                self.refused[key] = reason
+            else:
+                self._supported.append(trial)
+
+    def _confirmed(self, one: Probe, rival: float) -> Trial:
+        """Trial of the round; a backlash with soft contacts that cannot simulate gets hard ones if they are better.
+
+        The residual hardly tells how hard the contacts are, for errors of the flights add up between lively ones.
+        """
+        trial = confirm(self.current, self.data, one, rival)
+        if not is_read_off(self.current.model, self.data.training, one.candidate) or not worse_in_simulation(trial):
+            return trial
+        other = probe(self.current.baseline, self.data.training, one.candidate, hard=True)
+        harder = confirm(self.current, self.data, other)
+        return trial if worse_in_simulation(harder) else harder
+
+    def thresholds(self) -> Thresholds:
+        """Thresholds of the round for an effect when so many have been tried."""
+        return Thresholds(self.tried * self.number, min(m.dt for m in self.data.training.motions))
+
+    @cached_property
+    def timed(self) -> InTime:
+        """Residuals of the round's model without the effect of uncertain sample times."""
+        return in_time(self.current, self.data)
+
+    def _refused(self, trial: Trial, thresholds: Thresholds) -> str:
+        """Reason why a trial of the round is refused, or ""."""
+        candidate = trial.probe.candidate
+        reason = refuse_trial(trial, thresholds) or self._only_timing(trial, thresholds)
+        if reason and self._is_predicted(trial, thresholds):
+            reason = ""
+        if not reason and is_read_off(self.current.model, self.data.training, candidate):
+            reason = only_compliant(trial.judged.model, candidate.site, self.data.training)
+        return reason or only_ringing(self.current, self.data, trial)
+
+    def _is_predicted(self, trial: Trial, thresholds: Thresholds) -> bool:
+        """Whether closed-loop predictions support a delay of the round that gains little and surely.
+
+        Stiction imitates a delay in an inverse-dynamics residual, but not in a prediction. A prediction also does not
+        depend on the sample to which a command was logged.
+        """
+        late = is_late(trial.probe.candidate.effect, trial.judged.model) and not self._takes_long()
+        if not late or refuse_trial(replace(trial, supported=True), thresholds) or self.prediction is None:
+            return False
+        return is_supported(self.prediction, trial, self.data, thresholds)
+
+    @cached_property
+    def prediction(self) -> ClosedLoopPrediction | None:
+        """Closed-loop prediction of the training records by the round's model."""
+        return prediction_without(self.current, self.data)
+
+    def _only_timing(self, trial: Trial, thresholds: Thresholds) -> str:
+        """Why an otherwise accepted trial of the round does no more than shifted commands do, or ""."""
+        if self.timed.shift == 0.0 or explains_most(trial):
+            return ""
+        shifted = in_time(trial.judged, self.data)
+        before, validation = self.timed.validation, shifted.validation
+        if low_frequency_shows_it(trial, thresholds):
+            before, validation = (low_frequency(self.data.validation, each) for each in (before, validation))
+        if is_late(trial.probe.candidate.effect, trial.judged.model):
+            # Stiction looks like a delay, with a shift as without, so delays are judged in motion only.
+            before, validation = (in_motion(self.data.validation) * each for each in (before, validation))
+        timed = gain(before, validation, segments(self.data.validation))
+        return refuse_timing(timed, self.timed.shift, thresholds, beside=shifted.shift)
+
+    def best(self) -> Accepted | None:
+        """Candidate that the round accepts, if any; it has to stand when fitted to the end."""
+        while self._supported:
+            best = choose(self._supported, self.data)
+            whole = finished(self.current, self.data, best.trial)
+            if whole is best.trial:
+                self.mark(best.key)
+                return best
+            place = next(n for n, trial in enumerate(self._supported) if trial is best.trial)
+            if reason := self._refused(whole, self.thresholds()):
+                self.refused[best.key] = reason
+                del self._supported[place]
+            else:
+                self._supported[place] = whole
+        return None
+
+    def mark(self, accepted: Key) -> None:
+        """Mark the accepted candidates in the ranking of the round."""
+        for key, entry in self._ranking.items():
+            self._ranking[key] = replace(entry, accepted=key == accepted)
+
+    def after(self, judged: Judged) -> Round:
+        """Next round with ``judged`` as its model."""
+        return Round(judged, self.data, self.number + 1, self.tell, self.each)
+
+    def ranked(self) -> list[RankedCandidate]:
+        """Ranked candidates of the round: accepted ones, then by validation gain, then by predicted gain."""
+        return sorted(self._ranking.values(), key=_by_gain)
+
+
+def _by_gain(candidate: RankedCandidate) -> tuple[int, float]:
+    """Sort key of the round's ranking: predicted gain."""
+    if candidate.accepted:
+        return 0, 0.0
+    if candidate.unseen > 0.0:
+        return 1, -candidate.unseen
+    return 2, -candidate.screened

@@ -1,0 +1,233 @@
+"""Structure: a model with effects, parameter values, and priors of its unknown parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from types import MappingProxyType
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.catalogue.kinds import Side
+from vpm.discrepancy.screening.candidates import Key
+from vpm.discrepancy.screening.location_parameter import ANYWHERE
+from vpm.model import Effect, Model
+from vpm.ranking.settings import MOVE
+from vpm.weighing.priors import Prior
+
+Array = NDArray[np.float64]
+
+#: Share by which periods may be off that are found in whole fractions of each other.
+OVERTONE = 0.02
+
+
+def sides_taken(model: Model, joint: str) -> set[Side]:
+    """Sides of a joint in a structure that hold effects with a choice of side."""
+    return {effect.side for effect in model.effects if effect.at == joint and effect.type.has_sides}
+
+
+def approximate(model: Model) -> list[Effect]:
+    """Effects of a structure's model whose laws are not exact."""
+    return [effect for effect in model.effects if not effect.type.exact]
+
+
+def without_sizes(model: Model, theta: Array, effects: Collection[Effect]) -> Array:
+    """Parameter values of a structure at which some effects do nothing; shapes stay."""
+    theta = theta.copy()
+    for effect in effects:
+        for short, name in effect.parameter_names.items():
+            parameter = effect.type.parameter(short)
+            if not parameter.shape and parameter.neutral is not None:
+                theta[model.index(name)] = parameter.neutral
+    return theta
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """Structure: effects in a model, parameter values, and priors of the unknown ones.
+
+    Attributes
+    ----------
+    model : Model
+    theta : ndarray, shape (p + f,)
+        Values of the parameters, those of the model are its own, then of the unknown first states of the records.
+    priors : mapping of str to Prior
+        Parameters and first states that are unknown.
+    effects : tuple of (str, str)
+        What was added to the model of the user, in order.
+    range_limited : tuple of str
+        Shapes that records show between two ends alone: at one of these the effect is another one, or none.
+    firsts : tuple of str
+        Unknown first states, in their order.
+    free_places : bool
+        Whether places that records need not show, as of a spring that rests far away, may be anywhere; else they are as
+        likely as their prior says.
+    """
+
+    model: Model
+    theta: Array
+    priors: Mapping[str, Prior]
+    effects: tuple[Key, ...] = ()
+    range_limited: tuple[str, ...] = ()
+    firsts: tuple[str, ...] = ()
+    free_places: bool = True
+
+    def place(self, name: str) -> int:
+        """Index of a parameter or first state among a structure's values."""
+        if name in self.model.parameters:
+            return self.model.index(name)
+        return len(self.model.theta) + self.firsts.index(name)
+
+    def shows(self, key: Key) -> bool:
+        """Whether records can show each shape of an effect in a structure."""
+        own = set(self.model.effect(*key, self.side(key)).parameter_names.values())
+        values = {name: float(self.theta[self.model.index(name)]) for name in self.range_limited if name in own}
+        return all(self.priors[name].low < value < self.priors[name].high for name, value in values.items())
+
+    def is_overtone(self, key: Key) -> bool:
+        """Whether an effect's period in a structure is a whole fraction of another's at its place.
+
+        A law that repeats along the way has one tone, and what it stands for has overtones: those are no other effect.
+        """
+        own = self._period(self.model.effect(*key, self.side(key)))
+        others = [self._period(one) for one in self.model.effects if one.at == key[1] and one.name != key[0]]
+        ratios = [other / own for other in others if own and other]
+        return any(round(ratio) > 1 and abs(ratio / round(ratio) - 1.0) < OVERTONE for ratio in ratios)
+
+    def _period(self, effect: Effect) -> float:
+        """Period of an effect in a structure; zero without one."""
+        name = effect.parameter_names.get("period")
+        return 0.0 if name is None else abs(float(self.theta[self.model.index(name)]))
+
+    @cached_property
+    def columns(self) -> list[int]:
+        """Indices of a structure's unknown parameters."""
+        return [self.place(name) for name in self.priors]
+
+    @cached_property
+    def ends(self) -> Array:
+        """Bounds of a structure's unknown parameters (k, 2), in deviations of the priors."""
+        return np.array([prior.ends for prior in self.priors.values()]).reshape(-1, 2)
+
+    @cached_property
+    def standard(self) -> Array:
+        """Unknown parameters of a structure in deviations of their priors (k,)."""
+        pairs = zip(self.priors.values(), self.columns, strict=True)
+        return np.array([prior.standard(float(self.theta[column])) for prior, column in pairs])
+
+    @cached_property
+    def slopes(self) -> Array:
+        """Change of each unknown parameter of a structure by one prior deviation (k,)."""
+        pairs = zip(self.priors.values(), self.columns, strict=True)
+        return np.array([prior.slope(float(self.theta[column])) for prior, column in pairs])
+
+    def moves(self, names: Sequence[str]) -> Array:
+        """Step of each parameter of a structure for a difference quotient (len(names),)."""
+        slopes = dict(zip(self.priors, np.abs(self.slopes), strict=True))
+        return MOVE * np.array([slopes[name] or 1.0 for name in names])
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Unknown parameters of a structure by name, SI."""
+        own = zip(self.priors, self.columns, strict=True)
+        return {name: float(self.theta[column]) for name, column in own if name not in self.firsts}
+
+    @property
+    def repaired(self) -> Model:
+        """Model of a structure with its effects, at its values."""
+        return self.model.with_parameters(self.values)
+
+    def bare(self, effects: Collection[Effect]) -> Structure:
+        """Structure in which some effects do nothing; shapes stay."""
+        return replace(self, theta=without_sizes(self.model, self.theta, effects), priors={})
+
+    def at(self, standard: Array) -> Structure:
+        """Structure with unknown parameters at given prior deviations, within bounds."""
+        inside = np.clip(standard, self.ends[:, 0], self.ends[:, 1])
+        theta = self.theta.copy()
+        for prior, column, z in zip(self.priors.values(), self.columns, inside, strict=True):
+            theta[column] = prior.value(float(z))
+        return replace(self, theta=theta)
+
+    @cached_property
+    def leaning(self) -> list[tuple[int, int]]:
+        """Sizes of a structure's effects and location parameters that may lie anywhere, among the unknown.
+
+        Of a spring records tell the stiffness, and the product of that and the place where it rests.
+        """
+        names, found = list(self.priors), []
+        for effect in self.model.effects if self.free_places else ():
+            own = [(effect.type.parameter(short), name) for short, name in effect.parameter_names.items()]
+            places = [name for one, name in own if one.shape and tuple(one.physical) == ANYWHERE and name in names]
+            sizes = [name for one, name in own if not one.shape and name in names]
+            if len(places) == len(sizes) == 1 and self.theta[self.place(sizes[0])] != 0.0:
+                found.append((names.index(sizes[0]), names.index(places[0])))
+        return found
+
+    def moved(self, move: Array) -> Structure:
+        """Structure moved by prior deviations; products of size and location move linearly."""
+        to, change = self.at(self.standard + move), move * self.slopes
+        for size, place in self.leaning:
+            before, where = (float(self.theta[self.columns[one]]) for one in (size, place))
+            after = float(to.theta[self.columns[size]])
+            if after * before > 0.0:
+                to.theta[self.columns[place]] = (before * (where + change[place]) + where * (after - before)) / after
+        return to
+
+    def carried(self, model: Model, renamed: Mapping[str, str] = MappingProxyType({})) -> Structure:
+        """Structure carried to another model, for parameters that it has too."""
+        names = {name: renamed.get(name, name) for name in self.model.parameter_names}
+        kept = {name: new for name, new in names.items() if new in model.parameters}
+        theta = np.concatenate([model.theta, self.theta[len(self.model.theta) :]])
+        for name, new in kept.items():
+            theta[model.index(new)] = self.theta[self.model.index(name)]
+        kept |= {name: name for name in self.firsts}
+        priors = {kept[name]: prior for name, prior in self.priors.items() if name in kept}
+        range_limited = tuple(kept[name] for name in self.range_limited if name in kept)
+        return Structure(model, theta, priors, self.effects, range_limited, self.firsts)
+
+    def beside(self, joint: str, side: Side) -> Structure:
+        """Structure with friction, springs or stops of a joint on one of its sides."""
+        content, renamed = self.model.to_dict(), {}
+        for entry, effect in zip(content["effects"], self.model.effects, strict=True):
+            if effect.at == joint and effect.type.has_sides:
+                entry["side"] = side
+        model = type(self.model)(content)
+        for old, new in zip(self.model.effects, model.effects, strict=True):
+            renamed.update({name: new.parameter_names[short] for short, name in old.parameter_names.items()})
+        return self.carried(model, renamed)
+
+    def side(self, key: Key) -> Side:
+        """Side of its joint on which an effect of a structure is."""
+        return next(effect.side for effect in reversed(self.model.effects) if (effect.name, effect.at) == key)
+
+    def without(self, key: Key) -> Structure:
+        """Structure without one of its effects.
+
+        Raises
+        ------
+        ModelError
+            Another effect rests on it.
+        """
+        rest = self.carried(self.model.without_effect(*key, self.side(key)))
+        return replace(rest, effects=tuple(effect for effect in self.effects if effect != key))
+
+    def with_last_of(self, other: Structure) -> Structure:
+        """Structure with the last effect of another structure added.
+
+        Raises
+        ------
+        VpmError
+            It cannot stand here.
+        """
+        key = (name, site) = other.effects[-1]
+        there = other.model.effect(name, site, other.side(key))
+        places = {short: other.model.index(dotted) for short, dotted in there.parameter_names.items()}
+        values = {short: float(other.theta[place]) for short, place in places.items()}
+        carried = self.carried(self.model.with_effect(name, site, side=there.side, **values))
+        own = set(there.parameter_names.values()) - set(self.model.parameters)
+        priors = {**carried.priors, **{name: prior for name, prior in other.priors.items() if name in own}}
+        limited = (*carried.range_limited, *(name for name in other.range_limited if name in own))
+        return replace(carried, priors=priors, effects=(*self.effects, key), range_limited=limited)

@@ -1,0 +1,119 @@
+"""Priors of parameters before a ranking's fit: from the model file, or natural sizes of the records."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.catalogue import EffectParameter
+from vpm.discrepancy.screening.candidates import Candidate, joint_at, shares_at, slow_speeds
+from vpm.discrepancy.screening.compliance_and_stop_start import moved
+from vpm.discrepancy.stuck_channels import is_moving
+from vpm.identify import InverseDynamicsProblem
+from vpm.model import Model
+from vpm.ranking.settings import DELAY
+from vpm.weighing.priors import FACTOR, NATURAL, NEAR, SHARE, Prior, natural_sizes
+
+Array = NDArray[np.float64]
+
+#: What an effect may amount to, as a share of the size of its kind, where that is not `SHARE`: what is near a value by
+#: nature, and what has a size that matters rather than one that records show.
+SHARES = {"one": NEAR, "channel": NEAR, "time": 1.0, "resistance": 1.0, "leakage": 1.0}
+#: Effort, speed and way of what stands, in SI units.
+LEAST = 1e-9
+
+
+class Sizes:
+    """Natural sizes for priors by joint and transmission: effort, speed and way in the records."""
+
+    def __init__(self, model: Model, data: InverseDynamicsProblem) -> None:
+        self.model = model
+        records = range(len(data.motions))
+        efforts = np.concatenate([data.effort(model, model.theta, record)[1] for record in records])
+        positions, velocities, accelerations = map(np.concatenate, zip(*map(data.state, records), strict=True))
+        self.joints: dict[str, tuple[float, float, float]] = {}
+        self.ways: dict[str, tuple[float, float]] = {}
+        moving = [any(is_moving(log, f"{joint}.position") for log in data.experiments) for joint in data.joints]
+        self.moving: set[str] = set()
+        for site in (*data.joints, *model.transmissions):
+            shares = shares_at(model, site, data.joints)
+            way = positions @ shares
+            if np.any(shares[moving]):
+                self.moving.add(site)
+            self.ways[site] = float(way.min()), float(way.max())
+            effort = efforts @ (shares / max(float(shares @ shares), 1e-300))
+            # Where no drive does anything, it is inertia that forces are as large as.
+            size = _strength(effort) or moved(model, site) * _strength(accelerations @ shares)
+            self.joints[site] = size, _strength(velocities @ shares), 0.5 * float(np.ptp(way))
+        self.commands = {
+            name: _strength(np.concatenate([motion.inputs[:, place] for motion in data.motions]))
+            for place, name in enumerate(model.actuators)
+        }
+        self.readings: dict[str, float] = {}
+        for channel in dict.fromkeys(channel for log in data.experiments for channel in log.channels):
+            if sensor := model.sensor_of(channel):
+                shown = [log[channel] for log in data.experiments if channel in log]
+                self.readings[sensor] = 0.5 * float(np.ptp(np.concatenate(shown)))
+
+    def moves(self, site: str) -> bool:
+        """Whether a joint or a transmission moves in the records, so that its priors have a size."""
+        return site in self.moving
+
+    def prior(self, candidate: Candidate, parameter: EffectParameter, value: float) -> Prior:
+        """Prior of an effect's parameter that starts at ``value``."""
+        low, high = candidate.bounds.get(parameter.name, parameter.physical)
+        size = self._size(candidate.site, parameter)
+        neutral = np.nan if parameter.shape or parameter.neutral is None else parameter.neutral
+        if neutral in NATURAL and (candidate.neutral or value == neutral):
+            return Prior(neutral, SHARES.get(parameter.scale, SHARE) * size, low, high)
+        if low < 0.0 or value <= 0.0:
+            return Prior(value, SHARE * size, low, high)
+        return Prior(value, FACTOR, max(low, 1e-12), high, logarithmic=True)
+
+    def _size(self, site: str, parameter: EffectParameter) -> float:
+        effort, speed, way = (max(number, LEAST) for number in self._shown(site))
+        sizes = {
+            **natural_sizes(effort, speed, way),
+            "channel": max(self.readings.get(site, way), LEAST),
+            "time": DELAY,
+            "command": self.commands.get(site, 1.0),
+        }
+        return sizes.get(parameter.scale, parameter.typical)
+
+    def _shown(self, site: str) -> tuple[float, float, float]:
+        """Effort, speed and way at a site for its priors; the largest of all joints for other sites."""
+        if (joint := joint_at(self.model, site) or site) in self.joints:
+            return self.joints[joint]
+        effort, speed, way = np.max(list(self.joints.values()), axis=0)
+        return float(effort), float(speed), float(way)
+
+
+def _strength(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))
+
+
+def stated(model: Model) -> dict[str, Prior]:
+    """Priors of a model's parameters as its file states them."""
+    return {
+        p.name: Prior(p.value, p.uncertainty, p.minimum, p.maximum)
+        for p in model.parameters.values()
+        if p.adjustable and p.uncertainty and np.isfinite(p.uncertainty)
+    }
+
+
+def known(model: Model, data: InverseDynamicsProblem) -> dict[str, Prior]:
+    """Priors of a model as its file states them, and of the transition velocities of its dry friction.
+
+    Nobody knows these, and a wrong one leaves a gap at every reversal, where the finer effects live.
+    """
+    priors = stated(model)
+    for effect in model.effects:
+        name = effect.parameter_names.get("transition_velocity")
+        if name is None or name in priors or effect.at not in (*data.joints, *model.transmissions):
+            continue
+        shares = shares_at(model, effect.at, data.joints)
+        speeds = np.concatenate([np.abs(data.state(record)[1] @ shares) for record in range(len(data.motions))])
+        low, high = slow_speeds(float(np.quantile(speeds, 0.999)))
+        spread = 0.25 * float(np.log(high / low))
+        priors[name] = Prior(float(np.sqrt(low * high)), spread, low, high, logarithmic=True)
+    return priors

@@ -1,0 +1,46 @@
+"""Fits of many proposals in a race: those that cannot win are given up."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from vpm.discrepancy.parallel_candidates import SideBySide
+from vpm.ranking.fit import Fitted, Fitter
+from vpm.ranking.look import Look
+from vpm.ranking.proposals import Proposal
+from vpm.ranking.tried_effect import is_part
+
+
+def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: SideBySide) -> list[Fitted]:
+    """Fits of the proposals that may win the race.
+
+    Each has to gain what makes it worth while. The most promising one is fitted first, and another one has to save a
+    share of the cost that this one saved (O. Maron and A. Moore, *Advances in Neural Information Processing Systems* 6,
+    1994: those that cannot win leave a race early). A part of another one is fitted all the same: a rotor may seem to
+    gain little where a spring takes it along. The outcome does not depend on how many are fitted at a time.
+
+    Parameters
+    ----------
+    chosen : sequence of Proposal
+    look : Look
+        What there is without them.
+    fitter : Fitter
+    each : SideBySide
+    """
+    ordered = sorted(chosen, key=lambda one: -one.gain)
+    first = _fitted(ordered[:1], look.needed, look, fitter, each)
+    saved = [look.fitted.cost - fitted.cost for fitted in first]
+    wanted = max([look.needed, *(fitter.settings.share * nats for nats in saved)])
+    model, keys = look.fitted.structure.model, {one.key for one in chosen}
+    parts = [one for one in ordered[1:] if any(is_part(model, one.key, key) for key in keys)]
+    others = [one for one in ordered[1:] if one not in parts]
+    return first + _fitted(others, wanted, look, fitter, each) + _fitted(parts, look.needed, look, fitter, each)
+
+
+def _fitted(several: Sequence[Proposal], wanted: float, look: Look, fitter: Fitter, each: SideBySide) -> list[Fitted]:
+    def one_fitted(one: Proposal) -> Fitted:
+        view, residual = one.seen_in(look)
+        return fitter.fitted(one.structure, look.fitted.tracker, view, look.fitted.cost - wanted, residual)
+
+    ends = each("fitting", one_fitted, several, lambda one: " at ".join(one.structure.effects[-1]))
+    return [end for end in ends if isinstance(end, Fitted)]

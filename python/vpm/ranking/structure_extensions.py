@@ -1,0 +1,79 @@
+"""Extensions of a structure by one effect."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from weakref import WeakKeyDictionary
+
+from vpm.catalogue.kinds import Side
+from vpm.discrepancy.screening.candidates import Candidate, Key
+from vpm.model import Model
+from vpm.ranking.model_structure import Structure, sides_taken
+from vpm.ranking.parameter_priors import Sizes
+
+#: How sharply a law bends: a detail that need not be seen.
+DETAILS = frozenset({"transition_velocity", "width"})
+SIDES: tuple[Side, Side] = ("motor", "link")
+#: An effect, its side, and which of its numbers are given.
+_Kind = tuple[Key, Side, frozenset[str]]
+
+
+class Extensions:
+    """Extensions of structures by one effect; their models are built once for all start values.
+
+    Parameters
+    ----------
+    sizes : Sizes
+        For what is known of the parameters of effects.
+    """
+
+    def __init__(self, sizes: Sizes) -> None:
+        self.sizes = sizes
+        self._made: WeakKeyDictionary[Model, dict[_Kind, Model]] = WeakKeyDictionary()
+
+    def extended(self, structure: Structure, candidate: Candidate, start: Mapping[str, float], side: Side) -> Structure:
+        """Extension of a structure by one effect, on one side of a joint that is split.
+
+        What splits a joint takes the friction and the like that was there to that side.
+
+        Raises
+        ------
+        VpmError
+            The effect cannot sit there with these values.
+        """
+        made = self._made.setdefault(structure.model, {})
+        kind = (candidate.key, side, frozenset(start))
+        splits = candidate.effect.splits
+        if splits and side == "link":
+            structure = structure.beside(candidate.site, side)
+        own: Side = "motor" if splits else side
+        if kind not in made:
+            made[kind] = structure.model.with_effect(candidate.effect.name, candidate.site, side=own, **start)
+        effect, carried = made[kind].effect(*candidate.key, own), structure.carried(made[kind])
+        priors = dict(carried.priors)
+        for short, name in effect.parameter_names.items():
+            if name in structure.model.parameters:
+                continue
+            parameter, place = candidate.effect.parameter(short), carried.model.index(name)
+            carried.theta[place] = start.get(short, carried.theta[place])
+            shown = short not in candidate.fixed or short in candidate.bounds
+            free = shown and (not parameter.shape or parameter.learnt or short in start)
+            if free:
+                priors[name] = self.sizes.prior(candidate, parameter, float(carried.theta[place]))
+        shapes = set(start) & set(candidate.bounds) - DETAILS
+        limited = (name for short, name in effect.parameter_names.items() if short in shapes)
+        return replace(
+            carried,
+            priors=priors,
+            effects=(*structure.effects, candidate.key),
+            range_limited=(*carried.range_limited, *limited),
+        )
+
+
+def sides_of(candidate: Candidate, model: Model) -> tuple[Side, ...]:
+    """Sides of a joint for an extension: where the effect sits, or where other effects stay after a split."""
+    site = candidate.site
+    if candidate.effect.splits:
+        return SIDES if sides_taken(model, site) else SIDES[:1]
+    return SIDES if candidate.effect.has_sides and model.joint_behind(site) else SIDES[:1]

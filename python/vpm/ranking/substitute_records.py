@@ -1,0 +1,108 @@
+"""Substitute records for machines without inverse dynamics: closed loops opened, sampled drives idle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.experiment import Experiment
+from vpm.identify import InverseDynamicsProblem
+from vpm.identify.following import Following
+from vpm.identify.response_along_motion import SAMPLED_TYPES, Response
+from vpm.model import Model
+from vpm.ranking.tracked_records import TrackedRecords, Tracker
+
+Array = NDArray[np.float64]
+
+#: What tells where an actuator acts.
+PLACES = ("joint", "line", "transmission")
+
+
+def why_unbalanced(model: Model) -> str:
+    """Why a machine needs substitute records, because no efforts follow from its motion, or ""."""
+    if model.loops:
+        return f"the closed loops ({', '.join(model.loops)}) share efforts among them"
+    for name in model.actuators:
+        if (kind := model.actuator_type(name)) in SAMPLED_TYPES:
+            return f"the actuator {name} (type {kind}) goes by samples of its own"
+    return ""
+
+
+def shown(model: Model, tracked: TrackedRecords) -> InverseDynamicsProblem:
+    """Motion and efforts of the records, or those of substitute records that are as large."""
+    return StandIn(model, tracked) if why_unbalanced(model) else InverseDynamicsProblem(model, tracked.experiments)
+
+
+class StandIn(InverseDynamicsProblem):
+    """Problem on substitute records: loops opened, all joints measured, sampled drives without effort.
+
+    Motions are those of the machine, and efforts as large as its inertia needs. That is enough for natural sizes and
+    for where fits begin, and nothing is judged by it.
+    """
+
+    def __init__(self, model: Model, tracked: TrackedRecords) -> None:
+        super().__init__(opened(model), _completed(model, tracked))
+
+    def _answer(
+        self,
+        model: Model,
+        theta: Array,
+        record: int,
+        columns: Sequence[int] = (),
+        origin: Array | None = None,
+        known: Following | None = None,
+    ) -> Response:
+        other = _opened_at(model, theta)
+        places = [other.index(model.parameter_names[column]) for column in columns]
+        tangent = None if origin is None else _opened_at(model, origin).theta
+        return super()._answer(other, other.theta, record, places, tangent, known)
+
+
+def opened(model: Model) -> Model:
+    """Substitute machine: its loops are opened, and drives without effort act at the freed joints."""
+    if not why_unbalanced(model):
+        return model
+    content = model.to_dict()
+    content.pop("loops", None)
+    actuators = content.setdefault("actuators", {})
+    for name, actuator in actuators.items():
+        if model.actuator_type(name) in SAMPLED_TYPES:
+            place = {key: actuator[key] for key in PLACES if key in actuator}
+            actuators[name] = {"type": "ideal", "gain": 0.0, **place}
+    if model.loops:
+        driven = {*model.driven_joints, *model.added_joints}
+        idle = [joint for joint in model.joints if joint not in driven]
+        actuators |= {_idle(joint): {"type": "ideal", "gain": 0.0, "joint": joint} for joint in idle}
+    return Model.from_dict(content)
+
+
+def _opened_at(model: Model, theta: Array) -> Model:
+    """Substitute machine at other values of the parameters."""
+    return opened(model.with_parameters(dict(zip(model.parameter_names, theta.tolist(), strict=True))))
+
+
+def _idle(joint: str) -> str:
+    """Name of an idle drive in a substitute machine."""
+    return f"{joint}_idle"
+
+
+def _completed(model: Model, tracked: TrackedRecords) -> list[Experiment]:
+    """Substitute records with positions of all joints; a tracker estimates unmeasured ones."""
+    if not model.loops:
+        return list(tracked.experiments)
+    fast = Tracker(max(tracked.settings.bands), fine=False)
+    motions = tracked.states(model, fast)
+    added = [name for name in opened(model).actuators if name not in model.actuators]
+    records = []
+    for record, motion in zip(tracked.experiments, motions, strict=True):
+        whole = record
+        for place, joint in enumerate(model.joints):
+            channel = f"{joint}.position"
+            if channel not in record and joint not in model.added_joints:
+                whole = whole.with_channel(channel, motion[:, place], model.channel_unit(channel))
+        for name in added:
+            whole = whole.with_channel(f"{name}.command", np.zeros(len(record.time)), "1")
+        records.append(whole)
+    return records
