@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+import geared_turntables
 import textbook_arm
 import vpm
 from command_line import vpm as run_vpm
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 Columns = dict[str, Array]
 
 MODEL = vpm.Model.from_toml(textbook_arm.FILE)
+GEARED = geared_turntables.MODEL
 SLIDE_FILE = """
     name = "slide"
     gravity = [0.1, 0.0, -9.81]
@@ -121,49 +123,16 @@ def test_a_fault_of_the_machine_is_no_mistake(logs: dict[str, Columns], fault: s
     assert vpm.check_log(MODEL, record(logs[fault]), workers=1).mistakes == ()
 
 
-GEARED_FILE = """
-    name = "geared turntables"
-    gravity = [0.0, 0.0, -9.81]
-    bodies.near = { mass = 1.0, inertia = [0.02, 0.02, { value = 0.02, uncertainty = 0.002 }, 0.0, 0.0, 0.0] }
-    bodies.far = { mass = 1.0, inertia = [0.005, 0.005, { value = 0.005, uncertainty = 0.0005 }, 0.0, 0.0, 0.0] }
-    joints.one = { type = "revolute", parent = "world", child = "near", axis = [0.0, 0.0, 1.0] }
-    joints.two = { type = "revolute", parent = "world", child = "far", axis = [0.0, 0.0, 1.0] }
-    actuators.m1 = { joint = "one", gain = 1.0, command_unit = "N m" }
-    actuators.m2 = { joint = "two", gain = 1.0, command_unit = "N m" }
-"""
-GEARED = vpm.Model.from_toml(GEARED_FILE)
-
-
-def geared_log(seed: int, factors: tuple[float, float] = (1.0, 1.0)) -> vpm.Experiment:
-    """Turntables behind gears whose friction takes many times the torque of their inertia, each by Newton's law."""
-    inertia, dry, drag = np.array([0.02, 0.005]), np.array([0.9, 0.5]), np.array([0.6, 0.3])
-    drawn, dt, steps = np.random.default_rng(seed), 0.004, 16
-    tones, phases = drawn.uniform(0.15, 0.6, (2, 3)), drawn.uniform(0.0, 2.0 * np.pi, (2, 3))
-    time = np.arange(0.0, 10.0, dt)
-    q, v, places, torques = np.sum(np.sin(phases), axis=1), np.zeros(2), [], []
-    for t in time:
-        torque = 30.0 * (np.sum(np.sin(2.0 * np.pi * tones * t + phases), axis=1) - q) - 0.3 * v
-        places.append(q + 2e-5 * drawn.standard_normal(2))
-        torques.append(torque)
-        for _ in range(steps):
-            v = v + dt / steps * (torque - dry * np.tanh(v / 5e-3) - drag * v) / inertia
-            q = q + dt / steps * v
-    q1, q2 = np.array(places).T * np.array(factors)[:, None]
-    m1, m2 = np.array(torques).T
-    columns = {"one.position": q1, "two.position": q2, "m1.command": m1, "m2.command": m2}
-    return vpm.Experiment.from_arrays(time, columns, {}, model=GEARED)
-
-
 @pytest.mark.parametrize("seed", at_night(range(6), but=[0]))
 def test_friction_far_above_inertia_is_no_mistake(seed: int) -> None:
-    found = vpm.check_log(GEARED, geared_log(seed), workers=1)
+    found = vpm.check_log(GEARED, geared_turntables.log(seed), workers=1)
     assert found.mistakes == ()
     assert max(found.shares.values()) < 0.01
 
 
 @pytest.mark.parametrize("seed", at_night(range(4), but=[0]))
 def test_names_a_mistake_beside_friction_far_above_inertia(seed: int) -> None:
-    found = vpm.check_log(GEARED, geared_log(seed, (1.0, 180.0 / np.pi)), workers=1)
+    found = vpm.check_log(GEARED, geared_turntables.log(seed, (1.0, 180.0 / np.pi)), workers=1)
     (one,) = found.mistakes
     assert (one.kind, one.channels) == ("unit", ("two.position",))
 
