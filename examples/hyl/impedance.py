@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 import vpm
 from vpm import impedance
-from vpm.plot import plot_loops
+from vpm.studies.impedance.pictures import plot_loops
 
 Array = NDArray[np.float64]
 

@@ -33,15 +33,12 @@ if TYPE_CHECKING:
     from vpm.errors import VpmError
     from vpm.experiment import Campaign, Experiment
     from vpm.identify import (
-        CylinderGeometry,
         Fit,
         Fitting,
         InertialFit,
         InertialRegression,
-        OilFit,
         identify,
         identify_inertial,
-        identify_oil,
     )
     from vpm.linear import LinearModel
     from vpm.log_check import LogCheck, check_log
@@ -59,6 +56,7 @@ if TYPE_CHECKING:
     from vpm.simplify import Ladder, simplify
     from vpm.simulate import Run, Setup, simulate
     from vpm.stepping import Simulation
+    from vpm.studies.oil import CylinderGeometry, OilFit, identify_oil
     from vpm.view import view
     from vpm.weighing import Weighing, weigh
 
@@ -160,15 +158,12 @@ _HOMES = {
     "VpmError": "vpm.errors",
     "Campaign": "vpm.experiment",
     "Experiment": "vpm.experiment",
-    "CylinderGeometry": "vpm.identify",
     "Fit": "vpm.identify",
     "Fitting": "vpm.identify",
     "InertialFit": "vpm.identify",
     "InertialRegression": "vpm.identify",
-    "OilFit": "vpm.identify",
     "identify": "vpm.identify",
     "identify_inertial": "vpm.identify",
-    "identify_oil": "vpm.identify",
     "LinearModel": "vpm.linear",
     "LogCheck": "vpm.log_check",
     "check_log": "vpm.log_check",
@@ -204,6 +199,9 @@ _HOMES = {
     "Setup": "vpm.simulate",
     "simulate": "vpm.simulate",
     "Simulation": "vpm.stepping",
+    "CylinderGeometry": "vpm.studies.oil",
+    "OilFit": "vpm.studies.oil",
+    "identify_oil": "vpm.studies.oil",
     "view": "vpm.view",
     "Weighing": "vpm.weighing",
     "weigh": "vpm.weighing",

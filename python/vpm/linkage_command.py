@@ -18,7 +18,7 @@ def linkage(
     plot: Plot = None,
 ) -> None:
     """Say what a closed linkage can do: singular strokes of KARL, cylinders and shares of dynamics of a leg."""
-    from vpm.linkages import load
+    from vpm.studies.linkages import load
 
     found = load(path)
     give(name=found.name, kind=type(found).__name__, summary=found.summary)

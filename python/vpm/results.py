@@ -46,6 +46,7 @@ from vpm.errors import VpmError, needs
 from vpm.fields import misfit
 from vpm.files import replacing, unreadable
 from vpm.json_values import plain
+from vpm.moved import present_name
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -103,30 +104,14 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "vpm.identify.inertial_fit": ("InertialFit",),
     "vpm.identify.inertial_regression": ("InertialRegression",),
     "vpm.identify.intervals": ("Bootstrap", "Profile"),
-    "vpm.identify.oil_equations": ("CylinderGeometry",),
-    "vpm.identify.oil_fit": ("OilFit",),
     "vpm.identify.settings": ("Checks", "Fitting"),
     "vpm.identify.whiteness": ("Whiteness",),
-    "vpm.impedance.decay": ("Decay", "LogarithmicDecrement"),
-    "vpm.impedance.impact": ("ImpulseBalance", "Stop"),
-    "vpm.impedance.landing": ("Landing",),
-    "vpm.impedance.hysteresis_loop": ("Loop",),
-    "vpm.impedance.loss": ("LossLaw",),
-    "vpm.impedance.repeated": ("ImpedanceTable", "Repeated", "RepeatedTests"),
     "vpm.linear": ("LinearModel",),
-    "vpm.linkages.dropping": ("DropLimit",),
-    "vpm.linkages.karl": ("KarlGeometry",),
-    "vpm.linkages.karl_results": ("KarlPoses", "KarlSingularities", "KarlWorkspace"),
-    "vpm.linkages.leg_parameters": ("Attachment", "Cylinder", "LegParameters", "LegPart", "Segment"),
-    "vpm.linkages.leg_results": ("LegReactions", "LegStrokes", "LegTerms", "ShareMap"),
     "vpm.log_check.finding": ("Finding", "LogCheck"),
     "vpm.model.model": ("Model",),
     "vpm.narx.maxwell": ("MaxwellNarx",),
-    "vpm.narx.maxwell_maps": ("MaxwellMap",),
     "vpm.narx.maxwell_records": ("MaxwellSignals",),
     "vpm.narx.maxwell_result": ("MaxwellFit",),
-    "vpm.narx.maxwell_runs": ("MaxwellErrors",),
-    "vpm.narx.maxwell_windows": ("MaxwellWindows",),
     "vpm.narx.model": ("Narx",),
     "vpm.narx.run": ("NarxRun", "ResidualTests"),
     "vpm.narx.validation": ("NarxValidation",),
@@ -143,6 +128,22 @@ _MODULES: Mapping[str, tuple[str, ...]] = {
     "vpm.simulate.resolution": ("Resolution",),
     "vpm.simulate.run": ("Run",),
     "vpm.simulate.setup": ("Setup",),
+    "vpm.studies.impedance.decay": ("Decay", "LogarithmicDecrement"),
+    "vpm.studies.impedance.hysteresis_loop": ("Loop",),
+    "vpm.studies.impedance.impact": ("ImpulseBalance", "Stop"),
+    "vpm.studies.impedance.landing": ("Landing",),
+    "vpm.studies.impedance.loss": ("LossLaw",),
+    "vpm.studies.impedance.repeated": ("ImpedanceTable", "Repeated", "RepeatedTests"),
+    "vpm.studies.linkages.dropping": ("DropLimit",),
+    "vpm.studies.linkages.karl": ("KarlGeometry",),
+    "vpm.studies.linkages.karl_results": ("KarlPoses", "KarlSingularities", "KarlWorkspace"),
+    "vpm.studies.linkages.leg_parameters": ("Attachment", "Cylinder", "LegParameters", "LegPart", "Segment"),
+    "vpm.studies.linkages.leg_results": ("LegReactions", "LegStrokes", "LegTerms", "ShareMap"),
+    "vpm.studies.maxwell.maps": ("MaxwellMap",),
+    "vpm.studies.maxwell.runs": ("MaxwellErrors",),
+    "vpm.studies.maxwell.windows": ("MaxwellWindows",),
+    "vpm.studies.oil.equations": ("CylinderGeometry",),
+    "vpm.studies.oil.fit": ("OilFit",),
     "vpm.weighing.weigh": ("Weighing",),
 }
 
@@ -398,10 +399,12 @@ def _built(kind: type[Storable], items: Mapping[str, Any], path: object) -> Stor
 
 def _stored_class(name: str, path: object) -> type[Storable]:
     module, _, kind = name.partition(":")
+    if module not in _MODULES:
+        module = present_name(module)
     if kind in _MODULES.get(module, ()):
         import_module(module)
     try:
-        return _STORED_CLASSES[name]
+        return _STORED_CLASSES[f"{module}:{kind}"]
     except KeyError as error:
         raise VpmError(
             f"{path} holds a {name}, which is not known here; import its class before, or use the version that wrote it"

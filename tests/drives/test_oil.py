@@ -13,8 +13,8 @@ import vpm
 from hydraulic_reference import AREA, NO_LOAD_IN, NO_LOAD_OUT, RATIO, ROOT, SUPPLY, TANK, held
 from oil_witness import BETA, FREQUENCIES, GAIN, GEOMETRY, LEAKAGE, SPOOL, found, seen, solved, sum_rule_bias
 from vpm.errors import IdentificationError
-from vpm.identify import pressures_from_force
-from vpm.identify.oil_equations import balances, through_spool
+from vpm.studies.oil import pressures_from_force
+from vpm.studies.oil.equations import balances, through_spool
 
 PRESSURES = ("pressure_a", "pressure_b")
 leg = SimpleNamespace(**runpy.run_path(str(ROOT / "examples/hyl/oil.py"), run_name="leg"))

@@ -140,6 +140,14 @@ def test_names_of_vpm_are_light() -> None:
     assert SLOW & added == set()
 
 
+def test_the_tool_works_without_the_studies() -> None:
+    # Also where the name of a study stands in a text, which the layers do not see.
+    parts = sorted({part_of(path) for path in modules()} - {"impedance", "linkages", "studies"})
+    added = loaded_by("import " + ", ".join(f"vpm.{part}" for part in parts))
+    assert "vpm.simplify.learnt" in added
+    assert not any(name.startswith("vpm.studies") for name in added)
+
+
 def test_names_of_vpm_are_those_that_type_checkers_see() -> None:
     body = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8")).body
     (block,) = (node for node in body if is_type_checking(node) and isinstance(node, ast.If) and not node.orelse)

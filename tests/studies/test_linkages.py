@@ -13,6 +13,8 @@ from vpm import linkages
 from vpm.cli import app
 from vpm.errors import ModelError
 from vpm.linkages import Karl, KarlGeometry, KarlPoses, Leg, LegParameters, ShareMap
+from vpm.studies.linkages.leg import ShareDefinition
+from vpm.studies.linkages.leg_parameters import HyqSet
 
 ROOT = Path(__file__).resolve().parents[2]
 KARL_FILE = ROOT / "examples" / "karl" / "karl.toml"
@@ -32,7 +34,7 @@ def load_leg() -> Leg:
 
 
 @pytest.mark.parametrize("data", ["table", "identified", "plausible"])
-def test_derivations_agree_with_every_set_of_parameters(data: linkages.leg_parameters.HyqSet) -> None:
+def test_derivations_agree_with_every_set_of_parameters(data: HyqSet) -> None:
     assert disagreement(Leg.hyq(data, shank=0.36, thigh=0.33)) < 1e-10
 
 
@@ -89,7 +91,7 @@ def test_rods_that_reach_nothing_leave_no_singular_strokes() -> None:
 
 
 @pytest.mark.parametrize("definition", ["sum_of_norms", "norm_of_absolute_sum", "root_of_squares", "torque"])
-def test_shares_follow_their_definition(definition: linkages.leg.ShareDefinition) -> None:
+def test_shares_follow_their_definition(definition: ShareDefinition) -> None:
     leg, q = Leg.hyq(), np.radians([20.0, -80.0])
     found = leg.shares((4.0, 3.0), first=q[:1], second=q[1:], samples=4, definition=definition)
     v = np.array(np.meshgrid(*[np.linspace(-4.0, 4.0, 4)] * 2)).reshape(2, -1).T

@@ -12,7 +12,7 @@ from maxwell_element import C1, K1, SIGNALS, STEP, element, made, motions, poses
 from vpm import narx
 from vpm.errors import IdentificationError
 from vpm.narx import MaxwellNarx, MaxwellSignals
-from vpm.narx.maxwell_maps import Basis
+from vpm.narx.maxwell_basis import Basis
 from vpm.narx.maxwell_problem import OutputErrors
 from vpm.narx.maxwell_records import element_samples
 

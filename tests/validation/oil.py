@@ -7,7 +7,7 @@ import numpy as np
 from hydraulic_reference import NO_LOAD_IN, NO_LOAD_OUT, SUPPLY, TANK
 from oil_witness import BETA, FREQUENCIES, GAIN, GEOMETRY, LEAKAGE, found, seen, sum_rule_bias
 from validation.row import Row, row
-from vpm.identify import pressures_from_force
+from vpm.studies.oil import pressures_from_force
 
 PRESSURES = ("pressure_a", "pressure_b")
 #: Stiffness of the oil in mid-stroke (N/m), closed form, and friction of the rig (N s/m).

@@ -1,5 +1,7 @@
 """Identification: parameters, their uncertainty, and what the data cannot see."""
 
+from typing import TYPE_CHECKING
+
 from vpm.identify.comparison import FIT_MODES, problem
 from vpm.identify.estimation import Estimate, Worth, estimate
 from vpm.identify.export import write_fit
@@ -13,8 +15,6 @@ from vpm.identify.inertial_regression import InertialRegression
 from vpm.identify.input_error import InputErrorProblem
 from vpm.identify.intervals import Bootstrap, Profile, bootstrap, profile_intervals
 from vpm.identify.inverse_dynamics import InverseDynamicsProblem
-from vpm.identify.oil_equations import CylinderGeometry, pressures_from_force
-from vpm.identify.oil_fit import OilFit, identify_oil
 from vpm.identify.output_error import OutputErrorProblem
 from vpm.identify.prediction_error import PredictionErrorProblem
 from vpm.identify.problem import Block, Problem, gaps, segments
@@ -23,6 +23,12 @@ from vpm.identify.settings import Checks, Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.statistics import Gain, gain, robust_covariance
 from vpm.identify.whiteness import Whiteness, ljung_box
+from vpm.moved import names_of_study
+
+if TYPE_CHECKING:
+    from vpm.studies.oil import CylinderGeometry, OilFit, identify_oil, pressures_from_force
+else:
+    __getattr__ = names_of_study(__name__, "vpm.studies.oil")
 
 __all__ = [
     "FIT_MODES",

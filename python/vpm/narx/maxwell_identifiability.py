@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from vpm.compare import autocorrelation
 from vpm.narx.maxwell import MaxwellNarx
-from vpm.narx.maxwell_maps import COUNTS, Basis
+from vpm.narx.maxwell_basis import COUNTS, Basis
 from vpm.narx.maxwell_problem import OutputErrors, Parameters
 from vpm.narx.maxwell_records import MaxwellSignals, Samples
 from vpm.narx.maxwell_recursion import POWER_NAMES, POWERS

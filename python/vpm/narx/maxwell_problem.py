@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.narx.maxwell_maps import Basis
+from vpm.narx.maxwell_basis import Basis
 from vpm.narx.maxwell_records import Samples
 from vpm.narx.maxwell_recursion import Recursion, Scheme, seen, stretch
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,42 +106,3 @@ def _samples(record: RecordLike, signals: MaxwellSignals, step: float | None, na
     unit = record.unit(signals.force) if isinstance(record, Experiment) else "1"
     time = given.time if clocked else given.time * dt
     return Samples(given.name, unit, time, dt, given.output, given.inputs[:, 0].copy(), drive)
-
-
-def smoothed(one: Samples, cutoff: float | None) -> Samples:
-    """The record with its length low-passed without delay, and without its ends, where that filter does not hold.
-
-    The length is the input of the element: its noise, times ``k0 + k1``, is not white noise of the force, and makes k1
-    too small. The force is left as it is, so that its own noise stays white.
-
-    Parameters
-    ----------
-    one : Samples
-    cutoff : float, optional
-        Hz, well above the motion.
-
-    Raises
-    ------
-    IdentificationError
-        The cut-off is not between zero and half the sampling rate, or the record is too short for it.
-    """
-    if cutoff is None:
-        return one
-    if not 0.0 < cutoff < 0.5 / one.step:
-        raise IdentificationError(
-            f"a cut-off of {cutoff:g} Hz is not between zero and half the sampling rate of {1.0 / one.step:g} Hz"
-        )
-    end = round(2.0 / (cutoff * one.step))
-    if one.length.size < 4 * end:
-        raise IdentificationError(
-            f"record {one.name} has {one.length.size} samples, but a cut-off of {cutoff:g} Hz takes {end} from each "
-            "end; give a longer record or a higher cut-off"
-        )
-    from scipy.signal import butter, sosfiltfilt
-
-    sections = butter(4, cutoff, fs=1.0 / one.step, output="sos")
-    length = sosfiltfilt(sections, one.length)
-    inner = slice(end, one.length.size - end)
-    return replace(
-        one, time=one.time[inner], force=one.force[inner], length=np.asarray(length)[inner], drive=one.drive[inner]
-    )

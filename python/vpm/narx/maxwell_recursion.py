@@ -8,8 +8,6 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.narx.maxwell import MaxwellNarx
-
 Array = NDArray[np.float64]
 Scheme = Literal["trapezoidal", "printed", "central_mean"]
 
@@ -113,17 +111,3 @@ def surface_columns(drive: Array, length: Array) -> Array:
 POWERS = ((0, 0), (1, 0), (0, 1), (2, 0), (1, 1), (0, 2), (3, 0), (2, 1), (1, 2), (0, 3))
 #: The same in words.
 POWER_NAMES = ("1", "u", "s", "u^2", "u*s", "s^2", "u^3", "u^2*s", "u*s^2", "s^3")
-
-
-def one_step(element: MaxwellNarx, force: Array, length: Array, drive: Array) -> Array:
-    """One step of the recursion from the **measured** force a lag before, N, shape (N,)."""
-    recursion = Recursion(element.scheme, element.relaxation_time / element.step)
-    w, r = recursion.weights, recursion.ratio
-    columns = surface_columns(drive, length)
-    stiffness = columns @ element.k0
-    elastic = stiffness * (length - columns @ element.s0)
-    rate = (seen(element.scheme, stiffness) + element.k1) * stretch(element.scheme, length)
-    past = (w.gamma + w.delta * r) * recursion.lagged(force)
-    values = (seen(element.scheme, elastic) + r * rate + past) / (w.alpha + w.beta * r)
-    values[:2] = force[:2]
-    return np.asarray(values)

@@ -12,10 +12,12 @@ from vpm.errors import DivergedError
 from vpm.narx.maxwell import MaxwellNarx
 from vpm.narx.maxwell_records import Samples
 from vpm.narx.maxwell_recursion import POWER_NAMES
-from vpm.narx.maxwell_runs import FAR
 from vpm.results import Result
 
 Array = NDArray[np.float64]
+
+#: A free run beyond so many times the largest measured force counts as diverged.
+FAR = 1e3
 
 
 @dataclass(frozen=True, repr=False, eq=False)

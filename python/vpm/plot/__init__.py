@@ -2,7 +2,6 @@
 
 from vpm.plot.bars import plot_candidates, plot_climb, plot_gap, plot_ladder, plot_parameters, plot_step_cost
 from vpm.plot.evidence import plot_evidence
-from vpm.plot.impedance import plot_impedances, plot_loops
 from vpm.plot.inertial import plot_inertial
 from vpm.plot.linear import plot_bode, plot_poles
 from vpm.plot.narx import plot_narx_run, plot_narx_terms
@@ -29,11 +28,9 @@ __all__ = [
     "plot_correlation",
     "plot_evidence",
     "plot_gap",
-    "plot_impedances",
     "plot_inertial",
     "plot_innovations",
     "plot_ladder",
-    "plot_loops",
     "plot_narx_run",
     "plot_narx_terms",
     "plot_parameters",

@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
-from vpm.impedance.channels import Columns
-from vpm.impedance.harmonics import Complex, Series, fundamental
+from vpm.studies.impedance.channels import Columns
+from vpm.studies.impedance.harmonics import Complex, Series, fundamental
 
 Array = NDArray[np.float64]
 

@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
-from vpm.impedance.channels import RecordLike, Sense, check_moves, check_sense, columns
-from vpm.impedance.cycles import FEWEST_PER_CYCLE, Sums, parts, visible, whole_cycles
-from vpm.impedance.harmonics import Complex, evaluate, fourier
-from vpm.impedance.hysteresis_notes import loop_notes
 from vpm.results import Result
+from vpm.studies.impedance.channels import RecordLike, Sense, check_moves, check_sense, columns
+from vpm.studies.impedance.cycles import FEWEST_PER_CYCLE, Sums, parts, visible, whole_cycles
+from vpm.studies.impedance.harmonics import Complex, evaluate, fourier
+from vpm.studies.impedance.hysteresis_notes import loop_notes
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -140,7 +140,7 @@ class Loop(Result):
 
     def plot(self) -> Figure:
         """Draw the loop and the ellipse of its stiffness and damping. Needs the extra ``plot``."""
-        from vpm.plot import plot_loops
+        from vpm.studies.impedance.pictures import plot_loops
 
         return plot_loops([self])
 

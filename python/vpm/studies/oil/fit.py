@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import IdentificationError
-from vpm.identify.oil_check import Channels, check_answer, check_choices, check_record
-from vpm.identify.oil_equations import (
+from vpm.numbers import NORMAL_95
+from vpm.results import Result
+from vpm.studies.oil.check import Channels, check_answer, check_choices, check_record
+from vpm.studies.oil.equations import (
     CylinderGeometry,
     Equation,
     balances,
     pressures_from_force,
     through_spool,
 )
-from vpm.identify.oil_solve import integral_rows, noise_share, rate_rows, solve
-from vpm.numbers import NORMAL_95
-from vpm.results import Result
+from vpm.studies.oil.solve import integral_rows, noise_share, rate_rows, solve
 
 Array = NDArray[np.float64]
 

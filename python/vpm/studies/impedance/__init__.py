@@ -1,11 +1,11 @@
 """Stiffness and damping of joints and cylinders from hysteresis loops, impacts and landings, with repeated tests."""
 
-from vpm.impedance.decay import Decay, LogarithmicDecrement, identify_decay, logarithmic_decrement
-from vpm.impedance.hysteresis_loop import Loop, identify_loop
-from vpm.impedance.impact import ImpulseBalance, Stop, impulse_balance, stop_damping, stop_factor
-from vpm.impedance.landing import Landing, identify_landing
-from vpm.impedance.loss import LossLaw, identify_loss_law
-from vpm.impedance.repeated import ImpedanceTable, Repeated, RepeatedTests, repeat, repeat_tests
+from vpm.studies.impedance.decay import Decay, LogarithmicDecrement, identify_decay, logarithmic_decrement
+from vpm.studies.impedance.hysteresis_loop import Loop, identify_loop
+from vpm.studies.impedance.impact import ImpulseBalance, Stop, impulse_balance, stop_damping, stop_factor
+from vpm.studies.impedance.landing import Landing, identify_landing
+from vpm.studies.impedance.loss import LossLaw, identify_loss_law
+from vpm.studies.impedance.repeated import ImpedanceTable, Repeated, RepeatedTests, repeat, repeat_tests
 
 __all__ = [
     "Decay",

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.experiment import noise_std
-from vpm.impedance.channels import RecordLike, check_moves, columns
 from vpm.results import Result
+from vpm.studies.impedance.channels import RecordLike, check_moves, columns
 
 if TYPE_CHECKING:
     from scipy.optimize import OptimizeResult

@@ -60,7 +60,7 @@ class KarlPoses(Result):
         -------
         matplotlib.figure.Figure
         """
-        from vpm.plot.linkages import plot_limbs
+        from vpm.studies.linkages.pictures import plot_limbs
 
         return plot_limbs(self.elbows, self.end_points, [f"{q1:.0f}°, {q2:.0f}°" for q1, q2 in np.degrees(self.angles)])
 
@@ -163,7 +163,7 @@ class KarlWorkspace(Result):
         -------
         matplotlib.figure.Figure
         """
-        from vpm.plot.linkages import plot_stroke_workspace
+        from vpm.studies.linkages.pictures import plot_stroke_workspace
 
         singular = [self.singularities.of(actuator) for actuator in (0, 1)]
         return plot_stroke_workspace(

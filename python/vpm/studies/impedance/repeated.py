@@ -213,7 +213,7 @@ class ImpedanceTable(Result):
 
     def plot(self) -> Figure:
         """Draw stiffness and damping of every row with their intervals. Needs the extra ``plot``."""
-        from vpm.plot import plot_impedances
+        from vpm.studies.impedance.pictures import plot_impedances
 
         return plot_impedances(self.rows)
 

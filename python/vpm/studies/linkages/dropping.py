@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import ModelError
-from vpm.linkages.leg import Leg
 from vpm.results import Result
+from vpm.studies.linkages.leg import Leg
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -80,7 +80,7 @@ class DropLimit(Result):
 
     def plot(self) -> Figure:
         """Map of the limits for dropping a term over the joint angles. Needs the extra ``plot``."""
-        from vpm.plot.linkages import plot_shares
+        from vpm.studies.linkages.pictures import plot_shares
 
         worst = np.clip(self.limit / self.limits, 0.0, 1.0)
         title = f"{100 * self.tolerance:g} % of the effort is missing at {self.limit:.3g} {self.unit} where this is 1"

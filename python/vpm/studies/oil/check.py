@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import IdentificationError, near_match
-from vpm.identify.oil_equations import CylinderGeometry
-from vpm.identify.oil_solve import Rows, unexplained
 from vpm.numbers import NORMAL_95
+from vpm.studies.oil.equations import CylinderGeometry
+from vpm.studies.oil.solve import Rows, unexplained
 
 if TYPE_CHECKING:
-    from vpm.identify.oil_fit import OilFit
+    from vpm.studies.oil.fit import OilFit
 
 Array = NDArray[np.float64]
 

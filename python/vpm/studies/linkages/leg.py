@@ -10,10 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm._core import Leg as _Leg
 from vpm.errors import ModelError, near_match
-from vpm.linkages.arrays import rowwise
-from vpm.linkages.leg_parameters import Cylinder, HyqSet, LegParameters, LegPart, Segment
-from vpm.linkages.leg_regressor import leg_regressor
-from vpm.linkages.leg_results import LegReactions, LegStrokes, LegTerms, ShareMap
+from vpm.studies.linkages.arrays import rowwise
+from vpm.studies.linkages.leg_parameters import Cylinder, HyqSet, LegParameters, LegPart, Segment
+from vpm.studies.linkages.leg_regressor import leg_regressor
+from vpm.studies.linkages.leg_results import LegReactions, LegStrokes, LegTerms, ShareMap
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -50,7 +50,7 @@ class Leg:
 
     Examples
     --------
-    >>> from vpm.linkages import Leg
+    >>> from vpm.studies.linkages import Leg
     >>> leg = Leg.hyq("plausible", shank=0.341)
     >>> leg.strokes([0.35, -1.4]).shape
     (2,)

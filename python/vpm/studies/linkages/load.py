@@ -7,10 +7,10 @@ from os import PathLike
 from typing import Any, NoReturn
 
 from vpm.errors import ModelError, UnitError, near_match
-from vpm.linkages.karl import Karl, KarlGeometry
-from vpm.linkages.leg import Leg
-from vpm.linkages.leg_parameters import Attachment, Cylinder, LegParameters, LegPart, Segment
 from vpm.model.reading import read_toml
+from vpm.studies.linkages.karl import Karl, KarlGeometry
+from vpm.studies.linkages.leg import Leg
+from vpm.studies.linkages.leg_parameters import Attachment, Cylinder, LegParameters, LegPart, Segment
 from vpm.units import convert
 
 TYPES = ("karl", "leg")

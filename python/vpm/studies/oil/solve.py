@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.experiment.signal import differentiate, lowpass, settling_samples
-from vpm.identify.oil_equations import Equation
 from vpm.identify.statistics import correlation_length, window_sums
+from vpm.studies.oil.equations import Equation
 
 Array = NDArray[np.float64]
 

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
-from vpm.impedance.hysteresis_loop import Loop
 from vpm.results import Result
+from vpm.studies.impedance.hysteresis_loop import Loop
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vpm.errors import IdentificationError
-from vpm.impedance.channels import RecordLike, columns
 from vpm.results import Result
+from vpm.studies.impedance.channels import RecordLike, columns
 
 #: Farther from a quarter or half sine than this share, and the damping is worth a warning.
 OFF = 0.1

@@ -10,20 +10,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
-from vpm.narx.maxwell_maps import MaxwellMap
 from vpm.narx.maxwell_problem import OutputErrors, Parameters
-from vpm.narx.maxwell_records import MaxwellSignals, Samples, element_samples, smoothed
+from vpm.narx.maxwell_records import MaxwellSignals, Samples, element_samples
 from vpm.narx.maxwell_recursion import WEIGHTS, Recursion, Scheme, seen, stretch
-from vpm.narx.maxwell_windows import MaxwellWindows
+from vpm.narx.maxwell_refinement import LEAST
 from vpm.narx.records import RecordLike
+from vpm.studies.maxwell.maps import MaxwellMap
+from vpm.studies.maxwell.smoothing import smoothed
+from vpm.studies.maxwell.windows import MaxwellWindows
 
 Array = NDArray[np.float64]
 Method = Literal["output_error", "instrumental", "least_squares"]
 
 #: Relaxation times that a descent may start from, in samples.
 GRID = np.geomspace(0.6, 300.0, 16)
-#: Fewest samples of a window.
-LEAST = 20
 
 
 def dynamic_windows(

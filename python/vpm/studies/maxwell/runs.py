@@ -10,16 +10,15 @@ from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, SimulationError
 from vpm.narx.maxwell import MaxwellNarx
-from vpm.narx.maxwell_records import MaxwellSignals, Samples, element_samples, smoothed
-from vpm.narx.maxwell_recursion import one_step
+from vpm.narx.maxwell_records import MaxwellSignals, Samples, element_samples
+from vpm.narx.maxwell_recursion import Recursion, seen, stretch, surface_columns
+from vpm.narx.maxwell_result import FAR
 from vpm.narx.records import RecordLike
 from vpm.narx.run import NarxRun
 from vpm.results import Result
+from vpm.studies.maxwell.smoothing import smoothed
 
 Array = NDArray[np.float64]
-
-#: A free run beyond so many times the largest measured force counts as diverged.
-FAR = 1e3
 
 
 def maxwell_one_step(element: MaxwellNarx, record: RecordLike, signals: MaxwellSignals | None = None) -> NarxRun:
@@ -76,8 +75,22 @@ def maxwell_free_run(
     return _free(element, _sampled(element, record, signals), signals, limit)
 
 
+def _one_step(element: MaxwellNarx, one: Samples) -> Array:
+    """Force of each sample from the **measured** force a lag before, N, shape (N,); the first two are as given."""
+    recursion = Recursion(element.scheme, element.relaxation_time / element.step)
+    w, r = recursion.weights, recursion.ratio
+    columns = surface_columns(one.drive, one.length)
+    stiffness = columns @ element.k0
+    elastic = stiffness * (one.length - columns @ element.s0)
+    rate = (seen(element.scheme, stiffness) + element.k1) * stretch(element.scheme, one.length)
+    past = (w.gamma + w.delta * r) * recursion.lagged(one.force)
+    values = (seen(element.scheme, elastic) + r * rate + past) / (w.alpha + w.beta * r)
+    values[:2] = one.force[:2]
+    return np.asarray(values)
+
+
 def _ahead(element: MaxwellNarx, one: Samples, signals: MaxwellSignals) -> NarxRun:
-    return _run("one-step prediction", one, one_step(element, one.force, one.length, one.drive), signals)
+    return _run("one-step prediction", one, _one_step(element, one), signals)
 
 
 def _free(element: MaxwellNarx, one: Samples, signals: MaxwellSignals, limit: float | None = None) -> NarxRun:

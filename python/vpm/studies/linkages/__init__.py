@@ -10,14 +10,14 @@ Both are described by a TOML file or by numbers, and answer with frozen results 
 The laws are those of the core, see ``docs/linkages.md``. Angles in rad, lengths in m, all numbers SI.
 """
 
-from vpm.linkages.dropping import DropLimit, drop_limit
-from vpm.linkages.karl import Karl, KarlGeometry
-from vpm.linkages.karl_results import KarlPoses, KarlSingularities, KarlWorkspace
-from vpm.linkages.leg import Leg
-from vpm.linkages.leg_parameters import Attachment, Cylinder, LegParameters, LegPart, Segment
-from vpm.linkages.leg_regressor import INERTIAL_NAMES, inertial_values, with_inertial_values
-from vpm.linkages.leg_results import LegReactions, LegStrokes, LegTerms, ShareMap
-from vpm.linkages.load import load
+from vpm.studies.linkages.dropping import DropLimit, drop_limit
+from vpm.studies.linkages.karl import Karl, KarlGeometry
+from vpm.studies.linkages.karl_results import KarlPoses, KarlSingularities, KarlWorkspace
+from vpm.studies.linkages.leg import Leg
+from vpm.studies.linkages.leg_parameters import Attachment, Cylinder, LegParameters, LegPart, Segment
+from vpm.studies.linkages.leg_regressor import INERTIAL_NAMES, inertial_values, with_inertial_values
+from vpm.studies.linkages.leg_results import LegReactions, LegStrokes, LegTerms, ShareMap
+from vpm.studies.linkages.load import load
 
 __all__ = [
     "INERTIAL_NAMES",

@@ -11,9 +11,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm._core import Karl as _Karl
 from vpm.errors import ModelError
-from vpm.linkages.arrays import rowwise
-from vpm.linkages.karl_results import KarlPoses, KarlSingularities, KarlWorkspace
 from vpm.results import Storable
+from vpm.studies.linkages.arrays import rowwise
+from vpm.studies.linkages.karl_results import KarlPoses, KarlSingularities, KarlWorkspace
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -75,7 +75,7 @@ class Karl:
 
     Examples
     --------
-    >>> from vpm.linkages import Karl
+    >>> from vpm.studies.linkages import Karl
     >>> karl = Karl()
     >>> len(karl.direct((0.20, 0.18)))
     4

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from vpm.linkages.leg_parameters import Cylinder, LegParameters, LegPart, Segment
+from vpm.studies.linkages.leg_parameters import Cylinder, LegParameters, LegPart, Segment
 
 if TYPE_CHECKING:
-    from vpm.linkages.leg import Leg
+    from vpm.studies.linkages.leg import Leg
 
 Array = NDArray[np.float64]
 

@@ -133,7 +133,7 @@ class LegStrokes(Result):
         -------
         matplotlib.figure.Figure
         """
-        from vpm.plot.linkages import plot_strokes
+        from vpm.studies.linkages.pictures import plot_strokes
 
         return plot_strokes(self.angles, self.strokes, self.levers, ("hip", "knee"))
 
@@ -194,7 +194,7 @@ class ShareMap(Result):
         -------
         matplotlib.figure.Figure
         """
-        from vpm.plot.linkages import plot_shares
+        from vpm.studies.linkages.pictures import plot_shares
 
         maps = {"μ_M, inertia": self.inertia, "μ_V, velocity": self.velocity, "μ_G, weight": self.gravity}
         return plot_shares(self.first, self.second, maps, f"up to {self.rate:g} rad/s, {self.acceleration:g} rad/s²")

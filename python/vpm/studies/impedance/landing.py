@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, IdentificationError
 from vpm.experiment import noise_std
-from vpm.impedance.channels import RecordLike, Sense, check_moves, check_sense, columns
 from vpm.results import Result
+from vpm.studies.impedance.channels import RecordLike, Sense, check_moves, check_sense, columns
 
 Array = NDArray[np.float64]
 
