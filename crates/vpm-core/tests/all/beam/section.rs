@@ -40,6 +40,7 @@ fn torsion_of_rectangles_follows_the_tables() -> Result<()> {
 fn round_sections_agree_with_each_other() -> Result<()> {
     let circle = Shape::Circle { diameter: 0.02 }.properties(0.3)?;
     let thick = Shape::Tube { outer: 0.02, inner: 1e-9 }.properties(0.3)?;
+    close(circle.area, PI * 1e-4, 1e-14);
     close(circle.moment_x, PI * 0.02_f64.powi(4) / 64.0, 1e-14);
     close(circle.shear_x, 6.0 * 1.3 / (7.0 + 6.0 * 0.3), 1e-14);
     close(thick.shear_x, circle.shear_x, 1e-12);

@@ -56,6 +56,18 @@ fn both_ends_of_a_stroke_push_alike_and_never_pull() {
 }
 
 #[test]
+fn chambers_trade_volume_along_the_stroke() {
+    let cylinder = complete().cylinder;
+    let [full, rod] = [0.016_f64, 0.010].map(|diameter| std::f64::consts::FRAC_PI_4 * diameter * diameter);
+    // From end to end; beyond an end nothing is left but the line.
+    for way in [0.0, 0.013, 0.04, 0.08, 0.09] {
+        let found = cylinder.volumes(way - 0.04);
+        assert!((found.a - 2.9e-6 - full * way).abs() < 1e-18, "{way}");
+        assert!((found.b - 2.9e-6 - (full - rod) * (0.08 - way).max(0.0)).abs() < 1e-18, "{way}");
+    }
+}
+
+#[test]
 fn every_number_has_its_domain() {
     type Spoil = fn(&mut ServoCylinder<f64>);
     let spoiled: [(&str, Spoil); 26] = [
