@@ -56,9 +56,31 @@ fn both_ends_of_a_stroke_push_alike_and_never_pull() {
 }
 
 #[test]
+fn a_valve_reversed_exchanges_its_chambers() {
+    for clearance in [None, Some(1e-4)] {
+        let mut valve = complete().valve;
+        valve.clearance = clearance;
+        for place in [4e-3, 1e-3, 1e-5, -7e-3] {
+            for (a, b) in [(9e6, 3e6), (1e6, 15e6), (17e6, 5e4)] {
+                let (found, mirror) = (valve.flows(place, 16e6, 1e5, [a, b]), valve.flows(-place, 16e6, 1e5, [b, a]));
+                assert!(
+                    (found.into_a + mirror.out_of_b).abs() < 1e-18 && (found.out_of_b + mirror.into_a).abs() < 1e-18
+                );
+                assert!((found.supply - mirror.supply).abs() < 1e-18 && (found.tank - mirror.tank).abs() < 1e-18);
+                // What comes from the supply and does not go to the tank stays in the chambers.
+                assert!((found.supply - found.tank - found.into_a + found.out_of_b).abs() < 1e-18, "{place} {a} {b}");
+            }
+        }
+    }
+}
+
+#[test]
 fn chambers_trade_volume_along_the_stroke() {
     let cylinder = complete().cylinder;
     let [full, rod] = [0.016_f64, 0.010].map(|diameter| std::f64::consts::FRAC_PI_4 * diameter * diameter);
+    let ratio = (full - rod) / full;
+    let areas = PistonSize::Areas { area: full, area_ratio: ratio }.areas();
+    assert!((areas.a - full).abs() < 1e-18 && (areas.b - (full - rod)).abs() < 1e-18);
     // From end to end; beyond an end nothing is left but the line.
     for way in [0.0, 0.013, 0.04, 0.08, 0.09] {
         let found = cylinder.volumes(way - 0.04);
