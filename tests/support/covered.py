@@ -77,7 +77,7 @@ def main(python: Path, core: Path) -> int:
             print(f"  {where:26}{lines}")
         print(f"  {'all':26}{whole}\n")
         if not found or whole.percent < BOUND:
-            print(f"tests run {whole.percent:.1f} % of the lines of {top}, less than {BOUND:g} %", file=sys.stderr)
+            print(f"tests run {whole.run} of {whole.all} lines of {top}, less than {BOUND:g} %", file=sys.stderr)
             enough = False
     return 0 if enough else 1
 
