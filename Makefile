@@ -5,18 +5,20 @@
 #   DEMO_OUT     the folder that the demo's report goes to   (demo-report)
 #   DATA         the folder of public benchmarks            (data)
 #   CASES FIRST  count and first seed of `make fuzz`        (20000, 1)
+#   SHARD        the part of all mutants of `make mutants`  (0/200)
 #   PYTEST_ARGS  CARGO_ARGS                                  passed on
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
 .SUFFIXES:
-.PHONY: help demo test test-rust test-python test-nightly fuzz fuzz-files fuzz-c fuzz-rust reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis benchmarks bench-lisdd docs docs-rust figures site package wheels clean
+.PHONY: help demo test test-rust test-python test-nightly fuzz fuzz-files fuzz-c fuzz-rust coverage mutants reference validation lint lint-rust lint-python bench peers chirp narx-peers bench-counts c-library bench-diagnosis benchmarks bench-lisdd docs docs-rust figures site package wheels clean
 
 PYTHON ?= python3
 DEMO_OUT ?= demo-report
 DATA ?= data
 CASES ?= 20000
 FIRST ?= 1
+SHARD ?= 0/200
 PYTEST_ARGS ?=
 CARGO_ARGS ?=
 
@@ -89,6 +91,20 @@ fuzz-rust: $(VENV)/.installed ## libFuzzer on what the core reads from texts, CA
 	  target/release/$$target -runs=$(CASES) -seed=$(FIRST) -max_len=100000 -timeout=3600 -rss_limit_mb=2048 \
 	    -artifact_prefix=fuzz/ -print_final_stats=1 fuzz/corpus/$$target || exit 1; \
 	done
+
+coverage: $(VENV)/.installed target/tools/bin/cargo-llvm-cov ## lines that the tests run, by room; too few are an error; takes an hour
+	rustup component add llvm-tools
+	mkdir -p build/coverage
+	$(CARGO_TOOL) llvm-cov --package vpm-core --json --summary-only --output-path build/coverage/core.json $(CARGO_ARGS)
+	$(BIN)/python -m coverage erase
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python -m coverage run -m pytest $(PYTEST_ARGS)
+	$(BIN)/python -m coverage combine --quiet
+	$(BIN)/python -m coverage json --quiet -o build/coverage/python.json
+	$(BIN)/python tests/support/covered.py build/coverage/python.json build/coverage/core.json
+
+# Shares of all 5000 mutants are drawn evenly. Each mutant compiles the core and its tests anew, and runs them, for some minutes.
+mutants: $(VENV)/.installed target/tools/bin/cargo-mutants ## one mistake in a law of the core at a time, SHARD of them: do the tests notice?
+	$(CARGO_TOOL) mutants --package vpm-core --shard $(SHARD) --sharding round-robin --output build $(CARGO_ARGS)
 
 lint: lint-rust lint-python ## formatting, static checks and types, all as errors
 
@@ -208,3 +224,9 @@ $(VENV)/.installed: pyproject.toml $(RUST_SOURCES) | $(VENV)/.tools
 	@# A peer of the tests, of pure Python; its list of dependencies, all there already, would hold NumPy back.
 	$(BIN)/python -m pip install --quiet --no-deps 'sysidentpy>=0.9'
 	@touch $@
+
+# Programs of cargo that only some commands need, in the folder of what is compiled.
+CARGO_TOOL := PATH="$(CURDIR)/target/tools/bin:$$PATH" cargo
+
+target/tools/bin/cargo-%: | $(VENV)/.tools-found
+	cargo install --quiet --locked --root target/tools cargo-$*

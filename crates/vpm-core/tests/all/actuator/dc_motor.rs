@@ -74,6 +74,13 @@ fn of_the_power_of_a_driving_motor_the_efficiency_arrives() {
     // Driven back it holds more than it drives with.
     close(motor.effort(10.0, -0.2), 1.2 * 25.0, 1e-7);
     close(motor.effort(0.0, 3.0), 0.0, 0.0);
+    // The loss is the chord from rest times the speed, also where the gear barely turns.
+    for (current, rate) in [(10.0, 0.2), (-10.0, 0.03), (7.0, -1e-3), (3.0, -0.5)] {
+        let driving = 2.5 * current;
+        let loss = motor.gear_resistance(driving, rate) * rate;
+        close(loss, 0.2 * driving.abs() * (rate / 0.02_f64).tanh(), 1e-12);
+        close(motor.effort(current, rate), driving - loss, 1e-12);
+    }
 }
 
 proptest! {

@@ -1,5 +1,8 @@
-//! Empirical forces in machines: exact state Jacobians, where the load comes from a command or from oil, and chords.
+//! Empirical forces: each term against its formula; in machines exact state Jacobians, where the load comes from a command or from oil.
 
+use std::f64::consts::TAU;
+
+use serde_json::json;
 use vpm_core::effect::{EmpiricalForce, Law};
 use vpm_core::ode::Ode;
 use vpm_core::samples::slider;
@@ -76,6 +79,50 @@ fn state_jacobian_is_that_of_differences_under_oil_pressure() {
     check_jacobian(&machine, &x, 1e-3);
     (x[dim - 2], x[dim - 1]) = (x[dim - 2] - 5e6, x[dim - 1] + 3e6);
     check_jacobian(&machine, &x, 1e-3);
+}
+
+#[test]
+fn each_term_is_what_the_formula_says() -> serde_json::Result<()> {
+    // By place x, speed y, direction s and phase phi; those of the load by its size.
+    type Term = fn(f64, f64, f64, f64) -> f64;
+    let terms: [(&str, Term); 20] = [
+        ("constant", |_, _, _, _| 1.0),
+        ("position", |x, _, _, _| x),
+        ("position_2", |x, _, _, _| x * x),
+        ("position_3", |x, _, _, _| x * x * x),
+        ("cosine", |_, _, _, phi| phi.cos()),
+        ("sine", |_, _, _, phi| phi.sin()),
+        ("viscous", |_, y, _, _| y),
+        ("speed_2", |_, y, _, _| y * y),
+        ("drag", |_, y, _, _| y * y.abs()),
+        ("speed_3", |_, y, _, _| y * y * y),
+        ("viscous_position", |x, y, _, _| y * x),
+        ("viscous_position_2", |x, y, _, _| y * x * x),
+        ("dry", |_, _, s, _| s),
+        ("dry_position", |x, _, s, _| s * x),
+        ("dry_position_2", |x, _, s, _| s * x * x),
+        ("dry_cosine", |_, _, s, phi| s * phi.cos()),
+        ("dry_sine", |_, _, s, phi| s * phi.sin()),
+        ("load_dry", |_, _, s, _| 3.0 * s),
+        ("load_cosine", |_, _, _, phi| 3.0 * phi.cos()),
+        ("load_sine", |_, _, _, phi| 3.0 * phi.sin()),
+    ];
+    for (name, term) in terms {
+        for period in [Some(0.3), None] {
+            let mut numbers = json!({"middle": 0.1, "reach": 0.5, "speed": 2.0, "transition_velocity": 0.4});
+            numbers[name] = json!(0.4);
+            period.iter().for_each(|&period| numbers["period"] = json!(period));
+            let law: EmpiricalForce<f64> = serde_json::from_value(numbers)?;
+            assert_eq!(law.follows_load(), name.starts_with("load"));
+            // Within the range that was seen, and beyond it.
+            for (q, v) in [(0.23, 0.7), (-0.15, -1.3), (0.1, 0.0), (1.9, 5.0), (-3.0, -2.5)] {
+                let [x, y] = [(q - 0.1) / 0.5, v / 2.0].map(|share: f64| share.clamp(-1.0, 1.0));
+                let expected = -0.4 * term(x, y, (v / 0.4).tanh(), TAU * q / period.unwrap_or(1.0));
+                close(law.effort_under(q, v, -3.0), expected, 1e-13);
+            }
+        }
+    }
+    Ok(())
 }
 
 #[test]

@@ -80,6 +80,47 @@ fn slopes_are_those_of_differences_and_continuous() {
 }
 
 #[test]
+fn slopes_at_nodes_are_those_of_fritsch_and_butland() {
+    // Over unequal steps h with secants s: inside 1/slope is the mean of 1/s with the weights h_left + 2 h_right and 2 h_left + h_right,
+    // nothing where the secants differ in sign; at an end the slope of the parabola through three nodes, of the secant's sign and at most
+    // three times as steep. Source: Fritsch & Butland 1984, "A method for constructing local monotone piecewise cubic interpolants".
+    let u = [0.0, 1.0, 3.0];
+    for (values, slopes) in [
+        ([0.0, 1.0, 7.0], [1.0 / 3.0, 27.0 / 19.0, 13.0 / 3.0]),
+        ([0.0, -1.0, -7.0], [-1.0 / 3.0, -27.0 / 19.0, -13.0 / 3.0]),
+        ([0.0, 1.0, -17.0], [3.0, 0.0, -47.0 / 3.0]),
+        ([0.0, 1.0, 19.0], [0.0, 81.0 / 49.0, 43.0 / 3.0]),
+    ] {
+        let by = |node: f64| values[u.iter().position(|&place| place == node).unwrap()];
+        let along_u: TableDrive = serde_json::from_value(written(|node, _| by(node), &u, &[-1.0, 1.0])).unwrap();
+        let along_v: TableDrive = serde_json::from_value(written(|_, node| by(node), &[-1.0, 1.0], &u)).unwrap();
+        for (node, slope) in u.into_iter().zip(slopes) {
+            // A little inside, since beyond its ends a table goes on as it does there.
+            let place = (node + 1e-9).min(3.0 - 1e-9);
+            let (variable, other) = (Dual::<f64, 1>::variable(place, 0), Dual::from_f64(0.2));
+            close(along_u.effort(variable, other).gradient[0], slope, 1e-6);
+            close(along_v.effort(other, variable).gradient[0], slope, 1e-6);
+        }
+    }
+}
+
+#[test]
+fn twists_at_nodes_are_exact_for_parabolas() {
+    // f = v g(u), g = (2 u^2 + u)/3: along u the slope at v = 1/4 is Hermite's polynomial of its slopes at v = 0 and 1, that of the limited
+    // g among them, and of the slopes g' of f_v at both.
+    let g = |u: f64| (2.0 * u * u + u) / 3.0;
+    let found: TableDrive = serde_json::from_value(written(|u, v| v * g(u), &[0.0, 1.0, 3.0], &[0.0, 1.0])).unwrap();
+    let (value, slopes) = (5.0 / 32.0, 3.0 / 32.0);
+    for (u, limited, exact) in
+        [(0.0, 1.0 / 3.0, 1.0 / 3.0), (1.0, 27.0 / 19.0, 5.0 / 3.0), (3.0, 13.0 / 3.0, 13.0 / 3.0)]
+    {
+        let place = f64::min(u + 1e-9, 3.0 - 1e-9);
+        let by_u = found.effort(Dual::<f64, 1>::variable(place, 0), Dual::from_f64(0.25)).gradient[0];
+        close(by_u, value * limited + slopes * exact, 1e-6);
+    }
+}
+
+#[test]
 fn closer_nodes_come_nearer() {
     let smooth = |u: f64, v: f64| (0.7 * u).exp() * 2.0 - (0.4 * v).exp();
     let gap = |count: u32| {

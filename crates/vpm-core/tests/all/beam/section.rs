@@ -40,10 +40,19 @@ fn torsion_of_rectangles_follows_the_tables() -> Result<()> {
 fn round_sections_agree_with_each_other() -> Result<()> {
     let circle = Shape::Circle { diameter: 0.02 }.properties(0.3)?;
     let thick = Shape::Tube { outer: 0.02, inner: 1e-9 }.properties(0.3)?;
+    close(circle.area, PI * 1e-4, 1e-14);
     close(circle.moment_x, PI * 0.02_f64.powi(4) / 64.0, 1e-14);
     close(circle.shear_x, 6.0 * 1.3 / (7.0 + 6.0 * 0.3), 1e-14);
     close(thick.shear_x, circle.shear_x, 1e-12);
     close(thick.torsion, circle.torsion, 1e-12);
+    // A tube and what was bored out of it are the full circle.
+    let [tube, bore] = [Shape::Tube { outer: 0.02, inner: 0.013 }, Shape::Circle { diameter: 0.013 }]
+        .map(|shape| shape.properties(0.3));
+    let (tube, bore) = (tube?, bore?);
+    close(tube.area + bore.area, circle.area, 1e-14);
+    close(tube.moment_y + bore.moment_y, circle.moment_y, 1e-14);
+    close(tube.torsion + bore.torsion, circle.torsion, 1e-14);
+    close(circle.torsion, circle.moment_x + circle.moment_y, 1e-14);
     // Cowper's thin tube: 2 (1 + nu) / (4 + 3 nu).
     let thin = Shape::Tube { outer: 1.0, inner: 0.9999 }.properties(0.3)?;
     close(thin.shear_y, 2.6 / 4.9, 1e-3);
@@ -57,7 +66,41 @@ fn an_i_is_a_rectangle_less_two() -> Result<()> {
     let [full, cut] = [(width, height), (width - web, height - 2.0 * flange)].map(|(w, h)| w * h.powi(3) / 12.0);
     close(i.moment_x, full - cut, 1e-12);
     close(i.area, width * height - (width - web) * (height - 2.0 * flange), 1e-12);
+    // As wide in the web as in the flanges it is the full rectangle, about y too.
+    let filled = Shape::I { width, height, flange, web: width * (1.0 - 1e-12) }.properties(0.3)?;
+    close(filled.moment_y, height * width.powi(3) / 12.0, 1e-11);
+    // Of thin plates each turns for itself, as Saint-Venant's rectangle; across, those along the force carry it.
+    let (flange, web) = (2e-5, 1e-5);
+    let thin = Shape::I { width, height, flange, web }.properties(0.3)?;
+    let plate = |width: f64, height: f64| Shape::Rectangle { width, height }.properties(0.0);
+    let (top, middle) = (plate(width, flange)?, plate(web, height - 2.0 * flange)?);
+    close(thin.torsion, 2.0 * top.torsion + middle.torsion, 1e-3);
+    close(thin.moment_y, 2.0 * top.moment_y + middle.moment_y, 1e-12);
+    close(thin.shear_x * thin.area, 2.0 * top.shear_x * top.area, 1e-12);
+    close(thin.shear_y * thin.area, middle.area, 1e-12);
     Ok(())
+}
+
+#[test]
+fn a_rectangle_on_its_side_swaps_its_moments() -> Result<()> {
+    let [upright, lying] =
+        [(0.02, 0.05), (0.05, 0.02)].map(|(width, height)| Shape::Rectangle { width, height }.properties(0.3));
+    let (upright, lying) = (upright?, lying?);
+    close(upright.moment_x, 0.02 * 0.05_f64.powi(3) / 12.0, 1e-14);
+    close(upright.moment_y, lying.moment_x, 1e-14);
+    close(upright.moment_x, lying.moment_y, 1e-14);
+    // Cowper 1966: 10 (1 + nu)/(12 + 11 nu) both ways.
+    close(upright.shear_x, 13.0 / 15.3, 1e-14);
+    close(upright.shear_y, lying.shear_x, 1e-14);
+    Ok(())
+}
+
+#[test]
+fn ratios_of_poisson_reach_from_minus_one_to_a_half() {
+    let refused = |poisson| Section::new(Shape::Circle { diameter: 0.01 }, Material { poisson, ..STEEL }).is_err();
+    // E = 2 G (1 + nu) and K = E/(3 (1 - 2 nu)) are positive in between; at a half the solid keeps its volume.
+    assert!([-0.999, 0.0, 0.5].map(refused).iter().all(|refused| !refused));
+    assert!([-1.05, -1.0, 0.501, f64::NAN].map(refused).iter().all(|&refused| refused));
 }
 
 #[test]
@@ -126,6 +169,33 @@ fn bernstein_polynomials_share_out_one_and_clamp_the_root() -> Result<()> {
     let clamped = Basis::bernstein(2.0, 7, 2)?;
     assert_eq!(clamped.len(), 6);
     assert!(clamped.evaluate(0.0, 0).iter().chain(&clamped.evaluate(0.0, 1)).all(|value| value.abs() < 1e-15));
+    Ok(())
+}
+
+#[test]
+fn functions_of_nodes_are_one_at_their_own() -> Result<()> {
+    let (length, elements) = (0.7, 3);
+    let unit = |count: usize, own: Option<usize>| -> Vec<f64> {
+        (0..count).map(|k| if Some(k) == own { 1.0 } else { 0.0 }).collect()
+    };
+    let check = |found: Vec<f64>, expected: Vec<f64>| {
+        assert_eq!(found.len(), expected.len());
+        assert!(found.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-13), "{found:?} {expected:?}");
+    };
+    let cubic = Basis::hermite(length, elements)?;
+    for node in 0..=elements {
+        let mu = length * node as f64 / elements as f64;
+        // Deflection and slope of each node but the root; hats of all nodes, or of those but the root.
+        check(cubic.evaluate(mu, 0), unit(6, node.checked_sub(1).map(|k| 2 * k)));
+        check(cubic.evaluate(mu, 1), unit(6, node.checked_sub(1).map(|k| 2 * k + 1)));
+        check(Basis::linear(length, elements, 0)?.evaluate(mu, 0), unit(4, Some(node)));
+        check(Basis::linear(length, elements, 1)?.evaluate(mu, 0), unit(3, node.checked_sub(1)));
+    }
+    assert_eq!([0, 1].map(|clamped| Basis::linear(length, elements, clamped).map(|basis| basis.len())), [Ok(4), Ok(3)]);
+    // Between them a hat falls evenly, by the same on every element.
+    check(Basis::linear(length, elements, 0)?.evaluate(0.25 * length, 0), vec![0.25, 0.75, 0.0, 0.0]);
+    let slope = elements as f64 / length;
+    check(Basis::linear(length, elements, 0)?.evaluate(0.25 * length, 1), vec![-slope, slope, 0.0, 0.0]);
     Ok(())
 }
 

@@ -252,6 +252,28 @@ fn end_stops_push_back_only_and_take_energy_out() {
 }
 
 #[test]
+fn end_stops_follow_hyperbolas() {
+    // p and r are the positive roots of p (p - x) = width^2/4 and of r (r - y - b) = e^2/4, y = damping times the approaching speed.
+    let (stiffness, damping, width, e) = (2e3, 0.4, 0.05, 0.1);
+    let b = 1.0 - 0.25 * e * e;
+    for side in [1.0, -1.0] {
+        // The other end is so far away that it pushes by less than rounding.
+        let [low, high] = if side > 0.0 { [-1e15, 0.2] } else { [-0.2, 1e15] };
+        let law = EndStop { stiffness, damping, low, high, width };
+        for depth in [-0.3, -0.02, 0.0, 0.1] {
+            let q = side * (0.2 + depth);
+            let p = -side * law.effort(q, 0.0) / stiffness;
+            assert!(p > 0.0);
+            close(p * (p - depth), 0.25 * width * width, 1e-15);
+            for y in [-30.0, -1.5, -1.0, -0.3, 0.2, 4.0] {
+                let r = -side * law.effort(q, side * y / damping) / (stiffness * p);
+                close(r * (r - y - b), 0.25 * e * e, 1e-11);
+            }
+        }
+    }
+}
+
+#[test]
 fn fast_motion_over_a_sharp_corner_stays_finite_with_its_derivatives() {
     let law = CoulombFriction { coulomb: 2.0, transition_velocity: 1e-9 }
         .map(&mut |&number| Dual::<f64, 3>::constant(number));

@@ -31,6 +31,113 @@ fn complete() -> ServoCylinder<f64> {
 }
 
 #[test]
+fn seals_resist_by_their_chord() {
+    let seal = complete().cylinder.seal;
+    for v in [-0.3_f64, -0.004, 0.01, 0.05] {
+        let (rounded, fading) = ((v / 0.01).tanh(), (-(v / 0.02) * (v / 0.02)).exp());
+        let force = -(120.0 * v + (30.0 + 15.0 * fading) * rounded);
+        assert!((seal.force(v) - force).abs() < 1e-12 && (seal.resistance(v) * v + force).abs() < 1e-12, "{v}");
+    }
+    let none = nominal().cylinder.seal;
+    let (viscous, coulomb, stribeck) = (seal.viscous, seal.coulomb, seal.stribeck);
+    let alone = [SealFriction { viscous, ..none }, SealFriction { coulomb, ..none }, SealFriction { stribeck, ..none }];
+    assert!(alone.iter().all(SealFriction::is_there) && !none.is_there());
+}
+
+#[test]
+fn both_ends_of_a_stroke_push_alike_and_never_pull() {
+    let stop = nominal().cylinder.stop;
+    for (x, v) in [(0.041, 0.0), (0.041, 3.0), (0.041, -3.0), (0.0401, -30.0), (0.039, 5.0), (0.0, 1.0)] {
+        let beyond: f64 = x - 0.04;
+        let push = if beyond > 0.0 { (5e8 * beyond + 2e4 * v).max(0.0) } else { 0.0 };
+        assert!((stop.force(x, v, 0.04) + push).abs() < 1e-6, "{x} {v}");
+        assert!((stop.force(-x, -v, 0.04) - push).abs() < 1e-6, "{x} {v}");
+    }
+}
+
+#[test]
+fn a_valve_reversed_exchanges_its_chambers() {
+    for clearance in [None, Some(1e-4)] {
+        let mut valve = complete().valve;
+        valve.clearance = clearance;
+        for place in [4e-3, 1e-3, 1e-5, -7e-3] {
+            for (a, b) in [(9e6, 3e6), (1e6, 15e6), (17e6, 5e4)] {
+                let (found, mirror) = (valve.flows(place, 16e6, 1e5, [a, b]), valve.flows(-place, 16e6, 1e5, [b, a]));
+                assert!(
+                    (found.into_a + mirror.out_of_b).abs() < 1e-18 && (found.out_of_b + mirror.into_a).abs() < 1e-18
+                );
+                assert!((found.supply - mirror.supply).abs() < 1e-18 && (found.tank - mirror.tank).abs() < 1e-18);
+                // What comes from the supply and does not go to the tank stays in the chambers.
+                assert!((found.supply - found.tank - found.into_a + found.out_of_b).abs() < 1e-18, "{place} {a} {b}");
+            }
+        }
+    }
+}
+
+#[test]
+fn chambers_trade_volume_along_the_stroke() {
+    let cylinder = complete().cylinder;
+    let [full, rod] = [0.016_f64, 0.010].map(|diameter| std::f64::consts::FRAC_PI_4 * diameter * diameter);
+    let ratio = (full - rod) / full;
+    let areas = PistonSize::Areas { area: full, area_ratio: ratio }.areas();
+    assert!((areas.a - full).abs() < 1e-18 && (areas.b - (full - rod)).abs() < 1e-18);
+    // From end to end; beyond an end nothing is left but the line.
+    for way in [0.0, 0.013, 0.04, 0.08, 0.09] {
+        let found = cylinder.volumes(way - 0.04);
+        assert!((found.a - 2.9e-6 - full * way).abs() < 1e-18, "{way}");
+        assert!((found.b - 2.9e-6 - (full - rod) * (0.08 - way).max(0.0)).abs() < 1e-18, "{way}");
+    }
+}
+
+#[test]
+fn every_number_has_its_domain() {
+    type Spoil = fn(&mut ServoCylinder<f64>);
+    let spoiled: [(&str, Spoil); 26] = [
+        ("fluid.bulk_modulus", |servo| servo.fluid.bulk_modulus = 0.0),
+        ("fluid.vapour_pressure", |servo| servo.fluid.vapour_pressure = 0.0),
+        ("fluid.air.fraction", |servo| servo.fluid.air = Some(EntrainedAir { fraction: -0.1, ..AIR })),
+        ("fluid.air.exponent", |servo| servo.fluid.air = Some(EntrainedAir { exponent: 0.0, ..AIR })),
+        ("fluid.air.exponent", |servo| servo.fluid.more_air = Some(EntrainedAir { exponent: 0.0, ..AIR })),
+        ("fluid.air.reference_pressure", |servo| {
+            servo.fluid.air = Some(EntrainedAir { reference_pressure: 0.0, ..AIR });
+        }),
+        ("valve.stroke", |servo| servo.valve.stroke = 0.0),
+        ("valve.overlap", |servo| servo.valve.overlap.width = -1e-4),
+        ("valve.frequency", |servo| servo.valve.frequency = Some(0.0)),
+        ("valve.damping", |servo| servo.valve.damping = Some(-0.1)),
+        ("valve.clearance", |servo| servo.valve.clearance = Some(0.0)),
+        ("valve.delay", |servo| servo.valve.delay = Some(-1e-3)),
+        ("valve.orifice.gain", |servo| servo.valve.orifice.gain = -1.0),
+        ("valve.orifice.transition_pressure", |servo| servo.valve.orifice.transition_pressure = 0.0),
+        ("cylinder.bore", |servo| servo.cylinder.size = PistonSize::Diameters { bore: 0.0, rod: 0.01 }),
+        ("cylinder.rod", |servo| servo.cylinder.size = PistonSize::Diameters { bore: 0.02, rod: 0.0 }),
+        ("cylinder.area", |servo| servo.cylinder.size = PistonSize::Areas { area: 0.0, area_ratio: 0.6 }),
+        ("cylinder.area_ratio", |servo| servo.cylinder.size = PistonSize::Areas { area: 2e-4, area_ratio: 1.1 }),
+        ("cylinder.stroke", |servo| servo.cylinder.stroke = 0.0),
+        ("cylinder.line_a", |servo| servo.cylinder.line_a = 0.0),
+        ("cylinder.line_b", |servo| servo.cylinder.line_b = 0.0),
+        ("cylinder.internal_leakage", |servo| servo.cylinder.internal_leakage = -1e-13),
+        ("cylinder.external_leakage", |servo| servo.cylinder.external_leakage = -1e-13),
+        ("cylinder.stop.stiffness", |servo| servo.cylinder.stop.stiffness = 0.0),
+        ("cylinder.stop.damping", |servo| servo.cylinder.stop.damping = -1.0),
+        ("cylinder.seal.coulomb", |servo| {
+            servo.cylinder.seal.coulomb = Some(CoulombFriction { coulomb: 30.0, transition_velocity: 0.0 });
+        }),
+    ];
+    let outside = |servo: &ServoCylinder<f64>| -> Vec<&str> {
+        let (oil, valve, cylinder) = (servo.fluid.domains(), servo.valve.domains(), servo.cylinder.domains());
+        let all = oil.into_iter().chain(valve).chain(cylinder);
+        all.filter(|(_, number, domain)| !domain.contains(**number)).map(|(name, ..)| name).collect()
+    };
+    assert!(outside(&complete()).is_empty());
+    for (name, spoil) in spoiled {
+        let mut servo = complete();
+        spoil(&mut servo);
+        assert_eq!(outside(&servo), [name]);
+    }
+}
+
+#[test]
 fn the_chirp_helper_is_an_ordinary_rig() {
     // Without amplitude it rests as the rig does, while its clock runs.
     let chirp = Chirp { amplitude: 0.0, start: 1.0, slope: 0.0 };

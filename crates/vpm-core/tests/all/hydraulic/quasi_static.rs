@@ -54,6 +54,22 @@ fn what_flows_in_flows_out() {
 }
 
 #[test]
+fn worn_seals_leak_beside_new_ones() {
+    let mut new = leaking(2e-4);
+    new.cylinder.internal_leakage = 5e-12;
+    let mut worn = new;
+    (worn.cylinder.internal_leakage, worn.cylinder.worn_leakage) = (2e-12, Some(3e-12));
+    for (spool, v) in [(4e-4, 0.01), (-1e-3, -0.05), (0.0, 0.0)] {
+        let [as_new, as_worn] = [new, worn].map(|servo| balanced(&servo, spool, v));
+        close(as_worn.a, as_new.a, 1e-6);
+        close(as_worn.b, as_new.b, 1e-6);
+        let lost = worn.cylinder.leakage(as_worn, 1e5);
+        close(lost.a, 5e-12 * (as_worn.a - as_worn.b), 1e-18);
+        close(lost.a + lost.b, 0.0, 0.0);
+    }
+}
+
+#[test]
 fn a_symmetric_cylinder_has_a_closed_form() {
     // Both drops are those of A v through an edge: pa - pb = ps - pt - 2 (A v / (gain u))^2 along an open valve.
     let mut servo = leaking(1e-8);

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use serde_json::{Value, json};
-use vpm_core::actuator::hydraulic::{PistonSize, ServoCylinder};
+use vpm_core::actuator::hydraulic::{PistonSize, Sagging, ServoCylinder, SupplyDrop};
 use vpm_core::description::Description;
 use vpm_core::error::{DriveError, Error};
 use vpm_core::evaluate::internal_state;
@@ -30,6 +30,20 @@ fn twins(servo: &ServoCylinder<f64>, source: Value) -> Machine {
         machine.add("actuators", json!({"name": name, "on": {"joint": joint}}), json!({"drive": drive(servo)}));
     }
     machine
+}
+
+#[test]
+fn a_drop_and_a_sag_follow_a_flow_exponentially() {
+    // From rest under a flow Q both end R Q lower: the drop with its own time constant, the sag with R C.
+    let (resistance, flow, pressure) = (4e10, 3e-5, 16e6);
+    let (drop, sag) =
+        (SupplyDrop { resistance, time_constant: 0.02 }, Sagging { resistance, capacitance: 0.05 / resistance });
+    for t in [0.0, 0.013, 0.07] {
+        let [fast, slow] = [0.02, 0.05].map(|time: f64| (-t / time).exp());
+        let fall = resistance * flow;
+        close(drop.rate(fall * (1.0 - fast), flow), fall / 0.02 * fast, 1e-12 * fall / 0.02);
+        close(sag.rate(pressure - fall * (1.0 - slow), pressure, flow), -fall / 0.05 * slow, 1e-11 * fall / 0.05);
+    }
 }
 
 #[test]
