@@ -57,7 +57,9 @@ class Search:
         self.extensions = Extensions(Sizes(model, self.data))
         firsts = self.fitter.tracked.firsts.priors
         values = np.append(model.theta, np.zeros(len(firsts)))
-        self.start = Structure(model, values, known(model, self.data) | firsts, firsts=tuple(firsts))
+        self.start = Structure(
+            model, values, known(model, self.data, self.fitter.tracked) | firsts, firsts=tuple(firsts)
+        )
         self.first: dict[float, Look] = {}  # looks at the model as it was, by bandwidth
         self.others: dict[Key, list[Structure]] = {}  # what counted as well when an effect came in
 
