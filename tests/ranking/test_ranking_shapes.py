@@ -1,4 +1,4 @@
-"""Rankings where nobody knows the shape of a law of friction: how it turns round."""
+"""Rankings where nobody knows the shape of a law of friction: how it turns round, and how it fades from rest."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from second_suite.cases import inputs_of
 from second_suite.logs import logged
 from second_suite.loop import simulated
 from second_suite.machine import columns_of
+from sledge import DRY, pushed
 from vpm.discrepancy.candidates import slow_speeds
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -61,3 +62,23 @@ def test_seals_that_stick_are_no_other_friction_of_the_joint() -> None:
     ranking = vpm.rank(model, record, effects=["stribeck_friction"])
     assert ranking.effects == ()
     assert ranking.recalibrated.parameters["lifter.friction.transition_velocity"].value < 2e-4
+
+
+def test_what_a_law_is_wrong_by_in_its_shape_is_no_other_effect() -> None:
+    """An excess that falls off by the square of the speed is no bell; the rest looks like a drag, all the way.
+
+    Nothing but the free shape refuses that here.
+    """
+    records = [pushed(seed=seed, dry=3.0, excess=10.0, duration=5.0) for seed in (1, 2)]
+    lenient, effects = Settings(score=0.0, inexact=0.0, slight=0.0, second=0.0), ["stribeck_friction", "quadratic_drag"]
+    ranking = vpm.rank(Model.from_toml(DRY), records, effects=effects, settings=lenient)
+    assert [one.effect for one in ranking.effects] == ["stribeck_friction"]
+    (drag,) = (one for one in ranking.rounds[1] if one.effect == "quadratic_drag")
+    assert drag.judgement.lacks(lenient) == "stribeck_friction at way does as well by another shape of its law"
+
+
+@pytest.mark.parametrize("hidden", [{"bell": 10.0, "drag": 4.0}, {"excess": 10.0, "drag": 8.0}])
+def test_a_drag_that_is_there_is_found_beside_an_excess_of_either_shape(hidden: dict[str, float]) -> None:
+    records = [pushed(seed=seed, dry=3.0, duration=5.0, **hidden) for seed in (1, 2)]
+    ranking = vpm.rank(Model.from_toml(DRY), records, effects=["stribeck_friction", "quadratic_drag"])
+    assert {one.effect for one in ranking.effects} == {"stribeck_friction", "quadratic_drag"}

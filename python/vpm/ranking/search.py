@@ -17,6 +17,7 @@ from vpm.ranking.alike import alike
 from vpm.ranking.choice import as_good, evidence, weighed
 from vpm.ranking.extensions import Extensions
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
+from vpm.ranking.free_shape import against_free_shapes
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
 from vpm.ranking.noise_model import fitted_noise
@@ -186,8 +187,9 @@ class Search:
         counting: list[Trial] = []
         for look in (look for look in looks if look.has_room()):
             seen = self._tried(look)
-            tried += seen
-            counting += [trial for trial in self._finished(seen) if trial.counts]
+            ends = [against_free_shapes(trial, self.fitter) for trial in self._finished(seen) if trial.counts]
+            tried += [*(trial for trial in ends if not trial.counts), *seen]
+            counting += [trial for trial in ends if trial.counts]
             if any(not trial.look.has_room(trial.fitted) for trial in counting):
                 break  # nothing could be missing beside it
         told: list[Trial] = []
@@ -296,7 +298,8 @@ class Search:
                 return looks, ()
             now = Trial.of(look.fitted, bare[-1], key)
             trials = (now, *self._in_its_place(bare[-1], self.others.get(key, ())))
-            if counting := [trial for trial in trials if trial.counts]:
+            told = [against_free_shapes(trial, self.fitter) for trial in trials if trial.counts]
+            if counting := [trial for trial in told if trial.counts]:
                 return self._exchanged(now, counting, looks)
         self.say(f"no longer needed: {' at '.join(key)}")
         return self._all_looks(bare[0]), ()
