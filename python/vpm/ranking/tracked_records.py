@@ -185,10 +185,8 @@ class TrackedRecords:
 
     def outputs(self, model: Model, channels: Sequence[str]) -> list[Array]:
         """Outputs (N,) of a model along all records, as the slowest tracker has them; none where it runs away."""
-        places, coarse = (
-            [model.output_channels.index(name) for name in channels],
-            Tracker(self.settings.bands[0]).coarse,
-        )
+        places = [model.output_channels.index(name) for name in channels]
+        coarse = Tracker(self.settings.bands[0]).coarse
         if not places:
             return []
         with contextlib.suppress(VpmError, ArithmeticError):
