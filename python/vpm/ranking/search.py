@@ -152,6 +152,7 @@ class Search:
         """A structure under each tracker that can follow it, that which is known first.
 
         A slow tracker may lose what hangs behind a contact, or let a leg fall over. What it leaves then says nothing.
+        Where one follows, fits under the next begin at its values: these hide more, and begun afar they may end early.
 
         Raises
         ------
@@ -162,8 +163,9 @@ class Search:
         reason: Exception = VpmError(f"{structure.model.name} runs away from the records")
         for band in self.settings.bands:
             if known is None or band != known.fitted.tracker.band:
+                begun = next((look.fitted.structure for look in looks if look.follows), structure)
                 try:
-                    looks.append(self._look(self._fitted(structure, Tracker(band))))
+                    looks.append(self._look(self._fitted(begun, Tracker(band))))
                 except ASTRAY as error:
                     reason = error
         if not looks:
