@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import vpm
 from second_suite import arm
 from sledge import GAIN, MASS, OIL, SLEDGE, pushed
 from vpm.catalogue import EFFECTS
@@ -28,7 +29,7 @@ from vpm.ranking.look import Look
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.parameter_priors import Sizes
 from vpm.ranking.proposals import Proposal, _seated, proposals
-from vpm.ranking.ranking_search import _is_worse
+from vpm.ranking.ranking_search import Search, _is_worse
 from vpm.ranking.settings import PLACES, Settings
 from vpm.ranking.start_values import started
 from vpm.ranking.structure_extensions import Extensions
@@ -455,6 +456,21 @@ def test_a_tracker_that_lets_a_machine_fall_is_not_looked_at() -> None:
         view = View(fitter.noise_of(structure, Tracker(band)))
         looks[band] = Look(fitter.fitted(structure, Tracker(band), view), fitter)
     assert {band: look.follows for band, look in looks.items()} == {1.0: False, 10.0: True}
+
+
+def test_fits_under_the_next_tracker_begin_where_the_first_one_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, fitted = [], Search._fitted
+
+    def seen(search: Search, structure: Structure, tracker: Tracker) -> Any:
+        begun.append((tracker.band, structure.values["sledge.mass"]))
+        return fitted(search, structure, tracker)
+
+    monkeypatch.setattr(Search, "_fitted", seen)
+    vpm.rank(Model.from_toml(SLEDGE), pushed(seed=1, duration=2.0), effects=[])
+    (first, at_first), (second, then) = begun[:2]
+    assert (first, second) == Settings().bands
+    assert at_first == 3.3
+    assert then == pytest.approx(MASS, rel=0.02)
 
 
 @pytest.mark.parametrize(

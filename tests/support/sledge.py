@@ -49,6 +49,8 @@ coulomb = { value = 3.4, uncertainty = 0.4 }
 )
 #: Way after which dry friction repeats, and the torque constant of the motor, m.
 WAVE, TURN = 1.5, 0.4
+#: Speed at which an excess of friction close to rest has faded to a part, m/s.
+FADING = 0.2
 MASS, OIL, GAIN, STEP, FINE, READING = 3.0, 8.0, 4.0, 2e-3, 10, 5e-6
 
 
@@ -57,6 +59,9 @@ def pushed(
     dry: float = 0.0,
     uneven: float = 0.0,
     wavy: float = 0.0,
+    excess: float = 0.0,
+    bell: float = 0.0,
+    drag: float = 0.0,
     winding: float = 0.0,
     lag: float = 0.0,
     late: float = 0.0,
@@ -68,7 +73,9 @@ def pushed(
     """The sledge by small explicit steps: dry friction as an impulse that at most stops it, a delay as a queue.
 
     Dry friction may differ between the two directions by ``uneven``, and from place to place by ``wavy`` either way;
-    the force of the motor differs by a share ``winding`` of it, and goes by a difference equation with a ``pole``.
+    close to rest it has an ``excess`` that falls off by the square of the speed, and one that is a ``bell`` of it. What
+    surrounds it resists by a ``drag`` times the square of the speed. The force of the motor differs by a share
+    ``winding`` of it, and goes by a difference equation with a ``pole``.
     """
     random, samples, h = np.random.default_rng(seed), round(duration / STEP), STEP / FINE
     time = STEP * np.arange(samples)
@@ -88,9 +95,11 @@ def pushed(
             asked, before = GAIN * queue.popleft() * (1.0 - winding * np.sin(2.0 * np.pi * place / TURN)), speed
             mean = asked + (force - asked) * (_mean_decay(h / lag) if lag else 0.0)
             force = asked + (force - asked) * (np.exp(-h / lag) if lag else 0.0)
-            stop = -4e4 * (place - np.clip(place, -ends, ends))
+            stop = -4e4 * (place - np.clip(place, -ends, ends)) - drag * speed * abs(speed)
             speed = speed * np.exp(-h * OIL / MASS) + h * _mean_decay(h * OIL / MASS) * (mean + stop) / MASS
             level = dry + 0.5 * uneven * np.sign(speed) + wavy * np.cos(2.0 * np.pi * place / WAVE)
+            fast = (speed / FADING) ** 2
+            level += excess / (1.0 + fast) + bell * np.exp(-fast)
             speed -= np.clip(speed, -h * level / MASS, h * level / MASS)
             place += 0.5 * h * (before + speed)
     readings = places + READING * random.standard_normal(samples)

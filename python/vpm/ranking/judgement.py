@@ -35,6 +35,8 @@ class Judgement(Storable):
         tracker alone.
     overtone : bool
         Whether it repeats along a whole fraction of the period of another effect at its place.
+    reshaped : str
+        An effect of the same curve that was found before and does as well by another shape of its law; "" if none does.
     """
 
     removed: float
@@ -45,6 +47,7 @@ class Judgement(Storable):
     shape: float
     alone: float = 0.0
     overtone: bool = False
+    reshaped: str = ""
 
     @property
     def words(self) -> str:
@@ -90,6 +93,8 @@ class Judgement(Storable):
             )
         if self.overtone:
             return "it repeats along a whole fraction of the period of another effect there, and is an overtone of that"
+        if self.reshaped:
+            return f"{self.reshaped} does as well by another shape of its law"
         return ""
 
 

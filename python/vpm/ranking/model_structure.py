@@ -14,13 +14,10 @@ from vpm.catalogue.kinds import Side
 from vpm.discrepancy.screening.candidates import Key
 from vpm.discrepancy.screening.location_parameter import ANYWHERE
 from vpm.model import Effect, Model
-from vpm.ranking.settings import MOVE
+from vpm.ranking.settings import MOVE, OVERTONE
 from vpm.weighing.priors import Prior
 
 Array = NDArray[np.float64]
-
-#: Share by which periods may be off that are found in whole fractions of each other.
-OVERTONE = 0.02
 
 
 def sides_taken(model: Model, joint: str) -> set[Side]:

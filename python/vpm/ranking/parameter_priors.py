@@ -12,6 +12,7 @@ from vpm.discrepancy.stuck_channels import is_moving
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.ranking.settings import DELAY
+from vpm.ranking.tracked_records import TrackedRecords
 from vpm.weighing.priors import FACTOR, NATURAL, NEAR, SHARE, Prior, natural_sizes
 
 Array = NDArray[np.float64]
@@ -101,19 +102,26 @@ def stated(model: Model) -> dict[str, Prior]:
     }
 
 
-def known(model: Model, data: InverseDynamicsProblem) -> dict[str, Prior]:
+def known(model: Model, data: InverseDynamicsProblem, tracked: TrackedRecords) -> dict[str, Prior]:
     """Priors of a model as its file states them, and of the transition velocities of its dry friction.
 
-    Nobody knows these, and a wrong one leaves a gap at every reversal, where the finer effects live.
+    Nobody knows these, and a wrong one leaves a gap at every reversal, where the finer effects live. Seals of a
+    cylinder rub as joints do.
     """
     priors = stated(model)
     for effect in model.effects:
         name = effect.parameter_names.get("transition_velocity")
-        if name is None or name in priors or effect.at not in (*data.joints, *model.transmissions):
-            continue
-        shares = shares_at(model, effect.at, data.joints)
-        speeds = np.concatenate([np.abs(data.state(record)[1] @ shares) for record in range(len(data.motions))])
-        low, high = slow_speeds(float(np.quantile(speeds, 0.999)))
-        spread = 0.25 * float(np.log(high / low))
-        priors[name] = Prior(float(np.sqrt(low * high)), spread, low, high, logarithmic=True)
-    return priors
+        if name is not None and name not in priors and effect.at in (*data.joints, *model.transmissions):
+            shares = shares_at(model, effect.at, data.joints)
+            speeds = [np.abs(data.state(record)[1] @ shares) for record in range(len(data.motions))]
+            priors[name] = _turning(np.concatenate(speeds))
+    drives = {f"{drive}.friction.transition_velocity": model.rate_channel(drive) for drive in model.actuators}
+    unknown = {name: rate for name, rate in drives.items() if name in model.parameters and name not in priors}
+    rates = tracked.outputs(model, tuple(unknown.values()))
+    return priors | dict(zip(unknown, map(_turning, rates), strict=False))
+
+
+def _turning(speeds: Array) -> Prior:
+    """Prior of the speed at which dry friction turns round, where these speeds are seen."""
+    low, high = slow_speeds(max(float(np.quantile(np.abs(speeds), 0.999)), LEAST))
+    return Prior(float(np.sqrt(low * high)), 0.25 * float(np.log(high / low)), low, high, logarithmic=True)

@@ -15,6 +15,7 @@ from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.ranking.choice_by_evidence import as_good, evidence, weighed
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
+from vpm.ranking.free_shape import against_free_shapes
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
 from vpm.ranking.model_structure import Structure
@@ -57,7 +58,9 @@ class Search:
         self.extensions = Extensions(Sizes(model, self.data))
         firsts = self.fitter.tracked.firsts.priors
         values = np.append(model.theta, np.zeros(len(firsts)))
-        self.start = Structure(model, values, known(model, self.data) | firsts, firsts=tuple(firsts))
+        self.start = Structure(
+            model, values, known(model, self.data, self.fitter.tracked) | firsts, firsts=tuple(firsts)
+        )
         self.first: dict[float, Look] = {}  # looks at the model as it was, by bandwidth
         self.others: dict[Key, list[Structure]] = {}  # what counted as well when an effect came in
 
@@ -150,6 +153,7 @@ class Search:
         """Looks of the search at a structure under each tracker that can follow it.
 
         A slow tracker may lose what hangs behind a contact, or let a leg fall over. What it leaves then says nothing.
+        Where one follows, fits under the next begin at its values: these hide more, and begun afar they may end early.
 
         Raises
         ------
@@ -160,8 +164,9 @@ class Search:
         reason: Exception = VpmError(f"{structure.model.name} runs away from the records")
         for band in self.settings.bands:
             if known is None or band != known.fitted.tracker.band:
+                begun = next((look.fitted.structure for look in looks if look.follows), structure)
                 try:
-                    looks.append(self._look(self._fitted(structure, Tracker(band))))
+                    looks.append(self._look(self._fitted(begun, Tracker(band))))
                 except ASTRAY as error:
                     reason = error
         if not looks:
@@ -185,8 +190,9 @@ class Search:
         counting: list[Trial] = []
         for look in (look for look in looks if look.has_room()):
             seen = self._tried(look)
-            tried += seen
-            counting += [trial for trial in self._finished(seen) if trial.counts]
+            ends = [against_free_shapes(trial, self.fitter) for trial in self._finished(seen) if trial.counts]
+            tried += [*(trial for trial in ends if not trial.counts), *seen]
+            counting += [trial for trial in ends if trial.counts]
             if any(not trial.look.has_room(trial.fitted) for trial in counting):
                 break  # nothing could be missing beside it
         told: list[Trial] = []
@@ -295,7 +301,8 @@ class Search:
                 return looks, ()
             now = Trial.of(look.fitted, bare[-1], key)
             trials = (now, *self._in_its_place(bare[-1], self.others.get(key, ())))
-            if counting := [trial for trial in trials if trial.counts]:
+            told = [against_free_shapes(trial, self.fitter) for trial in trials if trial.counts]
+            if counting := [trial for trial in told if trial.counts]:
                 return self._exchanged(now, counting, looks)
         self.say(f"no longer needed: {' at '.join(key)}")
         return self._all_looks(bare[0]), ()

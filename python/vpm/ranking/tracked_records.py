@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import copy
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -182,6 +183,18 @@ class TrackedRecords:
         begun = zip(self.records, self._begun(model), strict=True)
         return [self._run(model, model.theta, tracker, NOTHING, *one)[1] for one in begun]
 
+    def outputs(self, model: Model, channels: Sequence[str]) -> list[Array]:
+        """Outputs (N,) of a model along all records, as the slowest tracker has them; none where it runs away."""
+        places = [model.output_channels.index(name) for name in channels]
+        coarse = Tracker(self.settings.bands[0]).coarse
+        if not places:
+            return []
+        with contextlib.suppress(VpmError, ArithmeticError):
+            begun = zip(self.records, self._begun(model), strict=True)
+            ran = [self._run(model, model.theta, coarse, NOTHING, *one, alone=False)[0] for one in begun]
+            return list(np.concatenate(ran).T[places])
+        return []
+
     def follow(
         self,
         model: Model,
@@ -261,8 +274,13 @@ class TrackedRecords:
         by: By,
         record: Record,
         start: Array,
+        *,
+        alone: bool = True,
     ) -> tuple[Array, Array, Array]:
-        """Outputs of a tracked record (N, m), states (N, nx) and derivatives ``by`` some numbers (N, m, k)."""
+        """Outputs of a tracked record (N, m), states (N, nx) and derivatives ``by`` some numbers (N, m, k).
+
+        Outputs are those of its channels ``alone``, or all of the model.
+        """
         known = [column for column, name in enumerate(record.channels) if name in model.output_channels]
         channels = [record.channels[column] for column in known]
         gain = tracker_gain(model, channels, tracker.band, record.dt, theta)
@@ -280,10 +298,10 @@ class TrackedRecords:
             method,
             list(by[0]),
             self.setup.course,
-            alone=True,
+            alone=alone,
             moves=by[1],
         )
-        if len(known) < len(record.channels):
+        if alone and len(known) < len(record.channels):
             outputs, slopes = (_among(known, len(record.channels), one) for one in (outputs, slopes))
         return outputs, states, slopes
 

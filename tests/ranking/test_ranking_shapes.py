@@ -1,0 +1,84 @@
+"""Rankings where nobody knows the shape of a law of friction: how it turns round, and how it fades from rest."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import vpm
+from second_suite import boom
+from second_suite.cases import inputs_of
+from second_suite.logs import logged
+from second_suite.loop import simulated
+from second_suite.machine import columns_of
+from sledge import DRY, pushed
+from vpm.discrepancy.candidates import slow_speeds
+from vpm.experiment import Experiment
+from vpm.model import Model
+from vpm.ranking.parameter_priors import known
+from vpm.ranking.settings import Settings
+from vpm.ranking.substitute_records import shown
+from vpm.ranking.tracked_records import TrackedRecords
+
+
+@cache
+def luffed() -> tuple[Model, Experiment]:
+    """The boom of a crane on a cylinder whose seals truly stick, by other code, and a model with its numbers."""
+    machine = replace(boom.MACHINE, lengths=(8.0,))
+    asked, _ = inputs_of(machine, 3)
+    signals = simulated(machine, columns_of(machine.values, 1), (), asked, np.array([True]), np.random.default_rng(3))
+
+    def number(key: str) -> object:
+        value, share = machine.values[key], machine.adjustable.get(key)
+        return value if share is None else {"value": value, "uncertainty": share * value}
+
+    return Model.from_dict(machine.document(number, frozenset())), logged(machine, asked, signals, 0)
+
+
+def test_seals_turn_round_at_a_speed_of_the_piston_that_nobody_knows() -> None:
+    """The way of the piston follows from the logged angle by the law of cosines."""
+    model, record = luffed()
+    tracked = TrackedRecords(model, [record], Settings())
+    prior = known(model, shown(model, tracked), tracked)["lifter.friction.transition_velocity"]
+    length, _ = boom.line({}, np.convolve(record["luff.position"], np.full(25, 0.04), "valid"))
+    rate = np.abs(np.gradient(length, record.time[1] - record.time[0]))
+    assert (prior.low, prior.high) == pytest.approx(slow_speeds(float(np.quantile(rate, 0.999))), rel=0.1)
+    stated = model.to_dict()
+    stated["actuators"]["lifter"]["friction"]["transition_velocity"] = {"value": 2e-3, "uncertainty": 1e-3}
+    sure = Model.from_dict(stated)
+    told = known(sure, shown(sure, tracked), tracked)["lifter.friction.transition_velocity"]
+    assert (told.centre, told.spread) == (2e-3, 1e-3)
+
+
+def test_seals_that_stick_are_no_other_friction_of_the_joint() -> None:
+    """The numbers of the model are those of the boom; its seals turn round over 1 mm/s, and those of the boom at once.
+
+    What that leaves at every reversal looks like an excess of friction close to rest.
+    """
+    model, record = luffed()
+    ranking = vpm.rank(model, record, effects=["stribeck_friction"])
+    assert ranking.effects == ()
+    assert ranking.recalibrated.parameters["lifter.friction.transition_velocity"].value < 2e-4
+
+
+def test_what_a_law_is_wrong_by_in_its_shape_is_no_other_effect() -> None:
+    """An excess that falls off by the square of the speed is no bell; the rest looks like a drag, all the way.
+
+    Nothing but the free shape refuses that here.
+    """
+    records = [pushed(seed=seed, dry=3.0, excess=10.0, duration=5.0) for seed in (1, 2)]
+    lenient, effects = Settings(score=0.0, inexact=0.0, slight=0.0, second=0.0), ["stribeck_friction", "quadratic_drag"]
+    ranking = vpm.rank(Model.from_toml(DRY), records, effects=effects, settings=lenient)
+    assert [one.effect for one in ranking.effects] == ["stribeck_friction"]
+    (drag,) = (one for one in ranking.rounds[1] if one.effect == "quadratic_drag")
+    assert drag.judgement.lacks(lenient) == "stribeck_friction at way does as well by another shape of its law"
+
+
+@pytest.mark.parametrize("hidden", [{"bell": 10.0, "drag": 4.0}, {"excess": 10.0, "drag": 8.0}])
+def test_a_drag_that_is_there_is_found_beside_an_excess_of_either_shape(hidden: dict[str, float]) -> None:
+    records = [pushed(seed=seed, dry=3.0, duration=5.0, **hidden) for seed in (1, 2)]
+    ranking = vpm.rank(Model.from_toml(DRY), records, effects=["stribeck_friction", "quadratic_drag"])
+    assert {one.effect for one in ranking.effects} == {"stribeck_friction", "quadratic_drag"}
