@@ -3,10 +3,10 @@
 use std::hint::black_box;
 
 use criterion::Criterion;
-use vpm_core::error::Result;
-use vpm_core::linkage::Newton;
-use vpm_core::linkage::karl::{Karl, KarlGeometry};
-use vpm_core::linkage::leg::{HyqData, Leg, LegParameters};
+use vpm_studies::Result;
+use vpm_studies::linkage::Newton;
+use vpm_studies::linkage::karl::{Karl, KarlGeometry};
+use vpm_studies::linkage::leg::{HyqData, Leg, LegParameters};
 
 #[path = "common/share.rs"]
 mod share;

@@ -18,7 +18,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parent.parent
 STAMP = "vpm/sources.txt"
 TOP = ("Cargo.toml", "Cargo.lock", "pyproject.toml", "README.md", "LICENSE*")
-PARTS = (*TOP, "crates/vpm-core/**/*", "crates/vpm-py/**/*", "python/vpm/**/*")
+PARTS = (*TOP, "crates/vpm-core/**/*", "crates/vpm-py/**/*", "crates/vpm-studies/**/*", "python/vpm/**/*")
 #: Beginnings of names of platforms in wheels, by what Python calls the system.
 SYSTEMS = {"linux": ("manylinux", "linux"), "darwin": ("macosx",), "win32": ("win",)}
 

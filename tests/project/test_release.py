@@ -66,6 +66,15 @@ def test_a_wheel_of_these_sources_is_taken_and_a_stale_one_never(sources: Module
     assert sources.fitting(tree / "dist", tree) == made
 
 
+def test_every_crate_of_the_wheel_counts(sources: ModuleType) -> None:
+    bindings = ROOT / "crates" / "vpm-py"
+    with (bindings / "Cargo.toml").open("rb") as file:
+        needed = [each["path"] for each in tomllib.load(file)["dependencies"].values() if "path" in each]
+    counted = set(sources.files())
+    assert needed
+    assert [path for path in needed if (bindings / path / "src" / "lib.rs").resolve() not in counted] == []
+
+
 def test_what_is_made_from_sources_does_not_count(sources: ModuleType, tree: Path) -> None:
     before = sources.digest(tree)
     (tree / "python/vpm/_core.abi3.so").write_bytes(b"core")

@@ -2,12 +2,10 @@
 
 pub use connection::ConnectionError;
 pub use drive::DriveError;
-pub use linkage::LinkageError;
 pub use narx::NarxError;
 
 mod connection;
 mod drive;
-mod linkage;
 mod narx;
 
 /// An input or a computation that has no physical meaning.
@@ -322,9 +320,6 @@ pub enum Error {
         /// The multiple next to it, s.
         nearest: f64,
     },
-    /// A linkage that cannot be closed, or not be solved for its motion.
-    #[error("{0}")]
-    Linkage(#[from] LinkageError),
     /// A NARX model that cannot be as described, or records that cannot tell it.
     #[error("{0}")]
     Narx(Box<NarxError>),

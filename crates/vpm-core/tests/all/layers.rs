@@ -5,7 +5,7 @@ use std::io::Result;
 use std::path::{Path, PathBuf};
 
 /// The tree, lowest first, `beam` after `integrator` because `beam::witness` steps its motions by itself: each may import any before it.
-const TREE: [&str; 17] = [
+const TREE: [&str; 15] = [
     "error",
     "scalar",
     "transmission",
@@ -13,7 +13,6 @@ const TREE: [&str; 17] = [
     "spatial",
     "mount",
     "joint",
-    "kinematics",
     "line",
     "body",
     "ode",
@@ -22,7 +21,6 @@ const TREE: [&str; 17] = [
     "model",
     "data",
     "dynamics",
-    "linkage",
 ];
 /// Parts that stand alone, each a rig of its own, and all that they may import besides themselves.
 const ALONE: [(&str, &[&str]); 17] = [

@@ -16,7 +16,6 @@ mod effect;
 mod hydraulic;
 mod integrator;
 mod layers;
-mod linkage;
 mod machine;
 mod narx;
 mod recording;

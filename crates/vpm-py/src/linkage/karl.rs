@@ -2,12 +2,13 @@
 
 use numpy::{PyArray1, PyArray2};
 use pyo3::prelude::*;
-use vpm_core::algebra::{Conic, resultant};
-use vpm_core::linkage::StrokeLinkage;
-use vpm_core::linkage::karl::{Karl as Limb, KarlGeometry, KarlPose};
+use vpm_studies::algebra::{Conic, resultant};
+use vpm_studies::linkage::StrokeLinkage;
+use vpm_studies::linkage::karl::{Karl as Limb, KarlGeometry, KarlPose};
 
 use crate::arrays::{Numbers, matrix};
 use crate::errors::{CoreError, exception};
+use crate::linkage::raised;
 
 type Table<'py> = Bound<'py, PyArray2<f64>>;
 type Any<'py> = Bound<'py, PyAny>;
@@ -60,13 +61,13 @@ impl Karl {
 
     /// Direct kinematics of KARL: joint angles (4, 2) of all assembly modes at two strokes.
     fn direct<'py>(&self, py: Python<'py>, strokes: [f64; 2]) -> PyResult<Table<'py>> {
-        let poses = self.limb.direct(strokes).map_err(|error| exception(py, error, 0, 0))?;
+        let poses = self.limb.direct(strokes).map_err(|error| raised(py, error))?;
         matrix(py, poses.iter().flat_map(|pose| pose.angles).collect(), [4, 2])
     }
 
     /// Inverse kinematics of KARL: angles and strokes (8, 4) that put the end point at `target`.
     fn inverse<'py>(&self, py: Python<'py>, target: [f64; 2]) -> PyResult<Table<'py>> {
-        let poses = self.limb.inverse(target).map_err(|error| exception(py, error, 0, 0))?;
+        let poses = self.limb.inverse(target).map_err(|error| raised(py, error))?;
         matrix(py, poses.iter().flat_map(|pose| [pose.angles, pose.strokes].concat()).collect(), [8, 4])
     }
 

@@ -3,16 +3,17 @@
 use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
 use vpm_core::Error;
-use vpm_core::linkage::leg::{
+use vpm_core::spatial::Vector2;
+use vpm_studies::linkage::leg::{
     Attachment, DutyCycle, HyqData, Leg as Limb, LegBody, LegParameters, Reactions, ShareDefinition, ShareStudy,
 };
-use vpm_core::linkage::{ActuatorBody, LineActuator};
-use vpm_core::spatial::Vector2;
+use vpm_studies::linkage::{ActuatorBody, LineActuator};
 
 use super::karl::{same_rows, table};
 use crate::arrays::{Numbers, cube};
 use crate::errors::{CoreError, exception};
 use crate::interrupt::interruptible;
+use crate::linkage::raised;
 
 type Table<'py> = Bound<'py, PyArray2<f64>>;
 type Cube<'py> = Bound<'py, PyArray3<f64>>;
@@ -153,9 +154,9 @@ impl Leg {
         let a = pairs("accelerations", accelerations)?;
         same_rows("rates", v.len(), q.len())?;
         same_rows("accelerations", a.len(), q.len())?;
-        let rows: Result<Vec<[f64; 23]>, Error> =
+        let rows: Result<Vec<[f64; 23]>, vpm_studies::Error> =
             py.detach(|| (0..q.len()).map(|k| Ok(flat(&self.limb.newton_euler(q[k], v[k], a[k])?))).collect());
-        table(py, rows.map_err(|error| exception(py, error, 0, 0))?.into_iter())
+        table(py, rows.map_err(|error| raised(py, error))?.into_iter())
     }
 
     /// Cylinder forces (N, 2) of the leg that give joint torques (N, 2).
@@ -176,9 +177,9 @@ impl Leg {
         let (q, v, tau) = (pairs("angles", angles)?, pairs("rates", rates)?, pairs("torques", torques)?);
         same_rows("rates", v.len(), q.len())?;
         same_rows("torques", tau.len(), q.len())?;
-        let rows: Result<Vec<[f64; 2]>, Error> =
+        let rows: Result<Vec<[f64; 2]>, vpm_studies::Error> =
             (0..q.len()).map(|k| self.limb.acceleration(q[k], v[k], tau[k])).collect();
-        table(py, rows.map_err(|error| exception(py, error, 0, 0))?.into_iter())
+        table(py, rows.map_err(|error| raised(py, error))?.into_iter())
     }
 
     /// Largest shares (N, 3) of inertia, velocity and gravity in the leg at joint angles (N, 2). They are those over

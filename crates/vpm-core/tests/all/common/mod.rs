@@ -6,7 +6,6 @@ pub mod connections;
 pub mod derivatives;
 pub mod element_arm;
 pub mod entries;
-pub mod free_leg;
 pub mod hydraulics;
 pub mod parts;
 pub mod places;

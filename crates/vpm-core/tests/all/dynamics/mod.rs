@@ -1,6 +1,5 @@
 //! The algorithms: number types, spatial algebra, dynamics of rigid and flexible trees.
 
-mod algebra;
 mod articulated;
 mod articulated_cost;
 mod articulated_machine;
