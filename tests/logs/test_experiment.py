@@ -384,6 +384,25 @@ def test_units_in_brackets_have_to_be_known(tmp_path: Path) -> None:
         Experiment.load(log(tmp_path, rows, "time,q [furlong]"))
 
 
+def test_a_table_may_leave_out_the_unit_behind_a_name(tmp_path: Path) -> None:
+    path = log(tmp_path, [f"{k},{k},{2 * k}" for k in range(12)], "t [ms],axis [mm],axis [deg]")
+    clock = ChannelEntry(column="t", unit="ms")
+    several = {"time": clock, "axis.position": ChannelEntry(column="axis [mm]", unit="mm")}
+    np.testing.assert_allclose(Experiment.load(path, several)["axis.position"], 1e-3 * np.arange(12))
+    with pytest.raises(ExperimentError, match='has no column "axis"'):  # there are two
+        Experiment.load(path, {"time": clock, "axis.position": ChannelEntry(column="axis", unit="mm")})
+
+
+def test_a_temperature_is_read_in_kelvin(tmp_path: Path) -> None:
+    rows = [f"{0.01 * k},{20 + k}" for k in range(12)]
+    plain = Experiment.load(log(tmp_path, rows, "time,oil [°C]"))
+    assert plain.units == ("K",)
+    np.testing.assert_allclose(plain["oil"], 293.15 + np.arange(12))
+    table = {"time": ChannelEntry(column="time", unit="s"), "oil": ChannelEntry(column="oil", unit="degF")}
+    np.testing.assert_allclose(Experiment.load(tmp_path / "log.csv", table)["oil"], (20 + np.arange(12) + 459.67) / 1.8)
+    np.testing.assert_allclose(plain.with_channel("air", np.full(12, 20.0), "°C")["air"], 293.15)
+
+
 def test_irregular_takes_two_words(tmp_path: Path) -> None:
     word: Any = "ignore"
     with pytest.raises(ExperimentError, match='choose "error" or "interpolate"'):
