@@ -15,7 +15,7 @@ from second_suite.logs import logged
 from second_suite.loop import simulated
 from second_suite.machine import columns_of
 from sledge import DRY, pushed
-from vpm.discrepancy.candidates import slow_speeds
+from vpm.discrepancy.screening.candidates import slow_speeds
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.ranking.parameter_priors import known
