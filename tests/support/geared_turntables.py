@@ -19,9 +19,11 @@ actuators.m2 = { joint = "two", gain = 1.0, command_unit = "N m" }
 INERTIA, DRY, DRAG = np.array([0.02, 0.005]), np.array([0.9, 0.5]), np.array([0.6, 0.3])
 
 
-def log(seed: int, factors: tuple[float, float] = (1.0, 1.0)) -> vpm.Experiment:
+def log(
+    seed: int, factors: tuple[float, float] = (1.0, 1.0), dry: tuple[float, float] = (DRY[0], DRY[1])
+) -> vpm.Experiment:
     """Angles (rad) and torques (N m) of a motion about a reference; angles are logged times ``factors``."""
-    drawn, dt, steps = np.random.default_rng(seed), 0.004, 16
+    drawn, dt, steps = np.random.default_rng(seed), 0.004, 32
     tones, phases = drawn.uniform(0.15, 0.6, (2, 3)), drawn.uniform(0.0, 2.0 * np.pi, (2, 3))
     time = np.arange(0.0, 10.0, dt)
     q, v, angles, torques = np.sum(np.sin(phases), axis=1), np.zeros(2), [], []
@@ -30,7 +32,7 @@ def log(seed: int, factors: tuple[float, float] = (1.0, 1.0)) -> vpm.Experiment:
         angles.append(q + 2e-5 * drawn.standard_normal(2))
         torques.append(torque)
         for _ in range(steps):
-            v = v + dt / steps * (torque - DRY * np.tanh(v / 5e-3) - DRAG * v) / INERTIA
+            v = v + dt / steps * (torque - np.array(dry) * np.tanh(v / 0.02) - DRAG * v) / INERTIA
             q = q + dt / steps * v
     (q1, q2), (m1, m2) = np.array(angles).T * np.array(factors)[:, None], np.array(torques).T
     columns = {"one.position": q1, "two.position": q2, "m1.command": m1, "m2.command": m2}

@@ -20,10 +20,11 @@ from vpm.log_check.delay import Delayed, with_delay, without_delay
 from vpm.log_check.settings import Settings
 from vpm.model import Model
 from vpm.observer import measured_outputs
-from vpm.ranking.fit import ASTRAY, Fitter, Followed, View, bounded_step
+from vpm.ranking.fit import ASTRAY, Fitter, Followed, View
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.noise_model import white_noise
 from vpm.ranking.parameter_priors import stated
+from vpm.ranking.regression import regressed
 from vpm.ranking.settings import Settings as RankingSettings
 from vpm.ranking.substitute_records import why_unbalanced
 from vpm.ranking.tracked_records import TrackedRecords, Tracker, is_position
@@ -39,8 +40,6 @@ FORCES = tuple(effect.name for effect in BUILT_IN if effect.usual)
 TRANSITION = 0.02
 #: How often derivatives are worked out in a fit of all forces.
 TURNS = 2
-#: Steps of a regression, and the share of an error that is noise in the first one.
-REGRESSIONS, QUIET = 3, 0.01
 #: Pieces of a record between whose ends speeds are measured, which noise hardly moves.
 PIECES = 200
 
@@ -181,27 +180,19 @@ class Judge:
         return self._with_departure(shares, found.structure)
 
     def _regressed(self, record: Experiment, structure: Structure) -> Array | None:
-        """Values that leave least of the inverse-dynamics residual, which is linear in masses and friction.
+        """Values that leave least of the inverse-dynamics residual of a record, see `vpm.ranking.regression`.
 
-        The first step takes nearly all of the error for an error of the parameters, and each one after it what the one
-        before has left for noise. None where no efforts follow from the motion, or where the model file rules such
-        values out: commands that are far too small ask for masses that are far too small.
+        None where no efforts follow from the motion, or where the model file rules such values out: commands that are
+        far too small ask for masses that are far too small.
         """
         if why_unbalanced(self.model):
             return None
         try:
-            data = InverseDynamicsProblem(self.model, [record])
-            residual, jacobian = data.evaluate(self.model, structure.theta, structure.columns)
-            variance = QUIET**2 * float(np.mean(residual**2))
-            for _ in range(REGRESSIONS):
-                slopes = jacobian * structure.slopes
-                move = bounded_step(structure, residual, slopes, np.inf, variance)
-                structure, residual = structure.moved(move), residual + slopes @ move
-                variance = float(np.mean(residual**2))
+            found = regressed(structure, InverseDynamicsProblem(self.model, [record]))
         except ASTRAY:
             return None
-        farthest = max(self._departures(structure).values(), default=0.0)
-        return None if farthest > self.settings.far else structure.theta
+        farthest = max(self._departures(found).values(), default=0.0)
+        return None if farthest > self.settings.far else found.theta
 
     def tangent(self, record: Experiment, at: Shares, forces: Collection[str] = FRICTION) -> Tangent | None:
         """Tangent of the error share by the parameters; None where that cannot be computed."""

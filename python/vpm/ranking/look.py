@@ -118,6 +118,14 @@ class Look:
         return float(np.sum(np.log(self._ratio(still, self.left)))) < 0.0
 
     @property
+    def is_lost(self) -> bool:
+        """Whether a look leaves more error at each of several joints than masses on which nothing acts."""
+        tracked = self._fitter.tracked
+        shares = zip(tracked.records[0].channels, _shares(self._drawn, self.left).tolist(), strict=True)
+        joints = [share for channel, share in shares if channel in tracked.drawn_to]
+        return len(joints) > 1 and min(joints) > 1.0
+
+    @property
     def needed(self) -> float:
         """Least gain for which an effect is worth it in a look, nats."""
         samples = len(self.left[0])

@@ -28,9 +28,10 @@ from vpm.ranking.result import Ranked, Ranking
 from vpm.ranking.settings import Settings
 from vpm.ranking.several_places import alike
 from vpm.ranking.structure_extensions import Extensions
-from vpm.ranking.substitute_records import shown
+from vpm.ranking.substitute_records import shown, why_unbalanced
 from vpm.ranking.tracked_records import TrackedRecords, Tracker
 from vpm.ranking.tried_effect import Trial
+from vpm.ranking.usual_friction import with_usual_friction
 from vpm.ranking.validation_errors import gaps
 from vpm.simulate import Setup
 from vpm.simulate.setup import AUTOMATIC
@@ -55,7 +56,8 @@ class Search:
         self.names, self.settings, self.each, self.say = names, settings, each, say
         self.fitter = Fitter(TrackedRecords(model, records, settings, setup), settings)
         self.data = shown(model, self.fitter.tracked)
-        self.extensions = Extensions(Sizes(model, self.data))
+        self.sizes = Sizes(model, self.data)
+        self.extensions = Extensions(self.sizes)
         firsts = self.fitter.tracked.firsts.priors
         values = np.append(model.theta, np.zeros(len(firsts)))
         self.start = Structure(
@@ -74,6 +76,8 @@ class Search:
         interrupted = False
         before: list[frozenset[Key]] = []
         try:
+            looks, rounds = self._brought_back(looks)
+            named = {ranked.key: ranked for ranked, *_ in rounds}
             for _ in range(2 * self.settings.effects):  # effects may replace each other, but not for ever
                 present = looks[0].fitted.structure.effects
                 if len(present) == self.settings.effects or frozenset(present) in before:
@@ -224,6 +228,25 @@ class Search:
                 if all(one.counts and one.evidence > self.settings.odds for one in found):
                     self.say(f"{trial.key[0]} at {' and '.join(site for _, site in new)} together {_removing(trial)}")
                     return self._all_looks(look), [self._listed(one, [one]) for one in found]
+        return looks, []
+
+    def _brought_back(self, looks: list[Look]) -> tuple[list[Look], list[tuple[Ranked, ...]]]:
+        """Search begun with the usual friction that counts, of a model that is lost at several joints without it."""
+        if why_unbalanced(self.start.model) or not all(look.is_lost for look in looks):
+            return looks, []
+        with contextlib.suppress(*ASTRAY):
+            most = self.settings.effects
+            structure = with_usual_friction(looks[0], self.data, self.extensions, self.sizes, self.names, most)
+            while structure is not None and structure.effects:
+                look = self._look(self._fitted(structure, looks[0].fitted.tracker))
+                found = [weighed([self._beside_others(key, look)], self.fitter)[0] for key in structure.effects]
+                needless = [one.key for one in found if not (one.counts and one.evidence > self.settings.odds)]
+                if not needless:
+                    self.say(f"{' and '.join(one.label for one in found)} bring the model back to its records")
+                    return self._all_looks(look), [self._listed(one, [one]) for one in found]
+                structure = look.fitted.structure
+                for key in needless:
+                    structure = structure.without(key)
         return looks, []
 
     def _is_likelier(self, trial: Trial, other: Trial) -> bool:
