@@ -93,7 +93,7 @@ class SampleMask:
     def busy(self, record: int) -> Array:
         """Sample mask (n, joints): 0 where a joint is slow in the mean over ``REST_TIME``."""
         m = self.motions[record]
-        width = max(1, round(REST_TIME / m.dt))
+        width = min(max(1, round(REST_TIME / m.dt)), len(m.velocity))  # a wrong clock may shrink the whole record
         mean = np.abs(uniform_filter1d(m.velocity[:, self.places], width, axis=0))
         moving = maximum_filter1d(mean, width, axis=0) > REST_SHARE * self._largest
         busy = moving[m.retained].astype(np.float64)
