@@ -149,7 +149,7 @@ class Judge:
             parameter = self.model.effect(*key).parameter_names["coulomb"]
             values[self.model.index(parameter)] = structure.priors[parameter].spread
         tried = [plain, self.measured(record, values)]
-        if plain.above(self.settings.doubtful) and (near := self._regressed(record, structure)) is not None:
+        if (near := self._regressed(record, structure, plain)) is not None:
             tried.append(self.measured(record, near))
         return min(tried, key=lambda shares: shares.order)
 
@@ -161,10 +161,7 @@ class Judge:
         """
         structure = self._structure(record)
         found = [self._fitted(record, structure)]
-        if (
-            self.measured(record).above(self.settings.doubtful)
-            and (near := self._regressed(record, structure)) is not None
-        ):
+        if (near := self._regressed(record, structure, self.measured(record))) is not None:
             found.append(self._fitted(record, replace(structure, theta=near)))
         return min(found, key=lambda shares: shares.order)
 
@@ -179,13 +176,13 @@ class Judge:
         shares = self._shares(tracked, found.residual, tracker, found.structure.theta)
         return self._with_departure(shares, found.structure)
 
-    def _regressed(self, record: Experiment, structure: Structure) -> Array | None:
+    def _regressed(self, record: Experiment, structure: Structure, plain: Shares) -> Array | None:
         """Values that leave least of the inverse-dynamics residual of a record, see `vpm.ranking.regression`.
 
-        None where no efforts follow from the motion, or where the model file rules such values out: commands that are
-        far too small ask for masses that are far too small.
+        None where the model as it is follows the record, by its ``plain`` shares, and where no efforts follow from the
+        motion. Nor where the model file rules such values out: commands that are far too small ask for masses that are.
         """
-        if why_unbalanced(self.model):
+        if not plain.above(self.settings.doubtful) or why_unbalanced(self.model):
             return None
         try:
             found = regressed(structure, InverseDynamicsProblem(self.model, [record]))

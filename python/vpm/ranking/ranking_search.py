@@ -224,8 +224,8 @@ class Search:
                     continue
                 look = self._look(trial.fitted)
                 new = [key for key in trial.fitted.structure.effects if key not in trial.look.fitted.structure.effects]
-                found = [weighed([self._beside_others(key, look)], self.fitter)[0] for key in new]
-                if all(one.counts and one.evidence > self.settings.odds for one in found):
+                found = [self._weighed_beside_others(key, look) for key in new]
+                if all(map(self._stands, found)):
                     self.say(f"{trial.key[0]} at {' and '.join(site for _, site in new)} together {_removing(trial)}")
                     return self._all_looks(look), [self._listed(one, [one]) for one in found]
         return looks, []
@@ -239,8 +239,8 @@ class Search:
             structure = with_usual_friction(looks[0], self.data, self.extensions, self.sizes, self.names, most)
             while structure is not None and structure.effects:
                 look = self._look(self._fitted(structure, looks[0].fitted.tracker))
-                found = [weighed([self._beside_others(key, look)], self.fitter)[0] for key in structure.effects]
-                needless = [one.key for one in found if not (one.counts and one.evidence > self.settings.odds)]
+                found = [self._weighed_beside_others(key, look) for key in structure.effects]
+                needless = [one.key for one in found if not self._stands(one)]
                 if not needless:
                     self.say(f"{' and '.join(one.label for one in found)} bring the model back to its records")
                     return self._all_looks(look), [self._listed(one, [one]) for one in found]
@@ -255,9 +255,13 @@ class Search:
         told = [evidence(one.fitted, self.fitter, noise) for one in (trial, other)]
         return told[0] - told[1] > self.settings.odds
 
-    def _beside_others(self, key: Key, look: Look) -> Trial:
-        """Effect of a searched structure, judged against the structure without it."""
-        return Trial.of(look.fitted, self._without(key, look), key)
+    def _weighed_beside_others(self, key: Key, look: Look) -> Trial:
+        """Effect of a searched structure with its evidence, judged against the structure without it."""
+        return weighed([Trial.of(look.fitted, self._without(key, look), key)], self.fitter)[0]
+
+    def _stands(self, trial: Trial) -> bool:
+        """Whether a weighed effect of the search counts and is more probable than chance."""
+        return trial.counts and trial.evidence > self.settings.odds
 
     def _tried(self, look: Look) -> list[Trial]:
         """Most promising effects of a search round, fitted under one tracker."""
