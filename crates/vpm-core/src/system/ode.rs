@@ -14,8 +14,9 @@ use crate::integrator::Method;
 use crate::ode::Ode;
 use crate::scalar::Scalar;
 
-/// The largest code of a whole step, in operations. Each takes some 3 us to compile; larger steps gain little.
-const MOST_OF_STEP: usize = 3_000;
+/// The largest code of a whole step, in operations, and of one with approximate derivatives. Each takes some 3 us to compile; larger steps
+/// gain little beside their functions one by one. Of derivatives that is more, and fits run them often.
+const MOST_OF_STEP: [usize; 2] = [3_000, 12_000];
 /// A gap (m, or the cosine of an angle that has to be a right one) at which a loop counts as torn.
 const OPEN: f64 = 1e-9;
 /// How often loops are closed again after a correction, which may lead farther away than steps do, to where their ways bend.
@@ -106,10 +107,11 @@ impl<S: Scalar> System<S> {
         Self { seen: Kind::Motion, ..self }
     }
 
-    /// ODE of a machine with derivatives of the order of its steps, where that takes less time.
+    /// ODE of a machine with derivatives of the order of its steps, where that takes less time. Memories of friction come
+    /// to rest within a step, so that no order tells what is left out of their matrices.
     #[must_use]
     pub(crate) fn with_approximate_derivatives(self) -> Self {
-        Self { approximate: !Self::is_plain(), ..self }
+        Self { approximate: !Self::is_plain() && self.memories.len() == 0, ..self }
     }
 
     /// Enters a user's state: brings it into the coordinates of the ODE.
@@ -268,22 +270,34 @@ impl<S: Scalar> System<S> {
     /// Compiles whole steps of the ODE with constant inputs to machine code, where that pays.
     pub(crate) fn compile_steps(&mut self, method: Method) -> std::result::Result<(), String> {
         if method == Method::LinearlyImplicit && self.dynamics.is_well_scaled() && self.has_small_steps() {
-            let made = self.routines.compile_within(&Kind::Step, MOST_OF_STEP);
+            let kind = self.step_kind();
+            let made = self.routines.compile_within(&kind, self.most_of_step());
             let mut needed = [self.seen.clone()].into_iter().chain(self.closing());
             if made.and_then(|()| needed.try_for_each(|kind| self.routines.compile(&kind))).is_ok() {
                 (self.ready, self.whole) = (false, true);
                 return Ok(());
             }
-            self.routines.forget(&Kind::Step);
+            self.routines.forget(&kind);
         }
         self.compile(method)
+    }
+
+    /// Kind of a whole linearly implicit step of the ODE.
+    fn step_kind(&self) -> Kind {
+        if self.approximate { Kind::StepOfConstantMatrix } else { Kind::Step }
+    }
+
+    /// Largest code of a whole step of the ODE, in operations.
+    fn most_of_step(&self) -> usize {
+        MOST_OF_STEP[usize::from(self.approximate)]
     }
 
     /// Whether the ODE is small enough to record a whole step. The matrix, which is at hand, shows about how large it
     /// is.
     fn has_small_steps(&mut self) -> bool {
         let larger = LARGER[usize::from(!Self::is_plain())];
-        self.routines.get(&Kind::Prepared).is_some_and(|routine| larger * routine.size() <= MOST_OF_STEP)
+        let most = self.most_of_step();
+        self.routines.get(&Kind::Prepared).is_some_and(|routine| larger * routine.size() <= most)
     }
 
     /// Whether the ODE's functions run as machine code.
@@ -575,7 +589,7 @@ impl<S: Scalar> Ode<S> for System<S> {
         if !self.whole {
             return false;
         }
-        let next = self.routines.get(&Kind::Step).and_then(|routine| routine.step(x, step));
+        let next = self.routines.get(&self.step_kind()).and_then(|routine| routine.step(x, step));
         next.map(|next| x.copy_from_slice(next)).is_some_and(|()| {
             self.ready = false;
             true

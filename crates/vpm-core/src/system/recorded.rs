@@ -88,6 +88,8 @@ pub enum Kind {
     Additive,
     /// The state after a linearly implicit step, then whether it is exact: one, or zero where the elimination would have to exchange rows.
     Step,
+    /// As [`Kind::Step`], but its derivatives are those of a step with a constant matrix, see [`super::constant`].
+    StepOfConstantMatrix,
     /// Coordinates and rates brought to where all loops are closed, these coordinates held, then the largest gap that is left and how many
     /// equations count, see `Loops::close`.
     Closed(Vec<u32>),
@@ -116,6 +118,11 @@ pub enum Kind {
 }
 
 impl Kind {
+    /// Whether this kind is a whole step.
+    fn is_step(&self) -> bool {
+        matches!(self, Self::Step | Self::StepOfConstantMatrix)
+    }
+
     /// Places of the inputs of such a recorded program, from those of a free machine at `places`.
     fn places(&self, places: Places) -> Places {
         match self {
@@ -234,7 +241,7 @@ impl Placed {
         let program = Program::new(&graph, &nodes, places.count());
         let placed = Self { program, places, entries, directions, of_values: !graph.decisions().is_empty() };
         Ok(match kind {
-            Kind::Derived(kind, by) if **kind != Kind::Step => placed.derived(by),
+            Kind::Derived(kind, by) if !kind.is_step() => placed.derived(by),
             _ => placed,
         })
     }
@@ -314,9 +321,10 @@ fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recor
             (state, None)
         }
         Kind::Additive => (dynamics.additive(&x, places), None),
-        Kind::Step => (step::linearly_implicit(&mut dynamics, places), None),
-        Kind::Derived(kind, by) if **kind == Kind::Step => {
-            let (values, matrix) = step::linearly_implicit_derived(&mut dynamics, places, by);
+        Kind::Step | Kind::StepOfConstantMatrix => (step::linearly_implicit(&mut dynamics, places), None),
+        Kind::Derived(kind, by) if kind.is_step() => {
+            let constant = **kind == Kind::StepOfConstantMatrix;
+            let (values, matrix) = step::linearly_implicit_derived(&mut dynamics, places, by, constant);
             (values, Some(matrix))
         }
         Kind::Derived(kind, _) => return outputs(build, places, parameters, kind),

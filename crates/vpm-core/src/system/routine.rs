@@ -6,7 +6,7 @@ use super::constant::Constant;
 use super::functions::{Function, Functions};
 use super::recorded::Kind;
 use crate::error::{Error, Result};
-use crate::graph::{Evaluator, LARGEST, Program, Work};
+use crate::graph::{Evaluator, Program, Work};
 use crate::integrator::Method;
 use crate::scalar::{Dual, Scalar};
 
@@ -307,11 +307,8 @@ impl<S: Scalar> Routines<S> {
     }
 
     /// Leaves derivatives out of routines for matrices of linearly implicit steps, or says why not. That holds from now
-    /// on where there is machine code of these matrices, and none of their derivatives. Else it goes on as before.
+    /// on where there is machine code of these matrices. Else it goes on as before.
     pub(crate) fn leave_matrices_constant(&mut self) -> std::result::Result<(), String> {
-        if self.has_derivatives_to_compile(&Kind::Prepared) {
-            return Err("the derivatives of the matrices have machine code".to_owned());
-        }
         let plain = |numbers: &[S]| numbers.iter().map(Scalar::re).collect::<Vec<_>>();
         let routines = Routines::new(self.functions.clone(), &plain(&self.theta), plain(&self.held));
         self.constant = Some(Box::new(Constant::new(routines)?));
@@ -365,15 +362,6 @@ impl<S: Scalar> Routines<S> {
         let derived = derived.map_err(words)?;
         fits(&derived)?;
         self.get(kind).map_or(Ok(()), |routine| routine.differentiate_by(derived, &by))
-    }
-
-    /// Whether derivatives of a routine by the states are few enough to compile. Those by parameters are few beside
-    /// these.
-    fn has_derivatives_to_compile(&mut self, kind: &Kind) -> bool {
-        let Some(states) = self.get(kind).map(|routine| routine.function.places.states as u32) else { return false };
-        let values: Vec<f64> = self.theta.iter().map(Scalar::re).collect();
-        let derived = self.functions.function(&Kind::Derived(Box::new(kind.clone()), (0..states).collect()), &values);
-        derived.is_ok_and(|function| function.directions.is_none() && function.often.size() <= LARGEST)
     }
 
     /// Makes the routines of these kinds as machine code, all or none, or says why not.

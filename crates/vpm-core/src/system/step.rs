@@ -16,7 +16,7 @@ const LARGEST_FACTOR: f64 = 100.0;
 ///
 /// Law: [`LinearlyImplicit`].
 pub(super) fn linearly_implicit(dynamics: &mut Dynamics<Recorded>, places: Places) -> Vec<Recorded> {
-    step::<0>(dynamics, places, &[]).into_iter().map(|number| number.value).collect()
+    step::<0>(dynamics, places, &[], false).into_iter().map(|number| number.value).collect()
 }
 
 /// Whole step of [`linearly_implicit`] with its derivatives by the inputs at the places `by`.
@@ -27,11 +27,12 @@ pub(super) fn linearly_implicit_derived(
     dynamics: &mut Dynamics<Recorded>,
     places: Places,
     by: &[u32],
+    constant: bool,
 ) -> (Vec<Recorded>, Matrix) {
     let values = linearly_implicit(dynamics, places);
     let mut matrix = vec![Recorded::zero(); values.len() * by.len()];
     for (part, by_some) in by.chunks(LANES).enumerate() {
-        let numbers = step::<LANES>(dynamics, places, by_some);
+        let numbers = step::<LANES>(dynamics, places, by_some, constant);
         for (row, number) in matrix.chunks_exact_mut(by.len()).zip(numbers) {
             row[part * LANES..][..by_some.len()].copy_from_slice(&number.gradient[..by_some.len()]);
         }
@@ -40,11 +41,18 @@ pub(super) fn linearly_implicit_derived(
 }
 
 /// Whole step with at most N derivatives, `by` the inputs at these places.
-fn step<const N: usize>(dynamics: &mut Dynamics<Recorded>, places: Places, by: &[u32]) -> Vec<Dual<Recorded, N>> {
+///
+/// Those of the matrix may be left out, as if it were `constant`, see [`super::constant`].
+fn step<const N: usize>(
+    dynamics: &mut Dynamics<Recorded>,
+    places: Places,
+    by: &[u32],
+    constant: bool,
+) -> Vec<Dual<Recorded, N>> {
     let lane = |place: usize| by.iter().position(|&by| by as usize == place).unwrap_or(N);
     let mut x: Vec<_> = (0..places.states).map(|place| Dual::variable(input(place, 0.0), lane(place))).collect();
     let mut integrator = LinearlyImplicit::new(x.len());
-    let mut machine = Machine { dynamics, by, columns: Vec::new(), turns: Vec::new() };
+    let mut machine = Machine { dynamics, by, constant, columns: Vec::new(), turns: Vec::new() };
     integrator.step(&mut machine, &mut x, Dual::constant(input(places.reach(), 0.0)));
     let exact = integrator.largest_factor().if_less(LARGEST_FACTOR.into(), Dual::one, Dual::zero);
     x.push(exact);
@@ -56,6 +64,8 @@ struct Machine<'a> {
     dynamics: &'a mut Dynamics<Recorded>,
     /// Which inputs these are, lane by lane.
     by: &'a [u32],
+    /// Whether derivatives of the matrix are left out.
+    constant: bool,
     /// Row and column of each entry of the last matrix that may change.
     columns: Vec<(usize, usize)>,
     /// Which of these changes by which input, and how fast.
@@ -115,13 +125,15 @@ impl<const N: usize> Ode<Dual<Recorded, N>> for Machine<'_> {
         let entries = self.dynamics.clone().prepared(&state).entries();
         matrix.fill(Dual::zero());
         entries.iter().for_each(|&((row, column), entry)| matrix[row * x.len() + column] = Dual::constant(entry));
-        let (places, numbers): (Vec<_>, Vec<_>) = entries.into_iter().unzip();
-        self.columns = places;
-        self.turns = slopes(&numbers, &variables);
+        if !self.constant {
+            let (places, numbers): (Vec<_>, Vec<_>) = entries.into_iter().unzip();
+            self.columns = places;
+            self.turns = slopes(&numbers, &variables);
+        }
     }
 
     fn turns(&self) -> bool {
-        N > 0
+        N > 0 && !self.constant
     }
 
     fn turned(&mut self, k: &[Dual<Recorded, N>], product: &mut [Dual<Recorded, N>]) {

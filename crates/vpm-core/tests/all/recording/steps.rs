@@ -4,6 +4,7 @@ use vpm_core::Result;
 use vpm_core::description::Description;
 use vpm_core::graph::Evaluator;
 use vpm_core::integrator::{LinearlyImplicit, Method};
+use vpm_core::ode::Ode;
 use vpm_core::samples::{Random, random_tree};
 use vpm_core::scalar::{Dual, Scalar};
 use vpm_core::simulate::{Run, Setting, Stepping, free_run};
@@ -56,6 +57,16 @@ impl Start {
 
     /// The state after the step by the integrator, in numbers that `lift` makes of each input of the recorded function.
     fn direct<S: Scalar>(&self, d: &Description, lift: impl Fn(usize, f64) -> S) -> Result<Vec<S>> {
+        self.reached(d, lift, |system, x| LinearlyImplicit::new(x.len()).step(system, x, self.step))
+    }
+
+    /// The state that `step` leads to, as [`Start::direct`].
+    fn reached<S: Scalar>(
+        &self,
+        d: &Description,
+        lift: impl Fn(usize, f64) -> S,
+        step: impl Fn(&mut System<S>, &mut [S]),
+    ) -> Result<Vec<S>> {
         let places = d.program(&Kind::Rates, &self.theta)?.places;
         let all = |first: usize, values: &[f64]| -> Vec<S> {
             values.iter().enumerate().map(|(k, &value)| lift(first + k, value)).collect()
@@ -66,21 +77,57 @@ impl Start {
             system.hold(number, input);
         }
         let mut x = all(0, &self.x);
-        LinearlyImplicit::new(x.len()).step(&mut system, &mut x, self.step);
+        step(&mut system, &mut x);
         Ok(x)
     }
 
     /// The derivatives of the state after the step by the inputs at these places, row by row, in dual numbers.
     fn derived(&self, d: &Description, by: &[u32]) -> Result<Vec<f64>> {
+        self.derived_by(d, by, |system, x| LinearlyImplicit::new(x.len()).step(system, x, self.step))
+    }
+
+    /// The same of another `step`.
+    fn derived_by(
+        &self,
+        d: &Description,
+        by: &[u32],
+        step: impl Fn(&mut System<Number>, &mut [Number]),
+    ) -> Result<Vec<f64>> {
         let mut matrix = vec![0.0; self.x.len() * by.len()];
         for (part, some) in by.chunks(LANES).enumerate() {
             let lane = |place: usize| some.iter().position(|&by| by as usize == place).unwrap_or(LANES);
-            let next: Vec<Number> = self.direct(d, |place, value| Dual::variable(value, lane(place)))?;
+            let next = self.reached(d, |place, value| Dual::variable(value, lane(place)), &step)?;
             for (row, number) in matrix.chunks_exact_mut(by.len()).zip(next) {
                 row[part * LANES..][..some.len()].copy_from_slice(&number.gradient[..some.len()]);
             }
         }
         Ok(matrix)
+    }
+}
+
+/// A machine whose matrices of linearly implicit steps carry no derivatives.
+struct ConstantMatrix<'a>(&'a mut System<Number>);
+
+impl Ode<Number> for ConstantMatrix<'_> {
+    fn dim(&self) -> usize {
+        self.0.dim()
+    }
+
+    fn coordinates(&self) -> usize {
+        self.0.coordinates()
+    }
+
+    fn rhs(&mut self, x: &[Number], dxdt: &mut [Number]) {
+        self.0.rhs(x, dxdt);
+    }
+
+    fn jacobian(&mut self, x: &[Number], jacobian: &mut [Number]) {
+        self.0.jacobian(x, jacobian);
+    }
+
+    fn prepare(&mut self, x: &[Number], matrix: &mut [Number], rates: &mut [Number]) {
+        self.0.prepare(x, matrix, rates);
+        matrix.iter_mut().for_each(|entry| *entry = entry.frozen());
     }
 }
 
@@ -145,6 +192,39 @@ fn derivatives_of_a_whole_step_are_those_of_dual_numbers() -> Result<()> {
         assert!(error < 1e-9, "machine {seed}: {error}");
         assert!(of_exact.iter().all(|&slope| slope == 0.0));
     }
+    Ok(())
+}
+
+/// What is left out falls with the third power of the step, as does the error of a step.
+#[test]
+fn derivatives_with_a_constant_matrix_are_those_of_dual_numbers_and_of_the_order_of_the_step() -> Result<()> {
+    let mut orders = Vec::new();
+    for seed in 0..150 {
+        let d = drawn(seed).build();
+        if d.n_coordinates() > 3 {
+            continue;
+        }
+        let start = Start::new(&d, seed);
+        let by: Vec<u32> = (0..d.n_states() as u32).collect();
+        let constant = Kind::Derived(Box::new(Kind::StepOfConstantMatrix), by.clone());
+        let found = start.recorded(&d, &constant)?;
+        let witness = start.derived_by(&d, &by, |system, x| {
+            LinearlyImplicit::new(x.len()).step(&mut ConstantMatrix(system), x, start.step);
+        })?;
+        let error = apart(&found[..witness.len()], &witness);
+        assert!(error < 1e-9, "machine {seed}: {error}");
+        let left_out = |step: f64| -> Result<f64> {
+            let start = Start { step, ..Start::new(&d, seed) };
+            Ok(apart(&start.recorded(&d, &constant)?[..witness.len()], &start.derived(&d, &by)?))
+        };
+        let (long, short) = (left_out(2e-5)?, left_out(1e-5)?);
+        if short > 1e-12 {
+            orders.push((long / short).log2());
+        }
+    }
+    orders.sort_by(f64::total_cmp);
+    assert!(orders.len() >= 10, "only {} steps leave out anything", orders.len());
+    assert!((orders[orders.len() / 2] - 3.0).abs() < 0.1, "{orders:?}");
     Ok(())
 }
 
