@@ -15,6 +15,7 @@ mod memory;
 mod observe;
 mod ode;
 mod quintic;
+mod rate_slopes;
 mod recorded;
 mod routine;
 mod settle;

@@ -123,6 +123,11 @@ impl Kind {
         matches!(self, Self::Step | Self::StepOfConstantMatrix)
     }
 
+    /// Whether derivatives of this kind are not those of each operation.
+    fn is_derived_apart(&self) -> bool {
+        self.is_step() || *self == Self::Rates
+    }
+
     /// Places of the inputs of such a recorded program, from those of a free machine at `places`.
     fn places(&self, places: Places) -> Places {
         match self {
@@ -241,7 +246,7 @@ impl Placed {
         let program = Program::new(&graph, &nodes, places.count());
         let placed = Self { program, places, entries, directions, of_values: !graph.decisions().is_empty() };
         Ok(match kind {
-            Kind::Derived(kind, by) if !kind.is_step() => placed.derived(by),
+            Kind::Derived(kind, by) if !kind.is_derived_apart() => placed.derived(by),
             _ => placed,
         })
     }
@@ -326,6 +331,15 @@ fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recor
             let constant = **kind == Kind::StepOfConstantMatrix;
             let (values, matrix) = step::linearly_implicit_derived(&mut dynamics, places, by, constant);
             (values, Some(matrix))
+        }
+        Kind::Derived(kind, by) if **kind == Kind::Rates => {
+            dynamics.rhs(&x, &mut rates);
+            let variables: Vec<_> = by.iter().map(|&place| input(place as usize, 0.0)).collect();
+            let mut matrix = zeros(dim * by.len());
+            for ((row, column), slope) in dynamics.slopes_of_rates(&x, &rates, &variables) {
+                matrix[row * by.len() + column] = slope;
+            }
+            (rates, Some(Matrix::Entries(matrix, by.len())))
         }
         Kind::Derived(kind, _) => return outputs(build, places, parameters, kind),
         Kind::Required

@@ -97,7 +97,8 @@ impl<const N: usize> Ode<Dual<Recorded, N>> for Machine<'_> {
         let (dim, states) = (x.len(), x.len() as u32);
         let held = (0..).zip(self.by).filter(|&(_, &place)| place >= states);
         let (lanes, held): (Vec<usize>, Vec<_>) = held.map(|(lane, &place)| (lane, input(place as usize, 0.0))).unzip();
-        for ((row, column), slope) in slopes(&rates, &[state, held].concat()) {
+        let variables = [&state[..], &held].concat();
+        for ((row, column), slope) in self.dynamics.slopes_of_rates(&state, &rates, &variables) {
             let along = match column.checked_sub(dim) {
                 None => x[column],
                 Some(place) => Dual::variable(Recorded::zero(), lanes[place]),
@@ -118,7 +119,7 @@ impl<const N: usize> Ode<Dual<Recorded, N>> for Machine<'_> {
         self.dynamics.rhs(&state, &mut values);
         rates.iter_mut().zip(&values).for_each(|(rate, &value)| *rate = Dual::constant(value));
         let variables = self.variables();
-        for ((row, lane), slope) in slopes(&values, &variables) {
+        for ((row, lane), slope) in self.dynamics.slopes_of_rates(&state, &values, &variables) {
             rates[row].gradient[lane] = slope;
         }
         // Chords stand for the laws in the copy: rates elsewhere follow the laws themselves.
