@@ -88,7 +88,7 @@ pub enum Kind {
     Additive,
     /// The state after a linearly implicit step, then whether it is exact: one, or zero where the elimination would have to exchange rows.
     Step,
-    /// As [`Kind::Step`], but its derivatives are those of a step with a constant matrix, see [`super::constant`].
+    /// As [`Kind::Step`], but its derivatives are those of a step with a constant matrix: they have the order of the step.
     StepOfConstantMatrix,
     /// Coordinates and rates brought to where all loops are closed, these coordinates held, then the largest gap that is left and how many
     /// equations count, see `Loops::close`.
