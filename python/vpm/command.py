@@ -14,7 +14,7 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
 from vpm.command_output import console as console  # noqa: PLC0414  # commands say their results by these two
-from vpm.command_output import detail, in_lines, notes, progressed, wrote
+from vpm.command_output import detail, in_lines, note, notes, progressed, wrote
 from vpm.command_output import errors as errors  # noqa: PLC0414
 from vpm.errors import VpmError
 from vpm.files import probe_file, probe_folder, replacing
@@ -194,7 +194,21 @@ def progress() -> Iterator[Callable[[str], None]]:
 
 @contextmanager
 def searching() -> Iterator[tuple[Tell, Each]]:
-    """A bar of the candidates of each round; some lines where the output goes to a file."""
+    """A bar of the candidates of each round; some lines where the output goes to a file.
+
+    What an interruption says of itself is noted.
+    """
+    try:
+        with _searching() as told:
+            yield told
+    except KeyboardInterrupt as stopped:
+        if stopped.args:
+            note(str(stopped))
+        raise
+
+
+@contextmanager
+def _searching() -> Iterator[tuple[Tell, Each]]:
     if in_lines():
         with _Lines() as lines:
             yield lines.tell, lines.each

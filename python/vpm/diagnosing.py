@@ -8,7 +8,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
-from typing import TypedDict, get_args
+from typing import Any, TypedDict, get_args
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis, Empirical
@@ -28,6 +28,7 @@ from vpm.discrepancy.rivals.discriminating_experiment import experiments as expe
 from vpm.discrepancy.screening.candidates import asked_for
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search import Search, ambiguities
+from vpm.discrepancy.unmeasured import unmeasured
 from vpm.discrepancy.verdict import is_negligible, verdict
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records
@@ -36,9 +37,9 @@ from vpm.identify.fit_result import fit_of
 from vpm.identify.parallel import worker_count
 from vpm.log_check import refuse_mistakes
 from vpm.model import Model
-from vpm.naming import BROKEN, FAILED, RANKING, Names, Tell, named, ranked_notes, ranking_of, until_stopped
+from vpm.naming import BROKEN, FAILED, RANKING, STOPPED, Names, Tell, named, ranked_notes, ranking_of, until_stopped
 from vpm.one_thread import in_one_thread
-from vpm.ranking import Ranking
+from vpm.ranking import Ranking, Settings
 from vpm.ranking.by_tracker import diagnosed_by_tracker
 from vpm.ranking.substitute_records import why_unbalanced
 from vpm.simulate import Setup, judging_mode
@@ -48,7 +49,10 @@ from vpm.tasks import done_by
 LEAST_LIMIT = 6
 #: Said where the logs tell what commands do between samples.
 FOUND_HOLD = "commands run from sample to sample, as readings of a drive do; simulate with hold {hold} too"
-#: Said where Ctrl-C came after the search.
+#: Said where Ctrl-C came after the naming.
+STOPPED_UNMEASURED = "stopped by Ctrl-C before what was named was measured on validation records"
+STOPPED_UNJUDGED = "stopped by Ctrl-C before the noise floor, and what is left above it, was examined"
+STOPPED_BARE = "stopped by Ctrl-C before all pictures were drawn, and experiments that discriminate were designed"
 STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, was examined"
 #: Said where a cut-off frequency was asked for and no motion is filtered.
 UNFILTERED = "the cut-off frequency is not used, for an observer filters nothing"
@@ -249,6 +253,29 @@ def _diagnosis(
     mode = "restarts" if notes else judging_mode(model, validation)
     by = (names, effects, limit)
     ranking = ranking_of(model, (training, validation), by, setup, say, each, notes)
+    try:
+        return _measured(model, records, ranking, by, (mode, cutoff, setup), each, say, began)
+    except KeyboardInterrupt:
+        known = ranking or Ranking((), (), model, model)
+        told = ranked_notes(known, (), known.interrupted) if ranking is not None else []
+        told.append(STOPPED_UNMEASURED if known.effects else STOPPED)
+        notes.extend(note for note in dict.fromkeys(told) if note not in notes)
+        return unmeasured(model, records, known, Settings(effects=limit), time.perf_counter() - began)
+
+
+def _measured(
+    model: Model,
+    records: Records,
+    ranking: Ranking | None,
+    by: tuple[Names, Sequence[str] | None, int],
+    how: tuple[str, float | None, Setup],
+    each: SideBySide,
+    say: Tell,
+    began: float,
+) -> Diagnosis:
+    """Diagnosis from a ranking, or by a search where there is none, measured on validation records."""
+    training, validation, notes = records
+    (mode, cutoff, setup), (_, effects, limit) = how, by
     if ranking is not None and ranking.hold != setup.course:
         notes.append(FOUND_HOLD.format(hold=ranking.hold))
         setup = replace(setup, hold=ranking.hold)
@@ -265,11 +292,16 @@ def _diagnosis(
     recalibrated = recalibrated_of(model, data, notes, each)
     found, ambiguous, late = named(ranking, recalibrated, data, by, say, each, notes)
     known = _Known(model, records, data, nominal, recalibrated, ranking, ambiguous, late, began)
+    plain = partial(of_search, model, records, recalibrated, found, data.training)
     try:
         return _told(known, found, mode, setup, each, say)
     except BROKEN as error:
         notes.append(FAILED.format(what="what follows the search", error=error))
-        return of_search(model, records, recalibrated, found, data.training, time.perf_counter() - began)
+        return plain(time.perf_counter() - began)
+    except KeyboardInterrupt:
+        notes.append(STOPPED_UNJUDGED)
+        gap = gaps_of(data, nominal, recalibrated, found.final, {})
+        return replace(plain(time.perf_counter() - began), gap=gap, interrupted=True)
 
 
 @dataclass(frozen=True)
@@ -315,18 +347,14 @@ def _told(known: _Known, found: Search, mode: str, setup: Setup, each: SideBySid
     floor, gap, left = measure(found.final)
     if (kept := only_where_closed(found, data, gap, left)) is not found:
         found, (floor, gap, left) = kept, measure(kept.final)
-    say("examining what is left")
-    rest, stopped = until_stopped(
-        lambda: _rest(known.recalibrated, found, data, each) if found.accepted or not is_negligible(gap) else None, None
-    )
+    rest, stopped = until_stopped(lambda: _rest(known.recalibrated, found, data, gap, each, say), None)
     beyond = tracker_gaps(known.ranking, data.training.joints) if known.ranking is not None else {}
     said = verdict(data, known.nominal, known.recalibrated, found, gap | beyond, left, rest)
     concluded = _concluded(known, found, said, gap, floor, rest)
-    say("designing discriminating experiments")
     if stopped or known.late:
         notes.append(STOPPED_LATE)
     concluded = replace(concluded, gap=concluded.gap | beyond)
-    return _whole(known, found, concluded, floor, interrupted=found.interrupted or stopped or known.late)
+    return _whole(known, found, concluded, floor, say, interrupted=found.interrupted or stopped or known.late)
 
 
 def _concluded(
@@ -352,13 +380,13 @@ def _concluded(
 
 
 def _whole(
-    known: _Known, found: Search, concluded: _Concluded, floor: dict[str, float], *, interrupted: bool
+    known: _Known, found: Search, concluded: _Concluded, floor: dict[str, float], say: Tell, *, interrupted: bool
 ) -> Diagnosis:
-    """Result of `diagnose` with its evidence and pictures."""
+    """Result of `diagnose` with its evidence and pictures, as far as Ctrl-C leaves time for them."""
     data, nominal, (training, validation, notes) = known.data, known.nominal, known.records
     final, accepted, summary = concluded.final, concluded.accepted, concluded.summary
     ambiguous = known.ambiguous if accepted else ()
-    return Diagnosis(
+    told = Diagnosis(
         concluded.word,
         f"Stopped before every candidate was tried. {summary}" if found.interrupted else summary,
         tuple(accepted_effect(entry, found.final) for entry in accepted),
@@ -366,26 +394,43 @@ def _whole(
         found.refused,
         found.ranking,
         listed(ambiguities(accepted), ambiguous),
-        where(known.recalibrated.model, data.validation),
+        {},
         tuple(step(data.training, data.validation, stage) for stage in found.stages),
         tuple(e.name for e in training),
         tuple(e.name for e in validation),
         tuple(notes),
         final.model,
         fit_of(final.model, data.training, final.fit, nominal.fit.residual, [e.name for e in training]),
-        pictures(data, nominal, known.recalibrated, final),
+        (),
         time.perf_counter() - known.began,
         interrupted,
-        gather(found.final.model, [entry.key for entry in accepted if entry.side == "motor"], data.validation, floor),
-        concluded.empirical,
-        experiments_for(found.final, ambiguous, data.training, floor),
-        classes(accepted, ambiguous),
-        traces(data, nominal, final),
-        {name: parameter.value for name, parameter in known.model.parameters.items()},
+        empirical=concluded.empirical,
+        classes=classes(accepted, ambiguous),
+        stated={name: parameter.value for name, parameter in known.model.parameters.items()},
     )
+    at_motors = [entry.key for entry in accepted if entry.side == "motor"]
+    more: dict[str, Callable[[], Any]] = {
+        "where": lambda: where(known.recalibrated.model, data.validation),
+        "pictures": lambda: pictures(data, nominal, known.recalibrated, final),
+        "evidence": lambda: gather(found.final.model, at_motors, data.validation, floor),
+        "traces": lambda: traces(data, nominal, final),
+        "experiments": lambda: experiments_for(found.final, ambiguous, data.training, floor),
+    }
+    try:
+        say("designing discriminating experiments")
+        for field, compute in more.items():
+            told = replace(told, **{field: compute()})
+    except KeyboardInterrupt:
+        told = replace(told, interrupted=True, notes=(*told.notes, STOPPED_BARE))
+    return replace(told, seconds=time.perf_counter() - known.began)
 
 
-def _rest(recalibrated: Judged, found: Search, data: Data, each: SideBySide) -> Remainder:
-    """Remainder of the residual in `diagnose`, under the effects found."""
+def _rest(
+    recalibrated: Judged, found: Search, data: Data, gap: dict[str, ChannelGap], each: SideBySide, say: Tell
+) -> Remainder | None:
+    """Remainder of the residual in `diagnose`, under the effects found; none where all is known."""
+    say("examining what is left")
+    if not found.accepted and is_negligible(gap):
+        return None
     start = found.final if found.interrupted or not found.accepted else recalibrated
     return remainder(start, found.final, data, min(m.dt for m in data.training.motions), worker_count(each.workers))

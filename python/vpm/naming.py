@@ -75,8 +75,8 @@ def ranking_of(
         return None
     reason = "" if unbalanced else why_not_ranked(model, training)
     if not reason:
-        tell("ranking what could be missing")
         try:
+            tell("ranking what could be missing")
             return rank(
                 model,
                 training,
@@ -120,7 +120,6 @@ def named(
     found = search(recalibrated, data, screened, limit, tell, each)
     if found.interrupted:
         notes.append(STOPPED)
-    tell("looking for what else would do in the place of each effect")
     nothing: tuple[Rivals, ...] = ()
     settle = partial(_settled, found, data, screened, limit, tell, each)
     try:
@@ -147,6 +146,7 @@ def _settled(
     Where something takes the place of an effect, or comes in beside it as runs of the model support it, the search goes
     on beside that.
     """
+    tell("looking for what else would do in the place of each effect")
     known = rivals(found.final, data, found.accepted, effects, each, found.last)
     for _ in range(limit):
         changed, known = replaced(found, known, data)

@@ -53,7 +53,7 @@ class AcceptedEffect(Storable):
     parameters : tuple of EffectParameterEstimate
         In the final model, after all effects were fitted together.
     gain : float
-        Share of the validation residual's mean square that went when it was accepted.
+        Share of the validation residual's mean square that went when it was accepted; NaN where Ctrl-C came before.
     score : float
         That gain in standard deviations between independent blocks.
     notes : tuple of str

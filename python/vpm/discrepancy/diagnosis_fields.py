@@ -34,7 +34,7 @@ ALIKE = "predicts the validation data as well"
 def of_search(
     model: Model, records: Records, start: Judged, found: Search, fitted: Problem, seconds: float
 ) -> Diagnosis:
-    """Diagnosis with the fields of the search alone, where nothing after it could be computed.
+    """Diagnosis with the fields of the search alone, where what follows it could not be computed or was stopped.
 
     Parameters
     ----------
@@ -52,7 +52,7 @@ def of_search(
     names = ", ".join(entry.label for entry in found.accepted) or "no effect"
     return Diagnosis(
         "effect_found" if found.accepted else "unexplained",
-        f"The search accepts {names} in {model.name}; what is left on validation records could not be computed.",
+        f"The search accepts {names} in {model.name}; what is left on validation records is not judged.",
         tuple(accepted_effect(entry, found.final) for entry in found.accepted),
         {},
         found.refused,

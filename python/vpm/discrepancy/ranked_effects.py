@@ -118,7 +118,7 @@ def searched(
     settings : vpm.ranking.Settings
         Of the ranking.
 
-    Ctrl-C gives the effects that were refitted until then.
+    Ctrl-C gives the effects that were refitted until then; before the first one was, it raises.
     """
     known: tuple[Rivals, ...] = ()
 
@@ -158,11 +158,11 @@ def staged(
     settings : vpm.ranking.Settings
         Of the ranking.
 
-    Ctrl-C gives the effects that were measured until then.
+    Ctrl-C gives the effects that were measured until then; before the first one was, it raises.
     """
     stages, accepted = [Stage("recalibrated", "", "", recalibrated)], list[Accepted]()
     outside: dict[Key, str] = {}
-    interrupted = ranking.interrupted or recalibrated.fit.interrupted
+    interrupted = ranking.interrupted
     try:
         for place, one in enumerate(ranking.effects):
             gone = [other for other in ranking.effects if other.key in outside] + list(ranking.effects[place + 1 :])
@@ -173,12 +173,19 @@ def staged(
                 continue
             accepted.append(Accepted(trial, one.rivals, one.evidence, one.probability, one.side, one.class_probability))
             stages.append(Stage("added", *one.key, trial.judged))
+        if ranking.rounds:
+            outside |= _unpromising(ranking, offered(stages[-1].judged))
     except KeyboardInterrupt:
-        interrupted = True
+        if not accepted:
+            raise
+        interrupted, known = True, {*outside, *(entry.key for entry in accepted)}
+        outside |= {
+            one.key: f"it {_removes(one)}, but Ctrl-C came before it was measured"
+            for one in ranking.effects
+            if one.key not in known
+        }
     gains = {entry.key: entry.trial.validation.relative for entry in accepted}
-    if ranking.rounds:
-        outside |= _unpromising(ranking, offered(stages[-1].judged))
-    refused, tried = _refused(ranking, outside, settings), _candidates(ranking, gains, settings)
+    refused, tried = refused_by(ranking, outside, settings), candidates_of(ranking, gains, settings)
     return Search(
         tuple(stages),
         tuple(accepted),
@@ -358,7 +365,7 @@ class _Last:
     came_in: bool
 
 
-def _refused(ranking: Ranking, outside: Mapping[Key, str], settings: RankingSettings) -> tuple[RefusedEffect, ...]:
+def refused_by(ranking: Ranking, outside: Mapping[Key, str], settings: RankingSettings) -> tuple[RefusedEffect, ...]:
     """Effects that a ranking refused or removed again, with the reason; the most hopeful of its last round first."""
     last: dict[Key, _Last] = {}
     for several in ranking.rounds:
@@ -402,7 +409,9 @@ def _reason(entry: _Last, settings: RankingSettings) -> str:
     )
 
 
-def _candidates(ranking: Ranking, gains: Mapping[Key, float], settings: RankingSettings) -> tuple[RankedCandidate, ...]:
+def candidates_of(
+    ranking: Ranking, gains: Mapping[Key, float], settings: RankingSettings
+) -> tuple[RankedCandidate, ...]:
     """Candidates of all rounds of a ranking for the result, the most probable first."""
     found = []
     for number, several in enumerate(ranking.rounds):

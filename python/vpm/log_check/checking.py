@@ -23,6 +23,9 @@ from vpm.observer import measured_outputs
 from vpm.one_thread import in_one_thread
 from vpm.simulate import Setup
 
+#: Said after Ctrl-C.
+UNCHECKED = "nothing is known yet: {record} was still being checked for wrong units, signs, names and clocks"
+
 
 @in_one_thread
 def check_log(
@@ -65,6 +68,8 @@ def check_log(
     ------
     VpmError
         A log lacks a command, or holds nothing that the model has.
+    KeyboardInterrupt
+        Ctrl-C, with a sentence.
 
     Examples
     --------
@@ -76,7 +81,10 @@ def check_log(
     findings: list[Finding] = []
     shares: dict[str, float] = {}
     for record in as_records(experiments):
-        odd, left = check.of(record, model.channel_table if table is None else table)
+        try:
+            odd, left = check.of(record, model.channel_table if table is None else table)
+        except KeyboardInterrupt:
+            raise KeyboardInterrupt(UNCHECKED.format(record=record.name)) from None
         findings += odd
         for name, share in left.by_channel.items():
             shares[name] = max(share, shares.get(name, 0.0))

@@ -173,7 +173,10 @@ def _beside(current: Judged, model: Model, one: Ranked, data: _Followed, *, refi
     known, own = fitted_in(current, model, one)
     judged = _judged(model, (*known, *own), data)
     if refit:
-        moved = _judged(estimate(model, data.training, judged.free, linear_only=True).on(model), judged.free, data)
+        first = estimate(model, data.training, judged.free, linear_only=True)
+        if first.interrupted:
+            raise KeyboardInterrupt
+        moved = _judged(first.on(model), judged.free, data)
         judged = min(judged, moved, key=lambda each: float(each.fit.residual @ each.fit.residual))
     values = {name: model.parameters[name].value for name in own}
     candidate = Candidate(EFFECTS[one.effect], one.site, ({},))

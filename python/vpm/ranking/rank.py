@@ -62,7 +62,7 @@ def rank(
     Returns
     -------
     Ranking
-        Ctrl-C during the search gives what is known until then, with ``interrupted``; earlier it raises.
+        Ctrl-C after the first fit gives what is known until then, with ``interrupted``; earlier it raises.
 
     Raises
     ------

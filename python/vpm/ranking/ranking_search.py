@@ -24,7 +24,7 @@ from vpm.ranking.parameter_priors import Sizes, known
 from vpm.ranking.posterior import robust_probabilities
 from vpm.ranking.proposal_fits import raced
 from vpm.ranking.proposals import proposals
-from vpm.ranking.result import Ranked, Ranking
+from vpm.ranking.result import Gap, Ranked, Ranking
 from vpm.ranking.settings import Settings
 from vpm.ranking.several_places import alike
 from vpm.ranking.structure_extensions import Extensions
@@ -114,11 +114,17 @@ class Search:
             interrupted = True
         found = looks[0].fitted.structure
         recalibrated = next(iter(self.first.values())).fitted.structure.repaired
-        stages = (self.start.model, recalibrated, found.repaired)
         hold = self.fitter.tracked.setup.course
-        left = gaps(held_out.with_hold(hold), stages, self.settings.bands[0])
         effects = tuple(replace(named[key], side=found.side(key)) for key in found.effects)
-        return Ranking(effects, tuple(rounds), found.repaired, recalibrated, left, interrupted, hold)
+        ranking = Ranking(effects, tuple(rounds), found.repaired, recalibrated, {}, interrupted, hold)
+        try:
+            return replace(ranking, gaps=self._gaps(held_out.with_hold(hold), ranking))
+        except KeyboardInterrupt:
+            return replace(ranking, interrupted=True)
+
+    def _gaps(self, held_out: TrackedRecords, ranking: Ranking) -> dict[str, Gap]:
+        """Errors of what the search found on validation records."""
+        return gaps(held_out, (self.start.model, ranking.recalibrated, ranking.model), self.settings.bands[0])
 
     def _held(self, looks: list[Look], best: Trial | None) -> list[Look]:
         """Search again with commands that change between samples, where no effect does as well; else none.

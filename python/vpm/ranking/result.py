@@ -112,9 +112,9 @@ class Ranking(Result):
     recalibrated : Model
         As it was, its uncertain parameters fitted.
     gaps : dict of str to Gap
-        By channel, on records that decided nothing; empty if there are none.
+        By channel, on records that decided nothing; empty if there are none, or Ctrl-C came before they were measured.
     interrupted : bool
-        Ctrl-C ended the search: there may be more.
+        Ctrl-C ended the search, where there may be more, or the measuring of what it found.
     hold : str
         What commands were taken to do between samples, see `Setup.hold`; pass it on to simulate the model.
     """

@@ -46,6 +46,8 @@ def undetermined(value: float, std: float, stated: float | None = None) -> str:
 
 def took(effect: AcceptedEffect) -> str:
     """Message on what an effect did to the validation error when it came in."""
+    if isnan(effect.gain):
+        return "was not measured on validation records"
     did = "took" if effect.gain >= 0.0 else "added"
     ending = "of the validation mean square" if effect.gain >= 0.0 else "to the validation mean square"
     return f"{did} {percent(abs(effect.gain))} {ending} ({effect.score:.1f} standard deviations)"

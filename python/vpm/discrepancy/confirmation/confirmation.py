@@ -169,6 +169,8 @@ def judge(
     ------
     DivergedError
         The fitted model cannot simulate the validation records.
+    KeyboardInterrupt
+        Ctrl-C ended the fit: its values say nothing of a candidate.
     """
     bounds = ends_apart(model, free, bounds)
     if origin is None and has_tangent(model, data.training):
@@ -180,6 +182,8 @@ def judge(
         )
     else:
         fit = estimate_on_tangent(model, data.training, free, origin, bounds=bounds, tolerance=TOLERANCE, worth=worth)
+    if fit.interrupted:
+        raise KeyboardInterrupt
     fitted = model.with_parameters(dict(zip(free, map(float, fit.values), strict=True)))
     validation, _ = data.validation.evaluate(fitted, fitted.theta)
     simulated = None if data.simulation is None else data.simulation.evaluate(fitted, fitted.theta)[0]
@@ -283,18 +287,11 @@ def judged_anyhow(
     origin: Array | None = None,
     worth: Worth | None = None,
 ) -> tuple[Judged, str]:
-    """Confirmation's judgement by the residual alone where a fit cannot simulate, with the reason.
-
-    One that Ctrl-C ended says nothing of a candidate.
-    """
-    reason = ""
+    """Confirmation's judgement by the residual alone where a fit cannot simulate, with the reason."""
     try:
-        judged = judge(start, free, data, bounds, origin, worth)
+        return judge(start, free, data, bounds, origin, worth), ""
     except DivergedError as error:
-        judged, reason = judge(start, free, replace(data, simulation=None), bounds, origin, worth), str(error)
-    if judged.fit.interrupted:
-        raise KeyboardInterrupt
-    return judged, reason
+        return judge(start, free, replace(data, simulation=None), bounds, origin, worth), str(error)
 
 
 def _visible_now(judged: Judged, data: Data, probe: Probe) -> tuple[str, ...]:

@@ -88,8 +88,7 @@ def search(
     start: Judged, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: SideBySide
 ) -> Search:
     """Search: add effects one at a time and drop replaced ones, until none is accepted any more."""
-    found = Search((Stage("recalibrated", "", "", start),), (), (), (), start.fit.interrupted)
-    return found if found.interrupted else further(found, data, effects, limit, tell, each)
+    return further(Search((Stage("recalibrated", "", "", start),), (), (), ()), data, effects, limit, tell, each)
 
 
 def further(
@@ -133,32 +132,36 @@ def further(
         if best is None:
             over = Over(tuple(outcome.probes), tuple(outcome.trials))
             break
-        if has_tangent(best.trial.judged.model, data.training):
-            best = refitted(best, data)
         # Beside the first of a pair, and in a round of a few, little else was tried.
         known = Tried(best.key, outcome.current, tuple(outcome.probes), tuple(outcome.trials))
         last = known if pair is None and not again else None
         accepted.append(best)
         stages.append(Stage("added", *best.key, best.trial.judged))
-        tell(f"round {number}: accepted {best.trial.probe.candidate.label}")
-        interrupted = best.trial.judged.fit.interrupted or not _dropped(stages, accepted, data, dropped)
+        try:
+            tell(f"round {number}: accepted {best.trial.probe.candidate.label}")
+            _reconsidered(stages, accepted, data, dropped)
+        except KeyboardInterrupt:
+            interrupted = True
         if interrupted:
             break
-    if not interrupted:
-        stages[-1], same = _loosened(stages[-1], data)
-        last = last if same and not dropped else None
-    listed = _listed({**dropped, **refused})
-    return Search(tuple(stages), tuple(accepted), listed, tuple(ranking), interrupted, last, over)
-
-
-def _dropped(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> bool:
-    """Search after backward elimination; also whether that ended before Ctrl-C."""
     try:
-        drop_replaced(stages, accepted, data, dropped)
-        drop_springs(stages, accepted, data, dropped)
+        if not interrupted:
+            stages[-1], same = _loosened(stages[-1], data)
+            last = last if same and not dropped else None
     except KeyboardInterrupt:
-        return False
-    return True
+        interrupted = True
+    return Search(
+        tuple(stages), tuple(accepted), _listed({**dropped, **refused}), tuple(ranking), interrupted, last, over
+    )
+
+
+def _reconsidered(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
+    """Search after an effect came in: that is fitted to the end, and what it makes needless is dropped."""
+    if has_tangent(accepted[-1].trial.judged.model, data.training):
+        accepted[-1] = refitted(accepted[-1], data)
+        stages[-1] = replace(stages[-1], judged=accepted[-1].trial.judged)
+    drop_replaced(stages, accepted, data, dropped)
+    drop_springs(stages, accepted, data, dropped)
 
 
 def _whole(
