@@ -17,11 +17,20 @@ from numpy.typing import NDArray
 
 from vpm.errors import ReductionError
 from vpm.model.beams.reduced import MODES, ReducedLink
-from vpm.reduction.structure import Structure, check_structure, check_units, rigid_motions
+from vpm.reduction.structure import (
+    Structure,
+    check_structure,
+    check_units,
+    rigid_motions,
+    second_moments,
+    with_real_bodies,
+)
 from vpm.reduction.tied import Tied
 
 Array = NDArray[np.float64]
 
+#: Signs of the cross product: ``(a x b)_k = CROSS_kij a_i b_j``.
+_CROSS = np.array([[np.cross(a, b)[k] for a in np.eye(3) for b in np.eye(3)] for k in range(3)]).reshape(3, 3, 3)
 #: Share of the largest one below which an entry of the Gram matrix is rounding.
 _RANK = 1e-12
 
@@ -102,6 +111,7 @@ def reduce_structure(structure: Structure, modes: int = 8) -> Reduction:
     if not 1 <= modes <= MODES:
         raise ReductionError(f"{modes} modes are asked for, but 1 to {MODES} are possible")
     check_structure(structure)
+    structure = with_real_bodies(structure)
     solid = Tied(structure)
     basis = np.hstack([solid.constraint_modes(), solid.fixed_modes(modes)])
     squares, shapes = _own_modes(solid, basis, modes)
@@ -110,7 +120,7 @@ def reduce_structure(structure: Structure, modes: int = 8) -> Reduction:
     fields, frames = solid.nodal(shapes), solid.frames(shapes)
     second = _second(solid, fields, frames)
     link = _link(structure, squares, fields, frames, second)
-    moved = rigid_motions(structure.nodes)[:, 3:]
+    moved = structure.rigid_motions(structure.centre)[:, 3:]
     effective = (fields.T @ (structure.mass @ moved)) ** 2 / structure.total_mass
     exact = np.diag(solid.compliance())
     kept = (frames**2 / squares).sum(axis=-1)
@@ -120,12 +130,13 @@ def reduce_structure(structure: Structure, modes: int = 8) -> Reduction:
 
 def _own_modes(solid: Tied, basis: Array, count: int) -> tuple[Array, Array]:
     """Slowest Craig-Bampton modes within a basis, of unit modal mass."""
-    basis = basis / np.sqrt(np.einsum("ij,ij->j", basis, solid.mass @ basis))
+    basis = basis / np.sqrt(np.einsum("ij,ij->j", basis, solid.stiffness @ basis))
     stiffness, mass = basis.T @ (solid.stiffness @ basis), basis.T @ (solid.mass @ basis)
-    values, shapes = scipy.linalg.eigh(0.5 * (stiffness + stiffness.T), 0.5 * (mass + mass.T))
-    shapes = basis @ shapes[:, :count]
-    shapes *= np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(count)])
-    return values[:count], shapes
+    # The other way round, for rotations without inertia leave the mass singular.
+    values, shapes = scipy.linalg.eigh(0.5 * (mass + mass.T), 0.5 * (stiffness + stiffness.T))
+    values, shapes = values[::-1][:count], basis @ shapes[:, ::-1][:, :count]
+    shapes *= np.sign(shapes[np.abs(shapes).argmax(axis=0), np.arange(count)]) / np.sqrt(values)
+    return 1.0 / values, shapes
 
 
 def _second(solid: Tied, fields: Array, frames: Array) -> tuple[Array, Array] | None:
@@ -170,13 +181,22 @@ def _link(
     """Point masses of a Craig-Bampton link with the Gram matrix of the solid's fields.
 
     With ``G = L L^T`` the columns of L are as good as the solid; a turn of them makes the masses equal. What is
-    quadratic goes to them by its products with all other fields.
+    quadratic goes to them by its products with all other fields. A node with rotary inertia J is a small rigid body
+    of the second moments ``tr(J)/2 - J``, and a field grows within it by its gradient, ``theta x r``.
     """
     nodes, n = structure.nodes - structure.places[0], squares.size
-    functions = np.hstack([np.ones((len(nodes), 1)), nodes, fields.reshape(len(nodes), 3 * n)])
+    shifts = fields[: nodes.size]
+    functions = np.hstack([np.ones((len(nodes), 1)), nodes, shifts.reshape(len(nodes), 3 * n)])
     weighted = structure.scalar_mass @ functions
     gram = functions.T @ weighted
+    if structure.rotations.size:
+        moments = second_moments(structure.rotary_inertia)
+        grown = np.einsum("kij,pin->pjkn", _CROSS, structure.turns(fields)).reshape(len(nodes), 3, 3 * n)
+        of_places = np.broadcast_to(np.eye(4)[1:], (len(nodes), 3, 4))
+        gradients = np.concatenate([of_places, grown], axis=2)
+        gram += np.einsum("pia,pij,pjb->ab", gradients, moments, gradients, optimize=True)
     size = np.sqrt(np.diag(gram))
+    size[size == 0.0] = 1.0
     values, vectors = np.linalg.eigh(gram / np.outer(size, size))
     if values[0] < -1e-9 * values[-1]:
         raise ReductionError(

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Annotated, Literal
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 from pydantic import Field, ValidationError
 
@@ -16,6 +17,7 @@ from vpm.errors import ReductionError, VpmError
 from vpm.model.beams.reduced import read_bytes
 from vpm.model.entry import Entry, Number, Switch, Text, Vector
 from vpm.reduction.craig_bampton import Reduction, reduce_structure
+from vpm.reduction.labelled import COMPONENTS, Labelled, read_labelled, read_labelled_nodes
 from vpm.reduction.matrices import read_matrix, read_nodes
 from vpm.reduction.solid import box_mesh, read_mesh, solid
 from vpm.reduction.structure import Interface, Matrix, Structure, Tie
@@ -153,12 +155,52 @@ def _of_solid(file: _File, entry: _Solid, path: Path) -> tuple[Structure, float 
 
 def _of_matrices(file: _File, entry: _Matrices, path: Path) -> tuple[Structure, float | None]:
     folder, (stiffness, mass, length) = path.parent, UNITS[entry.units]
+    labelled = [
+        read_labelled(folder / name, initial)
+        for name, initial in ((entry.stiffness, "K"), (entry.mass_matrix, "M"))
+        if Path(name).suffix.lower() not in (".npz", ".npy")
+    ]
+    if labelled and all(each is not None for each in labelled):
+        own = [each for each in labelled if each is not None]
+        return _of_labels(file, entry, own, path), entry.mass
     nodes = read_nodes(folder / entry.nodes) * length
     matrices = [read_matrix(folder / name, triangle=entry.triangle) for name in (entry.stiffness, entry.mass_matrix)]
     return Structure(matrices[0] * stiffness, matrices[1] * mass, nodes, _interfaces(file, nodes, path)), entry.mass
 
 
-def _interfaces(file: _File, nodes: Array, path: Path) -> tuple[Interface, ...]:
+def _of_labels(file: _File, entry: _Matrices, matrices: list[Labelled], path: Path) -> Structure:
+    """Files with labels as matrices of all displacements, then all rotations that stiffness or mass act on."""
+    stiffness, mass, length = UNITS[entry.units]
+    known = read_labelled_nodes(path.parent / entry.nodes)
+    given = np.unique(np.concatenate([matrix.places for matrix in matrices]))
+    labels = np.unique(given // COMPONENTS)
+    if lacking := [label for label in labels.tolist() if label not in known]:
+        raise ReductionError(
+            f"{path}: {entry.nodes} does not have the node {lacking[0]} of the matrices, nor {len(lacking) - 1} "
+            "others; give the places of all"
+        )
+    turns = given[given % COMPONENTS >= 3]
+    shifts = (COMPONENTS * labels[:, None] + np.arange(3)).ravel()
+    places = np.sort(np.concatenate([shifts, turns]))
+    order = np.searchsorted(places, np.concatenate([shifts, turns]))
+    # Of a rotation: a moment per turn, and a moment of inertia.
+    scale = sp.diags_array(np.repeat([1.0, length], [shifts.size, turns.size]))
+    full = [scale @ matrix.on(places)[order][:, order] @ scale for matrix in matrices]
+    nodes = length * np.array([known[label] for label in labels.tolist()]).reshape(-1, 3)
+    rotations = 3 * np.searchsorted(labels, turns // COMPONENTS) + turns % COMPONENTS - 3
+    return Structure(
+        sp.csr_array(stiffness * full[0]),
+        sp.csr_array(mass * full[1]),
+        nodes,
+        _interfaces(file, nodes, path, labels),
+        rotations=np.asarray(rotations, dtype=np.intp),
+        labels=np.asarray(labels, dtype=np.intp),
+    )
+
+
+def _interfaces(
+    file: _File, nodes: Array, path: Path, labels: NDArray[np.int64] | None = None
+) -> tuple[Interface, ...]:
     found = []
     for name, entry in file.interfaces.items():
         ways = [way for way in (entry.plane, entry.box, entry.nodes) if way is not None]
@@ -166,7 +208,14 @@ def _interfaces(file: _File, nodes: Array, path: Path) -> tuple[Interface, ...]:
             raise ReductionError(
                 f"{path}: interfaces.{name} needs one of plane, box and nodes; add one, or remove others"
             )
-        found.append(Interface(name, _chosen(entry, nodes), entry.tie))
+        chosen = _chosen(entry, nodes)
+        if labels is not None and entry.nodes is not None:
+            if (unknown := np.setdiff1d(chosen, labels)).size:
+                raise ReductionError(
+                    f"{path}: interfaces.{name} has the node {unknown[0]}, which no matrix has; correct it"
+                )
+            chosen = np.searchsorted(labels, chosen)
+        found.append(Interface(name, chosen, entry.tie))
     return tuple(found)
 
 
@@ -186,7 +235,6 @@ def _chosen(entry: _Interface, nodes: Array) -> NDArray[np.intp]:
 
 def _from_archive(path: Path) -> Structure:
     """Files of a solid in one ``.npz``; sparse matrices in CSR."""
-    import scipy.sparse as sp
 
     def matrix(stored: Mapping[str, Matrix], name: str) -> Matrix:
         if name in stored:

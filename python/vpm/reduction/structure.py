@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any, Literal
 
@@ -46,6 +46,8 @@ class Interface:
 class Structure:
     """Matrices of a solid with three displacements per node; number ``3 node + axis``, SI.
 
+    Rotations of nodes, as shells and beams have them, follow all displacements.
+
     Attributes
     ----------
     stiffness, mass : sparse matrix
@@ -56,6 +58,10 @@ class Structure:
     stretching : callable, optional
         For two displacement fields, the nodal forces of the stress of their Green-Lagrange strain, ``sym(A_i^T A_j)``
         with the gradients A; without it nothing of second order is known of the solid.
+    rotations : ndarray of int
+        Numbers ``3 node + axis`` of the rotations, in their order.
+    labels : ndarray of int
+        What messages call the nodes; their numbers from 0 on if empty.
     """
 
     stiffness: Matrix
@@ -63,6 +69,39 @@ class Structure:
     nodes: Array
     interfaces: tuple[Interface, ...]
     stretching: Callable[[Array, Array], Array] | None = field(default=None, repr=False)
+    rotations: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    labels: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+
+    @property
+    def size(self) -> int:
+        """Number of displacements and rotations of the structure."""
+        return 3 * len(self.nodes) + self.rotations.size
+
+    def label(self, node: int) -> int:
+        """What messages call a node of the structure."""
+        return int(self.labels[node]) if self.labels.size else node
+
+    def describe(self, number: int) -> str:
+        """What messages call a displacement or a rotation of the structure."""
+        shift = number < 3 * len(self.nodes)
+        place = number if shift else int(self.rotations[number - 3 * len(self.nodes)])
+        return f"node {self.label(place // 3)}, {'' if shift else 'rotation about '}{'xyz'[place % 3]}"
+
+    def turns(self, fields: Array) -> Array:
+        """Rotations of all nodes in fields of the structure (size, n), shape (N, 3, n); zero where there are none."""
+        found = np.zeros((3 * len(self.nodes), fields.shape[1]))
+        found[self.rotations] = fields[3 * len(self.nodes) :]
+        return found.reshape(len(self.nodes), 3, -1)
+
+    @cached_property
+    def rotary_inertia(self) -> Array:
+        """Moments of inertia of the structure's nodes about themselves (kg m^2), shape (N, 3, 3)."""
+        found, first = np.zeros((len(self.nodes), 3, 3)), 3 * len(self.nodes)
+        coupled = sp.coo_array(self.mass[first:, first:])
+        rows, columns = self.rotations[coupled.row], self.rotations[coupled.col]
+        own = rows // 3 == columns // 3
+        found[rows[own] // 3, rows[own] % 3, columns[own] % 3] = coupled.data[own]
+        return found
 
     @cached_property
     def scalar_mass(self) -> Matrix:
@@ -86,7 +125,14 @@ class Structure:
         return np.array([self.nodes[interface.nodes].mean(axis=0) for interface in self.interfaces])
 
     def _block(self, row: int, column: int) -> Matrix:
-        return sp.csr_array(self.mass[row::3, column::3])
+        shifts = 3 * len(self.nodes)
+        return sp.csr_array(self.mass[row:shifts:3, column:shifts:3])
+
+    def rigid_motions(self, centre: Array) -> Array:
+        """Displacements and rotations of the structure by a small rigid motion about a point, shape (size, 6)."""
+        turned = np.zeros((self.rotations.size, 6))
+        turned[np.arange(self.rotations.size), self.rotations % 3] = 1.0
+        return np.vstack([rigid_motions(self.nodes - centre), turned])
 
 
 def rigid_motions(places: Array) -> Array:
@@ -100,6 +146,33 @@ def rigid_motions(places: Array) -> Array:
     return motions.reshape(-1, 6)
 
 
+def second_moments(inertia: Array) -> Array:
+    """Second moments of mass of a structure's nodes from their moments of inertia, ``tr(J)/2 - J``."""
+    return np.asarray(0.5 * np.trace(inertia, axis1=1, axis2=2)[:, None, None] * np.eye(3) - inertia)
+
+
+def with_real_bodies(structure: Structure) -> Structure:
+    """Structure whose rotary inertia is that of real bodies.
+
+    Elements of bars often give a node a moment of inertia about their axis alone, which no body has. The least that is
+    added makes a flat disc of it: half of that about each of the other axes, as the section of a bar has it.
+    """
+    if not structure.rotations.size:
+        return structure
+    inertia = structure.rotary_inertia
+    moments, axes = np.linalg.eigh(second_moments(inertia))
+    real = np.einsum("pia,pa,pja->pij", axes, moments.clip(0.0), axes)
+    added = np.trace(real, axis1=1, axis2=2)[:, None, None] * np.eye(3) - real - inertia
+    rows = np.repeat(structure.rotations // 3, 3)
+    columns = 3 * rows + np.tile(np.arange(3), structure.rotations.size)
+    places = np.searchsorted(structure.rotations, columns).clip(0, structure.rotations.size - 1)
+    own = structure.rotations[places] == columns
+    more = added[rows, np.repeat(structure.rotations % 3, 3), columns % 3]
+    first = 3 * len(structure.nodes)
+    at = (first + np.repeat(np.arange(structure.rotations.size), 3)[own], first + places[own])
+    return replace(structure, mass=sp.csr_array(structure.mass + sp.coo_array((more[own], at), structure.mass.shape)))
+
+
 def check_structure(structure: Structure) -> None:
     """Refuse matrices that are those of no structure.
 
@@ -108,14 +181,14 @@ def check_structure(structure: Structure) -> None:
     ReductionError
         One sentence: what is wrong, by how much, and the repair.
     """
-    n = 3 * len(structure.nodes)
+    n = structure.size
     for what in ("stiffness", "mass"):
         matrix: Matrix = getattr(structure, what)
         if matrix.shape != (n, n):
             raise ReductionError(
                 f"the {what} matrix has {matrix.shape[0]} rows and {matrix.shape[1]} columns, but "
                 f"{len(structure.nodes)} nodes with 3 displacements each need {n}; give the "
-                "nodes of the matrix, without rotations"
+                "nodes of the matrix, and rotations with the labels of their nodes"
             )
         if not np.isfinite(matrix.data).all():
             raise ReductionError(f"the {what} matrix has numbers that are not finite; export it again")
@@ -130,7 +203,7 @@ def check_structure(structure: Structure) -> None:
         if least < 0.0 or (what == "stiffness" and least == 0.0):
             number = int(matrix.diagonal().argmin())
             raise ReductionError(
-                f"the {what} matrix has {least:.3g} on its diagonal, at node {number // 3}, {'xyz'[number % 3]}; "
+                f"the {what} matrix has {least:.3g} on its diagonal, at {structure.describe(number)}; "
                 "it is not that of a free solid, so export it without constraints"
             )
     _check_mass(structure)
@@ -153,8 +226,34 @@ def _check_mass(structure: Structure) -> None:
             "its largest entry, but mass is the same in all directions and couples none; check the order of the "
             "displacements: x, y and z node by node"
         )
+    _check_rotary(structure)
     if not structure.total_mass > 0.0:
         raise ReductionError(f"the mass matrix sums up to {structure.total_mass:.3g} kg; it has to be above 0")
+
+
+def _check_rotary(structure: Structure) -> None:
+    """Refuse a structure whose rotations have an inertia that is not that of bodies on its nodes.
+
+    In a large motion the products of a mass with places and displacements matter one by one, and matrices that couple
+    rotations with displacements do not tell them.
+    """
+    first = 3 * len(structure.nodes)
+    if not structure.rotations.size:
+        return
+    coupled = sp.coo_array(structure.mass[first:, :])
+    node = structure.rotations[coupled.row] // 3
+    beyond = coupled.col - first
+    own = (beyond >= 0) & (structure.rotations[beyond.clip(0)] // 3 == node)
+    shift = np.abs(coupled.data) > ROUNDING * np.sqrt(
+        structure.mass.diagonal()[first + coupled.row] * structure.mass.diagonal()[coupled.col]
+    )
+    if (wrong := np.flatnonzero(~own & shift)).size:
+        worst = wrong[0]
+        raise ReductionError(
+            f"the mass matrix couples {structure.describe(first + coupled.row[worst])}, with "
+            f"{structure.describe(coupled.col[worst])}, as consistent matrices of beams and shells do; export lumped "
+            "mass (Nastran: PARAM,COUPMASS,-1)"
+        )
 
 
 def _check_interfaces(structure: Structure) -> None:
@@ -171,20 +270,23 @@ def _check_interfaces(structure: Structure) -> None:
                 f"{what} has the node {wrong}, but the nodes are numbered 0 to {len(structure.nodes) - 1}; correct it"
             )
         spread = np.linalg.svd(structure.nodes[nodes] - structure.nodes[nodes].mean(axis=0), compute_uv=False)
-        if spread.size < 2 or spread[1] <= ROUNDING * spread[0] or spread[0] == 0.0:
+        holds = np.isin(3 * nodes[:, None] + np.arange(3), structure.rotations).all(axis=1).any()
+        if not holds and (spread.size < 2 or spread[1] <= ROUNDING * spread[0] or spread[0] == 0.0):
             raise ReductionError(
-                f"{what} has {nodes.size} nodes on one line, which hold no rotation about it; name nodes of a face"
+                f"{what} has {nodes.size} nodes on one line, which hold no rotation about it; name nodes of a face, or "
+                "a node with three rotations"
             )
         for node in nodes:
             if (other := taken.setdefault(int(node), interface.name)) != interface.name:
                 raise ReductionError(
-                    f'node {node} is part of the interfaces "{other}" and "{interface.name}"; keep one'
+                    f'node {structure.label(int(node))} is part of the interfaces "{other}" and "{interface.name}"; '
+                    "keep one"
                 )
 
 
 def _check_rigid(structure: Structure) -> None:
     """Refuse a structure in which rigid motions cost energy."""
-    motions = rigid_motions(structure.nodes - structure.centre)
+    motions = structure.rigid_motions(structure.centre)
     names = (
         "rotation about x",
         "rotation about y",
