@@ -91,6 +91,29 @@ class Unit:
     zero: float = 0.0
 
     @property
+    def is_si(self) -> bool:
+        """Whether values of this unit are those in SI."""
+        return (self.factor, self.zero) == (1.0, 0.0)
+
+    def to_si(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values of this unit, in SI.
+
+        Parameters
+        ----------
+        values : ndarray
+        """
+        return values * self.factor + self.zero
+
+    def from_si(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Values in SI, in this unit.
+
+        Parameters
+        ----------
+        values : ndarray
+        """
+        return (values - self.zero) / self.factor
+
+    @property
     def si(self) -> str:
         """The SI unit of the same build: ``"N/m"`` for ``"N/mm"``, ``"rad/s"`` for ``"rpm"``."""
         return _write(self.si_terms)

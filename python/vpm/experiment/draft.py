@@ -18,7 +18,7 @@ from vpm.experiment.readers import open_log
 from vpm.experiment.readers.base import Log, bracketed
 from vpm.experiment.table import Table
 from vpm.expression import PURE, Quantity, read_expression
-from vpm.units import parse_unit
+from vpm.units import Unit, parse_unit
 
 if TYPE_CHECKING:
     from vpm.model import ChannelEntry, Model
@@ -52,7 +52,7 @@ def mapped_draft(log: Log, table: Mapping[str, ChannelEntry], model: Model | Non
     content = log.read(columns, present["time"][""])
     source = Source(str(path), content.lines, str(path))
     entry = table["time"]
-    clock_factor, _, _ = to_si(entry.unit, "time", None, str(path), expected="s")
+    clock_factor = understood(entry.unit, "time", None, str(path), expected="s")[0].factor
     clock = present["time"][""]
     if clock in content.stamps and clock_factor * entry.scale != 1.0:
         raise ExperimentError(
@@ -117,8 +117,7 @@ def _map_channel(
     model: Model | None,
 ) -> None:
     """Draft of one channel in the unit of the entry: (column or value * scale + offset)."""
-    factor, zero, unit = to_si(entry.unit, channel, model, draft.source.name)
-    draft.units[channel] = unit
+    given, draft.units[channel] = understood(entry.unit, channel, model, draft.source.name)
     if columns is None:
         draft.columns[channel] = np.zeros(draft.time.size)
         lacking = "not all columns of the" if entry.value else "no"
@@ -133,7 +132,7 @@ def _map_channel(
             content.columns[columns[name]], draft.time if own is None else own, what, draft.source, channel=channel
         )
     raw = _built(draft, content, channel, entry, columns) if entry.value else content.columns[columns[""]]
-    draft.columns[channel] = (raw * entry.scale + entry.offset) * factor + zero
+    draft.columns[channel] = given.to_si(raw * entry.scale + entry.offset)
     words = [f"{channel} is {entry.told}"]
     if entry.value:
         words[0] += " of " + " and ".join(f'column "{part.column}" in {part.unit}' for part in entry.columns.values())
@@ -141,7 +140,7 @@ def _map_channel(
         words.append(f"times {entry.scale:.9g}")
     if entry.offset != 0.0:
         words.append(f"plus {entry.offset:.9g} {entry.unit}")
-    words.append(f"in {entry.unit}" if (factor, zero) == (1.0, 0.0) else f"converted from {entry.unit} to {unit}")
+    words.append(f"in {entry.unit}" if given.is_si else f"converted from {entry.unit} to {draft.units[channel]}")
     draft.history.append(", ".join(words) + ".")
     if entry.delay != 0.0:
         draft.delays[channel] = entry.delay
@@ -165,7 +164,7 @@ def _built(draft: Draft, content: Table, channel: str, entry: ChannelEntry, colu
     """Value of a drafted channel over several columns, in the unit of the entry."""
     units = {name: parse_unit(part.unit) for name, part in entry.columns.items()}
     parts = {
-        name: Quantity(content.columns[column] * units[name].factor + units[name].zero, units[name].dimension)
+        name: Quantity(units[name].to_si(content.columns[column]), units[name].dimension)
         for name, column in columns.items()
     }
     given = parse_unit(entry.unit)
@@ -181,7 +180,7 @@ def _built(draft: Draft, content: Table, channel: str, entry: ChannelEntry, colu
         raise ExperimentError(
             f"{draft.source.name}, channel {channel}: {error}", path=draft.source.path, channel=channel
         ) from error
-    return np.asarray((value.values - given.zero) / given.factor, dtype=np.float64)
+    return np.asarray(given.from_si(value.values), dtype=np.float64)
 
 
 def plain_draft(log: Log) -> Draft:
@@ -189,8 +188,8 @@ def plain_draft(log: Log) -> Draft:
     path, (names, clock) = log.path, _plain_columns(log)
     content = log.read(log.header, clock)
     source = Source(str(path), content.lines, str(path))
-    factor, _, _ = to_si(names[clock][1] or "s", "time", None, str(path), expected="s")
-    draft = Draft(source, content.columns[clock] * factor, clocks=dict(content.clocks))
+    seconds, _ = understood(names[clock][1] or "s", "time", None, str(path), expected="s")
+    draft = Draft(source, seconds.to_si(content.columns[clock]), clocks=dict(content.clocks))
     draft.history.append(f'Read {draft.time.size} rows of {Path(path).name}; the clock is column "{clock}".')
     draft.history += content.notes
     for column, (name, stated) in names.items():
@@ -198,8 +197,8 @@ def plain_draft(log: Log) -> Draft:
             continue
         own = content.clocks.get(column, draft.time)
         check_finite(content.columns[column], own, f'column "{column}"', source, channel=name)
-        factor, zero, draft.units[name] = to_si(stated or "1", name, None, str(path))
-        draft.columns[name] = content.columns[column] * factor + zero
+        given, draft.units[name] = understood(stated or "1", name, None, str(path))
+        draft.columns[name] = given.to_si(content.columns[column])
         how = f"converted from {stated} to {draft.units[name]}" if stated else "as it is, its unit is not stated"
         draft.history.append(f'{name} is column "{column}", {how}.')
     return draft
@@ -253,10 +252,10 @@ def _stated(column: str, log: Log) -> tuple[str, str]:
     return bracketed(column) if log.bracketed_units else (column, "")
 
 
-def to_si(
+def understood(
     unit: str, channel: str, model: Model | None, where: str, expected: str | None = None
-) -> tuple[float, float, str]:
-    """Factor to SI, the SI value of zero, and the SI unit, which is of the kind that the channel has in the model.
+) -> tuple[Unit, str]:
+    """Unit of a drafted column, of the kind that its channel has in the model, and what the model calls it in SI.
 
     Raises
     ------
@@ -269,7 +268,7 @@ def to_si(
     except UnitError as error:
         raise UnitError(f"{where}, channel {channel}: {error}", unit=unit, expected=wanted) from error
     if wanted is None:
-        return given.factor, given.zero, given.si
+        return given, given.si
     target = parse_unit(wanted)
     if given.dimension != target.dimension:
         raise ExperimentError(
@@ -277,4 +276,4 @@ def to_si(
             f"({target.kind}); correct the unit or the column of its entry in the channel table",
             channel=channel,
         )
-    return given.factor / target.factor, given.zero, wanted
+    return given, wanted

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import ExperimentError, near_match
-from vpm.experiment.draft import Draft, mapped_draft, plain_draft, to_si
+from vpm.experiment.draft import Draft, mapped_draft, plain_draft, understood
 from vpm.experiment.grid import Source, check_finite, check_increasing, check_uniform, make_uniform
 from vpm.experiment.merge import merge_clocks
 from vpm.experiment.record import Experiment
@@ -81,9 +81,9 @@ def array_parts(
                 channel=channel,
             )
         unit = units.get(channel) or (model.channel_unit(channel) if model is not None else "1")
-        factor, zero, draft.units[channel] = to_si(unit, channel, model, name)
-        draft.columns[channel] = column * factor + zero
-        if (factor, zero) != (1.0, 0.0):
+        own, draft.units[channel] = understood(unit, channel, model, name)
+        draft.columns[channel] = own.to_si(column)
+        if not own.is_si:
             draft.history.append(f"{channel} was converted from {unit} to {draft.units[channel]}.")
     return _finish(draft, name, irregular, resample)
 

@@ -409,9 +409,7 @@ class Experiment(Result):
         check_finite(column, self.time, f'the channel "{name}"', Source(self.name), channel=name)
         parsed = parse_unit(unit)
         verb = "replaced by" if name in self else "added from"
-        return self._with_column(
-            name, column * parsed.factor + parsed.zero, parsed.si, f"{name} was {verb} values in {unit}."
-        )
+        return self._with_column(name, parsed.to_si(column), parsed.si, f"{name} was {verb} values in {unit}.")
 
     def align(self, delays: Mapping[str, float]) -> Self:
         """Record with some channels moved back by the times by which they lag the others.
