@@ -7,9 +7,7 @@ import numpy as np
 from vpm.identify import InverseDynamicsProblem
 from vpm.ranking.fit import bounded_step
 from vpm.ranking.model_structure import Structure
-
-#: Steps of a regression, and the share of an error that is noise in the first one.
-STEPS, QUIET = 3, 0.01
+from vpm.ranking.settings import QUIET, REGRESSIONS
 
 
 def regressed(structure: Structure, data: InverseDynamicsProblem) -> Structure:
@@ -30,7 +28,7 @@ def regressed(structure: Structure, data: InverseDynamicsProblem) -> Structure:
     whole = np.zeros((len(residual), len(structure.priors)))
     whole[:, [list(structure.priors).index(name) for name in own]] = jacobian
     variance = QUIET**2 * float(np.mean(residual**2))
-    for _ in range(STEPS):
+    for _ in range(REGRESSIONS):
         slopes = whole * structure.slopes
         move = bounded_step(structure, residual, slopes, np.inf, variance)
         structure, residual = structure.moved(move), residual + slopes @ move

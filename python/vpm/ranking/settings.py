@@ -38,6 +38,8 @@ SURE = 3.0
 
 # ---- where fits begin and how they go on -------------------------------------------------------------------------
 
+#: Steps of a regression of masses and friction, and the share of an error that is noise in the first one.
+REGRESSIONS, QUIET = 3, 0.01
 #: Shares of a step that are tried, the largest first, each about a third of the one before.
 SHARES = (1.0, 0.3, 0.08)
 #: Weight of the prior of a place in a step beside a size, see `Structure.leaning`: it leads elsewhere than it points.
