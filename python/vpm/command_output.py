@@ -64,8 +64,8 @@ FLAGS = {
 
 
 @dataclass
-class Manner:
-    """Manner of output of the command that runs now, and what it has printed.
+class OutputOptions:
+    """OutputOptions of output of the command that runs now, and what it has printed.
 
     Attributes
     ----------
@@ -90,14 +90,16 @@ class Manner:
     begin: float = field(default_factory=perf_counter)
 
 
-_now = Manner()
+_now = OutputOptions()
 
 
-def asked(words: Sequence[str], command: str = "") -> Manner:
-    """Manner of output that a command line asks for, even a faulty one."""
+def asked(words: Sequence[str], command: str = "") -> OutputOptions:
+    """OutputOptions of output that a command line asks for, even a faulty one."""
     flags = list(takewhile(lambda word: word != "--", words))
     short = "".join(word for word in flags if re.fullmatch("-[qv]+", word))
-    return Manner("--json" in flags, "--quiet" in flags or "q" in short, "--verbose" in flags or "v" in short, command)
+    return OutputOptions(
+        "--json" in flags, "--quiet" in flags or "q" in short, "--verbose" in flags or "v" in short, command
+    )
 
 
 def give(**parts: object) -> None:
@@ -136,26 +138,26 @@ def in_lines() -> bool:
     return _now.verbose or not notes.is_terminal
 
 
-def speak(run: Callable[[bool], object], manner: Manner) -> object:
-    """Run a command with a manner of output.
+def speak(run: Callable[[bool], object], options: OutputOptions) -> object:
+    """Run a command with its output options.
 
     Parameters
     ----------
     run : callable
         Takes whether an error of usage is told, and ends the program, at once; gives the exit code.
-    manner : Manner
+    options : OutputOptions
     """
     global _now  # noqa: PLW0603  # one command runs at a time
-    _now = manner
-    notes.quiet = manner.quiet or notes.trouble is not None
+    _now = options
+    notes.quiet = options.quiet or notes.trouble is not None
 
     def checked(alone: bool) -> object:
-        if manner.quiet and manner.verbose:
+        if options.quiet and options.verbose:
             raise VpmError("--quiet and --verbose ask for opposite things; leave one out")
         return run(alone)
 
     with _warnings_told(), _times_told():
-        return _documented(checked) if manner.json else checked(True)
+        return _documented(checked) if options.json else checked(True)
 
 
 def _documented(run: Callable[[bool], object]) -> object:

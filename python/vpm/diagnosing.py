@@ -14,7 +14,7 @@ from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis, Empirical
 from vpm.discrepancy.diagnosis_fields import accepted_effect, classes, examined, gaps_of, of_search, step
 from vpm.discrepancy.evidence import gather
-from vpm.discrepancy.parallel_candidates import Progress, SideBySide
+from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
 from vpm.discrepancy.plot_samples import pictures, traces, where
 from vpm.discrepancy.preparation import Records, data_of, nominal_of, recalibrated_of, records_of
 from vpm.discrepancy.provenance import own_settings, provenance
@@ -221,7 +221,7 @@ def diagnosed(
     if cutoff is not None:
         for record in chain(*records[:2]):
             check_cutoff(cutoff, record.rate, len(record.time))
-    each = SideBySide(workers, progress)
+    each = ParallelCandidates(workers, progress)
     odd: list[str] = []
     if asked.get("check", True):
         if tell is not None:
@@ -242,7 +242,7 @@ def _diagnosis(
     setup: Setup,
     limit: int,
     names: Names,
-    each: SideBySide,
+    each: ParallelCandidates,
     tell: Tell | None,
 ) -> Diagnosis:
     """Diagnosis on checked records: it names effects, judges them, and describes the rest."""
@@ -269,7 +269,7 @@ def _measured(
     ranking: Ranking | None,
     by: tuple[Names, Sequence[str] | None, int],
     how: tuple[str, float | None, Setup],
-    each: SideBySide,
+    each: ParallelCandidates,
     say: Tell,
     began: float,
 ) -> Diagnosis:
@@ -339,7 +339,7 @@ class _Concluded:
     accepted: tuple[Accepted, ...]
 
 
-def _told(known: _Known, found: Search, mode: str, setup: Setup, each: SideBySide, say: Tell) -> Diagnosis:
+def _told(known: _Known, found: Search, mode: str, setup: Setup, each: ParallelCandidates, say: Tell) -> Diagnosis:
     """Diagnosis after naming: noise floor, remaining residual, and verdict."""
     data, (_, _, notes) = known.data, known.records
     say("measuring the noise floor")
@@ -426,7 +426,7 @@ def _whole(
 
 
 def _rest(
-    recalibrated: Judged, found: Search, data: Data, gap: dict[str, ChannelGap], each: SideBySide, say: Tell
+    recalibrated: Judged, found: Search, data: Data, gap: dict[str, ChannelGap], each: ParallelCandidates, say: Tell
 ) -> Remainder | None:
     """Remainder of the residual in `diagnose`, under the effects found; none where all is known."""
     say("examining what is left")

@@ -9,7 +9,7 @@ from typing import Literal, TypeVar
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import RefusedEffect
-from vpm.discrepancy.parallel_candidates import SideBySide
+from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.ranked_effects import free_joints, searched, why_not_ranked
 from vpm.discrepancy.ranked_effects import notes as notes_of
 from vpm.discrepancy.rivals.ambiguity import Rivals, rivals
@@ -51,7 +51,7 @@ def ranking_of(
     by: tuple[Names, Sequence[str] | None, int],
     setup: Setup,
     tell: Tell,
-    each: SideBySide,
+    each: ParallelCandidates,
     notes: list[str],
 ) -> Ranking | None:
     """Ranking of the training records if the naming uses one and it covers the machine.
@@ -106,7 +106,7 @@ def named(
     data: Data,
     by: tuple[Names, Sequence[str] | None, int],
     tell: Tell,
-    each: SideBySide,
+    each: ParallelCandidates,
     notes: list[str],
 ) -> tuple[Search, tuple[Rivals, ...], bool]:
     """Naming of missing effects by a ranking or a search, with rivals, and whether Ctrl-C ended it."""
@@ -139,7 +139,7 @@ def ranked_notes(ranking: Ranking, refused: Sequence[RefusedEffect], interrupted
 
 
 def _settled(
-    found: Search, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: SideBySide
+    found: Search, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: ParallelCandidates
 ) -> tuple[Search, tuple[Rivals, ...]]:
     """Names and their order, with the rivals of each, after it was removed again.
 

@@ -8,7 +8,7 @@ from threading import Barrier
 import numpy as np
 import pytest
 
-from vpm.discrepancy.parallel_candidates import Failure, SideBySide
+from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.errors import DiagnosisError
 from vpm.identify import Worth
 
@@ -44,7 +44,7 @@ def test_outcomes_stand_in_the_order_of_the_items_and_the_longest_begins_first()
             raise DiagnosisError("none")
         return 10 * item
 
-    outcomes = SideBySide(1)("work", work, [1, 5, 3, 4], str, float)
+    outcomes = ParallelCandidates(1)("work", work, [1, 5, 3, 4], str, float)
     assert begun == [5, 4, 3, 1]
     assert [outcomes[0], *outcomes[2:]] == [10, 30, 40]
     assert isinstance(outcomes[1], Failure)
@@ -52,5 +52,7 @@ def test_outcomes_stand_in_the_order_of_the_items_and_the_longest_begins_first()
 
 def test_as_many_items_run_at_a_time_as_there_are_workers() -> None:
     together = Barrier(3, timeout=600.0)
-    found = SideBySide(3)("work", lambda item: np.array([item, together.wait() >= 0]), [1, 2, 3], str, lambda n: -n)
+    found = ParallelCandidates(3)(
+        "work", lambda item: np.array([item, together.wait() >= 0]), [1, 2, 3], str, lambda n: -n
+    )
     assert [int(one[0]) for one in found if not isinstance(one, Failure)] == [1, 2, 3]

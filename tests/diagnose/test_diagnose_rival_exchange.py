@@ -16,7 +16,7 @@ from shared_cases import shared_case
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge
 from vpm.discrepancy.diagnosis import RefusedEffect
-from vpm.discrepancy.parallel_candidates import SideBySide
+from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.rivals import rival_exchange
 from vpm.discrepancy.rivals.ambiguity import Rivals
 from vpm.discrepancy.rivals.rival_exchange import earned, in_order
@@ -95,7 +95,7 @@ def test_a_search_goes_on_beside_what_took_the_place_of_an_effect(monkeypatch: p
     """Beside the true name a second effect stands clear; the name that went out does not come back."""
     naming = import_module("vpm.naming")
     model, free, data = inverse_dynamics_data(shared_case("axis_linear", ("spring", "viscous_friction"), 3))
-    start, each = judge(model, free, data, {}), SideBySide(1)
+    start, each = judge(model, free, data, {}), ParallelCandidates(1)
     spring = search(start, data, ["spring"], 6, print, each)
     gone = (Stage("added", "bias_force", "axis", start), Stage("removed", "bias_force", "axis", start))
     exchanged = replace(

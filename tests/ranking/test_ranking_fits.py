@@ -17,7 +17,7 @@ from second_suite import arm
 from sledge import GAIN, MASS, OIL, SLEDGE, pushed
 from vpm.catalogue import EFFECTS
 from vpm.catalogue.kinds import in_words
-from vpm.discrepancy.parallel_candidates import SideBySide
+from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import candidates
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
@@ -282,7 +282,9 @@ def test_what_remembers_behind_a_spring_begins_with_nothing_to_remember() -> Non
         assert rest[len(plain) :] == pytest.approx(0.0)
     data = InverseDynamicsProblem(Model.from_toml(SLEDGE), records())
     few = Fitter(fitter.tracked, Settings(seats=1, starts=1))
-    listed = proposals(Look(found, few), few, data, Extensions(Sizes(bare, data)), SideBySide(1), tuple(EFFECTS))
+    listed = proposals(
+        Look(found, few), few, data, Extensions(Sizes(bare, data)), ParallelCandidates(1), tuple(EFFECTS)
+    )
     assert all(proposal.structure.model.effect("hysteresis", "way", "link") for proposal in listed)
 
 
@@ -381,7 +383,7 @@ def test_effects_that_do_nothing_share_a_pass_and_promise_the_same(
     for at_once in (1, 4, 12):
         monkeypatch.setattr("vpm.ranking.proposals.AT_ONCE", at_once)
         passes.append(0)
-        listed = proposals(look, fitter, data, Extensions(Sizes(model, data)), SideBySide(1), effects)
+        listed = proposals(look, fitter, data, Extensions(Sizes(model, data)), ParallelCandidates(1), effects)
         promised.append({(one.key, *sorted(one.structure.values.items())): one.gain for one in listed})
     assert passes[0] > passes[1] > passes[2]
     for others in promised[1:]:
@@ -403,7 +405,7 @@ def test_effects_that_do_nothing_share_one_model_at_all_start_values(monkeypatch
         return follow(tracked, told, theta, tracker, columns, *by)
 
     monkeypatch.setattr(TrackedRecords, "follow", noted)
-    proposals(look, fitter, data, Extensions(Sizes(model, data)), SideBySide(1), ("spring", "cubic_spring"))
+    proposals(look, fitter, data, Extensions(Sizes(model, data)), ParallelCandidates(1), ("spring", "cubic_spring"))
     models, columns = {told for told, _ in passes}, [count for _, count in passes]
     assert (len(passes), len(models), columns) == (len(PLACES), 1, [2] * len(PLACES))
     pulled = model.with_effect("spring", "way", stiffness=0.0, rest=0.1)

@@ -28,7 +28,7 @@ class Failure:
 
 
 @dataclass(frozen=True)
-class SideBySide:
+class ParallelCandidates:
     """Number of candidates computed in parallel, and where progress is reported.
 
     Attributes

@@ -10,7 +10,7 @@ import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge, judged_anyhow
 from vpm.discrepancy.motion_filters import filters
-from vpm.discrepancy.parallel_candidates import SideBySide
+from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.prior_departure import moved_far
 from vpm.discrepancy.screening.candidates import slow_speeds
 from vpm.discrepancy.stuck_channels import check_moving, check_stuck
@@ -81,7 +81,7 @@ def nominal_of(model: Model, data: Data, notes: list[str]) -> Judged:
         return judge(model, (), replace(data, simulation=None), {})
 
 
-def recalibrated_of(model: Model, data: Data, notes: list[str], each: SideBySide) -> Judged:
+def recalibrated_of(model: Model, data: Data, notes: list[str], each: ParallelCandidates) -> Judged:
     """Prepare the recalibrated model: uncertain parameters fitted, judged by the residual if it cannot simulate."""
     free = model.adjustable
     if not free:

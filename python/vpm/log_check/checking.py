@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vpm.discrepancy.parallel_candidates import Progress, SideBySide
+from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
 from vpm.errors import ExperimentError, VpmError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
 from vpm.log_check.correction import TIME, Correction
@@ -77,7 +77,7 @@ def check_log(
     (Finding(kind='unit', channels=('axis.position',)),)
     """
     settings = settings or Settings()
-    check = _Check(Judge(model, settings, setup or Setup()), SideBySide(workers, progress))
+    check = _Check(Judge(model, settings, setup or Setup()), ParallelCandidates(workers, progress))
     findings: list[Finding] = []
     shares: dict[str, float] = {}
     for record in as_records(experiments):
@@ -123,7 +123,7 @@ def refuse_mistakes(
 class _Check:
     """Looks at one record after the other."""
 
-    def __init__(self, judge: Judge, each: SideBySide) -> None:
+    def __init__(self, judge: Judge, each: ParallelCandidates) -> None:
         self.judge, self.each, self.settings = judge, each, judge.settings
 
     def of(self, record: Experiment, table: Mapping[str, ChannelEntry]) -> tuple[list[Finding], Shares]:

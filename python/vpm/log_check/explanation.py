@@ -10,7 +10,7 @@ from typing import NamedTuple, TypeVar
 
 import numpy as np
 
-from vpm.discrepancy.parallel_candidates import Failure, SideBySide
+from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.experiment import Experiment
 from vpm.log_check.correction import Correction, Pair
 from vpm.log_check.shares import FORCES, Judge, Shares, Tangent
@@ -68,10 +68,10 @@ class Explainer:
     judge : Judge
     units : mapping of str to str
         Units in which the channels were read.
-    each : SideBySide
+    each : ParallelCandidates
     """
 
-    def __init__(self, judge: Judge, units: Mapping[str, str], each: SideBySide) -> None:
+    def __init__(self, judge: Judge, units: Mapping[str, str], each: ParallelCandidates) -> None:
         self.judge, self.units, self.each = judge, units, each
         self.model, self.settings = judge.model, judge.settings
 

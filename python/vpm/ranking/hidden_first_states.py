@@ -30,7 +30,7 @@ def hidden_states(model: Model, channels: Sequence[str]) -> tuple[str, ...]:
 
 
 @dataclass(frozen=True)
-class Firsts:
+class HiddenFirstStates:
     """Hidden first states of each record, as differences from equilibrium.
 
     Attributes

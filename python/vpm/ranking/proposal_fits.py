@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from vpm.discrepancy.parallel_candidates import SideBySide
+from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.ranking.fit import Fitted, Fitter
 from vpm.ranking.look import Look
 from vpm.ranking.proposals import Proposal
 from vpm.ranking.tried_effect import is_part
 
 
-def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: SideBySide) -> list[Fitted]:
+def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: ParallelCandidates) -> list[Fitted]:
     """Fits of the proposals that may win the race.
 
     Each has to gain what makes it worth while. The most promising one is fitted first, and another one has to save a
@@ -25,7 +25,7 @@ def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: SideBySi
     look : Look
         What there is without them.
     fitter : Fitter
-    each : SideBySide
+    each : ParallelCandidates
     """
     ordered = sorted(chosen, key=lambda one: -one.gain)
     first = _fitted(ordered[:1], look.needed, look, fitter, each)
@@ -37,7 +37,9 @@ def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: SideBySi
     return first + _fitted(others, wanted, look, fitter, each) + _fitted(parts, look.needed, look, fitter, each)
 
 
-def _fitted(several: Sequence[Proposal], wanted: float, look: Look, fitter: Fitter, each: SideBySide) -> list[Fitted]:
+def _fitted(
+    several: Sequence[Proposal], wanted: float, look: Look, fitter: Fitter, each: ParallelCandidates
+) -> list[Fitted]:
     def one_fitted(one: Proposal) -> Fitted:
         view, residual = one.seen_in(look)
         return fitter.fitted(one.structure, look.fitted.tracker, view, look.fitted.cost - wanted, residual)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue.kinds import Side
-from vpm.discrepancy.parallel_candidates import Failure, SideBySide
+from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.discrepancy.screening.candidates import Candidate, Key, candidates
 from vpm.identify import InverseDynamicsProblem
 from vpm.initial import invertible
@@ -64,7 +64,7 @@ def proposals(
     fitter: Fitter,
     data: InverseDynamicsProblem,
     extensions: Extensions,
-    each: SideBySide,
+    each: ParallelCandidates,
     effects: Sequence[str],
 ) -> list[Proposal]:
     """Best few proposals of effects beside a structure that are worth a fit under its tracker."""
@@ -128,7 +128,7 @@ def _extended(structure: Structure, listed: Sequence[Candidate], extensions: Ext
     return found
 
 
-def _hopeful(several: Sequence[_Extended], look: Look, fitter: Fitter, each: SideBySide) -> list[_Extended]:
+def _hopeful(several: Sequence[_Extended], look: Look, fitter: Fitter, each: ParallelCandidates) -> list[_Extended]:
     """Best few starts of each proposal that does something at its start, by predicted gain.
 
     This asks for no derivatives, which cost many times what a pass does where a joint is split.

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from vpm.discrepancy.parallel_candidates import Progress, SideBySide
+from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
 from vpm.discrepancy.screening.candidates import asked_for
 from vpm.discrepancy.stuck_channels import check_moving
 from vpm.errors import DiagnosisError
@@ -81,7 +81,7 @@ def rank(
     if not records:
         raise DiagnosisError("no record was given; pass at least one experiment")
     check_moving(model, records)
-    each = SideBySide(workers, progress)
+    each = ParallelCandidates(workers, progress)
     names = asked_for(effects)
     search = Search(model, records, names, settings or Settings(), setup, each, tell or (lambda _: None))
     # What a validation record lacks is said before the search.

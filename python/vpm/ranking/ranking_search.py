@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vpm.discrepancy.parallel_candidates import SideBySide
+from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import Key
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
@@ -50,7 +50,7 @@ class Search:
         names: Sequence[str],
         settings: Settings,
         setup: Setup | None,
-        each: SideBySide,
+        each: ParallelCandidates,
         say: Callable[[str], None],
     ) -> None:
         self.names, self.settings, self.each, self.say = names, settings, each, say

@@ -7,14 +7,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from vpm.discrepancy.parallel_candidates import SideBySide
+from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.ranking.fit import Fitter, View
 from vpm.ranking.look import Look
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.tried_effect import Trial
 
 
-def alike(tried: Sequence[Trial], most: int, fitter: Fitter, each: SideBySide) -> list[Trial]:
+def alike(tried: Sequence[Trial], most: int, fitter: Fitter, each: ParallelCandidates) -> list[Trial]:
     """Fits of one effect at several places together, ``most`` effects at a time, by the error that they leave.
 
     Joints that move each other hide such an effect from each other. A command that is delayed at one drive alone would
@@ -27,7 +27,7 @@ def alike(tried: Sequence[Trial], most: int, fitter: Fitter, each: SideBySide) -
     most : int
         Effects that a structure may still take.
     fitter : Fitter
-    each : SideBySide
+    each : ParallelCandidates
     """
     several: dict[tuple[Look, str], dict[str, Trial]] = defaultdict(dict)
     for trial in sorted(tried, key=lambda one: one.left):

@@ -32,10 +32,14 @@ def why_unbalanced(model: Model) -> str:
 
 def shown(model: Model, tracked: TrackedRecords) -> InverseDynamicsProblem:
     """Motion and efforts of the records, or those of substitute records that are as large."""
-    return StandIn(model, tracked) if why_unbalanced(model) else InverseDynamicsProblem(model, tracked.experiments)
+    return (
+        SubstituteProblem(model, tracked)
+        if why_unbalanced(model)
+        else InverseDynamicsProblem(model, tracked.experiments)
+    )
 
 
-class StandIn(InverseDynamicsProblem):
+class SubstituteProblem(InverseDynamicsProblem):
     """Problem on substitute records: loops opened, all joints measured, sampled drives without effort.
 
     Motions are those of the machine, and efforts as large as its inertia needs. That is enough for natural sizes and

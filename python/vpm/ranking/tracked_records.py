@@ -19,7 +19,7 @@ from vpm.experiment import Experiment
 from vpm.initial import initial_state
 from vpm.model import Model
 from vpm.observer import Record
-from vpm.ranking.hidden_first_states import STEP, Firsts, hidden_states
+from vpm.ranking.hidden_first_states import STEP, HiddenFirstStates, hidden_states
 from vpm.ranking.noise_model import NoiseModel, Parts, Structured, frequencies
 from vpm.ranking.settings import (
     CONTROLLED,
@@ -121,18 +121,20 @@ class TrackedRecords:
         return other
 
     @cached_property
-    def firsts(self) -> Firsts:
+    def firsts(self) -> HiddenFirstStates:
         """Unmeasured first states of tracked records, as far as the model moves them; none if it diverges."""
         states = hidden_states(self.model, self.records[0].channels)
         if not states:
-            return Firsts()
+            return HiddenFirstStates()
         try:
             motion = np.concatenate(self.states(self.model, Tracker(self.settings.bands[0], fine=False)))
         except (VpmError, ArithmeticError):
-            return Firsts()
+            return HiddenFirstStates()
         sizes = np.std(motion[:, [self.model.state_names.index(state) for state in states]], axis=0)
         moving = [(state, float(size)) for state, size in zip(states, sizes, strict=True) if 0.0 < size < np.inf]
-        return Firsts(tuple(state for state, _ in moving), tuple(size for _, size in moving), len(self.records))
+        return HiddenFirstStates(
+            tuple(state for state, _ in moving), tuple(size for _, size in moving), len(self.records)
+        )
 
     @cached_property
     def motion(self) -> Array:
@@ -210,7 +212,7 @@ class TrackedRecords:
         (len(columns),) tell by how much each of these numbers may be moved for a difference.
         """
         own = len(model.theta)
-        firsts = self.firsts if len(theta) > own else Firsts()
+        firsts = self.firsts if len(theta) > own else HiddenFirstStates()
         shifts = theta[own:].reshape(len(self.records), len(firsts.states))
         places, by = among_parameters(own, columns, moves)
         residuals: list[Array] = []

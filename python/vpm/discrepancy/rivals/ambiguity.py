@@ -9,7 +9,7 @@ from functools import partial
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.confirmation.refusal import LEAST_GAIN
 from vpm.discrepancy.diagnosis import Ambiguity
-from vpm.discrepancy.parallel_candidates import Failure, SideBySide
+from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.discrepancy.rivals.nested_model import probe_beside
 from vpm.discrepancy.screening.candidates import Candidate, Key, candidates
 from vpm.discrepancy.screening.probe import Probe, impossible_values, probe, refit_effort, screening_effort
@@ -72,7 +72,7 @@ def rivals(
     data: Data,
     accepted: Sequence[Accepted],
     effects: Sequence[str] | None = None,
-    each: SideBySide | None = None,
+    each: ParallelCandidates | None = None,
     last: Tried | None = None,
 ) -> tuple[Rivals, ...]:
     """Ambiguity of each accepted effect: rivals in its place that predict the validation data as well.
@@ -81,7 +81,7 @@ def rivals(
     are refitted. They have to predict the validation records as well as the effect. What the ``last`` effect competed
     with when it came in is not worked out again.
     """
-    each = each or SideBySide(1)
+    each = each or ParallelCandidates(1)
     known = {last.key: last} if last is not None else {}
     left = each("what each adds: refitting without", partial(_without, final, data, known), accepted, _label)
     bases = [None if isinstance(one, Failure) else one for one in left]

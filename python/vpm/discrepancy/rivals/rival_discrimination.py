@@ -18,14 +18,14 @@ from vpm.discrepancy.confirmation.prediction_comparison import (
 )
 from vpm.discrepancy.confirmation.refusal import Thresholds, impossible_trial
 from vpm.discrepancy.confirmation.whittle_likelihood import ClosedLoopPrediction
-from vpm.discrepancy.parallel_candidates import SideBySide
+from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.rivals.ambiguity import Rivals
 from vpm.discrepancy.rivals.rival_exchange import exchanged
 from vpm.discrepancy.search.search import Search
 
 
 def discriminated(
-    found: Search, known: Sequence[Rivals], data: Data, each: SideBySide
+    found: Search, known: Sequence[Rivals], data: Data, each: ParallelCandidates
 ) -> tuple[Search, tuple[Rivals, ...]]:
     """Exchange an effect for the rival that predictions discriminate clearly, on training and validation records.
 

@@ -19,7 +19,7 @@ from scipy.linalg import block_diag
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge
 from vpm.discrepancy.confirmation.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, WORTH_A_NAME
 from vpm.discrepancy.confirmation.whittle_likelihood import ClosedLoopPrediction, fit_prediction
-from vpm.discrepancy.parallel_candidates import Failure, SideBySide
+from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.discrepancy.screening.backlash_start import is_read_off
 from vpm.discrepancy.screening.candidates import Key
 from vpm.discrepancy.screening.compliance_and_stop_start import moved
@@ -47,7 +47,7 @@ ALL = 0.9
 TOLD = ("stiffness", "inertia")
 
 
-def with_predicted_contacts(found: Search, data: Data, each: SideBySide) -> Search:
+def with_predicted_contacts(found: Search, data: Data, each: ParallelCandidates) -> Search:
     """Search whose backlashes have contacts as stiff as closed-loop predictions of training records support.
 
     The predicted values stand if they simulate the training records better, beyond chance. The validation records may
@@ -62,7 +62,7 @@ def with_predicted_contacts(found: Search, data: Data, each: SideBySide) -> Sear
     return replace(found, stages=(*found.stages[:-1], replace(found.stages[-1], judged=final)))
 
 
-def _harder(final: Judged, entry: Accepted, data: Data, each: SideBySide) -> Judged:
+def _harder(final: Judged, entry: Accepted, data: Data, each: ParallelCandidates) -> Judged:
     """Model with harder contacts of one backlash where predictions support them, or unchanged."""
     if data.simulation is None or data.simulation.mode != "closed_loop":
         return final

@@ -25,7 +25,7 @@ from vpm.discrepancy.confirmation.prediction_comparison import (
 )
 from vpm.discrepancy.confirmation.refusal import WORTH_A_NAME, Thresholds, impossible_trial
 from vpm.discrepancy.confirmation.whittle_likelihood import ClosedLoopPrediction, misfit
-from vpm.discrepancy.parallel_candidates import SideBySide
+from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.probe import Probe, impossible_values
 from vpm.discrepancy.screening.short_list import same_models
 from vpm.discrepancy.search.backward_elimination import Stage
@@ -48,7 +48,7 @@ class _Predicted:
     run: ClosedLoopPrediction
 
 
-def forward_step(found: Search, data: Data, each: SideBySide) -> Search:
+def forward_step(found: Search, data: Data, each: ParallelCandidates) -> Search:
     """Forward step of the search: the effect that closed-loop predictions of all records support most."""
     promising = _promising(found)
     before = predicted(found.final, data) if promising else None

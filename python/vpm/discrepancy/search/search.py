@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
-from vpm.discrepancy.parallel_candidates import SideBySide
+from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import Key
 from vpm.discrepancy.screening.probe import Probe
 from vpm.discrepancy.search.backward_elimination import (
@@ -85,14 +85,14 @@ class Search:
 
 
 def search(
-    start: Judged, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: SideBySide
+    start: Judged, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: ParallelCandidates
 ) -> Search:
     """Search: add effects one at a time and drop replaced ones, until none is accepted any more."""
     return further(Search((Stage("recalibrated", "", "", start),), (), (), ()), data, effects, limit, tell, each)
 
 
 def further(
-    found: Search, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: SideBySide
+    found: Search, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: ParallelCandidates
 ) -> Search:
     """Continue a search from the end of another one; removed effects do not come back.
 

@@ -33,7 +33,7 @@ from vpm.discrepancy.diagnosis import RankedCandidate
 from vpm.discrepancy.noise.link_ringing import NOISE_ONLY, noise_alone, only_ringing
 from vpm.discrepancy.noise.residual_structure import structure
 from vpm.discrepancy.noise.sample_timing import InTime, in_time
-from vpm.discrepancy.parallel_candidates import Failure, SideBySide
+from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.discrepancy.screening.backlash_start import is_read_off, only_compliant
 from vpm.discrepancy.screening.candidates import Candidate, Key, candidates, joint_at, left_out
 from vpm.discrepancy.screening.probe import Probe, prepare, probe, refit_effort, screening_effort
@@ -54,7 +54,9 @@ Tell = Callable[[str], None]
 class Round:
     """One round of the search."""
 
-    def __init__(self, current: Judged, data: Data, number: int, tell: Tell, each: SideBySide, tried: int = 0) -> None:
+    def __init__(
+        self, current: Judged, data: Data, number: int, tell: Tell, each: ParallelCandidates, tried: int = 0
+    ) -> None:
         self.current, self.data, self.number, self.tell, self.each = current, data, number, tell, each
         self._chosen_from = tried
         self.refused: dict[Key, str] = {}
