@@ -11,6 +11,7 @@ import typer
 from vpm import __version__
 from vpm.command import console, load_model
 from vpm.command_output import give
+from vpm.errors import ModelError
 from vpm.plugins import KINDS, plugins
 
 if TYPE_CHECKING:
@@ -29,11 +30,11 @@ def info(model: Annotated[Path | None, typer.Argument(metavar="[MODEL]", help="M
             console.print(f"  {one['kind']} {one['name']} {told}", markup=False)
         return
     loaded = load_model(model)
-    way = _way(loaded)
+    way, loops = _way(loaded), _loops(loaded)
     parameters = list(loaded.parameters.values())
-    give(name=loaded.name, beams=loaded.beam_summary, steps=way, parameters=parameters)
+    give(name=loaded.name, beams=loaded.beam_summary, loops=loops, steps=way, parameters=parameters)
     console.print(repr(loaded), markup=False)
-    for sentence in (*loaded.beam_summary, way):
+    for sentence in (*loaded.beam_summary, *loops, way):
         console.print(f"  {sentence}", markup=False)
     for p in parameters:
         spread = "known" if p.uncertainty is None else f"± {p.uncertainty:g}"
@@ -53,6 +54,17 @@ def _plugins() -> list[dict[str, str]]:
     taken = {"effects": EFFECTS, "readers": READERS, "importers": IMPORTERS}
     found = (one for kind, names in taken.items() for one in plugins(kind, names).values())
     return [{"kind": KINDS[p.kind], "name": p.name, "package": p.package, "refused": p.refused} for p in found]
+
+
+def _loops(model: Model) -> list[str]:
+    """Sentences on closed loops: their equations, and the assembly that `start` chooses."""
+    if not model.loops:
+        return []
+    try:
+        q = model.loops.assembled()
+    except ModelError as error:
+        return [str(error)]
+    return [model.loops.summary(q), f"they are closed from their start with {model.loops.describe(q)}"]
 
 
 def _way(model: Model) -> str:

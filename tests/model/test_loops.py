@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,8 +12,10 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike, NDArray
 from scipy.integrate import solve_ivp
+from typer.testing import CliRunner
 
 from vpm import linkages
+from vpm.cli import app
 from vpm.errors import CoreError, ModelError, VpmError
 from vpm.experiment import Experiment
 from vpm.identify import identify
@@ -581,3 +584,101 @@ def test_a_fit_along_a_log_finds_a_parameter(parallelogram: Model) -> None:
     assert fit.model.parameters["left_crank.friction.viscous"].value == pytest.approx(0.05, rel=1e-3)
     with pytest.raises(VpmError, match=r"closed loops|elbow"):
         identify(wrong, log)
+
+
+#: Two links whose end is pinned to a point that they reach with either elbow; `start` is filled in.
+ELBOW = """
+name = "elbow"
+gravity = [0, 0, 0]
+[bodies.upper]
+mass = 1.0
+inertia = [0.01, 0.01, 0.01, 0, 0, 0]
+[bodies.lower]
+mass = 1.0
+inertia = [0.01, 0.01, 0.01, 0, 0, 0]
+[joints.shoulder]
+type = "revolute"
+parent = "world"
+child = "upper"
+axis = [0, 0, 1]
+[joints.elbow]
+type = "revolute"
+parent = "upper"
+child = "lower"
+translation = [0.4, 0, 0]
+axis = [0, 0, 1]
+[loops.pin]
+type = "revolute"
+axis = [0, 0, 1]
+a = { parent = "lower", point = [0.3, 0, 0] }
+b = { parent = "world", point = [0.5, 0, 0] }
+start = { START }
+"""
+
+
+#: Its angle, by the law of cosines.
+BEND = math.acos((0.4**2 + 0.3**2 - 0.5**2) / (-2.0 * 0.4 * 0.3))
+
+
+def elbow(start: str) -> Model:
+    return Model.from_toml(ELBOW.replace("START", start))
+
+
+@pytest.mark.parametrize(("start", "sign"), [("elbow = 0.4", 1.0), ("elbow = -0.4", -1.0), ("shoulder = -0.2", 1.0)])
+def test_a_start_off_the_stretched_pose_chooses_the_assembly(start: str, sign: float) -> None:
+    assert elbow(start).loops.assembled()[1] == pytest.approx(sign * BEND, abs=1e-9)
+
+
+@pytest.mark.parametrize("start", ["shoulder = 0.3, elbow = 0.1229", "shoulder = 1.09, elbow = 0.12", "elbow = 0.01"])
+def test_a_start_as_near_to_the_mirrored_assembly_is_refused(start: str) -> None:
+    """On the line between both, beyond it, and next to the stretched pose, where a digit more would turn it over."""
+    with pytest.raises(ModelError, match=r"close with shoulder = .*, and as near to their start with") as told:
+        elbow(start).loops.assembled()
+    found = [float(word) for word in re.findall(r"elbow = (\S+) rad", str(told.value))]
+    assert sorted(found) == pytest.approx([-BEND, BEND], rel=1e-3)
+    assert "\n" not in str(told.value)
+
+
+def test_every_start_leads_to_the_nearest_assembly_or_is_refused() -> None:
+    both = np.array([elbow(f"elbow = {sign * 0.8}").loops.assembled() for sign in (1.0, -1.0)])
+    refused = 0
+    for shoulder, bend in np.random.default_rng(0).uniform(-1.5, 1.5, (60, 2)).tolist():
+        model = elbow(f"shoulder = {shoulder}, elbow = {bend}")
+        away = np.linalg.norm(both - [shoulder, bend], axis=1)
+        try:
+            q = model.loops.assembled()
+        except ModelError:
+            refused += 1
+            continue
+        np.testing.assert_allclose(q, both[np.argmin(away)], atol=1e-9)
+    assert refused < 15
+
+
+def test_a_stretched_start_does_not_say_which_way_to_bend() -> None:
+    with pytest.raises(ModelError, match="give a start nearer to an assembly"):
+        elbow("").loops.assembled()
+
+
+def test_what_is_held_or_guessed_in_full_decides_between_assemblies() -> None:
+    model = elbow("")
+    guess = {"shoulder": 0.3, "elbow": -1.0}
+    assert model.loops.assembled(guess=guess)[1] == pytest.approx(-BEND, abs=1e-9)
+    assert model.loops.assembled({"elbow": BEND}, {"shoulder": -0.6})[1] == BEND
+
+
+@pytest.mark.parametrize("name", ["delta", "hyq_leg", "karl", "parallelogram", "slider_crank"])
+def test_examples_say_which_assembly_they_take(name: str) -> None:
+    model = load(name)
+    q = model.loops.assembled()
+    assert f"{model.joints[0]} = {q[0]:.4g} " in model.loops.describe(q)
+
+
+def test_the_command_tells_the_assembly_or_that_there_are_two(tmp_path: Path) -> None:
+    told = []
+    for start in ("elbow = 0.4", "elbow = 0.01"):
+        (tmp_path / "elbow.toml").write_text(ELBOW.replace("START", start), encoding="utf-8")
+        done = CliRunner().invoke(app, ["info", str(tmp_path / "elbow.toml")], catch_exceptions=False)
+        assert done.exit_code == 0
+        told.append(done.output)
+    assert "closed from their start with shoulder = -0.6435 rad, elbow = 1.571 rad" in told[0]
+    assert "and as near to their start with" in told[1]

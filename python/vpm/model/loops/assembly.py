@@ -22,6 +22,10 @@ CLOSED = 1e-12
 NOTHING = 1e-8
 #: Newton steps, and halvings of a step that does not bring the ends together.
 _STEPS, _HALVINGS = 200, 12
+#: Farthest turn of a joint in a step, rad: near a stretched pose steps would leap over whole turns.
+_TURN = 0.3
+#: Share by which an assembly may be farther from a start than another one and count as near.
+_AS_NEAR = 0.05
 #: Pieces of the way of an assembly from its start.
 _PIECES = 20
 
@@ -44,6 +48,36 @@ def assembled(loops: Loops, start: Array, fixed: Mapping[int, float], joints: in
     if _open(loops, closed) > CLOSED:
         closed = _closed(loops, closed, [place for place in range(start.size) if place not in fixed])
     return closed
+
+
+def mirrored(loops: Loops, start: Array, fixed: Mapping[int, float], joints: int) -> Array | None:
+    """Another assembly that is as near to a start as the one that is found from there, or nearer; or None.
+
+    It is sought opposite to the start, in all joints and in each of them: a linkage has its mirror image there.
+
+    Parameters
+    ----------
+    loops : Loops
+    start, fixed, joints
+        As for `assembled`.
+    """
+    first = _closed(loops, start, range(joints))
+    away = float(np.linalg.norm(first - start))
+    if away <= CLOSED:
+        return None
+    one = assembled(loops, start, fixed, joints)
+    for turned in (np.arange(start.size), *range(joints)):
+        second = first.copy()
+        second[turned] = 2.0 * start[turned] - first[turned]
+        second = _closed(loops, second, range(joints))
+        if _open(loops, second) > CLOSED or np.linalg.norm(second - start) > (1.0 + _AS_NEAR) * away:
+            continue
+        other = assembled(loops, second, fixed, joints)
+        between = other - one
+        between[loops.angles] = np.remainder(between[loops.angles] + np.pi, 2.0 * np.pi) - np.pi
+        if _open(loops, other) <= CLOSED and np.linalg.norm(between) > 0.5 * away:
+            return other
+    return None
 
 
 def _moved(loops: Loops, q: Array, fixed: Mapping[int, float], free: Sequence[int]) -> Array:
@@ -73,6 +107,7 @@ def _closed(loops: Loops, q: Array, free: Sequence[int]) -> Array:
             break
         step = np.zeros_like(q)
         step[list(free)] = least(state.jacobian[:, list(free)], -state.gap)
+        step /= max(float(np.abs(step[loops.angles]).max(initial=0.0)) / _TURN, 1.0)
         moved, share = state, 1.0
         for _ in range(_HALVINGS):
             moved = loops.at(q + share * step)

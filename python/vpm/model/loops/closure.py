@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import ModelError, near_match
-from vpm.model.loops.assembly import CLOSED, NOTHING, assembled, least, null_space, pivots
+from vpm.model.loops.assembly import CLOSED, NOTHING, assembled, least, mirrored, null_space, pivots
 from vpm.model.loops.path import Path, Singularity
 from vpm.model.loops.states import rest
 from vpm.numbers import array_of, number_of
@@ -117,6 +117,7 @@ class Loops:
         ------
         ModelError
             A name is unknown, or the loops do not close there; the message names the gap that is left.
+            Or two assemblies are as near to where the others begin, as from a stretched pose; the message tells both.
         """
         held = held or {}
         q = np.zeros(len(self._model.coordinates))
@@ -128,6 +129,8 @@ class Loops:
         }
         closed = assembled(self, q, fixed, len(self._model.joints))
         self._complain(closed, held)
+        if {*self._model.joints} - {*held} - {*(guess or {})}:
+            self._refuse_two(closed, q, fixed)
         return closed
 
     def velocities(self, q: ArrayLike, held: Mapping[str, float]) -> Array:
@@ -212,6 +215,11 @@ class Loops:
         """Whether a closure's coordinate is an angle, so that a whole turn of it changes nothing."""
         return coordinate in self._model.joints and self._model.joint_kind(coordinate) == "revolute"
 
+    @cached_property
+    def angles(self) -> list[int]:
+        """Places of the coordinates that turn a joint of the closed loops, see `turns`."""
+        return [place for place, name in enumerate(self._model.coordinates) if self.turns(name)]
+
     # ---- what is said of them ----------------------------------------------------------------------------------------
 
     def summary(self, q: ArrayLike | None = None) -> str:
@@ -224,6 +232,12 @@ class Loops:
             f"closed loops {', '.join(self.names)}: {m} equations, of which {state.rank} are independent ({said}), "
             f"so that {n - state.rank} of {n} coordinates are free"
         )
+
+    def describe(self, q: ArrayLike) -> str:
+        """Joints of an assembly of the closed loops in words, ``crank = 0.3 rad, guide = 0.4 m``."""
+        shown = zip(self._model.joints, np.asarray(q, dtype=np.float64).tolist(), strict=False)
+        units = {True: "rad", False: "m"}
+        return ", ".join(f"{name} = {value:.4g} {units[self.turns(name)]}" for name, value in shown)
 
     # ---- efforts -----------------------------------------------------------------------------------------------------
 
@@ -349,6 +363,14 @@ class Loops:
             repair = near_match(short, self._model.coordinates, what="it has")
             raise ModelError(f'{self._model.name} has no coordinate "{short}"; {repair}', where=name)
         return self._model.coordinates.index(short)
+
+    def _refuse_two(self, closed: Array, start: Array, fixed: Mapping[int, float]) -> None:
+        other = mirrored(self, start, fixed, len(self._model.joints))
+        if other is not None:
+            raise ModelError(
+                f"the loops of {self._model.name} close with {self.describe(closed)}, and as near to their start with "
+                f"{self.describe(other)}; give a start nearer to the one that is meant"
+            )
 
     def _complain(self, q: Array, held: Mapping[str, float]) -> None:
         gap, first, worst = self.at(q).gap, 0, ("", 0.0)
