@@ -159,20 +159,24 @@ class Judge:
         What a slow tracker leaves is not linear in a friction that is missing: where the model as it is does not follow
         the record, another fit begins where the inverse-dynamics residual is least.
         """
-        structure = self._structure(record)
-        found = [self._fitted(record, structure)]
-        if (near := self._regressed(record, structure, self.measured(record))) is not None:
-            found.append(self._fitted(record, replace(structure, theta=near)))
+        structure, plain = self._structure(record), self.measured(record)
+        starts = [(structure, plain)]
+        if (near := self._regressed(record, structure, plain)) is not None:
+            starts.append((replace(structure, theta=near), self.measured(record, near)))
+        found = [self._fitted(record, *start) or plain for start in starts]
         return min(found, key=lambda shares: shares.order)
 
-    def _fitted(self, record: Experiment, structure: Structure) -> Shares:
-        """Shares where a fit ends that begins at the values of a structure."""
+    def _fitted(self, record: Experiment, structure: Structure, start: Shares) -> Shares | None:
+        """Shares where a fit ends that begins at the values of a structure and its shares; None if it runs away."""
+        if start.residual is None:
+            return None
         tracker, tracked = self._tracker(record), self._tracked(record)
+        noise = white_noise(start.residual, tracked.parts)
         try:
             fitter = Fitter(tracked, tracked.settings)
-            found = fitter.fitted(structure, tracker, View(fitter.noise_of(structure, tracker)))
+            found = fitter.fitted(structure, tracker, View(noise))
         except ASTRAY:
-            return self.measured(record)
+            return None
         shares = self._shares(tracked, found.residual, tracker, found.structure.theta)
         return self._with_departure(shares, found.structure)
 
