@@ -298,6 +298,29 @@ def test_what_cannot_be_read_is_told_in_a_sentence(kind: str, old: str, new: str
     assert "\n" not in str(told.value)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_damaged_files_are_refused_in_a_sentence_or_give_finite_numbers(kind: str, tmp_path: Path) -> None:
+    """Bytes that are lost or exchanged, and numbers that no file should have."""
+    path = written(tmp_path, kind, bar(2))
+    whole = {file: file.read_bytes() for file in tmp_path.iterdir() if file != path}
+    told: list[str] = []
+    for seed in range(120):
+        generator = np.random.default_rng(seed)
+        for file, content in whole.items():
+            damaged = bytearray(content)
+            for _ in range(int(generator.integers(1, 4))):
+                at, width = int(generator.integers(len(damaged))), int(generator.integers(30))
+                inserted = generator.choice([b"", b"9e99", b"nan", b"-", b",", b"\n", b"1e400", b"9" * 20, b"\xff"])
+                damaged[at : at + width] = bytes(inserted)
+            file.write_bytes(bytes(damaged))
+        try:
+            assert np.isfinite(vpm.reduce(path, 3).frequencies).all()
+        except ReductionError as error:
+            told.append(str(error))
+    assert len(told) > 60
+    assert not [sentence for sentence in told if "\n" in sentence]
+
+
 def test_consistent_mass_of_beams_is_refused(tmp_path: Path) -> None:
     """A large motion needs products of the mass with places that such a matrix does not tell."""
     given = bar(3)

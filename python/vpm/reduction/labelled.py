@@ -103,6 +103,8 @@ def read_labelled_nodes(path: Path) -> dict[int, tuple[float, float, float]]:
             elif inside and _is_data(line):
                 label, x, y, z = line.replace(",", " ").split()
                 found[int(label)] = float(x), float(y), float(z)
+        if not np.isfinite(list(found.values())).all():
+            raise ValueError("not finite")
     except ValueError:
         raise ReductionError(
             f"{path} is no list of nodes with labels; write GRID cards, *NODE lines, or label, x, y and z in a line"
@@ -138,9 +140,10 @@ def _of_lines(text: str, path: Path) -> Labelled:
         raise ReductionError(
             f"{path} is no matrix ({str(error)[:80]}); write node, component, twice, and entry"
         ) from None
-    numbers = table[:, :4].astype(np.int64)
-    if not np.array_equal(numbers, table[:, :4]):
+    given = table[:, :4]
+    if not (np.isfinite(given).all() and (given == np.rint(given)).all() and np.abs(given).max() <= HIGHEST):
         raise ReductionError(f"{path} has labels that are no whole numbers; write node, component, twice, and entry")
+    numbers = given.astype(np.int64)
     rows, columns = (_places(numbers[:, at], numbers[:, at + 1], path) for at in (0, 2))
     return _whole(Labelled(rows, columns, table[:, 4]), path, triangle=True)
 
@@ -199,8 +202,8 @@ def _of_cards(text: str, path: Path, initial: str) -> Labelled:
             f"{initial}; leave one"
         )
     (name,) = own
-    form, precision = (_integer(each) for each in (headers[name] + ["", "", ""])[1:3])
-    if form not in (1, 6) or precision not in (1, 2):
+    form, precision = (headers[name] + ["", "", ""])[1:3]
+    if form not in ("1", "6") or precision not in ("1", "2"):
         raise ReductionError(
             f"{path}: {name} has form {form} and type {precision}, but a square (1) or symmetric (6) real matrix "
             "(1 or 2) is needed; export one"
@@ -209,11 +212,11 @@ def _of_cards(text: str, path: Path, initial: str) -> Labelled:
     entries: list[float] = []
     try:
         for node, component, _, *rest in columns.get(name, []):
-            at = int(node), _integer(component)
+            at = _integer(node), _integer(component)
             for begin in range(0, len(rest) - 2, 4):
                 row, own_component, entry = rest[begin : begin + 3]
                 if row or entry:
-                    labels.append((int(row), _integer(own_component), *at))
+                    labels.append((_integer(row), _integer(own_component), *at))
                     entries.append(_number(entry))
     except ValueError as error:
         raise ReductionError(
@@ -221,7 +224,7 @@ def _of_cards(text: str, path: Path, initial: str) -> Labelled:
         ) from None
     numbers = np.array(labels, dtype=np.int64).reshape(-1, 4)
     rows, at_columns = (_places(numbers[:, at], numbers[:, at + 1], path) for at in (0, 2))
-    return _whole(Labelled(rows, at_columns, np.array(entries)), path, triangle=form == 6)
+    return _whole(Labelled(rows, at_columns, np.array(entries)), path, triangle=form == "6")
 
 
 def _cards(text: str, name: str) -> Iterator[list[str]]:
@@ -261,4 +264,8 @@ def _number(text: str) -> float:
 
 
 def _integer(text: str) -> int:
-    return int(text) if text else 0
+    """Whole number of a field of a card, 0 if empty."""
+    number = int(text) if text else 0
+    if abs(number) > HIGHEST:
+        raise ValueError(f"{text} is no label")
+    return number
