@@ -135,10 +135,12 @@ def diagnose(
     Returns
     -------
     Diagnosis
-        Ctrl-C during the search gives what is known until then, with ``interrupted``; earlier it raises.
+        Ctrl-C gives what is known until then, with ``interrupted``.
 
     Raises
     ------
+    KeyboardInterrupt
+        Ctrl-C while logs were checked, before anything was known.
     DiagnosisError
         No record was given, an effect name or the source of names is unknown, or names are to come from a search where
         no efforts follow from a motion of the machine.

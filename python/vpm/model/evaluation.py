@@ -91,13 +91,16 @@ class Evaluations(Motions):
 
     @property
     def beam_summary(self) -> tuple[str, ...]:
-        """Flexible links in sentences: levels, coordinates, frequencies and sag, evaluated with joints at zero."""
+        """Flexible links in sentences: levels, coordinates, frequencies and sag, evaluated with joints at zero.
+
+        Where loops are closed joints cannot be locked there, and the last two are left out.
+        """
         sentences = []
         for beam in self.beams:
             own = [name for name in self.coordinates if name.startswith(f"{beam}.")]
             shapes = ", ".join(dict.fromkeys(name.split(".")[-2] for name in own)) or "none"
             sentences.append(f"beam {beam}: level {self.levels[beam]}, {len(own)} elastic coordinates ({shapes})")
-        if self.core.n_elastic:
+        if self.core.n_elastic and not self.loops:
             sentences += self._locked_summary()
         return tuple(sentences)
 
