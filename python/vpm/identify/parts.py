@@ -90,7 +90,7 @@ def carried(model: Model) -> Part:
     """
     gone = {name for name in model.actuators if model.actuator_type(name) == "hydraulic"}
     gone |= {*model.supplies, *model.controllers}
-    content = model.to_dict()
+    content = _content(model)
     content = {key: entry for key, entry in content.items() if key not in {"supplies", "controllers"}}
     for kind in ("actuators", "sensors"):
         entries = content.get(kind, {})
@@ -151,7 +151,7 @@ def bending(model: Model, joints: tuple[str, ...], *, wound: bool | None = None)
 
 
 def _bending(model: Model, plays: Sequence[Effect], aside: Sequence[Effect]) -> Bending:
-    content = model.to_dict()
+    content = _content(model)
     bare = _without(content, aside)
     owners = {*model.actuators, *model.controllers}
     moving = _part(model, bare, {name for name in bare.parameter_names if _owner(name) not in owners})
@@ -165,6 +165,11 @@ def _bending(model: Model, plays: Sequence[Effect], aside: Sequence[Effect]) -> 
     rigid = bool(model.core.n_elastic)
     with_laws, shell = (_without(content, effects, rigid=rigid) for effects in (bent, [*bent, *aside]))
     return Bending(moving, _part(model, with_laws, felt), _part(model, shell, felt))
+
+
+def _content(model: Model) -> dict[str, Any]:
+    """Content of a machine without its table of logged columns, which may name what a part does not have."""
+    return {key: entry for key, entry in model.to_dict().items() if key != "channels"}
 
 
 def _without(content: Content, effects: Sequence[Effect], *, rigid: bool = False) -> Model:
@@ -192,7 +197,7 @@ def _groups(model: Model) -> list[tuple[str, ...]]:
 
 def _drives(model: Model, machine: Model, group: Sequence[str]) -> Part:
     """Part with some of the drives, without joint laws, controllers and other drives."""
-    content = model.to_dict()
+    content = _content(model)
     content.pop("controllers", None)
     joints = {joint for name in group for joint in model.joints_of_actuator(name)}
     felt, sensors = {*group, *joints, *model.supplies}, content.get("sensors", {})

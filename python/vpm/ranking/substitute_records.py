@@ -69,7 +69,8 @@ def opened(model: Model) -> Model:
     if not why_unbalanced(model):
         return model
     content = model.to_dict()
-    content.pop("loops", None)
+    for gone in ("loops", "channels"):  # logged columns may be those of loops
+        content.pop(gone, None)
     actuators = content.setdefault("actuators", {})
     for name, actuator in actuators.items():
         if model.actuator_type(name) in SAMPLED_TYPES:
