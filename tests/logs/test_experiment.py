@@ -247,7 +247,7 @@ def load_small(path: Path) -> Experiment:
         (None, "0,1,2", r"line 1 holds numbers"),
         ([], "t,q,u", r"has a line of column names but no rows"),
         (changed(5, "30,x3,1"), "t,q,u", r'line 5: "x3" in column "q" is no number; write a number'),
-        (changed(5, "30,,1"), "t,q,u", r'line 5: the cell of column "q" is empty'),
+        (changed(5, "30,,1"), "t,q,u", r'line 5: "axis\.position" has no number, as in 1 of 12 rows; fill'),
         (changed(5, "30,3"), "t,q,u", r"line 5: there are 2 cells where the header names 3 columns"),
         (changed(5, "30,3,1,7"), "t,q,u", r"line 5: there are 4 cells where the header names 3 columns"),
         (changed(5, "30,nan,1"), "t,q,u", r'line 5: column "q" \(axis.position\) is nan at t = 0.03 s, the only one'),

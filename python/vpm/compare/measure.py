@@ -211,8 +211,9 @@ def _state(run: SimulatedRun, experiment: Experiment) -> tuple[dict[str, Array],
     state, units = {}, {}
     joints = [name.removesuffix(".position") for name in experiment.channels if name.endswith(".position")]
     for joint in joints if len(experiment) >= FEWEST_SAMPLES else ():
-        raw = experiment[f"{joint}.position"][:, None]
-        position = lowpass(raw, experiment.rate, choose_cutoff(raw, experiment.rate).cutoff)[:, 0]
+        channel = f"{joint}.position"
+        raw, read = experiment[channel][:, None], [experiment.read_rate(channel)]
+        position = lowpass(raw, experiment.rate, choose_cutoff(raw, experiment.rate, read).cutoff)[:, 0]
         velocity = differentiate(position, experiment.dt)
         motion = {"position": position, "velocity": velocity, "acceleration": differentiate(velocity, experiment.dt)}
         for (quantity, values), per in zip(motion.items(), ("", "/s", "/s^2"), strict=True):

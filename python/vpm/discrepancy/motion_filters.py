@@ -56,7 +56,8 @@ def quickest(record: Experiment, m: Motion, joints: Sequence[str]) -> float:
     """
     found = HIGHEST * record.rate
     for joint in joints:
-        noise = choose_cutoff(record[f"{joint}.position"][:, None], record.rate).noise[0]
+        channel = f"{joint}.position"
+        noise = choose_cutoff(record[channel][:, None], record.rate, [record.read_rate(channel)]).noise[0]
         speed = np.abs(m.velocity[m.kept, m.joints.index(joint)])
         least = 0.5 * STANDSTILL_SHARE * float(np.quantile(speed, 0.999))
         if noise > 0.0:

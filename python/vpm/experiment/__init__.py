@@ -4,7 +4,7 @@ from vpm.experiment.campaign import Campaign, as_records
 from vpm.experiment.cutoff import CutoffChoice, choose_cutoff
 from vpm.experiment.draft import plain_table
 from vpm.experiment.motion import Motion, common_cutoff, motion
-from vpm.experiment.noise import noise_std, quantisation_step
+from vpm.experiment.noise import instrument_noise, noise_std, quantisation_step
 from vpm.experiment.record import Experiment
 from vpm.experiment.shafts import joints_from_shafts
 from vpm.experiment.signal import decimation_for, differentiate, lowpass, parallel_filter
@@ -19,6 +19,7 @@ __all__ = [
     "common_cutoff",
     "decimation_for",
     "differentiate",
+    "instrument_noise",
     "joints_from_shafts",
     "lowpass",
     "motion",

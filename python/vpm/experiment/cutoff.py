@@ -8,6 +8,7 @@ least of all: what follows averages over noise, but nothing brings back motion t
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,7 +62,7 @@ class CutoffChoice:
     limited: bool
 
 
-def choose_cutoff(position: Array, rate: float) -> CutoffChoice:
+def choose_cutoff(position: Array, rate: float, read: Sequence[float] | None = None) -> CutoffChoice:
     """Cut-off frequency for deriving velocity and acceleration from measured positions.
 
     Parameters
@@ -70,6 +71,8 @@ def choose_cutoff(position: Array, rate: float) -> CutoffChoice:
         One column per joint.
     rate : float
         Hz.
+    read : sequence of float, optional
+        Rate at which each joint's position was read, Hz, where its samples in between are interpolated.
 
     Returns
     -------
@@ -92,8 +95,8 @@ def choose_cutoff(position: Array, rate: float) -> CutoffChoice:
     offered = np.geomspace(lowest, HIGHEST * rate, 80)
     total = np.zeros(offered.size)
     noise, band = [], []
-    for column in position.T:
-        frequency, spectrum, floor = position_spectrum(column, rate)
+    for column, own in zip(position.T, read or [rate] * position.shape[1], strict=True):
+        frequency, spectrum, floor = position_spectrum(column, rate, own)
         moving = spectrum > CLEARLY_ABOVE * floor
         within = moving & (frequency <= HIGHEST * rate)
         error = _expected_error(frequency, np.where(moving, spectrum - floor, 0.0), spectrum, rate, offered)
@@ -104,7 +107,7 @@ def choose_cutoff(position: Array, rate: float) -> CutoffChoice:
     return CutoffChoice(float(offered[pick]), tuple(noise), tuple(band), pick in {0, offered.size - 1})
 
 
-def position_spectrum(position: Array, rate: float) -> tuple[Array, Array, Array]:
+def position_spectrum(position: Array, rate: float, read: float | None = None) -> tuple[Array, Array, Array]:
     """Power spectrum of a position for its cut-off, smoothed and one-sided, and the noise floor.
 
     Welch's method on second differences, divided by their gain ``(2 - 2 cos w)^2``: positions fall so steeply with
@@ -115,6 +118,8 @@ def position_spectrum(position: Array, rate: float) -> tuple[Array, Array, Array
     position : ndarray, shape (N,)
     rate : float
         Hz.
+    read : float, optional
+        Rate at which the position was read, Hz. What is interpolated says nothing of noise above half of it.
 
     Returns
     -------
@@ -123,8 +128,8 @@ def position_spectrum(position: Array, rate: float) -> tuple[Array, Array, Array
     spectrum : ndarray, shape (F,)
         Unit of the position squared per hertz.
     floor : ndarray, shape (F,)
-        What white noise gives whose level is the median over the top fifth of the frequencies, and at least that of
-        the quantisation. Its lowest lines are raised by the window and the smoothing.
+        What white noise gives whose level is the median over the top fifth of the frequencies that were read, and at
+        least that of the quantisation. Its lowest lines are raised by the window and the smoothing.
     """
     from scipy.signal import welch
 
@@ -136,7 +141,10 @@ def position_spectrum(position: Array, rate: float) -> tuple[Array, Array, Array
     # What Hann's window makes of the gain: its spectrum has the powers 1/6, 2/3, 1/6 over three lines.
     seen = np.convolve(np.concatenate([gain[1:2], gain, gain[-2:-1]]), [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0], "valid")
     spectrum = _smooth(np.asarray(power[1:], dtype=np.float64)) / gain[1:]
-    level = float(np.median(spectrum[frequency[1:] >= 0.4 * rate]))
+    top = rate if read is None else read
+    top_fifth = (frequency[1:] >= 0.4 * top) & (frequency[1:] <= 0.5 * top)
+    kept = 1.0 if top >= rate else _spline_gain(frequency[1:][top_fifth] / top) ** 2
+    level = float(np.median(spectrum[top_fifth] / kept))
     step = quantisation_step(position)
     level = max(level, 0.0 if step is None else step**2 / (6.0 * rate))  # q^2/12 over half of the rate
     return frequency[1:], spectrum, level * _smooth(seen[1:]) / gain[1:]
@@ -159,6 +167,15 @@ def _expected_error(frequency: Array, motion: Array, spectrum: Array, rate: floa
         kept = slope / (1.0 + (warped / np.tan(np.pi * cutoff / rate)) ** (2 * MOTION_FILTER_ORDER))
         errors[i] = np.sum(fourth * (np.where(below, (1.0 - kept) ** 2, 0.0) * motion + kept**2 * noise))
     return np.maximum(errors, NEGLIGIBLE**2 * float(np.sum(fourth * motion * below)))
+
+
+def _spline_gain(share: Array) -> Array:
+    """Gain of the cubic spline through a position's readings, over the frequency as a share of their rate.
+
+    ``sinc^4(f) / sum_k sinc^4(f - k)`` (Unser, IEEE Signal Processing Magazine 16(6), 1999).
+    """
+    near, *images = (np.sinc(share - k) ** 4 for k in (0, 1, -1, 2, -2))
+    return np.asarray(near / (near + sum(images)))
 
 
 def _smooth(power: Array) -> Array:

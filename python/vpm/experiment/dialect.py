@@ -11,6 +11,7 @@ from os import PathLike
 from pathlib import Path
 
 from vpm.errors import ExperimentError, UnitError
+from vpm.experiment.dates import STAMP_BYTES
 from vpm.units import parse_unit
 
 #: Separators that are looked for; where a file has none of them, blanks separate.
@@ -74,7 +75,7 @@ def read_dialect(path: str | PathLike[str]) -> Dialect:
 
     Remarks and blank lines may stand above the names, and the names may be a remark themselves, as ``numpy.savetxt``
     writes them. Blanks separate where the names hold no other separator. Commas are decimal ones where another
-    separator is there, and no number has a point.
+    separator is there, and no number has a point; dates are no numbers.
 
     Raises
     ------
@@ -93,7 +94,7 @@ def read_dialect(path: str | PathLike[str]) -> Dialect:
     below = next((place for place in told if place > named), None)
     units = () if below is None else _units(_cells(lines[below], separator), len(header))
     skipped = below + 1 if units and below is not None else named + 1
-    numbers = content.split(b"\n", skipped)[-1] if separator != "," else b""
+    numbers = STAMP_BYTES.sub(b"", content.split(b"\n", skipped)[-1]) if separator != "," else b""
     comma = re.search(rb"\d,\d", numbers) is not None and re.search(rb"\d\.\d", numbers) is None
     return Dialect(encoding, header, units, named + 1, skipped, separator, comma)
 

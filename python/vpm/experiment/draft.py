@@ -39,7 +39,6 @@ class Draft:
     units: dict[str, str] = field(default_factory=dict)
     delays: dict[str, float] = field(default_factory=dict)
     clocks: dict[str, Array] = field(default_factory=dict)
-    shift: float = 0.0
     history: list[str] = field(default_factory=list)
     unused: tuple[str, ...] = ()
 
@@ -62,7 +61,8 @@ def mapped_draft(log: Log, table: Mapping[str, ChannelEntry], model: Model | Non
             channel="time",
         )
     draft = Draft(source, (content.columns[clock] * entry.scale + entry.offset) * clock_factor)
-    draft.shift = entry.offset * clock_factor
+    own_clocks = {column: (own * entry.scale + entry.offset) * clock_factor for column, own in content.clocks.items()}
+    content = replace(content, clocks=own_clocks)
     draft.history += [f"Read {draft.time.size} rows of {Path(path).name}.", *content.notes]
     draft.unused = tuple(column for column in log.header if column not in columns)
     for channel, entry in table.items():
@@ -125,12 +125,12 @@ def _map_channel(
         return
     own = _clock(draft, content, channel, columns)
     if own is not None:
-        draft.clocks[channel] = own + draft.shift
+        draft.clocks[channel] = own
+    # Lines are those of the record's clock.
+    clock, source = (draft.time, draft.source) if own is None else (own, replace(draft.source, lines=None))
     for name, part in entry.parts.items():
         what = f'column "{part.column}" ({channel})'
-        check_finite(
-            content.columns[columns[name]], draft.time if own is None else own, what, draft.source, channel=channel
-        )
+        check_finite(content.columns[columns[name]], clock, what, source, channel=channel)
     raw = _built(draft, content, channel, entry, columns) if entry.value else content.columns[columns[""]]
     draft.columns[channel] = given.to_si(raw * entry.scale + entry.offset)
     words = [f"{channel} is {entry.told}"]
@@ -188,14 +188,17 @@ def plain_draft(log: Log) -> Draft:
     path, (names, clock) = log.path, _plain_columns(log)
     content = log.read(log.header, clock)
     source = Source(str(path), content.lines, str(path))
-    seconds, _ = understood(names[clock][1] or "s", "time", None, str(path), expected="s")
-    draft = Draft(source, seconds.to_si(content.columns[clock]), clocks=dict(content.clocks))
+    stated = "" if clock in content.stamps else names[clock][1]
+    seconds, _ = understood(stated or "s", "time", None, str(path), expected="s")
+    draft = Draft(source, seconds.to_si(content.columns[clock]))
     draft.history.append(f'Read {draft.time.size} rows of {Path(path).name}; the clock is column "{clock}".')
     draft.history += content.notes
     for column, (name, stated) in names.items():
         if column == clock:
             continue
-        own = content.clocks.get(column, draft.time)
+        if column in content.clocks:
+            draft.clocks[name] = seconds.to_si(content.clocks[column])
+        own = draft.clocks.get(name, draft.time)
         check_finite(content.columns[column], own, f'column "{column}"', source, channel=name)
         given, draft.units[name] = understood(stated or "1", name, None, str(path))
         draft.columns[name] = given.to_si(content.columns[column])

@@ -31,8 +31,11 @@ MOST_GROWTH = 10.0
 #: The same where somebody asks for a finer grid.
 MOST_FINER = 1000.0
 
+#: What helps where samples are missing or uneven, in Python and on the command line.
+INTERPOLATE = 'load with irregular="interpolate" (--interpolate)'
+
 #: Quantities that change smoothly, and so may be interpolated by a spline.
-SMOOTH_QUANTITIES = ("position", "velocity", "acceleration")
+SMOOTH_QUANTITIES = ("position", "velocity", "acceleration", "length", "rate", "pressure", "pressure_a", "pressure_b")
 
 
 @dataclass(frozen=True)
@@ -79,7 +82,7 @@ def check_finite(values: Array, time: Array, what: str, source: Source, *, chann
         count = "the only one" if bad.size == 1 else f"the first of {bad.size}"
         raise source.error(
             f"{source.at(first)}: {what} is {values[first]}{when}, {count}; repair these cells, or delete "
-            'their rows and load with irregular="interpolate"',
+            f"their rows and {INTERPOLATE}",
             channel=channel,
             time=float(time[first]) if np.isfinite(time[first]) else None,
         )
@@ -133,7 +136,7 @@ def check_uniform(time: Array, source: Source) -> str:
     """
     steps = np.diff(time)
     median = float(np.median(steps))
-    repair = 'trim the log there, or load with irregular="interpolate"'
+    repair = f"trim the log there, or {INTERPOLATE}"
     gaps = np.flatnonzero(steps > GAP * median)
     if gaps.size:
         first = int(gaps[0])
@@ -149,8 +152,7 @@ def check_uniform(time: Array, source: Source) -> str:
     if share > STEP_TOLERANCE:
         raise source.error(
             f"{source.at(worst + 1)}: the step at t = {time[worst]:.9g} s is {steps[worst]:.6g} s, {share:.2%} off the "
-            f"median of {median:.6g} s, and {STEP_TOLERANCE:.1%} is allowed; load with "
-            'irregular="interpolate"',
+            f"median of {median:.6g} s, and {STEP_TOLERANCE:.1%} is allowed; {INTERPOLATE}",
             time=float(time[worst]),
         )
     _check_drift(time, source)
@@ -240,7 +242,7 @@ def _check_drift(time: Array, source: Source) -> None:
         raise source.error(
             f"{source.at(worst)}: the sample at t = {time[worst]:.9g} s lies {away[worst]:.2g} steps from a uniform "
             f"grid of {step:.6g} s, and {GRID_TOLERANCE:g} is allowed, because the clock's rate changes; "
-            'load with irregular="interpolate"',
+            f"{INTERPOLATE}",
             time=float(time[worst]),
         )
 

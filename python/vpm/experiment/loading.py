@@ -11,9 +11,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import ExperimentError, near_match
 from vpm.experiment.draft import Draft, mapped_draft, plain_draft, understood
-from vpm.experiment.grid import Source, check_finite, check_increasing, check_uniform, make_uniform
+from vpm.experiment.grid import (
+    GAP,
+    INTERPOLATE,
+    Source,
+    check_finite,
+    check_increasing,
+    check_uniform,
+    is_smooth,
+    make_uniform,
+)
 from vpm.experiment.merge import merge_clocks
 from vpm.experiment.record import Experiment
+from vpm.experiment.repeated import fresh_samples
 from vpm.numbers import array_of
 
 if TYPE_CHECKING:
@@ -33,6 +43,7 @@ class Parts(NamedTuple):
     units: tuple[str, ...]
     history: tuple[str, ...]
     unused_columns: tuple[str, ...]
+    slower: Mapping[str, float]
 
 
 def load_parts(
@@ -114,7 +125,10 @@ def _finish(draft: Draft, name: str, irregular: str, resample: float | None) -> 
         raise ExperimentError(f'irregular="{irregular}" is not known; choose "error" or "interpolate"')
     check_finite(draft.time, draft.time, "the time", draft.source, channel="time")
     check_increasing(draft.time, draft.source)
+    _take_fresh(draft, irregular)
+    slower: dict[str, float] = {}
     if draft.clocks:
+        slower = {channel: 1.0 / float(np.median(np.diff(own))) for channel, own in draft.clocks.items()}
         draft.time, draft.columns, merged = merge_clocks(
             draft.time, draft.columns, draft.clocks, draft.source, irregular=irregular
         )
@@ -131,11 +145,39 @@ def _finish(draft: Draft, name: str, irregular: str, resample: float | None) -> 
     else:
         sentence = check_uniform(time, draft.source)
     units = tuple(draft.units[channel] for channel in channels)
-    record = Experiment(name, time, data, channels, units, (*draft.history, sentence), draft.unused)
+    step = float(np.median(np.diff(time)))
+    slower = {channel: rate for channel, rate in slower.items() if rate * step * GAP < 1.0}
+    record = Experiment(name, time, data, channels, units, (*draft.history, sentence), draft.unused, slower)
     if draft.delays:
         record = record.align(draft.delays)
     if resample is not None:
         record = record.resample(resample)
     return Parts(
-        record.name, record.time, record.data, record.channels, record.units, record.history, record.unused_columns
+        record.name,
+        record.time,
+        record.data,
+        record.channels,
+        record.units,
+        record.history,
+        record.unused_columns,
+        record.slower,
     )
+
+
+def _take_fresh(draft: Draft, irregular: str) -> None:
+    """Take of motions in a loaded file what was read, where slower sensors had their values repeated."""
+    for channel, column in draft.columns.items():
+        own = draft.clocks.get(channel, draft.time)
+        fresh = fresh_samples(own, column) if is_smooth(channel) and np.all(np.isfinite(column)) else None
+        if fresh is None:
+            continue
+        usual, step = (float(np.median(np.diff(time))) for time in (own[fresh], own))
+        told = f"{channel} was read every {usual:.6g} s and repeated every {step:.6g} s in between"
+        if irregular != "interpolate":
+            raise draft.source.error(
+                f"{draft.source.name}: {told}, which makes its motion late and jerky; {INTERPOLATE}, which takes what "
+                "was read, or map a channel that was read in every sample",
+                channel=channel,
+            )
+        draft.columns[channel], draft.clocks[channel] = column[fresh], own[fresh]
+        draft.history.append(f"{told}; the {fresh.size} values that were read count.")

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from vpm.errors import ExperimentError
 from vpm.experiment.grid import (
     FEWEST_SAMPLES,
+    INTERPOLATE,
     MOST_GROWTH,
     Source,
     check_finite,
@@ -58,9 +59,17 @@ def merge_clocks(
         return time, dict(columns), []
     if irregular != "interpolate":
         first = clocks[others[0]]
+        lost = np.flatnonzero(~np.isin(time, first))
+        if first.size + lost.size == time.size:
+            raise source.error(
+                f'{source.at(int(lost[0]))}: "{others[0]}" has no number, as in {lost.size} of {time.size} rows; '
+                f"fill these cells, or {INTERPOLATE}",
+                channel=others[0],
+                time=float(time[lost[0]]),
+            )
         raise ExperimentError(
             f'{source.name}: "{others[0]}" has {first.size} samples on a clock of its own and the clock of the record '
-            f'{time.size}; load with irregular="interpolate", which brings all channels to one grid, or map channels '
+            f"{time.size}; {INTERPOLATE}, which brings all channels to one grid, or map channels "
             "of one topic or group only",
             path=source.path,
             channel=others[0],

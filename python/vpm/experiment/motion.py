@@ -213,7 +213,7 @@ def motion(
     raw = _channels(experiment, model, _of(joints, "position"))
     inputs = _channels(experiment, model, drivers, model.optional_inputs)
     rate = experiment.rate
-    choice = choose_cutoff(raw, rate) if cutoff is None else None
+    choice = _choice(experiment, model) if cutoff is None else None
     cutoff = choice.cutoff if choice is not None else float(cutoff or 0.0)
     position = lowpass(raw, rate, cutoff)
     edge = settling_samples(rate, cutoff) + 4  # two differences reach four samples outward
@@ -267,12 +267,17 @@ def common_cutoff(experiments: Iterable[Experiment], model: Machine) -> float:
     ExperimentError
         There is no record, a channel is missing, or a record is too short.
     """
-    joints = tuple(model.joints)
-    channels = _of(joints, "position")
-    cutoffs = [choose_cutoff(_channels(each, model, channels), each.rate).cutoff for each in experiments]
+    cutoffs = [_choice(each, model).cutoff for each in experiments]
     if not cutoffs:
         raise ExperimentError("a common cut-off frequency needs at least one record, and none was given")
     return min(cutoffs)
+
+
+def _choice(experiment: Experiment, model: Machine) -> CutoffChoice:
+    """Cut-off frequency for the motion of a log."""
+    channels = _of(tuple(model.joints), "position")
+    read = [experiment.read_rate(channel) for channel in channels]
+    return choose_cutoff(_channels(experiment, model, channels), experiment.rate, read)
 
 
 def _of(owners: tuple[str, ...], quantity: str) -> tuple[str, ...]:

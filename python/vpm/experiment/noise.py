@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 from math import comb, sqrt
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
+
+if TYPE_CHECKING:
+    from vpm.experiment.record import Experiment
 
 Array = NDArray[np.float64]
 
@@ -53,6 +57,26 @@ def noise_std(values: Array) -> float:
         estimates.append(NORMAL_MAD * spread / sqrt(comb(2 * order, order)))
     step = quantisation_step(values)
     return max(min(estimates), 0.0 if step is None else step / sqrt(12.0))
+
+
+def instrument_noise(record: Experiment, channel: str) -> float:
+    """Noise of a channel as the white noise of all samples of its record that has the same density.
+
+    Of a channel that was read at a lower rate ``r`` only the readings show it. The density of noise with deviation
+    ``s`` is ``2 s^2 / r``, so in all samples the deviation is larger by the root of the ratio of both rates.
+
+    Parameters
+    ----------
+    record : Experiment
+    channel : str
+
+    Returns
+    -------
+    float
+        Unit of the channel.
+    """
+    every = max(1, round(record.rate / record.read_rate(channel)))
+    return noise_std(record[channel][::every]) * sqrt(every)
 
 
 def quantisation_step(values: Array) -> float | None:

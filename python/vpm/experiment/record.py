@@ -46,6 +46,7 @@ class _Changes(TypedDict, total=False):
     data: Array
     channels: tuple[str, ...]
     units: tuple[str, ...]
+    slower: Mapping[str, float]
 
 
 _Record = TypeVar("_Record", bound="Experiment")
@@ -70,6 +71,9 @@ class Experiment(Result):
         One sentence for each thing that was done to the numbers.
     unused_columns : tuple of str
         Columns of the file that no channel asked for.
+    slower : mapping of str to float
+        Rate at which a channel was read, Hz, where that is below the rate of the record, whose samples between two
+        readings are interpolated.
     """
 
     name: str
@@ -79,6 +83,7 @@ class Experiment(Result):
     units: tuple[str, ...]
     history: tuple[str, ...] = ()
     unused_columns: tuple[str, ...] = field(default=())
+    slower: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Take read-only copies of a record's arrays and check that the parts fit together."""
@@ -292,6 +297,10 @@ class Experiment(Result):
         """SI unit of a record's channel."""
         return self.units[self._index(channel)]
 
+    def read_rate(self, channel: str) -> float:
+        """Rate at which a record's channel was read, Hz: that of the record, or below."""
+        return min(self.rate, self.slower.get(channel, self.rate))
+
     def trim(self, start: float | None = None, stop: float | None = None) -> Self:
         """Part of the record from `start` to `stop`, both in s on its own clock and inclusive."""
         slack = 1e-6 * self.dt
@@ -409,7 +418,9 @@ class Experiment(Result):
         check_finite(column, self.time, f'the channel "{name}"', Source(self.name), channel=name)
         parsed = parse_unit(unit)
         verb = "replaced by" if name in self else "added from"
-        return self._with_column(name, parsed.to_si(column), parsed.si, f"{name} was {verb} values in {unit}.")
+        sentence = f"{name} was {verb} values in {unit}."
+        changed = self._with_column(name, parsed.to_si(column), parsed.si, sentence)
+        return replace(changed, slower={other: rate for other, rate in self.slower.items() if other != name})
 
     def align(self, delays: Mapping[str, float]) -> Self:
         """Record with some channels moved back by the times by which they lag the others.

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, near_match
+from vpm.experiment.dates import is_date, seconds_of_dates
 from vpm.experiment.dialect import Dialect, is_number, read_dialect
 
 Array = NDArray[np.float64]
@@ -67,7 +68,7 @@ def read_header(path: str | PathLike[str]) -> Dialect:
     return dialect
 
 
-def read_table(path: str | PathLike[str], dialect: Dialect, wanted: Sequence[str]) -> Table:
+def read_table(path: str | PathLike[str], dialect: Dialect, wanted: Sequence[str], clock: str) -> Table:
     """Read columns of numbers of a text file.
 
     Parameters
@@ -78,6 +79,8 @@ def read_table(path: str | PathLike[str], dialect: Dialect, wanted: Sequence[str
         How the file writes them.
     wanted : sequence of str
         Columns to read; others may hold anything.
+    clock : str
+        Column of the time among them: numbers, or dates.
 
     Returns
     -------
@@ -86,7 +89,8 @@ def read_table(path: str | PathLike[str], dialect: Dialect, wanted: Sequence[str
     Raises
     ------
     ExperimentError
-        A column is missing, or a cell is no number (with its line, column and text).
+        A column is missing, or a cell is no number (with its line, column and text). A cell may be empty beside a
+        clock: a column with such cells was sampled more slowly, or lost samples.
     """
     header = dialect.header
     for name in wanted:
@@ -98,10 +102,53 @@ def read_table(path: str | PathLike[str], dialect: Dialect, wanted: Sequence[str
     try:
         values = _numbers(path, dialect, places)
     except (ValueError, UnicodeDecodeError) as error:
-        problem = _diagnose(path, dialect, places)
-        raise problem or _error(path, f"{path} cannot be read as a table of numbers ({error})") from error
+        problem = _diagnose(path, dialect, places, header.index(clock))
+        if problem is not None:
+            raise problem from error
+        return _by_cells(path, dialect, wanted, clock)
     lines = _line_numbers(path, dialect, len(values))
     return Table(header, {name: values[:, at] for at, name in enumerate(wanted)}, lines)
+
+
+def _by_cells(path: str | PathLike[str], dialect: Dialect, wanted: Sequence[str], clock: str) -> Table:
+    """Text table with dates or empty cells, row by row.
+
+    The clock of the record is that of the column with most samples. Columns with other rows have clocks of their own.
+    """
+    numbers, rows = zip(*dialect.rows(path), strict=True)
+    lines = np.asarray(numbers, dtype=np.int64)
+    cells = {name: [row[dialect.header.index(name)].strip() for row in rows] for name in wanted}
+    dated = is_date(cells[clock][0])
+    time = _dates(path, lines, cells[clock], clock) if dated else _floats(cells[clock], dialect)
+    filled = {name: np.array([bool(cell) for cell in cells[name]]) for name in wanted if name != clock}
+    for name, there in filled.items():
+        if not there.any():
+            raise _error(path, f'{path}: all cells of column "{name}" are empty; do not map it')
+    base = max(filled.values(), key=np.count_nonzero, default=np.ones(len(rows), dtype=bool))
+    columns = {clock: time[base]}
+    clocks, notes = {}, []
+    for name, there in filled.items():
+        columns[name] = _floats([cell for cell in cells[name] if cell], dialect)
+        if not np.array_equal(there, base):
+            clocks[name] = time[there]
+            notes.append(f'Column "{name}" has {np.count_nonzero(there)} numbers in {len(rows)} rows.')
+    stamps = frozenset({clock} if dated else ())
+    return Table(dialect.header, columns, lines[base], stamps, clocks, tuple(notes))
+
+
+def _floats(cells: Sequence[str], dialect: Dialect) -> Array:
+    """Numbers of cells of a text table."""
+    return np.array([float(dialect.number(cell)) for cell in cells], dtype=np.float64)
+
+
+def _dates(path: str | PathLike[str], lines: NDArray[np.int64], cells: Sequence[str], clock: str) -> Array:
+    """Seconds of the dates of a text table."""
+    try:
+        return seconds_of_dates(cells)
+    except ValueError as error:
+        place, why = error.args
+        told = f'{path}, line {lines[place]}: "{cells[place]}" in column "{clock}" {why}'
+        raise _error(path, told, channel="time") from error
 
 
 def _numbers(path: str | PathLike[str], dialect: Dialect, places: Sequence[int]) -> Array:
@@ -144,17 +191,17 @@ def _line_numbers(path: str | PathLike[str], dialect: Dialect, rows: int) -> NDA
     seen = np.diff(np.searchsorted(marks, ends), prepend=0)
     if dialect.delimiter and ends.size == rows + first and np.all(seen[first:] == len(dialect.header) - 1):
         return np.arange(first + 1, rows + first + 1, dtype=np.int64)
-    problem = _diagnose(path, dialect, ())
+    problem = _diagnose(path, dialect, (), -1)
     if problem is not None:
         raise problem
     return np.fromiter((number for number, _ in dialect.rows(path)), dtype=np.int64)[:rows]
 
 
-def _diagnose(path: str | PathLike[str], dialect: Dialect, places: Sequence[int]) -> ExperimentError | None:
-    """Diagnose a text table: the first row of the wrong length, or the first cell without a number."""
+def _diagnose(path: str | PathLike[str], dialect: Dialect, places: Sequence[int], clock: int) -> ExperimentError | None:
+    """Diagnose a text table: the first row of the wrong length, or the first cell with neither a number nor nothing."""
     try:
         for number, row in dialect.rows(path):
-            problem = _row_problem(row, dialect, places)
+            problem = _row_problem(row, dialect, places, clock)
             if problem:
                 return _error(path, f"{path}, line {number}: {problem}")
     except (UnicodeDecodeError, csv.Error) as error:
@@ -162,17 +209,20 @@ def _diagnose(path: str | PathLike[str], dialect: Dialect, places: Sequence[int]
     return None
 
 
-def _row_problem(row: Sequence[str], dialect: Dialect, places: Sequence[int]) -> str:
+def _row_problem(row: Sequence[str], dialect: Dialect, places: Sequence[int], clock: int) -> str:
     header = dialect.header
     if len(row) != len(header):
         return f"there are {len(row)} cells where the header names {len(header)} columns; repair or delete the row"
     for place in places:
         cell = row[place].strip()
+        if place != clock and not cell:
+            continue
         if not cell:
             return f'the cell of column "{header[place]}" is empty; fill it or delete the row'
-        if not is_number(dialect.number(cell)):
+        if not is_number(dialect.number(cell)) and not (place == clock and is_date(cell)):
             comma = is_number(cell.replace(",", ".", 1))
-            repair = "write decimal points" if comma else "write a number, or do not map this column"
+            other = "or a date such as 2026-03-14 09:26:53.120" if place == clock else "or do not map this column"
+            repair = "write decimal points" if comma else f"write a number, {other}"
             return f'"{cell}" in column "{header[place]}" is no number; {repair}'
     return ""
 

@@ -89,7 +89,7 @@ def _accelerations(model: Model, record: Experiment) -> Iterator[Related]:
         position, acceleration = f"{joint}.position", f"{joint}.acceleration"
         if position not in record or acceleration not in record:
             continue
-        cutoff = choose_cutoff(record[position][:, None], record.rate).cutoff
+        cutoff = choose_cutoff(record[position][:, None], record.rate, [record.read_rate(position)]).cutoff
         inside = slice((edge := settling_samples(record.rate, cutoff)), len(record) - edge)
         if len(record) <= 4 * edge:
             continue

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from vpm.discrepancy.noise.noise_spectrum import noise_shapes, noise_spectrum, with_noise
 from vpm.errors import VpmError
-from vpm.experiment import Experiment, noise_std
+from vpm.experiment import Experiment, instrument_noise
 from vpm.experiment.signal import RETAINED_BAND
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.model import Model
@@ -123,7 +123,7 @@ def own_log(
         if channel in experiment:
             values = run.outputs[:, column]
             if generator is not None and not channel.endswith(".command"):  # the controller wrote it: exact
-                values = values + noise_std(experiment[channel]) * generator.standard_normal(values.size)
+                values = values + instrument_noise(experiment, channel) * generator.standard_normal(values.size)
             own = own.with_channel(channel, values, _unit(experiment, channel))
     return own
 

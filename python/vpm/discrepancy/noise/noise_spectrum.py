@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
-from vpm.experiment import Experiment, Motion, noise_std
+from vpm.experiment import Experiment, Motion, instrument_noise
 from vpm.experiment.signal import RETAINED_BAND as _BAND
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.following import Following
@@ -160,7 +160,7 @@ def with_noise(model: Model, experiment: Experiment, generator: np.random.Genera
     for channel in model.output_channels:
         if channel in experiment and not channel.endswith(".command"):
             values = experiment[channel]
-            noise = noise_std(values) * generator.standard_normal(values.size)
+            noise = instrument_noise(experiment, channel) * generator.standard_normal(values.size)
             unit = experiment.units[experiment.channels.index(channel)]
             experiment = experiment.with_channel(channel, values + noise, unit)
     return experiment

@@ -21,6 +21,6 @@ class TextLog(Log):
         self.refused: dict[str, str] = {}
         self.units = dict(zip(self.header, self.dialect.units, strict=False))
 
-    def _read(self, columns: Sequence[str], clock: str) -> Table:  # noqa: ARG002
+    def _read(self, columns: Sequence[str], clock: str) -> Table:
         """Columns of a text file by name; see `Log.read`."""
-        return read_table(self.path, self.dialect, columns)
+        return read_table(self.path, self.dialect, columns, clock)

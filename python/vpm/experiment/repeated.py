@@ -1,0 +1,50 @@
+"""Motions that were read more slowly than they were logged, so that each value is repeated until the next one."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from vpm.experiment.noise import FEWEST_SAMPLES, quantisation_step
+
+Array = NDArray[np.float64]
+
+
+def fresh_samples(time: Array, values: Array) -> NDArray[np.int64] | None:
+    """Samples at which a motion was read, where it was repeated until it was read again.
+
+    Mass moves without jumps. A motion that is read in every sample and moves by several steps of its sensor in one of
+    them does so in its neighbours, too. So values were repeated that jump, and never in two samples running. One
+    lost row may bring two jumps together.
+
+    Parameters
+    ----------
+    time : ndarray, shape (N,)
+        Increasing, s.
+    values : ndarray, shape (N,)
+        A position, velocity, acceleration or length.
+
+    Returns
+    -------
+    ndarray of int, or None
+        None where values were not repeated, or too few changed to tell. A stretch at rest is read as often as others.
+    """
+    moved = np.abs(np.diff(values))
+    changes = np.flatnonzero(moved) + 1
+    if changes.size < FEWEST_SAMPLES:
+        return None
+    step = quantisation_step(values) or 0.0
+    if np.median(moved[changes - 1]) < 1.5 * step:  # steps of the sensor itself, in slow motion
+        return None
+    place = np.round((time - time[0]) / np.median(np.diff(time))).astype(np.int64)
+    lost = np.flatnonzero(np.diff(place) > 1) + 1
+    apart = np.diff(changes)
+    if np.count_nonzero(apart == 1) > np.count_nonzero(np.isin(changes, lost)):
+        return None
+    period = int(np.median(apart))
+    ends = np.append(changes[1:], values.size)
+    stretches = [
+        np.arange(start, max(start + 1, stop - period // 2), period) for start, stop in zip(changes, ends, strict=True)
+    ]
+    fresh = np.concatenate([np.arange(changes[0] - period, -1, -period)[::-1], *stretches])
+    return fresh[~np.isin(fresh, lost)]  # behind a lost row nobody knows when it was read
