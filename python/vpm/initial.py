@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
-from vpm.experiment import Experiment, Motion, joints_from_shafts, motion
+from vpm.experiment import Experiment, Motion, joints_from_sensors, motion
 from vpm.model import Model
 from vpm.model.drives.states import commanded_states, follow, rest
 from vpm.model.loops.states import kept, measured
@@ -83,7 +83,7 @@ def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
     """
     joints, coordinates = len(model.joints), len(model.coordinates)
     with suppress(ExperimentError):  # shafts that do not tell the joints leave them at rest
-        experiment = joints_from_shafts(experiment, model, theta)
+        experiment = joints_from_sensors(experiment, model, theta)
     state = np.zeros(model.core.n_states)
     gain, offset = sensor_errors(model, theta)
     for joint, name in enumerate(model.joints):
@@ -114,7 +114,7 @@ def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
 
 def whole_motion(model: Model, experiment: Experiment, theta: Array, cutoff: float | None) -> Motion:
     """Motion of all joints for an initial state; joints that effects split off are computed."""
-    experiment = joints_from_shafts(experiment, model, theta)
+    experiment = joints_from_sensors(experiment, model, theta)
     if not model.added_joints:
         return motion(experiment, model, cutoff=cutoff)
     own = tuple(name for name in model.joints if name not in model.added_joints)
@@ -313,7 +313,7 @@ def joint_motion(
     Of joints that are passive there (see `passive_joints`) it has no columns, as long as any joint is measured. The
     log need not hold commands, unless the motion is to be ``commanded``.
     """
-    experiment = joints_from_shafts(experiment, model)
+    experiment = joints_from_sensors(experiment, model)
     passive = passive_joints(experiment, model)
     followed = tuple(name for name in model.joints if name not in passive)
     inputs = (model.input_channels, tuple(model.optional_inputs)) if commanded else ((), ())

@@ -15,7 +15,7 @@ from vpm.discrepancy.prior_departure import moved_far
 from vpm.discrepancy.screening.candidates import slow_speeds
 from vpm.discrepancy.stuck_channels import check_moving, check_stuck
 from vpm.errors import DiagnosisError, DivergedError
-from vpm.experiment import Experiment, joints_from_shafts
+from vpm.experiment import Experiment, joints_from_sensors
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
 from vpm.identify.parallel import worker_count
 from vpm.model import Model
@@ -32,11 +32,11 @@ Records = tuple[tuple[Experiment, ...], tuple[Experiment, ...], list[str]]
 
 def records_of(model: Model, experiments: Sequence[Experiment], validate: Sequence[Experiment]) -> Records:
     """Prepare records for fit and validation, with notes on both."""
-    training = tuple(joints_from_shafts(record, model, free=model.adjustable) for record in experiments)
+    training = tuple(joints_from_sensors(record, model, free=model.adjustable) for record in experiments)
     if not training:
         raise DiagnosisError("no record was given; pass at least one experiment")
     check_moving(model, training)
-    validation = tuple(joints_from_shafts(record, model) for record in validate)
+    validation = tuple(joints_from_sensors(record, model) for record in validate)
     if validation:
         check_stuck(model, validation)
         return training, validation, []

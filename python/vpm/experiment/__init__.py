@@ -3,6 +3,7 @@
 from vpm.experiment.campaign import Campaign, as_records
 from vpm.experiment.cutoff import CutoffChoice, choose_cutoff
 from vpm.experiment.draft import plain_table
+from vpm.experiment.lengths import joints_from_lengths, joints_from_sensors
 from vpm.experiment.motion import Motion, common_cutoff, motion
 from vpm.experiment.noise import instrument_noise, noise_std, quantisation_step
 from vpm.experiment.record import Experiment
@@ -20,6 +21,8 @@ __all__ = [
     "decimation_for",
     "differentiate",
     "instrument_noise",
+    "joints_from_lengths",
+    "joints_from_sensors",
     "joints_from_shafts",
     "lowpass",
     "motion",

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
-from vpm.experiment import Experiment, as_records, joints_from_shafts
+from vpm.experiment import Experiment, as_records, joints_from_sensors
 from vpm.identify.closed_loop_prediction import Own
 from vpm.identify.comparison import comparison
 from vpm.identify.diagnostics import constant_channels, contradictions, lost_channels, remarks, resting
@@ -114,7 +114,7 @@ def identify(
     """
     records, names, ties, checks = as_records(experiments), _names(model, free), dict(ties or {}), checks or Checks()
     if mode in FOLLOWING:
-        records = [joints_from_shafts(record, model, free=names) for record in records]
+        records = [joints_from_sensors(record, model, free=names) for record in records]
     data = comparison(model, records, mode, cutoff=cutoff, setup=setup, ties=ties, fitting=fitting, free=names)
     check_ties(model, ties, names)
     data = _with_own_gains(model, data, names, tolerance)

@@ -8,7 +8,7 @@ from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
 from vpm.discrepancy.screening.candidates import asked_for
 from vpm.discrepancy.stuck_channels import check_moving
 from vpm.errors import DiagnosisError
-from vpm.experiment import Experiment, as_records, joints_from_shafts
+from vpm.experiment import Experiment, as_records, joints_from_sensors
 from vpm.model import Model
 from vpm.one_thread import in_one_thread
 from vpm.ranking.ranking_search import Search
@@ -76,8 +76,8 @@ def rank(
     >>> rank(model, log).effects
     (Ranked(effect='coulomb_friction', site='axis', judgement=Judgement(removed=0.97)),)
     """
-    records = [joints_from_shafts(record, model, free=model.adjustable) for record in as_records(experiments)]
-    unseen = [joints_from_shafts(record, model) for record in as_records(() if validate is None else validate)]
+    records = [joints_from_sensors(record, model, free=model.adjustable) for record in as_records(experiments)]
+    unseen = [joints_from_sensors(record, model) for record in as_records(() if validate is None else validate)]
     if not records:
         raise DiagnosisError("no record was given; pass at least one experiment")
     check_moving(model, records)

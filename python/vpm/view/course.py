@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, SimulationError, near_match
-from vpm.experiment import Experiment, joints_from_shafts
+from vpm.experiment import Experiment, joints_from_sensors
 from vpm.model import Model
 from vpm.simulate import Run, simulate
 
@@ -171,7 +171,7 @@ def _told(model: Model, seen: list[str]) -> Iterator[str]:
 def _of_log(model: Model, log: Experiment, mode: str | None) -> Course:
     told_by = {"command": "free_run", "reference": "closed_loop"}
     driven = [mode for kind, mode in told_by.items() if any(f"{name}.{kind}" in log for name in model.actuators)]
-    told = joints_from_shafts(log, model, model.theta) if model.transmissions else log
+    told = joints_from_sensors(log, model)
     there = [name for name in model.joints if f"{name}.position" in told]
     if not there and not driven:
         wanted = ", ".join(f"{name}.position" for name in model.joints)

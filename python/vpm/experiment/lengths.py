@@ -1,0 +1,146 @@
+"""Positions of joints that follow from lengths of lines, where a log holds the strokes of cylinders alone."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import PchipInterpolator
+
+from vpm.errors import ExperimentError
+from vpm.experiment.record import Experiment
+from vpm.experiment.shafts import joints_from_shafts
+from vpm.model import Model
+
+Array = NDArray[np.float64]
+
+#: Places of a joint at which the length of a line is worked out, over a turn or over the way that the length allows.
+PLACES = 4097
+#: A length that a joint moves by a smaller share of itself does not depend on that joint.
+UNMOVED = 1e-9
+
+
+def joints_from_sensors(
+    experiment: Experiment, model: Model, theta: Array | None = None, *, free: Collection[str] = ()
+) -> Experiment:
+    """Record with positions of joints in the place of lengths of lines and angles of shafts that tell them.
+
+    See `joints_from_lengths` and `vpm.experiment.joints_from_shafts` for parameters and errors.
+    """
+    return joints_from_shafts(joints_from_lengths(experiment, model, theta, free=free), model, theta, free=free)
+
+
+def joints_from_lengths(
+    experiment: Experiment, model: Model, theta: Array | None = None, *, free: Collection[str] = ()
+) -> Experiment:
+    """Record with positions of joints in the place of lengths of lines that one joint alone moves.
+
+    The length has its extremes at dead centres, where the line passes the axis. Between two of them it tells the joint;
+    those count between which the joint is at zero, as the model file draws it.
+
+    Parameters
+    ----------
+    experiment : Experiment
+    model : Model
+    theta : ndarray, shape (P,), optional
+        Values of the parameters, errors of sensors among them; by default those of the model.
+    free : collection of str
+        Parameters that are to be fitted to the result.
+
+    Raises
+    ------
+    ExperimentError
+        A length is outside of what the line can have there, or errors of its sensor are to be fitted or are a delay.
+    """
+    lacking = [joint for joint in model.joints if f"{joint}.position" not in experiment]
+    logged = [line for line in model.lines if f"{line}.length" in experiment]
+    if not lacking or not logged or len(model.coordinates) > len(model.joints):
+        return experiment
+    values = model.theta if theta is None else theta
+    told = experiment
+    for line in logged:
+        moved = [joint for joint in model.joints if _moves(model, line, joint)]
+        if len(moved) == 1 and f"{moved[0]}.position" not in told:
+            told = _told(told, model, values, line, moved[0], free)
+    return told
+
+
+def _told(
+    experiment: Experiment, model: Model, theta: Array, line: str, joint: str, free: Collection[str]
+) -> Experiment:
+    """Record with the position of a joint in the place of the length that tells it."""
+    channel, position = f"{line}.length", f"{joint}.position"
+    sensor = model.sensor_of(channel)
+    errors = [] if sensor is None else [one for one in model.parameter_names if one.startswith(f"{sensor}.")]
+    for parameter in errors:
+        if parameter in free or parameter.endswith(".delay.time"):
+            raise ExperimentError(
+                f"{experiment.name}: the position of {joint} does not follow from {channel} while {parameter} counts; "
+                f'log the joint itself, "{position}", or keep its value',
+                channel=position,
+            )
+    known = {one.split(".")[-2]: float(theta[model.index(one)]) for one in errors}
+    length = (experiment[channel] - known.get("offset", 0.0)) / known.get("gain", 1.0)
+    places, lengths = _course(model, line, joint)
+    if length.min() < lengths.min() or length.max() > lengths.max():
+        raise ExperimentError(
+            f"{experiment.name}: {channel} goes from {length.min():.6g} to {length.max():.6g} m, but {joint} moves it "
+            f"from {lengths.min():.6g} to {lengths.max():.6g} m, between its dead centres around zero; correct its "
+            "unit and offset in the channel table, or the ends of the line",
+            channel=channel,
+        )
+    order = np.argsort(lengths)
+    at = PchipInterpolator(lengths[order], places[order])(length)
+    rest = experiment.select([one for one in experiment.channels if one != channel])
+    told = rest.with_channel(position, at, model.channel_unit(position))
+    slower = {position: experiment.slower[channel]} if channel in experiment.slower else {}
+    return replace(told, slower={**told.slower, **slower})
+
+
+@lru_cache(maxsize=64)
+def _course(model: Model, line: str, joint: str) -> tuple[Array, Array]:
+    """Places of a joint around zero between dead centres, and the lengths of a line there, which rise or fall."""
+    here = float(_lengths(model, line, joint, np.zeros(1))[0])
+    # Two ends that slide apart by a way are apart by at least that way less their distance at zero.
+    reach = np.pi if model.channel_unit(f"{joint}.position") == "rad" else 100.0 * max(here, 1.0)
+    places = np.linspace(-reach, reach, PLACES)
+    slopes = np.diff(_lengths(model, line, joint, places)) > 0.0
+    middle = PLACES // 2
+    turns = np.flatnonzero(np.diff(slopes)) + 1
+    low = int(max(turns[turns < middle], default=0))
+    high = int(min(turns[turns > middle], default=PLACES - 1))
+    fine = np.linspace(places[low], places[high], PLACES)
+    lengths = _lengths(model, line, joint, fine)
+    rising = lengths[-1] > lengths[0]
+    steady = np.diff(lengths) > 0.0 if rising else np.diff(lengths) < 0.0
+    inside = np.append(steady, True) & np.append(True, steady)  # a grid point beside a dead centre may lie beyond it
+    return fine[inside], lengths[inside]
+
+
+@lru_cache(maxsize=64)
+def _moves(model: Model, line: str, joint: str) -> bool:
+    """Whether a joint moves the length of a line."""
+    lengths = _lengths(model, line, joint, np.array([-0.4, 0.0, 0.7]))
+    return bool(np.ptp(lengths) > UNMOVED * lengths.max())
+
+
+def _lengths(model: Model, line: str, joint: str, places: Array) -> Array:
+    """Lengths of a line with one joint at places and the others at zero, m."""
+    bones = _bones(model, line)
+    q = np.zeros((places.size, len(bones.joints)))
+    q[:, bones.joints.index(joint)] = places
+    start, end = (bones.forward_kinematics(marker, q)[:, :3, 3] for marker in ("start", "end"))
+    return np.asarray(np.linalg.norm(end - start, axis=1))
+
+
+@lru_cache(maxsize=64)
+def _bones(model: Model, line: str) -> Model:
+    """Bodies and joints of a model, with both ends of a line as markers."""
+    content = model.to_dict()
+    ends = (content["lines"][line][end] for end in ("from", "to"))
+    places = ({"parent": end["parent"], "translation": end.get("point", [0.0, 0.0, 0.0])} for end in ends)
+    kept = {key: content[key] for key in ("name", "gravity", "bodies", "joints")}
+    return Model.from_dict({**kept, "markers": dict(zip(("start", "end"), places, strict=True))})

@@ -1,0 +1,106 @@
+"""Joint angles from the wire sensors of cylinders, by the law of cosines."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+import vpm
+from vpm import Experiment, Model
+from vpm.errors import ExperimentError
+from vpm.experiment import joints_from_lengths
+
+#: Distances of both pins from the axis, m, and the angle between them at zero, rad.
+BASE, LEVER, ANGLE = 1.9, 0.43, 2.2
+TIME = 0.01 * np.arange(400)
+MOVED = -0.2 + 0.5 * np.sin(2.0 * TIME) + 0.1 * np.sin(7.0 * TIME)
+
+
+def boom(sensor: str = "") -> Model:
+    """A boom on a cylinder, with a stick on a cylinder of its own."""
+    pins = [[BASE, 0.0, 0.0], [LEVER * math.cos(ANGLE), 0.0, LEVER * math.sin(ANGLE)]]
+    return Model.from_toml(f"""
+        name = "boom"
+        gravity = [0.0, 0.0, -9.81]
+        [bodies.boom]
+        mass = 100.0
+        inertia = [1.0, 40.0, 40.0, 0.0, 0.0, 0.0]
+        center_of_mass = [1.0, 0.0, 0.0]
+        [bodies.stick]
+        mass = 40.0
+        inertia = [1.0, 10.0, 10.0, 0.0, 0.0, 0.0]
+        [joints.foot]
+        type = "revolute"
+        parent = "world"
+        child = "boom"
+        axis = [0.0, -1.0, 0.0]
+        [joints.knee]
+        type = "revolute"
+        parent = "boom"
+        child = "stick"
+        translation = [2.0, 0.0, 0.0]
+        axis = [0.0, -1.0, 0.0]
+        [lines.lift]
+        from = {{ parent = "world", point = {pins[0]} }}
+        to = {{ parent = "boom", point = {pins[1]} }}
+        [lines.stay]
+        from = {{ parent = "world", point = [0.0, 0.0, 3.0] }}
+        to = {{ parent = "stick", point = [1.0, 0.0, 0.0] }}
+        [actuators.lift_drive]
+        line = "lift"
+        gain = 1.0
+        {sensor}
+    """)
+
+
+def length(angle: np.ndarray) -> np.ndarray:
+    """Length of the cylinder: a turn by -y takes the lever away from the base."""
+    return np.sqrt(BASE**2 + LEVER**2 - 2.0 * BASE * LEVER * np.cos(ANGLE + angle))
+
+
+def record(values: np.ndarray, model: Model) -> Experiment:
+    """What a wire sensor logged, and the other joint's encoder."""
+    channels = {"lift.length": values, "knee.position": 0.3 * np.cos(TIME), "lift_drive.command": 0.0 * TIME}
+    return Experiment.from_arrays(TIME, channels, model=model)
+
+
+def test_a_length_tells_the_joint_that_moves_it() -> None:
+    model = boom()
+    told = joints_from_lengths(record(length(MOVED), model), model)
+    assert set(told.channels) == {"foot.position", "knee.position", "lift_drive.command"}
+    np.testing.assert_allclose(told["foot.position"], MOVED, atol=1e-7)
+    assert joints_from_lengths(told, model) is told
+
+
+def test_the_file_tells_the_side_of_the_dead_centre() -> None:
+    """Beyond the dead centre of ``ANGLE + angle = pi`` every length comes a second time."""
+    model = boom()
+    mirrored = 2.0 * (np.pi - ANGLE) - MOVED  # the other angle of the same length
+    np.testing.assert_allclose(length(mirrored), length(MOVED), atol=1e-12)
+    told = joints_from_lengths(record(length(mirrored), model), model)
+    np.testing.assert_allclose(told["foot.position"], MOVED, atol=1e-7)
+
+
+def test_gain_and_offset_of_the_sensor_are_undone() -> None:
+    sensor = '[sensors.wire]\nmeasures = "lift.length"\n'
+    model = boom(sensor).with_effect("sensor_offset", at="wire", value=0.02)
+    told = joints_from_lengths(record(length(MOVED) + 0.02, model), model)
+    np.testing.assert_allclose(told["foot.position"], MOVED, atol=1e-7)
+    with pytest.raises(ExperimentError, match=r"does not follow from lift\.length while wire\.offset\.value counts"):
+        joints_from_lengths(record(length(MOVED), model), model, free=["wire.offset.value"])
+
+
+def test_what_tells_no_joint_stays_or_is_refused() -> None:
+    model = boom()
+    stay = Experiment.from_arrays(TIME, {"stay.length": 2.0 + 0.1 * np.sin(TIME)}, model=model)
+    assert joints_from_lengths(stay, model) is stay  # both joints move it
+    with pytest.raises(ExperimentError, match=r"lift\.length goes from .* but foot moves it from 1\.47 to 2\.33 m"):
+        joints_from_lengths(record(1e3 * length(MOVED), model), model)
+
+
+def test_a_run_starts_where_the_cylinder_is() -> None:
+    model = boom()
+    run = vpm.simulate(model, record(length(MOVED), model))
+    assert run["foot.position"][0] == pytest.approx(MOVED[0], abs=2e-3)  # a parabola through the first samples
