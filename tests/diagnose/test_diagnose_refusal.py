@@ -6,10 +6,12 @@ import re
 from types import SimpleNamespace
 from typing import cast
 
+import numpy as np
 import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+import vpm
 from vpm.catalogue import EFFECTS
 from vpm.demo import MODEL
 from vpm.discrepancy.confirmation.confirmation import Trial
@@ -226,3 +228,32 @@ def test_a_simulation_that_becomes_worse_is_told_beside_what_the_balance_says() 
         said = worse_in_simulation(parts)
         assert said.startswith(f"it {word} the validation error of the inverse-dynamics residual")
         assert f", {joined} raises that of the simulation by 300.00 % of its mean square (1 to 2)" in said
+
+
+def test_a_payload_like_a_free_mass_is_called_that() -> None:
+    """In slow motion a weight anywhere on the only link is a heavier link; at its axis alone it would do nothing."""
+    arm = vpm.Model.from_toml("""
+        name = "slow arm"
+        gravity = [0.0, 0.0, -9.81]
+        [bodies.arm]
+        mass = { value = 4.0, unit = "kg", uncertainty = 0.4 }
+        center_of_mass = [0.5, 0.0, 0.0]
+        inertia = [0.01, 0.3, 0.3, 0.0, 0.0, 0.0]
+        [joints.axis]
+        type = "revolute"
+        parent = "world"
+        child = "arm"
+        axis = [0.0, -1.0, 0.0]
+        [actuators.drive]
+        joint = "axis"
+        gain = 1.0
+        command_unit = "N m"
+    """)
+    time = 0.01 * np.arange(2000)
+    q = 0.6 * np.sin(0.5 * time)
+    noise = np.random.default_rng(5).normal(scale=0.05, size=time.size)
+    torque = (4.0 * 0.5 + 1.0 * 0.9) * 9.81 * np.cos(q) - 0.6 * 0.25 * (0.3 + 1.0 + 0.81) * np.sin(0.5 * time) + noise
+    log = vpm.Experiment.from_arrays(time, {"axis.position": q, "drive.command": torque}, model=arm)
+    why = vpm.diagnose(arm, log, effects=["payload"], names="search", check=False, workers=1)
+    (refused,) = [one for one in why.refused if one.name == "payload"]
+    assert refused.reason == "these data do not discriminate it from arm.mass"

@@ -131,7 +131,10 @@ def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *,
         return _probe_start(base, data, start, still=True)
     if (found := _searched(base, data, candidate)) is not None:
         return found
-    probes = [_probe_start(base, data, candidate, start) for start in candidate.starts]
+    # Of starts without any gain one that resembles known parameters tells why, not a place without influence.
+    probes = sorted(
+        (_probe_start(base, data, candidate, start) for start in candidate.starts), key=lambda p: -len(p.held)
+    )
     best = max(probes, key=lambda p: p.drop)
     possible = [p for p in probes if not impossible_values(p)]
     if possible:
