@@ -138,9 +138,10 @@ def test_each_message_of_a_bus_has_its_own_rows(tmp_path: Path) -> None:
 def test_what_was_read_in_every_sample_stays(values: np.ndarray) -> None:
     log = Experiment.from_arrays(STEP * np.arange(COUNT), {"boom.position": values}, irregular="interpolate")
     np.testing.assert_allclose(log["boom.position"], values, atol=1e-9)
-    command = np.repeat(np.random.default_rng(3).normal(size=COUNT // 4), 4)  # held by its controller, as it acts
-    held = Experiment.from_arrays(STEP * np.arange(COUNT), {"drive.command": command}, irregular="interpolate")
-    np.testing.assert_allclose(held["drive.command"], command, atol=1e-12)
+    forces = np.repeat(np.random.default_rng(3).normal(size=COUNT // 4), 4)  # held by a controller, as they act
+    for channel in ("drive.command", "boom.acceleration"):
+        held = Experiment.from_arrays(STEP * np.arange(COUNT), {channel: forces}, irregular="interpolate")
+        np.testing.assert_allclose(held[channel], forces, atol=1e-9)
 
 
 def test_noise_between_two_readings_is_not_taken_for_none(tmp_path: Path) -> None:

@@ -168,7 +168,9 @@ def _take_fresh(draft: Draft, irregular: str) -> None:
     """Take of motions in a loaded file what was read, where slower sensors had their values repeated."""
     for channel, column in draft.columns.items():
         own = draft.clocks.get(channel, draft.time)
-        fresh = fresh_samples(own, column) if is_smooth(channel) and np.all(np.isfinite(column)) else None
+        # An acceleration may jump, as the force that a slower controller holds.
+        steady = is_smooth(channel) and not channel.endswith(".acceleration")
+        fresh = fresh_samples(own, column) if steady and np.all(np.isfinite(column)) else None
         if fresh is None:
             continue
         usual, step = (float(np.median(np.diff(time))) for time in (own[fresh], own))
