@@ -13,9 +13,9 @@ Array = NDArray[np.float64]
 def fresh_samples(time: Array, values: Array) -> NDArray[np.int64] | None:
     """Samples at which a motion was read, where it was repeated until it was read again.
 
-    Mass and oil move without jumps. A motion that is read in every sample and moves by several steps of its sensor in one of
-    them does so in its neighbours, too. So values were repeated that jump, and never in two samples running. One
-    lost row may bring two jumps together.
+    Mass and oil move without jumps. A motion that is read in every sample and moves by several steps of its sensor in
+    one of them does so in its neighbours, too. So values were repeated that jump, and never in two samples running.
+    One lost row may bring two jumps together.
 
     Parameters
     ----------

@@ -24,7 +24,7 @@ class Rung(Storable):
     Attributes
     ----------
     removed : tuple of str
-        What was made simpler: ``coulomb_friction at elbow`` was left out, ``upper as bezier(3)`` is coarser.
+        What was made simpler, such as ``without coulomb_friction at elbow`` or ``upper as bezier(3)``.
     integrator : str
     substeps : int
         In one period of the controller.

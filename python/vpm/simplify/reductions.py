@@ -71,7 +71,7 @@ class Reduction(Storable):
                 return f"{self.at} with {self.name}"
             case "terms":
                 return f"{self.at} without {self.name} terms"
-        return f"{self.name} at {in_words(self.at, self.side)}"
+        return f"without {self.name} at {in_words(self.at, self.side)}"
 
     @property
     def site(self) -> tuple[str, str]:
