@@ -20,7 +20,13 @@ from vpm.experiment import (
     quantisation_step,
 )
 from vpm.experiment.motion import Motion
-from vpm.experiment.signal import anti_alias, differentiator_gain, interpolate, settling_samples
+from vpm.experiment.signal import (
+    anti_alias,
+    differentiator_gain,
+    interpolate,
+    interpolation_gain,
+    settling_samples,
+)
 
 Array = NDArray[np.float64]
 
@@ -328,3 +334,16 @@ def test_inputs_that_run_on_are_their_means_until_the_next_sample(hold: str, ord
     assert m.held_as(hold).inputs[:-1, 0] == pytest.approx(whole, abs=1e-12)
     assert m.held_as(hold).inputs[-1, 0] == curve(time[-1])
     assert m.held_as("zero_order") is m
+
+
+@pytest.mark.parametrize("smooth", [True, False])
+def test_the_gain_of_interpolation_is_the_spectrum_of_what_it_makes_of_one_reading(smooth: bool) -> None:
+    readings, finer = np.zeros(401), 20
+    readings[200] = 1.0
+    time = np.arange(401.0)
+    drawn = interpolate(time, readings, np.arange(0.0, 400.0, 1.0 / finer), smooth=smooth)
+    share = np.fft.rfftfreq(drawn.size, 1.0 / finer)
+    inside = share < 3.0  # folding of what is drawn: sinc^2 falls to 1e-3 of itself at 17 times the rate
+    np.testing.assert_allclose(
+        np.abs(np.fft.rfft(drawn))[inside] / finer, interpolation_gain(share[inside], smooth=smooth), atol=2e-3
+    )

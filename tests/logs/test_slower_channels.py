@@ -10,7 +10,7 @@ import pytest
 
 from vpm import Experiment
 from vpm.errors import ExperimentError
-from vpm.experiment import choose_cutoff, instrument_noise, lowpass
+from vpm.experiment import choose_cutoff, instrument_noise, lowpass, read_noise
 from vpm.experiment.dates import seconds_of_dates
 from vpm.model import ChannelEntry
 
@@ -162,6 +162,12 @@ def test_noise_between_two_readings_is_not_taken_for_none(tmp_path: Path) -> Non
     assert log.read_rate("travel.position") == pytest.approx(1.0 / STEP)
     assert log.read_rate("swing.position") == pytest.approx(1.0 / (SLOW * STEP))
     assert instrument_noise(log, "swing.position") == pytest.approx(noise * np.sqrt(SLOW), rel=0.15)
+
+    lines = np.linspace(0.0, 0.5, 2001)
+    share = np.trapezoid(read_noise(log, "swing.position", lines), lines) / 0.5
+    error = log["swing.position"] - 0.4 * np.sin(1.9 * log.time) - 0.1 * np.sin(4.4 * log.time)
+    assert np.std(error) == pytest.approx(noise * np.sqrt(SLOW * share), rel=0.1)
+    assert np.all(read_noise(log, "travel.position", lines) == 1.0)
 
     swing_alone = log["swing.position"][:, None]
     chosen = choose_cutoff(swing_alone, log.rate, [log.read_rate("swing.position")])

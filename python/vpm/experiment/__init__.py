@@ -5,7 +5,7 @@ from vpm.experiment.cutoff import CutoffChoice, choose_cutoff
 from vpm.experiment.draft import plain_table
 from vpm.experiment.lengths import joints_from_lengths, joints_from_sensors
 from vpm.experiment.motion import Motion, common_cutoff, motion
-from vpm.experiment.noise import instrument_noise, noise_std, quantisation_step
+from vpm.experiment.noise import instrument_noise, noise_std, quantisation_step, read_noise
 from vpm.experiment.record import Experiment
 from vpm.experiment.shafts import joints_from_shafts
 from vpm.experiment.signal import decimation_for, differentiate, lowpass, parallel_filter
@@ -30,4 +30,5 @@ __all__ = [
     "parallel_filter",
     "plain_table",
     "quantisation_step",
+    "read_noise",
 ]

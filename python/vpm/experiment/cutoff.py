@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
 from vpm.experiment.noise import quantisation_step
-from vpm.experiment.signal import MOTION_FILTER_ORDER, differentiator_gain
+from vpm.experiment.signal import MOTION_FILTER_ORDER, differentiator_gain, interpolation_gain
 
 Array = NDArray[np.float64]
 
@@ -143,7 +143,7 @@ def position_spectrum(position: Array, rate: float, read: float | None = None) -
     spectrum = _smooth(np.asarray(power[1:], dtype=np.float64)) / gain[1:]
     top = rate if read is None else read
     top_fifth = (frequency[1:] >= 0.4 * top) & (frequency[1:] <= 0.5 * top)
-    kept = 1.0 if top >= rate else _spline_gain(frequency[1:][top_fifth] / top) ** 2
+    kept = 1.0 if top >= rate else interpolation_gain(frequency[1:][top_fifth] / top, smooth=True) ** 2
     level = float(np.median(spectrum[top_fifth] / kept))
     step = quantisation_step(position)
     level = max(level, 0.0 if step is None else step**2 / (6.0 * rate))  # q^2/12 over half of the rate
@@ -167,15 +167,6 @@ def _expected_error(frequency: Array, motion: Array, spectrum: Array, rate: floa
         kept = slope / (1.0 + (warped / np.tan(np.pi * cutoff / rate)) ** (2 * MOTION_FILTER_ORDER))
         errors[i] = np.sum(fourth * (np.where(below, (1.0 - kept) ** 2, 0.0) * motion + kept**2 * noise))
     return np.maximum(errors, NEGLIGIBLE**2 * float(np.sum(fourth * motion * below)))
-
-
-def _spline_gain(share: Array) -> Array:
-    """Gain of the cubic spline through a position's readings, over the frequency as a share of their rate.
-
-    ``sinc^4(f) / sum_k sinc^4(f - k)`` (Unser, IEEE Signal Processing Magazine 16(6), 1999).
-    """
-    near, *images = (np.sinc(share - k) ** 4 for k in (0, 1, -1, 2, -2))
-    return np.asarray(near / (near + sum(images)))
 
 
 def _smooth(power: Array) -> Array:

@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
+from vpm.experiment.grid import is_smooth
+from vpm.experiment.signal import interpolation_gain
 
 if TYPE_CHECKING:
     from vpm.experiment.record import Experiment
@@ -77,6 +79,17 @@ def instrument_noise(record: Experiment, channel: str) -> float:
     """
     every = max(1, round(record.rate / record.read_rate(channel)))
     return noise_std(record[channel][::every]) * sqrt(every)
+
+
+def read_noise(record: Experiment, channel: str, frequency: Array) -> Array:
+    """Power of a channel's noise by frequency (n,), in cycles per sample of the record, as a share of white noise.
+
+    Noise of the readings is white. What is interpolated between two of them has none above half of their rate.
+    """
+    ratio = record.rate / record.read_rate(channel)
+    if ratio == 1.0:
+        return np.ones_like(frequency)
+    return interpolation_gain(frequency * ratio, smooth=is_smooth(channel)) ** 2
 
 
 def quantisation_step(values: Array) -> float | None:

@@ -191,6 +191,20 @@ def _anti_alias_sections(factor: float) -> Array:
     return np.asarray(cheby1(8, 0.05, RETAINED_BAND / factor, output="sos"), dtype=np.float64)
 
 
+def interpolation_gain(share: Array, *, smooth: bool) -> Array:
+    """Gain of the signal that interpolation draws through readings, over the frequency as a share of their rate.
+
+    Straight lines: ``sinc^2(f)``. Cubic splines: ``sinc^4(f) / sum_k sinc^4(f - k)`` (M. Unser, "Splines: a perfect
+    fit for signal and image processing", IEEE Signal Processing Magazine 16(6), 1999).
+    """
+    if not smooth:
+        return np.asarray(np.sinc(share) ** 2)
+    own = np.sinc(share) ** 4
+    # Both neighbours on each side of the nearest multiple of the rate: the next add less than a thousandth.
+    near = np.round(share)
+    return np.asarray(own / sum(np.sinc(share - near - k) ** 4 for k in (-2, -1, 0, 1, 2)))
+
+
 def interpolate(time: Array, values: Array, at: Array, *, smooth: bool) -> Array:
     """Values of a signal at other times of the record.
 

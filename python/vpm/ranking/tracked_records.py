@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import VpmError
-from vpm.experiment import Experiment
+from vpm.experiment import Experiment, read_noise
 from vpm.initial import initial_state
 from vpm.model import Model
 from vpm.observer import Record
@@ -167,17 +167,19 @@ class TrackedRecords:
     def _passed(self, band: float, parts: Parts, channel: str) -> list[Array]:
         """Share of white sensor noise that a tracker passes to the residual, by frequency.
 
-        It draws the model to what is slow, noise among that: less than all of it is left there.
+        It draws the model to what is slow, noise among that: less than all of it is left there. Of a channel that was
+        read more slowly than its record there is none between two readings.
         """
-        if channel not in self.drawn_to:
-            return [np.ones(part.stop - part.start) for part in parts]
         ends = np.cumsum([len(record.time) for record in self.records])
         found = []
         for part in parts:
-            record = self.records[int(np.searchsorted(ends, part.stop))]
-            turns = np.exp(2j * np.pi * frequencies(part.stop - part.start))
-            zeros, poles = (np.polyval(one, turns) for one in _free_mass(band, record.dt))
-            found.append(np.abs(zeros / poles) ** 2)
+            place, lines = int(np.searchsorted(ends, part.stop)), frequencies(part.stop - part.start)
+            passed = read_noise(self.experiments[place], channel, lines)
+            if channel in self.drawn_to:
+                turns = np.exp(2j * np.pi * lines)
+                zeros, poles = (np.polyval(one, turns) for one in _free_mass(band, self.records[place].dt))
+                passed = passed * np.abs(zeros / poles) ** 2
+            found.append(passed)
         return found
 
     def states(self, model: Model, tracker: Tracker) -> list[Array]:
