@@ -8,7 +8,6 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.interpolate import PchipInterpolator
 
 from vpm.errors import ExperimentError
 from vpm.experiment.record import Experiment
@@ -72,6 +71,8 @@ def _told(
     experiment: Experiment, model: Model, theta: Array, line: str, joint: str, free: Collection[str]
 ) -> Experiment:
     """Record with the position of a joint in the place of the length that tells it."""
+    from scipy.interpolate import PchipInterpolator  # slow to import, and seldom needed
+
     channel, position = f"{line}.length", f"{joint}.position"
     sensor = model.sensor_of(channel)
     errors = [] if sensor is None else [one for one in model.parameter_names if one.startswith(f"{sensor}.")]
