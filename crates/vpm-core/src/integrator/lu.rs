@@ -69,14 +69,10 @@ impl<S: Scalar> Lu<S> {
             let pivots = &above[column * n..];
             let inverse = pivots[column].recip();
             columns[column * n + column] = inverse;
-            // Few entries are quicker taken all, zeros on the left included, than counted.
-            let left = if N == 0 { column + 1 } else { 0 };
             for (k, row) in below.chunks_exact_mut(n).enumerate() {
                 let factor = row[column] * inverse;
                 columns[column * n + column + 1 + k] = factor;
-                for (entry, &pivot) in row[left..].iter_mut().zip(&pivots[left..]) {
-                    *entry -= factor * pivot;
-                }
+                reduce::<S, N>(row, pivots, factor, column);
                 row[column] = S::zero();
             }
             for (k, &pivot) in pivots.iter().enumerate().skip(column + 1) {
@@ -116,6 +112,11 @@ impl<S: Scalar> Lu<S> {
             *entry = b[row];
         }
         change(known);
+        if N > 0 {
+            eliminate::<S, N>(columns, &mut few);
+            b.copy_from_slice(&few);
+            return;
+        }
         for k in 0..n {
             let (known, below) = known.split_at_mut(k + 1);
             take(below, &columns[k * n + k + 1..], known[k]);
@@ -156,6 +157,37 @@ pub(super) fn take<S: Scalar + Mul<F, Output = S>, F: Copy>(entries: &mut [S], c
     for (entry, &part) in entries.iter_mut().zip(column) {
         *entry -= factor * part;
     }
+}
+
+/// Takes `factor` times the `pivots` off a row of an LU factorisation, right of `column`; N is their number, or 0 for any number.
+#[inline(always)]
+fn reduce<S: Scalar, const N: usize>(row: &mut [S], pivots: &[S], factor: S, column: usize) {
+    match (row.first_chunk_mut::<N>(), pivots.first_chunk::<N>()) {
+        // Few entries are quicker taken all, zeros on the left included, than counted. All are read before one is written, so
+        // that the compiler takes several at a time.
+        (Some(row), Some(pivots)) if N > 0 => *row = std::array::from_fn(|k| row[k] - factor * pivots[k]),
+        _ => take(&mut row[column + 1..], &pivots[column + 1..], factor),
+    }
+}
+
+/// Solves by few LU `columns`, of N rows, in the place of `known`: written out, so that all numbers stay in registers.
+#[inline(always)]
+fn eliminate<S: Scalar, const N: usize>(columns: &[S], known: &mut [S; N]) {
+    let Some((columns, _)) = columns.split_at_checked(N * N) else { return };
+    macro_rules! each {
+        ($k:ident in $($size:literal)* => $work:block) => { $({ const K: usize = $size; let $k = K; if K < N $work })* };
+    }
+    each!(k in 0 1 2 3 4 5 6 7 8 9 10 11 => {
+        for row in k + 1..N {
+            known[row] -= columns[k * N + row] * known[k];
+        }
+        known[k] *= columns[k * N + k];
+    });
+    each!(k in 11 10 9 8 7 6 5 4 3 2 1 0 => {
+        for row in 0..k {
+            known[row] -= columns[k * N + row] * known[k];
+        }
+    });
 }
 
 /// Pivot row of an LU factorisation from `column` down; incomparable numbers stay where they are.

@@ -103,8 +103,12 @@ impl<S: Scalar> Rosenbrock<S> {
             if i == 0 {
                 increment.copy_from_slice(rates);
             } else {
-                stage.copy_from_slice(x);
-                for_size!(i, N => add::<S, N>(stage, 1.0, known, distance), 1 2 3 4 5);
+                if i < STAGES - 1 {
+                    stage.copy_from_slice(x);
+                    for_size!(i, N => add::<S, N>(stage, 1.0, known, distance), 1 2 3 4);
+                } else {
+                    add::<S, 1>(stage, 1.0, &known[known.len() - dim..], &[1.0; STAGES]);
+                }
                 ode.rhs(stage, increment);
             }
             let coupling = coupling.map(|weight| weight * RODAS4P2.gamma);

@@ -74,16 +74,13 @@ impl<S: Scalar + Mul<L, Output = S>, L: Length> Stage<S, L> {
         let left = if N == 0 { self.dim - n } else { N };
         let (dim, given) = (n + left, &self.matrix[n * (n + left)..]);
         let matrix = &mut self.lu.matrix()[..left * left];
-        for k in 0..left {
-            let row = &mut matrix[k * left..(k + 1) * left];
-            for (target, &entry) in row.iter_mut().zip(&given[k * dim + n..]) {
-                *target = entry * -reach;
-            }
+        let square = reach * reach;
+        for (k, row) in matrix.chunks_exact_mut(left.max(1)).enumerate() {
+            let given = &given[k * dim..(k + 1) * dim];
+            scale::<S, L, N>(row, &given[n..], -reach);
             row[k] = row[k] + 1.0;
-        }
-        for column in 0..n {
-            for k in 0..left {
-                matrix[k * left + column] -= given[k * dim + column] * (reach * reach);
+            for (target, &entry) in row.iter_mut().zip(&given[..n]) {
+                *target -= entry * square;
             }
         }
         self.lu.factorise_of::<N>();
@@ -169,6 +166,16 @@ impl<S: Scalar + Mul<L, Output = S>, L: Length> Stage<S, L> {
         for (coordinate, &rate) in coordinates.iter_mut().zip(&*others) {
             *coordinate += rate * self.reach;
         }
+    }
+}
+
+/// Writes `factor` times a row of an implicit stage; N is its length, or 0 for any.
+#[inline(always)]
+fn scale<S: Scalar + Mul<L, Output = S>, L: Length, const N: usize>(row: &mut [S], given: &[S], factor: L) {
+    match (row.first_chunk_mut::<N>(), given.first_chunk::<N>()) {
+        // All are read before one is written, so that the compiler takes several at a time.
+        (Some(row), Some(given)) if N > 0 => *row = given.map(|entry| entry * factor),
+        _ => row.iter_mut().zip(given).for_each(|(target, &entry)| *target = entry * factor),
     }
 }
 
