@@ -8,7 +8,7 @@ use crate::description::{ControllerEntry, Description};
 use crate::error::Result;
 use crate::scalar::Scalar;
 use crate::sensor::{Channel, Sensor};
-use crate::system::System;
+use crate::system::{Kind, System};
 use crate::table::Table;
 
 /// The controllers of a machine, with all that they remember.
@@ -83,6 +83,16 @@ impl<S: Scalar> Control<S> {
     /// Whether a controller that is due at sample `row` measures a force, which has to be there before its command is.
     pub(super) fn feels(&self, row: usize) -> bool {
         self.loops.iter().any(|control| control.due(row) && matches!(control.law, ControlLaw::ForceLoop(_)))
+    }
+
+    /// What the controllers ask of the machine at their samples.
+    pub(super) fn questions(&self) -> impl Iterator<Item = Kind> + use<S> {
+        let any = |asks: fn(&Loop<S>) -> bool| self.loops.iter().any(asks);
+        let forces = any(|control| matches!(control.law, ControlLaw::ForceLoop(_)));
+        let efforts = any(|control| matches!(control.law, ControlLaw::ComputedTorque(_)));
+        let levers = any(Loop::needs_machine) && !self.machine.levers.is_empty();
+        let asked = [(forces, Kind::Feedback), (efforts, Kind::RequiredOfTree), (levers, Kind::Levers)];
+        asked.into_iter().filter_map(|(asked, kind)| asked.then_some(kind))
     }
 
     /// Lets the controllers that are due at sample `row` command, and the others hold; `state` gives what no sensor is made for.

@@ -175,6 +175,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             Some(_) => self.compile(),
             None => self.system.compile_steps(method),
         };
+        if let Some(control) = self.control.as_ref().filter(|_| made.is_ok()) {
+            self.system.compile_answers(control.questions());
+        }
         made.is_ok()
     }
 
@@ -348,7 +351,10 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     fn control(&mut self, row: usize, start: usize) {
         if self.control.as_ref().is_some_and(|control| control.feels(row)) {
             // Forces under the commands that are still held.
-            self.record(row, start);
+            let own = self.own(row);
+            if !self.system.observe_feedback(&self.state, &mut self.truth[own]) {
+                self.record(row, start);
+            }
         } else if self.control.is_some() || !self.sampled.is_empty() {
             let own = self.own(row);
             self.system.observe_motion(&self.state, &mut self.truth[own]);

@@ -80,6 +80,13 @@ impl<S: Scalar> Dynamics<S> {
         connections.observe_bushings(data, &mut outputs[layout.bushings()..layout.load_cells()]);
     }
 
+    /// Observes the forces of the actuators at the state last evaluated.
+    pub(crate) fn observe_forces(&self, outputs: &mut [S]) {
+        for (channels, &force) in outputs[self.layout().actuators()..].chunks_exact_mut(2).zip(&self.forces) {
+            channels[1] = force;
+        }
+    }
+
     /// Observes ball joints: their orientations, and angular velocities of what they carry.
     fn observe_balls(&self, q: &[S], v: &[S], outputs: &mut [S]) {
         for (channels, ball) in outputs.chunks_exact_mut(7).zip(&self.balls) {
@@ -122,9 +129,7 @@ impl<S: Scalar> Dynamics<S> {
             channels[2] = a;
             channels[3] = effort;
         }
-        for (channels, &force) in outputs[layout.actuators()..].chunks_exact_mut(2).zip(&self.forces) {
-            channels[1] = force;
-        }
+        self.observe_forces(outputs);
         for (channels, &tension) in outputs[layout.lines()..].chunks_exact_mut(3).zip(&self.tensions) {
             channels[2] = tension;
         }

@@ -292,6 +292,15 @@ impl<S: Scalar> System<S> {
         MOST_OF_STEP[usize::from(self.approximate)]
     }
 
+    /// Compiles answers of the ODE to machine code, where they have some. The others are worked out as before.
+    pub(crate) fn compile_answers(&mut self, kinds: impl Iterator<Item = Kind>) {
+        for kind in kinds.filter(|_| Self::is_plain()) {
+            if self.routines.compile(&kind).is_err() {
+                self.routines.forget(&kind);
+            }
+        }
+    }
+
     /// Whether the ODE is small enough to record a whole step. The matrix, which is at hand, shows about how large it
     /// is.
     fn has_small_steps(&mut self) -> bool {
@@ -367,22 +376,31 @@ impl<S: Scalar> System<S> {
         self.turning.show_outputs(x, self.dynamics.coordinates(), None, outputs);
     }
 
+    /// Sample of the ODE's outputs that controllers read, by machine code; tells whether there is some. Others stay or
+    /// become zero.
+    pub(crate) fn observe_feedback(&mut self, x: &[S], outputs: &mut [S]) -> bool {
+        let Some(routine) = self.routines.get(&Kind::Feedback) else { return false };
+        outputs.copy_from_slice(routine.at(x));
+        self.turning.show_outputs(x, self.dynamics.coordinates(), None, outputs);
+        true
+    }
+
     /// Lever arms of the ODE's lines: length per unit of each coordinate at `q`, lines x n.
     pub(crate) fn levers(&mut self, q: &[S], levers: &mut [S]) {
-        if let (Some(q), Some(levers)) = (S::plain(q), S::plain_mut(levers)) {
-            self.dynamics().levers(q, levers);
-        } else {
-            self.routines.copy(&Kind::Levers, q, &[], levers);
+        match (S::plain(q), S::plain_mut(levers)) {
+            (Some(q), Some(levers)) if self.by_laws(&Kind::Levers) => self.dynamics().levers(q, levers),
+            _ => self.routines.copy(&Kind::Levers, q, &[], levers),
         }
     }
 
     /// Efforts that accelerations `a` need at the ODE's `state`, without contacts and bushings.
     pub(crate) fn required_of_tree(&mut self, state: &[S], a: &[S], efforts: &mut [S]) {
-        if let (Some(state), Some(a), Some(efforts)) = (S::plain(state), S::plain(a), S::plain_mut(efforts)) {
-            let (q, v) = state.split_at(a.len());
-            self.dynamics().inverse_dynamics_of_tree(q, v, a, efforts);
-        } else {
-            self.routines.copy(&Kind::RequiredOfTree, state, a, efforts);
+        match (S::plain(state), S::plain(a), S::plain_mut(efforts)) {
+            (Some(state), Some(a), Some(efforts)) if self.by_laws(&Kind::RequiredOfTree) => {
+                let (q, v) = state.split_at(a.len());
+                self.dynamics().inverse_dynamics_of_tree(q, v, a, efforts);
+            }
+            _ => self.routines.copy(&Kind::RequiredOfTree, state, a, efforts),
         }
     }
 

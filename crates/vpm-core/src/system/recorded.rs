@@ -73,6 +73,8 @@ pub enum Kind {
     Readings,
     /// All outputs of which those stand that the state alone decides, see [`Kind::Sample`].
     Motion,
+    /// As [`Kind::Motion`], and the forces of the actuators: what controllers read.
+    Feedback,
     /// dx/dt, then the entries of its derivatives by the states.
     Linearised,
     /// dx/dt, then the entries of the matrix that an implicit step puts in the place of the derivatives, see
@@ -297,6 +299,13 @@ fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recor
         Kind::Motion => {
             let mut seen = zeros(dynamics.layout().count());
             dynamics.observe_motion(&x, &mut seen);
+            (seen, None)
+        }
+        Kind::Feedback => {
+            let mut seen = zeros(dynamics.layout().count());
+            dynamics.rhs(&x, &mut rates);
+            dynamics.observe_motion(&x, &mut seen);
+            dynamics.observe_forces(&mut seen);
             (seen, None)
         }
         Kind::Linearised => {

@@ -111,6 +111,14 @@ impl<'a> Witness<'a> {
                 self.direct.dynamics().observe_motion(x, &mut outputs);
                 outputs
             }
+            Kind::Feedback => {
+                let (first, drives) = (self.description.layout().actuators(), self.description.actuators.len());
+                let mut all = outputs.clone();
+                self.direct.dynamics().observe(x, &rates, &mut all);
+                self.direct.dynamics().observe_motion(x, &mut outputs);
+                (0..drives).map(|drive| first + 2 * drive + 1).for_each(|force| outputs[force] = all[force]);
+                outputs
+            }
             Kind::Required => {
                 self.direct.dynamics().inverse_dynamics(&x[..n], &x[n..2 * n], a, &mut efforts);
                 efforts
@@ -182,10 +190,19 @@ fn check(name: &str, d: &Description, kinds: &[Kind], rest: &[f64]) -> Result<()
 }
 
 /// What all methods of integration ask for but the exact derivatives, which are large where beams bend.
-const WITHOUT_DERIVATIVES: [Kind; 5] = [Kind::Rates, Kind::Sample, Kind::Motion, Kind::Required, Kind::Additive];
+const WITHOUT_DERIVATIVES: [Kind; 6] =
+    [Kind::Rates, Kind::Sample, Kind::Motion, Kind::Feedback, Kind::Required, Kind::Additive];
 /// With the matrices of implicit steps.
-const WITH_DERIVATIVES: [Kind; 7] =
-    [Kind::Rates, Kind::Sample, Kind::Motion, Kind::Required, Kind::Additive, Kind::Linearised, Kind::Prepared];
+const WITH_DERIVATIVES: [Kind; 8] = [
+    Kind::Rates,
+    Kind::Sample,
+    Kind::Motion,
+    Kind::Feedback,
+    Kind::Required,
+    Kind::Additive,
+    Kind::Linearised,
+    Kind::Prepared,
+];
 
 #[test]
 fn rigid_trees_with_effects_on_all_joints_agree() -> Result<()> {
