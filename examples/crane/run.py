@@ -18,7 +18,6 @@ from scipy.signal import cont2discrete, lfilter
 from threadpoolctl import threadpool_limits
 
 from vpm.experiment import Experiment
-from vpm.experiment.table import read_header, read_table
 from vpm.identify import Fit, identify
 from vpm.model import Model
 from vpm.simulate import Setup, simulate
@@ -84,7 +83,7 @@ def load(path: Path) -> Experiment:
 
     The log counts the valve against the arm: it opens with negative values where the arm rises, which is a scale of -1.
     """
-    columns = read_table(path, read_header(path), ["valve_u", "arm_position", "oil_pressure"]).columns
+    columns = np.genfromtxt(path, delimiter=",", names=True)
     pressure = columns["oil_pressure"] + ZERO
     channels = {"lift.command": -columns["valve_u"], PLACE: columns["arm_position"], PRESSURE: pressure}
     units = {"lift.command": "1", PLACE: "m", PRESSURE: "MPa"}

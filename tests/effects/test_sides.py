@@ -205,7 +205,7 @@ def test_files_names_and_states_keep_the_sides_apart() -> None:
     assert "axis.link.friction.coulomb" not in fewer.parameters
     assert model.effect("coulomb_friction", "axis").parameter_names["coulomb"] == "axis.friction.coulomb"
     left_out = {str(change) for changes in reductions(model).values() for change in changes}
-    assert {"coulomb_friction at axis", "coulomb_friction at axis, link side"} <= left_out
+    assert {"without coulomb_friction at axis", "without coulomb_friction at axis, link side"} <= left_out
     with pytest.raises(ModelError, match="axis, link side"):
         fewer.without_effect("coulomb_friction", at="axis", side="link")
     with pytest.raises(ModelError, match="second coulomb_friction"):

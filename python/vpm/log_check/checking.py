@@ -77,17 +77,19 @@ def check_log(
     (Finding(kind='unit', channels=('axis.position',)),)
     """
     settings = settings or Settings()
-    check = _Check(Judge(model, settings, setup or Setup()), ParallelCandidates(workers, progress))
     findings: list[Finding] = []
     shares: dict[str, float] = {}
-    for record in as_records(experiments):
-        try:
+    checked = "the first record"
+    try:
+        check = _Check(Judge(model, settings, setup or Setup()), ParallelCandidates(workers, progress))
+        for record in as_records(experiments):
+            checked = record.name
             odd, left = check.of(record, model.channel_table if table is None else table)
-        except KeyboardInterrupt:
-            raise KeyboardInterrupt(UNCHECKED.format(record=record.name)) from None
-        findings += odd
-        for name, share in left.by_channel.items():
-            shares[name] = max(share, shares.get(name, 0.0))
+            findings += odd
+            for name, share in left.by_channel.items():
+                shares[name] = max(share, shares.get(name, 0.0))
+    except KeyboardInterrupt:
+        raise KeyboardInterrupt(UNCHECKED.format(record=checked)) from None
     return LogCheck(tuple(sorted(_together(findings), key=lambda one: not one.mistake)), shares)
 
 
