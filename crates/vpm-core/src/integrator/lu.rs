@@ -115,7 +115,8 @@ impl<S: Scalar> Lu<S> {
             *entry = b[row];
         }
         change(known);
-        if N >= WRITTEN_OUT {
+        // Of numbers with derivatives that would be much code for little: they take the factors of plain ones.
+        if N >= WRITTEN_OUT && S::plain(&[]).is_some() {
             eliminate::<S, N>(columns, &mut few);
             b.copy_from_slice(&few);
             return;
@@ -168,7 +169,9 @@ fn reduce<S: Scalar, const N: usize>(row: &mut [S], pivots: &[S], factor: S, col
     match (row.first_chunk_mut::<N>(), pivots.first_chunk::<N>()) {
         // Few entries are quicker taken all, zeros on the left included, than counted. All are read before one is written, so
         // that the compiler takes several at a time.
-        (Some(row), Some(pivots)) if N > 0 => *row = std::array::from_fn(|k| row[k] - factor * pivots[k]),
+        (Some(row), Some(pivots)) if N > 0 && S::plain(&[]).is_some() => {
+            *row = std::array::from_fn(|k| row[k] - factor * pivots[k])
+        }
         _ => take(&mut row[column + 1..], &pivots[column + 1..], factor),
     }
 }

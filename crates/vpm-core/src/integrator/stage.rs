@@ -174,7 +174,7 @@ impl<S: Scalar + Mul<L, Output = S>, L: Length> Stage<S, L> {
 fn scale<S: Scalar + Mul<L, Output = S>, L: Length, const N: usize>(row: &mut [S], given: &[S], factor: L) {
     match (row.first_chunk_mut::<N>(), given.first_chunk::<N>()) {
         // All are read before one is written, so that the compiler takes several at a time.
-        (Some(row), Some(given)) if N > 0 => *row = given.map(|entry| entry * factor),
+        (Some(row), Some(given)) if N > 0 && S::plain(&[]).is_some() => *row = given.map(|entry| entry * factor),
         _ => row.iter_mut().zip(given).for_each(|(target, &entry)| *target = entry * factor),
     }
 }
