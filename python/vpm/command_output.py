@@ -65,7 +65,7 @@ FLAGS = {
 
 @dataclass
 class OutputOptions:
-    """OutputOptions of output of the command that runs now, and what it has printed.
+    """Output options of the command that runs now, and what it has printed.
 
     Attributes
     ----------
@@ -94,7 +94,7 @@ _now = OutputOptions()
 
 
 def asked(words: Sequence[str], command: str = "") -> OutputOptions:
-    """OutputOptions of output that a command line asks for, even a faulty one."""
+    """Output options that a command line has, even a faulty one."""
     flags = list(takewhile(lambda word: word != "--", words))
     short = "".join(word for word in flags if re.fullmatch("-[qv]+", word))
     return OutputOptions(

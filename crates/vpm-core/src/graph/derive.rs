@@ -44,9 +44,9 @@ impl Graph {
         self.derive_within(outputs, inputs, usize::MAX).unwrap_or_default()
     }
 
-    /// As [`Graph::derive`], by numbers of the graph as if they were inputs; what is frozen moves with what it is.
-    pub fn derive_by(&mut self, outputs: &[Node], variables: &[Node]) -> Derivative {
-        self.derive_to(outputs, Variables::Numbers(variables), usize::MAX).unwrap_or_default()
+    /// As [`Graph::derive_within`], by numbers of the graph as if they were inputs; what is frozen moves with what it is.
+    pub fn derive_by_within(&mut self, outputs: &[Node], variables: &[Node], most: usize) -> Option<Derivative> {
+        self.derive_to(outputs, Variables::Numbers(variables), most)
     }
 
     /// As [`Graph::derive`]; none as soon as the graph has more than `most` operations.

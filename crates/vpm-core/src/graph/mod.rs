@@ -21,5 +21,5 @@ pub use evaluate::{Evaluator, LANES, Lanes};
 pub use native::{LARGEST, Native, Unavailable, Work};
 pub use operation::{Call, Function, Node, Operation};
 pub use program::{Program, Stages};
-pub use record::{Decision, Graph, Recorded, derivatives, input, record, slopes};
+pub use record::{Decision, Graph, Recorded, derivatives, input, record, slopes, slopes_within};
 pub use source::{Block, Source, literal};

@@ -308,8 +308,17 @@ pub fn derivatives(numbers: &[Recorded], by: &[u32]) -> Vec<((usize, usize), Rec
 /// The derivatives of `numbers` of the recording under way by `variables`, themselves numbers of it, as if they were inputs: likewise.
 /// Numbers that are frozen move with what they are.
 pub fn slopes(numbers: &[Recorded], variables: &[Recorded]) -> Vec<((usize, usize), Recorded)> {
+    slopes_within(numbers, variables, usize::MAX).unwrap_or_default()
+}
+
+/// As [`slopes`]; none as soon as the recording has more than `most` operations.
+pub fn slopes_within(
+    numbers: &[Recorded],
+    variables: &[Recorded],
+    most: usize,
+) -> Option<Vec<((usize, usize), Recorded)>> {
     let nodes = |numbers: &[Recorded]| numbers.iter().map(|number| number.0).collect::<Vec<_>>();
-    entries_of(on(|graph| graph.derive_by(&nodes(numbers), &nodes(variables))))
+    on(|graph| graph.derive_by_within(&nodes(numbers), &nodes(variables), most)).map(entries_of)
 }
 
 fn entries_of(derivative: Derivative) -> Vec<((usize, usize), Recorded)> {

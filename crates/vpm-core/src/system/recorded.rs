@@ -125,11 +125,6 @@ impl Kind {
         matches!(self, Self::Step | Self::StepOfConstantMatrix)
     }
 
-    /// Whether derivatives of this kind are not those of each operation.
-    fn is_derived_apart(&self) -> bool {
-        self.is_step() || *self == Self::Rates
-    }
-
     /// Places of the inputs of such a recorded program, from those of a free machine at `places`.
     fn places(&self, places: Places) -> Places {
         match self {
@@ -223,6 +218,11 @@ impl Placed {
         let places = kind.places(places);
         let free: Vec<usize> = (0..theta.len()).collect();
         let Recording { mut graph, values: mut nodes, matrix } = Recording::new(build, places, (theta, &free), kind)?;
+        // Whole steps, and rates of rigid trees, come with their derivatives.
+        let derived = match kind {
+            Kind::Derived(kind, _) => kind.is_step() || (**kind == Kind::Rates && matrix.is_some()),
+            _ => false,
+        };
         let (mut entries, mut directions) = (Vec::new(), None);
         match matrix {
             None => {}
@@ -248,7 +248,7 @@ impl Placed {
         let program = Program::new(&graph, &nodes, places.count());
         let placed = Self { program, places, entries, directions, of_values: !graph.decisions().is_empty() };
         Ok(match kind {
-            Kind::Derived(kind, by) if !kind.is_derived_apart() => placed.derived(by),
+            Kind::Derived(kind, by) if !derived => placed.derived(by),
             _ => placed,
         })
     }
@@ -344,11 +344,14 @@ fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recor
         Kind::Derived(kind, by) if **kind == Kind::Rates => {
             dynamics.rhs(&x, &mut rates);
             let variables: Vec<_> = by.iter().map(|&place| input(place as usize, 0.0)).collect();
-            let mut matrix = zeros(dim * by.len());
-            for ((row, column), slope) in dynamics.slopes_of_rates(&x, &rates, &variables) {
-                matrix[row * by.len() + column] = slope;
-            }
-            (rates, Some(Matrix::Entries(matrix, by.len())))
+            let matrix = dynamics.slopes_of_rates(&x, &rates, &variables, MOST).map(|slopes| {
+                let mut matrix = zeros(dim * by.len());
+                for ((row, column), slope) in slopes {
+                    matrix[row * by.len() + column] = slope;
+                }
+                Matrix::Entries(matrix, by.len())
+            });
+            (rates, matrix)
         }
         Kind::Derived(kind, _) => return outputs(build, places, parameters, kind),
         Kind::Required

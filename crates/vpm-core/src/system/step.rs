@@ -22,7 +22,7 @@ pub(super) fn linearly_implicit(dynamics: &mut Dynamics<Recorded>, places: Place
 /// Whole step of [`linearly_implicit`] with its derivatives by the inputs at the places `by`.
 ///
 /// Law: derivatives of a stage follow from those of its state, and of the solution of a linear system from that system again, see
-/// [`Ode::turned`]: far fewer operations than derivatives of each operation.
+/// [`Ode::turned`]: far fewer operations than derivatives of each operation. The matrix may be taken for `constant`.
 pub(super) fn linearly_implicit_derived(
     dynamics: &mut Dynamics<Recorded>,
     places: Places,
@@ -77,6 +77,17 @@ impl Machine<'_> {
     fn variables(&self) -> Vec<Recorded> {
         self.by.iter().map(|&place| input(place as usize, 0.0)).collect()
     }
+
+    /// Slopes of the rates in a whole step, without a limit: only small machines have such steps.
+    fn slopes_of_rates(
+        &self,
+        x: &[Recorded],
+        rates: &[Recorded],
+        variables: &[Recorded],
+    ) -> Vec<((usize, usize), Recorded)> {
+        let found = self.dynamics.slopes_of_rates(x, rates, variables, usize::MAX);
+        found.unwrap_or_else(|| slopes(rates, variables))
+    }
 }
 
 impl<const N: usize> Ode<Dual<Recorded, N>> for Machine<'_> {
@@ -98,7 +109,7 @@ impl<const N: usize> Ode<Dual<Recorded, N>> for Machine<'_> {
         let held = (0..).zip(self.by).filter(|&(_, &place)| place >= states);
         let (lanes, held): (Vec<usize>, Vec<_>) = held.map(|(lane, &place)| (lane, input(place as usize, 0.0))).unzip();
         let variables = [&state[..], &held].concat();
-        for ((row, column), slope) in self.dynamics.slopes_of_rates(&state, &rates, &variables) {
+        for ((row, column), slope) in self.slopes_of_rates(&state, &rates, &variables) {
             let along = match column.checked_sub(dim) {
                 None => x[column],
                 Some(place) => Dual::variable(Recorded::zero(), lanes[place]),
@@ -119,7 +130,7 @@ impl<const N: usize> Ode<Dual<Recorded, N>> for Machine<'_> {
         self.dynamics.rhs(&state, &mut values);
         rates.iter_mut().zip(&values).for_each(|(rate, &value)| *rate = Dual::constant(value));
         let variables = self.variables();
-        for ((row, lane), slope) in self.dynamics.slopes_of_rates(&state, &values, &variables) {
+        for ((row, lane), slope) in self.slopes_of_rates(&state, &values, &variables) {
             rates[row].gradient[lane] = slope;
         }
         // Chords stand for the laws in the copy: rates elsewhere follow the laws themselves.

@@ -228,6 +228,20 @@ fn derivatives_with_a_constant_matrix_are_those_of_dual_numbers_and_of_the_order
     Ok(())
 }
 
+/// Of a tree of many joints they would be too many operations, however they are found.
+#[test]
+fn derivatives_of_a_large_tree_are_worked_out_along_directions() -> Result<()> {
+    for (joints, along) in [(4, false), (60, true)] {
+        let d = Machine::new(&random_tree(5, joints)).build();
+        let places = d.program(&Kind::Rates, &d.parameters)?.places;
+        let parameters = places.first_parameter() as u32..places.count() as u32;
+        let by: Vec<u32> = (0..places.states as u32).chain(parameters).collect();
+        let placed = d.program(&Kind::Derived(Box::new(Kind::Rates), by), &d.parameters)?;
+        assert_eq!((placed.directions.is_some(), placed.entries.is_empty()), (along, along), "{joints} joints");
+    }
+    Ok(())
+}
+
 /// Steps within steps: as long runs take them as a whole, and short ones do not.
 fn run(d: &Description, rows: usize, sensitivities: &[usize]) -> Result<Run> {
     let start = vec![0.0; d.n_states()];
