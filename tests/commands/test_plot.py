@@ -5,15 +5,15 @@ from __future__ import annotations
 import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from vpm import plot
 from vpm.compare import compare
 from vpm.compare.correlation import gapped_autocorrelation
+from vpm.discrepancy.diagnosis import ChannelGap, Picture, RankedCandidate, Trace
 from vpm.errors import MissingExtraError
 from vpm.experiment import Experiment
 from vpm.numbers import stretches
@@ -21,91 +21,38 @@ from vpm.plot import findings
 from vpm.plot.evidence import law_line
 from vpm.plot.signals import amplitude_density, running_mean
 from vpm.plot.style import MOST_POINTS, plain_power, thinned
+from vpm.simulate import Run
 
 matplotlib = pytest.importorskip("matplotlib")
 from matplotlib.figure import Figure  # noqa: E402  # only where there is one
-
-Array = NDArray[np.float64]
 
 TIME = np.arange(600) / 100
 WAVE = np.sin(2 * TIME)
 
 
-@dataclass(frozen=True)
-class Run:
-    """A run that is made up."""
-
-    time: Array = field(default_factory=lambda: TIME)
-    channels: tuple[str, ...] = ("axis.position", "axis.velocity")
-    units: tuple[str, ...] = ("m", "m/s")
-    values: Array = field(default_factory=lambda: np.column_stack([WAVE, 2 * np.cos(2 * TIME)]))
-    measured: Array = field(default_factory=lambda: np.column_stack([WAVE + 0.1, np.full(600, np.nan)]))
-    starts: NDArray[np.int64] = field(default_factory=lambda: np.array([0, 300]))
-    model_name: str = "slide"
-    experiment_name: str = "log"
-    mode: str = "free_run"
-    notes: tuple[str, ...] = ()
-
-
-@dataclass(frozen=True)
-class Gap:
-    """A gap that is made up."""
-
-    before: float = 5.0
-    recalibrated: float = 2.0
-    after: float = 1.0
-    noise_floor: float = 0.3
-    signal: float = 10.0
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A candidate that is made up."""
-
-    name: str
-    site: str = "axis"
-    round: int = 1
-    screened: float = 0.5
-    unseen: float = 0.4
-    accepted: bool = False
-
-
-@dataclass(frozen=True)
-class Picture:
-    """Residuals that are made up."""
-
-    channel: str = "axis.effort"
-    unit: str = "N"
-    coordinate_unit: str = "m"
-    time: Array = field(default_factory=lambda: TIME)
-    position: Array = field(default_factory=lambda: WAVE)
-    velocity: Array = field(default_factory=lambda: 2 * np.cos(2 * TIME))
-    measured: Array = field(default_factory=lambda: 5 * WAVE)
-    before: Array = field(default_factory=lambda: 3 * WAVE)
-    recalibrated: Array = field(default_factory=lambda: 2 * WAVE)
-    after: Array = field(default_factory=lambda: WAVE)
-
-
-@dataclass(frozen=True)
-class Trace:
-    """A channel that is made up."""
-
-    channel: str = "axis.position"
-    unit: str = "m"
-    time: Array = field(default_factory=lambda: TIME)
-    measured: Array = field(default_factory=lambda: WAVE)
-    before: Array = field(default_factory=lambda: 0.9 * WAVE)
-    after: Array = field(default_factory=lambda: np.where(TIME < 1.0, np.nan, WAVE))
-
+RUN = Run(
+    "slide",
+    "log",
+    "free_run",
+    TIME,
+    ("axis.position", "axis.velocity"),
+    ("m", "m/s"),
+    np.column_stack([WAVE, 2 * np.cos(2 * TIME)]),
+    np.column_stack([WAVE + 0.1, np.full(600, np.nan)]),
+    np.array([0, 300]),
+)
+GAP = ChannelGap(5.0, 2.0, 1.0, 0.3, "N", 10.0, "free_run")
+PICTURE = Picture("axis.effort", "N", "m", TIME, WAVE, 2 * np.cos(2 * TIME), 5 * WAVE, 3 * WAVE, 2 * WAVE, WAVE)
+TRACE = Trace("log", "axis.position", "m", "free_run", TIME, WAVE, 0.9 * WAVE, np.where(TIME < 1.0, np.nan, WAVE))
 
 #: Residuals of a joint with dry friction, whose samples at standstill do not count.
 HOLES = np.where(np.abs(2 * np.cos(2 * TIME)) < 0.3, np.nan, 0.5 * np.sign(np.cos(2 * TIME)) + 0.1 * np.sin(40 * TIME))
 
 CANDIDATES = [
-    Candidate("coulomb_friction", accepted=True),
-    Candidate("asymmetric_friction", round=2, accepted=True),
-    Candidate("bias_force", unseen=float("nan")),
-    Candidate("stribeck_friction", screened=0.7),
+    RankedCandidate("coulomb_friction", "axis", 1, 0.5, 0.4, True),
+    RankedCandidate("asymmetric_friction", "axis", 2, 0.5, 0.4, True),
+    RankedCandidate("bias_force", "axis", 1, 0.5, float("nan"), False),
+    RankedCandidate("stribeck_friction", "axis", 1, 0.7, 0.4, False),
 ]
 
 FIGURES: dict[str, tuple[Callable[[], Figure], list[str]]] = {
@@ -114,7 +61,7 @@ FIGURES: dict[str, tuple[Callable[[], Figure], list[str]]] = {
         ["time [s]", "[m]", "log", "a", "b"],
     ),
     "run": (
-        lambda: plot.plot_run(Run()),
+        lambda: plot.plot_run(RUN),
         ["time [s]", "[m]", "axis.position", "measured", "simulated", "slide on log, free run"],
     ),
     "residual_time": (
@@ -127,15 +74,15 @@ FIGURES: dict[str, tuple[Callable[[], Figure], list[str]]] = {
     ),
     "spectrum": (lambda: plot.plot_spectrum({"a": WAVE}, 100.0, "N"), ["frequency [Hz]", "density [N/√Hz]", "a"]),
     "traces": (
-        lambda: findings.plot_traces([Trace(), Trace(channel="b.position")]),
+        lambda: findings.plot_traces([TRACE, replace(TRACE, channel="b.position")]),
         ["axis.position [m]", "b.position [m]", "time [s]", "measured", "simulated before", "simulated after"],
     ),
     "joint_over_time": (
-        lambda: findings.plot_joint_over_time(Picture(), {"recalibrated": HOLES, "with the effects": HOLES}),
+        lambda: findings.plot_joint_over_time(PICTURE, {"recalibrated": HOLES, "with the effects": HOLES}),
         ["axis.effort [N]", "measured", "needed, recalibrated", "needed, with the effects", "residual [N]"],
     ),
     "joint_over_state": (
-        lambda: findings.plot_joint_over_state(Picture(), {"recalibrated": HOLES}),
+        lambda: findings.plot_joint_over_state(PICTURE, {"recalibrated": HOLES}),
         ["velocity [m/s]", "position [m]", "> forward, < backward", "recalibrated, mean"],
     ),
     "joint_noise": (
@@ -155,7 +102,7 @@ FIGURES: dict[str, tuple[Callable[[], Figure], list[str]]] = {
         ["mass", "bias", "95 ± 0.2 kg", "-3 ± inf N", "value / size of the start"],
     ),
     "gap": (
-        lambda: plot.plot_gap({"axis.effort": Gap(), "b.effort": Gap(noise_floor=float("nan"), signal=0.0)}),
+        lambda: plot.plot_gap({"axis.effort": GAP, "b.effort": replace(GAP, noise_floor=float("nan"), signal=0.0)}),
         ["axis.effort", "before", "recalibrated", "after", "noise floor", "50.00 %", "20.00 %", "10.00 %", "no signal"],
     ),
     "candidates": (
@@ -171,11 +118,11 @@ FIGURES: dict[str, tuple[Callable[[], Figure], list[str]]] = {
         ["p50", "max", "1 µs, 0.1 %", "1200 µs, 120 %", "period, 100 %"],
     ),
     "pictures": (
-        lambda: plot.plot_pictures([Picture(), Picture(channel="b.effort")]),
+        lambda: plot.plot_pictures([PICTURE, replace(PICTURE, channel="b.effort")]),
         ["axis.effort", "b.effort", "velocity [m/s]", "position [m]", "before", "recalibrated", "with the effects"],
     ),
     "comparison": (
-        lambda: plot.plot_comparison(compare(Run(), log())),
+        lambda: plot.plot_comparison(compare(RUN, log())),
         ["slide against log, free run", "residual over time", "axis.velocity [m/s]", "measured", "simulated"],
     ),
 }
@@ -226,21 +173,21 @@ def test_svg_names_of_two_figures_do_not_meet() -> None:
 
 
 def test_only_measured_channels_of_a_run_are_drawn() -> None:
-    assert len(plot.plot_run(Run()).axes) == 1
-    nothing = Run(measured=np.full((600, 2), np.nan))
+    assert len(plot.plot_run(RUN).axes) == 1
+    nothing = replace(RUN, measured=np.full((600, 2), np.nan))
     assert len(plot.plot_run(nothing).axes) == 2
     # Two pieces, measured and simulated: four lines, none across the restart.
-    lines = plot.plot_run(Run()).axes[0].get_lines()
+    lines = plot.plot_run(RUN).axes[0].get_lines()
     assert [len(np.asarray(line.get_xdata())) for line in lines] == [300, 300, 300, 300]
 
 
 def test_results_draw_themselves() -> None:
     assert len(log().plot().axes) == 1
-    assert len(compare(Run(), log()).plot().axes) == 3
+    assert len(compare(RUN, log()).plot().axes) == 3
 
 
 def test_an_accepted_candidate_of_a_later_round_is_drawn_and_others_are_not() -> None:
-    later = [*CANDIDATES, Candidate("torque_ripple", round=2)]
+    later = [*CANDIDATES, RankedCandidate("torque_ripple", "axis", 2, 0.5, 0.4, False)]
     written = texts(plot.plot_candidates(later))
     assert "asymmetric friction at axis" in written
     assert "torque ripple at axis" not in written

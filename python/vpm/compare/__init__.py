@@ -3,7 +3,7 @@
 from vpm.compare.comparison import ChannelComparison, Comparison
 from vpm.compare.correlation import Correlation, autocorrelation, cross_correlation, effective_samples
 from vpm.compare.export import write_mcap
-from vpm.compare.measure import SimulatedRun, compare
+from vpm.compare.measure import compare
 from vpm.compare.regions import Bin, Region, Where
 
 __all__ = [
@@ -12,7 +12,6 @@ __all__ = [
     "Comparison",
     "Correlation",
     "Region",
-    "SimulatedRun",
     "Where",
     "autocorrelation",
     "compare",

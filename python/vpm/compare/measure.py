@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +15,7 @@ from vpm.errors import ExperimentError, near_match
 from vpm.experiment import Experiment, choose_cutoff, differentiate, lowpass
 from vpm.experiment.cutoff import FEWEST_SAMPLES
 from vpm.experiment.signal import anti_alias
+from vpm.simulate.run import Run
 
 Array = NDArray[np.float64]
 
@@ -26,43 +26,7 @@ INPUTS = ("command", "reference", "disturbance")
 SAME = 1e-12
 
 
-class SimulatedRun(Protocol):
-    """Simulated channels with time and units as `compare` needs them; `vpm.simulate.Run` has all of it."""
-
-    @property
-    def model_name(self) -> str:
-        """Name of the model."""
-
-    @property
-    def mode(self) -> str:
-        """Mode of the simulation that a run comes from."""
-
-    @property
-    def time(self) -> Array:
-        """Time of the samples of the run, shape (N,), s."""
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Names of the C simulated channels."""
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Units of the simulated channels."""
-
-    @property
-    def values(self) -> Array:
-        """Values of the simulated channels, shape (N, C)."""
-
-    @property
-    def measured(self) -> Array | None:
-        """Measured values, shape (N, C), NaN where a channel was not measured; None to take them from the log."""
-
-    @property
-    def starts(self) -> NDArray[np.int64]:
-        """Rows at which a contiguous piece begins."""
-
-
-def compare(run: SimulatedRun, experiment: Experiment, channels: Sequence[str] | None = None) -> Comparison:
+def compare(run: Run, experiment: Experiment, channels: Sequence[str] | None = None) -> Comparison:
     """Say how far simulation and measurement are apart, and where.
 
     Parameters
@@ -80,9 +44,11 @@ def compare(run: SimulatedRun, experiment: Experiment, channels: Sequence[str] |
     Raises
     ------
     ExperimentError
-        A channel was not simulated or not measured, none is left to compare, or the log does not cover the run.
+        A channel was not simulated or not measured, or none is left to compare.
     """
-    measured = _measured(run, experiment)
+    if run.time.size < 2:
+        raise ExperimentError(f"the run of {run.model_name} has {run.time.size} samples; compare at least two")
+    measured = run.measured
     picked, skipped = _picked(run, experiment, measured, channels)
     pieces = _pieces(run)
     dt = float(np.median(np.concatenate([np.diff(run.time[piece]) for piece in pieces])))
@@ -106,7 +72,7 @@ def compare(run: SimulatedRun, experiment: Experiment, channels: Sequence[str] |
 
 
 def _channel(
-    run: SimulatedRun,
+    run: Run,
     at: int,
     y: Array,
     pieces: Sequence[slice],
@@ -143,35 +109,13 @@ def _ratio(part: float, whole: float) -> float:
     return part / whole if whole > 0.0 else float("inf")
 
 
-def _pieces(run: SimulatedRun) -> list[slice]:
+def _pieces(run: Run) -> list[slice]:
     edges = [*(int(start) for start in run.starts), run.time.size]
     return [slice(first, last) for first, last in pairwise(edges) if last - first > 1]
 
 
-def _measured(run: SimulatedRun, experiment: Experiment) -> Array:
-    """Measured counterpart of the run's values, NaN where there is none."""
-    if run.time.size < 2:
-        raise ExperimentError(f"the run of {run.model_name} has {run.time.size} samples; compare at least two")
-    if run.measured is not None:
-        return run.measured
-    measured = np.full(run.values.shape, np.nan)
-    rows = np.clip(np.round((run.time - experiment.time[0]) / experiment.dt).astype(int), 0, len(experiment) - 1)
-    away = np.abs(experiment.time[rows] - run.time)
-    worst = int(np.argmax(away))
-    if away[worst] > 0.1 * experiment.dt:
-        raise ExperimentError(
-            f"{experiment.name}: the run has a sample at t = {run.time[worst]:.9g} s, and the nearest of the log is "
-            f"{away[worst]:.3g} s away; simulate this log, or resample it to the rate of the run",
-            time=float(run.time[worst]),
-        )
-    for at, channel in enumerate(run.channels):
-        if channel in experiment:
-            measured[:, at] = experiment[channel][rows]
-    return measured
-
-
 def _picked(
-    run: SimulatedRun, experiment: Experiment, measured: Array, channels: Sequence[str] | None
+    run: Run, experiment: Experiment, measured: Array, channels: Sequence[str] | None
 ) -> tuple[tuple[str, ...], tuple[str, ...]]:
     """Channels to measure the error of, and a sentence on each that is left out."""
     known = [bool(np.isfinite(column).all()) for column in measured.T]
@@ -206,7 +150,7 @@ def _picked(
     )
 
 
-def _state(run: SimulatedRun, experiment: Experiment) -> tuple[dict[str, Array], dict[str, str]]:
+def _state(run: Run, experiment: Experiment) -> tuple[dict[str, Array], dict[str, str]]:
     """Joint motion beside measured errors: from the log where it has positions, else as simulated."""
     state, units = {}, {}
     joints = [name.removesuffix(".position") for name in experiment.channels if name.endswith(".position")]
@@ -227,7 +171,7 @@ def _state(run: SimulatedRun, experiment: Experiment) -> tuple[dict[str, Array],
     return state, units
 
 
-def _inputs(run: SimulatedRun, experiment: Experiment, dt: float) -> dict[str, Array]:
+def _inputs(run: Run, experiment: Experiment, dt: float) -> dict[str, Array]:
     """Varying inputs beside measured errors, at the samples of the run and within its band."""
     found = {}
     factor = dt / experiment.dt

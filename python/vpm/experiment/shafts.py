@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
 from vpm.experiment.record import Experiment
+from vpm.model import Model
 
 Array = NDArray[np.float64]
 
@@ -17,44 +17,8 @@ Array = NDArray[np.float64]
 REGULAR = 1e6
 
 
-class Geared(Protocol):
-    """What is asked of a model: its joints, and which of them turn the shafts of transmissions."""
-
-    @property
-    def name(self) -> str:
-        """Name of a model with shafts."""
-
-    @property
-    def joints(self) -> tuple[str, ...]:
-        """Names of the joints that shafts turn."""
-
-    @property
-    def transmissions(self) -> tuple[str, ...]:
-        """Names of the transmissions, which are shafts."""
-
-    @property
-    def theta(self) -> Array:
-        """Parameter values of a model with shafts."""
-
-    def ratios(self, transmission: str) -> Mapping[str, str]:
-        """Parameter that is the ratio of each joint to a shaft."""
-
-    def index(self, name: str) -> int:
-        """Index of a parameter of a model with shafts."""
-
-    def channel_unit(self, channel: str) -> str:
-        """SI unit of a channel of shafts and joints."""
-
-    def sensor_of(self, channel: str) -> str | None:
-        """Sensor that reads a channel of shafts and joints."""
-
-    @property
-    def parameter_names(self) -> tuple[str, ...]:
-        """Parameter names of a model with shafts."""
-
-
 def joints_from_shafts(
-    experiment: Experiment, model: Geared, theta: Array | None = None, *, free: Collection[str] = ()
+    experiment: Experiment, model: Model, theta: Array | None = None, *, free: Collection[str] = ()
 ) -> Experiment:
     """Record with positions of joints in the place of those of shafts that tell them.
 
@@ -101,7 +65,7 @@ def joints_from_shafts(
 
 
 def _check_regular(
-    experiment: Experiment, model: Geared, ratios: Array, shafts: Sequence[str], lacking: Sequence[str]
+    experiment: Experiment, model: Model, ratios: Array, shafts: Sequence[str], lacking: Sequence[str]
 ) -> None:
     """Complain about shafts that do not tell the joints."""
     if len(shafts) == len(lacking) and np.linalg.cond(ratios / np.linalg.norm(ratios, axis=0)) <= REGULAR:
@@ -115,7 +79,7 @@ def _check_regular(
 
 
 def _check_known(
-    experiment: Experiment, model: Geared, shafts: Mapping[str, Mapping[str, str]], joint: str, free: Collection[str]
+    experiment: Experiment, model: Model, shafts: Mapping[str, Mapping[str, str]], joint: str, free: Collection[str]
 ) -> None:
     """Refuse shafts whose ratios and sensors are to be fitted, and delayed sensors."""
     errors = [parameter for name in shafts for parameter in _errors(model, name)]
@@ -133,14 +97,14 @@ def _check_known(
         raise ExperimentError(f"{experiment.name}: {rest}", channel=f"{joint}.position")
 
 
-def _angle(experiment: Experiment, model: Geared, values: Array, name: str) -> Array:
+def _angle(experiment: Experiment, model: Model, values: Array, name: str) -> Array:
     """Angle of a shaft behind gain and offset of its sensor, rad."""
     numbers = {parameter.split(".")[-2]: float(values[model.index(parameter)]) for parameter in _errors(model, name)}
     reading: Array = experiment[f"{name}.position"]
     return (reading - numbers.get("offset", 0.0)) / numbers.get("gain", 1.0)
 
 
-def _errors(model: Geared, name: str) -> list[str]:
+def _errors(model: Model, name: str) -> list[str]:
     """Parameters of the sensor of a shaft's angle: gain, offset, delay."""
     sensor = model.sensor_of(f"{name}.position")
     return [] if sensor is None else [one for one in model.parameter_names if one.startswith(f"{sensor}.")]

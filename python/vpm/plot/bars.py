@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -16,64 +16,14 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from vpm.climb.result import Level
+    from vpm.discrepancy.diagnosis import ChannelGap, RankedCandidate
+
 Array = NDArray[np.float64]
 
-Candidate = TypeVar("Candidate", bound="CandidateLike")
 
 #: Candidates that are drawn.
 MOST_CANDIDATES = 16
-
-
-class GapLike(Protocol):
-    """Gap of one channel at each stage."""
-
-    @property
-    def before(self) -> float:
-        """Plotted error of the nominal model."""
-
-    @property
-    def recalibrated(self) -> float:
-        """Plotted error with fitted parameters."""
-
-    @property
-    def after(self) -> float:
-        """Plotted error with the accepted effects."""
-
-    @property
-    def noise_floor(self) -> float:
-        """Plotted error that noise alone leaves; may be NaN."""
-
-    @property
-    def signal(self) -> float:
-        """Root mean square of the measured signal beside plotted errors."""
-
-
-class CandidateLike(Protocol):
-    """One candidate effect of a search, as bars show it."""
-
-    @property
-    def name(self) -> str:
-        """Name of a plotted candidate effect."""
-
-    @property
-    def site(self) -> str:
-        """Component at which a plotted candidate would be."""
-
-    @property
-    def round(self) -> int:
-        """Round of the search in which a plotted candidate was tried."""
-
-    @property
-    def screened(self) -> float:
-        """Share of the training mean square that a plotted candidate would take."""
-
-    @property
-    def unseen(self) -> float:
-        """Share of the validation mean square that a plotted candidate took; may be NaN."""
-
-    @property
-    def accepted(self) -> bool:
-        """Whether a plotted candidate was accepted."""
 
 
 @styled
@@ -106,7 +56,7 @@ def plot_parameters(
 
 
 @styled
-def plot_gap(gaps: Mapping[str, GapLike]) -> Figure:
+def plot_gap(gaps: Mapping[str, ChannelGap]) -> Figure:
     """Draw bars of each channel's error at each stage as a share of the signal, with the noise floor.
 
     Parameters
@@ -145,7 +95,7 @@ def plot_gap(gaps: Mapping[str, GapLike]) -> Figure:
 
 
 @styled
-def plot_candidates(candidates: Sequence[CandidateLike]) -> Figure:
+def plot_candidates(candidates: Sequence[RankedCandidate]) -> Figure:
     """Draw bars of what candidates of the first round would explain, and did after a refit.
 
     Parameters
@@ -179,7 +129,7 @@ def plot_candidates(candidates: Sequence[CandidateLike]) -> Figure:
     return figure
 
 
-def drawn_candidates(candidates: Sequence[Candidate]) -> list[Candidate]:
+def drawn_candidates(candidates: Sequence[RankedCandidate]) -> list[RankedCandidate]:
     """Candidates among the bars of `plot_candidates`, accepted ones above."""
     first = min((c.round for c in candidates), default=1)
     chosen = [c for c in candidates if c.round == first or c.accepted]
@@ -273,32 +223,8 @@ def _name_rows(axis: Axes, names: Sequence[str]) -> None:
     axis.tick_params(axis="y", length=0, labelcolor=INK)
 
 
-class Climbed(Protocol):
-    """A level of a climb, as far as its picture needs it."""
-
-    @property
-    def name(self) -> str:
-        """Name of a plotted level of a climb."""
-
-    @property
-    def error(self) -> float:
-        """Share of the signal that is left on validation data."""
-
-    @property
-    def pays(self) -> bool:
-        """Whether validation data say that it is better."""
-
-    @property
-    def values(self) -> Mapping[str, float]:
-        """Fitted parameters at a plotted level of a climb."""
-
-    @property
-    def std(self) -> Mapping[str, float]:
-        """Standard deviations of the parameters at a plotted level of a climb."""
-
-
 @styled
-def plot_climb(levels: Sequence[Climbed], top: str) -> Figure:
+def plot_climb(levels: Sequence[Level], top: str) -> Figure:
     """Draw bars of validation errors over the level of detail, and below how each parameter moved.
 
     Parameters

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from vpm.discrepancy.evidence import Evidence
+
 Array = NDArray[np.float64]
 
 #: Points that a cloud keeps.
@@ -25,72 +27,8 @@ LAW_BINS, LINE_SHARE = 300, 0.97
 BAND = 1.96
 
 
-class EvidenceLike(Protocol):
-    """Samples of one finding, as a plot of its evidence shows them."""
-
-    @property
-    def effect(self) -> str:
-        """Name of the effect whose evidence is plotted."""
-
-    @property
-    def site(self) -> str:
-        """Component at which the plotted effect sits."""
-
-    @property
-    def record(self) -> str:
-        """Validation record whose evidence is plotted."""
-
-    @property
-    def channel(self) -> str:
-        """Channel of the plotted residual."""
-
-    @property
-    def unit(self) -> str:
-        """Unit of the plotted residual."""
-
-    @property
-    def axis(self) -> str:
-        """Quantity over which evidence is plotted."""
-
-    @property
-    def name(self) -> str:
-        """Quantity over which evidence is plotted, in words."""
-
-    @property
-    def axis_unit(self) -> str:
-        """Unit of the quantity over which evidence is plotted."""
-
-    @property
-    def time(self) -> Array:
-        """Time of the plotted evidence, shape (n,), s."""
-
-    @property
-    def values(self) -> Array:
-        """Quantity over which evidence is plotted, shape (n,)."""
-
-    @property
-    def without(self) -> Array:
-        """Plotted residual without the effect."""
-
-    @property
-    def repaired(self) -> Array:
-        """Plotted residual with the effect."""
-
-    @property
-    def law_values(self) -> Array:
-        """Values at which the law of the plotted effect is drawn, shape (k,)."""
-
-    @property
-    def law(self) -> Array:
-        """Contribution of the effect, over `law_values`."""
-
-    @property
-    def noise_floor(self) -> float:
-        """Root mean square that noise leaves."""
-
-
 @styled
-def plot_evidence(evidence: EvidenceLike) -> Figure:
+def plot_evidence(evidence: Evidence) -> Figure:
     """Draw the evidence of an effect: the residual without it, the fitted law, and the residual with it.
 
     Parameters
@@ -121,7 +59,7 @@ def plot_evidence(evidence: EvidenceLike) -> Figure:
     return figure
 
 
-def draw_partial(axis: Axes, evidence: EvidenceLike, *, most: int = MOST_DOTS, color: str = ORANGE) -> None:
+def draw_partial(axis: Axes, evidence: Evidence, *, most: int = MOST_DOTS, color: str = ORANGE) -> None:
     """Draw evidence: the residual without the effect as a cloud, and the law over it."""
     _cloud(axis, evidence.values, evidence.without, color, "residual without it", most)
     order = np.argsort(evidence.law_values, kind="stable")
@@ -135,7 +73,7 @@ def draw_partial(axis: Axes, evidence: EvidenceLike, *, most: int = MOST_DOTS, c
     axis.axhline(0.0, color=SOFT, linewidth=0.7)
 
 
-def draw_remaining(axis: Axes, evidence: EvidenceLike) -> None:
+def draw_remaining(axis: Axes, evidence: Evidence) -> None:
     """Draw evidence: the residual with the effect as a cloud over the noise floor."""
     floor = evidence.noise_floor
     if np.isfinite(floor):
@@ -170,7 +108,7 @@ def law_line(values: Array, law: Array) -> tuple[Array, Array, float]:
     return centers, means, 1.0 - rest / power if power > 0.0 else 0.0
 
 
-def _spectra(evidence: EvidenceLike) -> Figure:
+def _spectra(evidence: Evidence) -> Figure:
     """Amplitude densities of plotted evidence (Welch's method): both residuals and the law."""
     from scipy.signal import welch
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,10 +16,11 @@ from vpm.plot.signals import (
     legend_above,
 )
 from vpm.plot.style import BLUE, INK, ORANGE, SOFT, label, panels, styled, thinned
-from vpm.plot.summaries import PictureLike
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
+    from vpm.discrepancy.diagnosis import Picture, Trace
 
 Array = NDArray[np.float64]
 
@@ -29,44 +30,8 @@ MOST_IN_SEGMENT, FEW = 2048, 40
 MOST_NUMBERS = 14
 
 
-class TraceLike(Protocol):
-    """One channel of a record, measured and simulated."""
-
-    @property
-    def channel(self) -> str:
-        """Name of a plotted channel, measured and simulated."""
-
-    @property
-    def unit(self) -> str:
-        """Unit of a plotted channel, measured and simulated."""
-
-    @property
-    def time(self) -> Array:
-        """Time of a plotted channel, measured and simulated, shape (n,), s."""
-
-    @property
-    def measured(self) -> Array:
-        """Measured values of a plotted channel, shape (n,)."""
-
-    @property
-    def before(self) -> Array:
-        """Simulated by the nominal model; NaN where it does not count."""
-
-    @property
-    def after(self) -> Array:
-        """Simulated by the repaired model; NaN where it does not count."""
-
-
-class MeasuredLike(PictureLike, Protocol):
-    """Residuals of one joint with the measured effort."""
-
-    @property
-    def measured(self) -> Array:
-        """Effort of the actuators, shape (n,)."""
-
-
 @styled
-def plot_traces(traces: Sequence[TraceLike]) -> Figure:
+def plot_traces(traces: Sequence[Trace]) -> Figure:
     """Draw the findings' channels over time: measured pale and broad, simulated before and after.
 
     Parameters
@@ -88,7 +53,7 @@ def plot_traces(traces: Sequence[TraceLike]) -> Figure:
 
 
 @styled
-def plot_joint_over_time(picture: MeasuredLike, stages: Mapping[str, Array]) -> Figure:
+def plot_joint_over_time(picture: Picture, stages: Mapping[str, Array]) -> Figure:
     """Draw findings at a joint over time: efforts, measured and needed, and residuals below.
 
     Parameters
@@ -113,7 +78,7 @@ def plot_joint_over_time(picture: MeasuredLike, stages: Mapping[str, Array]) -> 
 
 
 @styled
-def plot_joint_over_state(picture: PictureLike, stages: Mapping[str, Array]) -> Figure:
+def plot_joint_over_state(picture: Picture, stages: Mapping[str, Array]) -> Figure:
     """Draw findings at a joint: the residual against velocity and position.
 
     Parameters

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from vpm.identify.inertial_fit import InertialFit
+
 Array = NDArray[np.float64]
 
 #: Half width of a 95 % interval, relative to the value, up to which a base parameter is drawn as known.
@@ -22,52 +24,8 @@ KNOWN = 0.2
 WIDEST = 3.0
 
 
-class InertialLike(Protocol):
-    """Inertial fit as `plot_inertial` draws it."""
-
-    @property
-    def names(self) -> Sequence[str]:
-        """Names of the plotted inertial parameters."""
-
-    @property
-    def nominal(self) -> Array:
-        """CAD values of the plotted inertial parameters."""
-
-    @property
-    def values(self) -> Array:
-        """Estimates of the plotted inertial parameters."""
-
-    @property
-    def std(self) -> Array:
-        """Deviations of the plotted inertial parameters; infinite where open."""
-
-    @property
-    def identifiable(self) -> Sequence[str]:
-        """What data know of each plotted inertial parameter."""
-
-    @property
-    def base_words(self) -> Sequence[str]:
-        """Plotted base parameters in words."""
-
-    @property
-    def base_nominal(self) -> Array:
-        """CAD values of the plotted base parameters."""
-
-    @property
-    def base_values(self) -> Array:
-        """Estimates of the plotted base parameters."""
-
-    @property
-    def base_std(self) -> Array:
-        """Deviations of the plotted base parameters."""
-
-    @property
-    def quantile(self) -> float:
-        """Half an interval over the deviation."""
-
-
 @styled
-def plot_inertial(fit: InertialLike) -> Figure:
+def plot_inertial(fit: InertialFit) -> Figure:
     """Draw bars of estimates over the CAD values with 95 % intervals; above parameters, below base parameters.
 
     Parameters

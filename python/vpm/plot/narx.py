@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,43 +14,13 @@ from vpm.plot.style import BLUE, INK, label, panels, styled, thinned
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from vpm.narx.run import NarxRun
+
 Array = NDArray[np.float64]
 
 
-class NarxRunLike(Protocol):
-    """Run of a NARX model as `plot_narx_run` draws it."""
-
-    @property
-    def kind(self) -> str:
-        """Kind of a plotted NARX run: free run or one-step prediction."""
-
-    @property
-    def record(self) -> str:
-        """Name of the record of a plotted NARX run."""
-
-    @property
-    def output(self) -> str:
-        """Name of the output of a plotted NARX run."""
-
-    @property
-    def unit(self) -> str:
-        """Unit of the output of a plotted NARX run."""
-
-    @property
-    def time(self) -> Array:
-        """Time of a plotted NARX run, shape (N,)."""
-
-    @property
-    def measured(self) -> Array:
-        """Measured output beside a plotted NARX run, shape (N,)."""
-
-    @property
-    def values(self) -> Array:
-        """Output of a plotted NARX run, shape (N,)."""
-
-
 @styled
-def plot_narx_run(run: NarxRunLike) -> Figure:
+def plot_narx_run(run: NarxRun) -> Figure:
     """Draw a NARX run: the computed over the measured output, and their difference below."""
     figure, axes = panels(2, height=1.9, share_x=True)
     draw_overlay(axes[0][0], run.time, run.measured, run.values, [0])

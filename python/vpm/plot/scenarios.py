@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import chain, cycle
 from math import inf
 from textwrap import fill
-from typing import TYPE_CHECKING, Literal, Protocol
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +19,8 @@ from vpm.units import convert
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+
+    from vpm.scenario.outcome import ScenarioRun
 
 Array = NDArray[np.float64]
 
@@ -37,36 +39,6 @@ _READABLE: Mapping[str, tuple[tuple[str, float, float], ...]] = {
 }
 
 
-class ScenarioLike(Protocol):
-    """Runs of a scenario as `plot_scenario` draws them."""
-
-    @property
-    def name(self) -> str:
-        """Name of a plotted scenario."""
-
-    @property
-    def panels(self) -> Sequence[Sequence[str]]:
-        """Channels of each panel of a plotted scenario."""
-
-    @property
-    def runs(self) -> Mapping[str, object]:
-        """Runs of a plotted scenario by name."""
-
-    @property
-    def failures(self) -> Mapping[str, str]:
-        """What went wrong, by the name of the run."""
-
-    @property
-    def columns(self) -> Mapping[str, Sequence[str]]:
-        """Runs of each column, by its heading; none where all share one."""
-
-    def traces(self, channel: str) -> Mapping[str, tuple[Array, Array]]:
-        """Time and values in each run that has the channel."""
-
-    def unit(self, channel: str) -> str:
-        """SI unit of a channel."""
-
-
 @dataclass(frozen=True)
 class _Row:
     """A panel of each column: channels, what the runs show of them, and the unit in which that is drawn.
@@ -83,7 +55,7 @@ class _Row:
 
 
 @styled
-def plot_scenario(result: ScenarioLike) -> Figure:
+def plot_scenario(result: ScenarioRun) -> Figure:
     """Draw all runs of a scenario: a colour for each run, a line style for each channel.
 
     Columns of the scenario stand side by side with common axes.
@@ -110,7 +82,7 @@ def plot_scenario(result: ScenarioLike) -> Figure:
     return figure
 
 
-def _finish(figure: Figure, result: ScenarioLike, colors: Mapping[str, str], columns: Sequence[Sequence[str]]) -> None:
+def _finish(figure: Figure, result: ScenarioRun, colors: Mapping[str, str], columns: Sequence[Sequence[str]]) -> None:
     """Finish a scenario's picture: title, names of the runs, and what failed."""
     from matplotlib.lines import Line2D
 
@@ -126,7 +98,7 @@ def _finish(figure: Figure, result: ScenarioLike, colors: Mapping[str, str], col
         figure.supxlabel(told, fontsize=8, color=ORANGE)
 
 
-def _row(result: ScenarioLike, channels: Sequence[str]) -> _Row:
+def _row(result: ScenarioRun, channels: Sequence[str]) -> _Row:
     traces = {channel: result.traces(channel) for channel in channels}
     pieces = [(name, values) for each in traces.values() for name, (_, values) in each.items() if values.size]
     sound = [values for name, values in pieces if name not in result.failures] or [values for _, values in pieces]

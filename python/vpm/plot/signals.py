@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 from textwrap import fill
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from vpm.simulate.run import Run
+
 Array = NDArray[np.float64]
 
 #: Bins of the running mean over a state, and samples that one has in the mean where there are fewer bins.
@@ -24,50 +26,6 @@ MEAN_BINS, TYPICAL_IN_BIN = 40, 10
 
 #: Share of the samples that a bin needs before its mean is drawn.
 LEAST_IN_BIN = 0.0005
-
-
-class RunLike(Protocol):
-    """Simulated run as `plot_run` draws it."""
-
-    @property
-    def model_name(self) -> str:
-        """Name of the model of a plotted run."""
-
-    @property
-    def experiment_name(self) -> str:
-        """Name of the log of a plotted run."""
-
-    @property
-    def mode(self) -> str:
-        """Mode of simulation of a plotted run."""
-
-    @property
-    def time(self) -> Array:
-        """Time of a plotted run, shape (N,), s."""
-
-    @property
-    def channels(self) -> tuple[str, ...]:
-        """Names of the C channels of a plotted run."""
-
-    @property
-    def units(self) -> tuple[str, ...]:
-        """Units of the channels of a plotted run."""
-
-    @property
-    def values(self) -> Array:
-        """Simulated values of a plotted run, shape (N, C)."""
-
-    @property
-    def measured(self) -> Array:
-        """Measured values beside a plotted run, shape (N, C), NaN where not measured."""
-
-    @property
-    def starts(self) -> NDArray[np.int64]:
-        """Rows at which a piece of a plotted run begins."""
-
-    @property
-    def notes(self) -> tuple[str, ...]:
-        """What to know before the numbers are trusted."""
 
 
 @styled
@@ -121,7 +79,7 @@ def plot_innovations(
 
 
 @styled
-def plot_run(run: RunLike) -> Figure:
+def plot_run(run: Run) -> Figure:
     """Draw simulated over measured signals, a panel per channel.
 
     Commands that were only copied do not count as measured. Where nothing was, all channels are drawn but what never

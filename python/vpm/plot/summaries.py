@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,111 +14,14 @@ from vpm.plot.style import label, panels, styled
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from vpm.compare.comparison import Comparison
+    from vpm.discrepancy.diagnosis import Picture
+
 Array = NDArray[np.float64]
 
 
-class ChannelLike(Protocol):
-    """One channel of a comparison, as a summary draws it."""
-
-    @property
-    def channel(self) -> str:
-        """Name of a channel of a plotted comparison."""
-
-    @property
-    def unit(self) -> str:
-        """Unit of a channel of a plotted comparison."""
-
-    @property
-    def time(self) -> Array:
-        """Time of a channel of a plotted comparison, shape (N,), s."""
-
-    @property
-    def measured(self) -> Array:
-        """Measured values of a plotted comparison, shape (N,)."""
-
-    @property
-    def simulated(self) -> Array:
-        """Simulated values of a plotted comparison, shape (N,)."""
-
-    @property
-    def residual(self) -> Array:
-        """Residual of a plotted comparison, shape (N,)."""
-
-    @property
-    def relative_error(self) -> float:
-        """Relative error of a channel of a plotted comparison, percent."""
-
-
-class ComparisonLike(Protocol):
-    """Comparison of a run with a log, as `plot_comparison` draws it."""
-
-    @property
-    def model_name(self) -> str:
-        """Name of the model of a plotted comparison."""
-
-    @property
-    def experiment_name(self) -> str:
-        """Name of the log of a plotted comparison."""
-
-    @property
-    def mode(self) -> str:
-        """Mode of simulation of a plotted comparison."""
-
-    @property
-    def channels(self) -> Sequence[ChannelLike]:
-        """Channels of a plotted comparison."""
-
-    @property
-    def state(self) -> Mapping[str, Array]:
-        """Motion of the joints at the same samples."""
-
-    @property
-    def state_units(self) -> Mapping[str, str]:
-        """Units of the joint motion of a plotted comparison."""
-
-
-class PictureLike(Protocol):
-    """Residuals of one joint at each stage of a diagnosis."""
-
-    @property
-    def channel(self) -> str:
-        """Name."""
-
-    @property
-    def unit(self) -> str:
-        """Unit of the residual."""
-
-    @property
-    def coordinate_unit(self) -> str:
-        """Unit of the position."""
-
-    @property
-    def time(self) -> Array:
-        """Shape (N,), s."""
-
-    @property
-    def position(self) -> Array:
-        """Shape (N,)."""
-
-    @property
-    def velocity(self) -> Array:
-        """Shape (N,)."""
-
-    @property
-    def before(self) -> Array:
-        """Residual of the nominal model, shape (N,); NaN where a sample does not count."""
-
-    @property
-    def recalibrated(self) -> Array:
-        """Residual with fitted parameters, shape (N,)."""
-
-    @property
-    def after(self) -> Array:
-        """Residual with the accepted effects, shape (N,)."""
-
-
 @styled
-def plot_comparison(comparison: ComparisonLike) -> Figure:
+def plot_comparison(comparison: Comparison) -> Figure:
     """Draw a summary of a comparison: measured and simulated channels, residuals over time and velocity.
 
     Parameters
@@ -151,7 +54,7 @@ def plot_comparison(comparison: ComparisonLike) -> Figure:
 
 
 @styled
-def plot_pictures(pictures: Sequence[PictureLike]) -> Figure:
+def plot_pictures(pictures: Sequence[Picture]) -> Figure:
     """Draw a summary of stages: the residual of each joint over time, velocity and position.
 
     Parameters
@@ -175,7 +78,7 @@ def plot_pictures(pictures: Sequence[PictureLike]) -> Figure:
     return figure
 
 
-def _velocity_of(comparison: ComparisonLike, channel: str) -> str | None:
+def _velocity_of(comparison: Comparison, channel: str) -> str | None:
     """Velocity of the channel's own joint, else that of the first joint."""
     known = [name for name in comparison.state if name.endswith(".velocity")]
     own = f"{channel.rpartition('.')[0]}.velocity"

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.experiment import quantisation_step
+
+if TYPE_CHECKING:
+    from vpm.studies.impedance.hysteresis_loop import Loop
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
@@ -16,59 +19,7 @@ Complex = NDArray[np.complex128]
 WORTH = 0.05
 
 
-class LoopLike(Protocol):
-    """Stiffness, damping, energy and harmonics of a loop, as `loop_notes` needs them."""
-
-    @property
-    def amplitude(self) -> float:
-        """Half of the stroke, m."""
-
-    @property
-    def stiffness(self) -> float:
-        """Stiffness of the loop, N/m."""
-
-    @property
-    def damping(self) -> float:
-        """Damping of the loop, N s/m."""
-
-    @property
-    def damping_std(self) -> float:
-        """Deviation of the loop's damping, N s/m."""
-
-    @property
-    def energy(self) -> float:
-        """Energy lost in one cycle, J."""
-
-    @property
-    def cycle_energy(self) -> Array:
-        """Energy lost in each cycle, J."""
-
-    @property
-    def frequency(self) -> float:
-        """Frequency of the cycles, Hz."""
-
-    @property
-    def displacement_harmonics(self) -> Complex:
-        """Harmonics of the loop's motion, m."""
-
-    @property
-    def force_harmonics(self) -> Complex:
-        """Harmonics of the loop's force, N."""
-
-    @property
-    def force_noise(self) -> float:
-        """Deviation of the noise of the loop's force, N."""
-
-    @property
-    def force(self) -> Array:
-        """Force over the loop, N."""
-
-    @property
-    def energy_std(self) -> float:
-        """Deviation of the energy lost in one cycle, J."""
-
-
-def loop_notes(loop: LoopLike, displacement: Array, step: float, delay_std: float, explained: float) -> tuple[str, ...]:
+def loop_notes(loop: Loop, displacement: Array, step: float, delay_std: float, explained: float) -> tuple[str, ...]:
     """Notes on a hysteresis loop, to know before its numbers are trusted.
 
     Parameters
@@ -126,7 +77,7 @@ def loop_notes(loop: LoopLike, displacement: Array, step: float, delay_std: floa
     return tuple(notes)
 
 
-def _bend(loop: LoopLike) -> float:
+def _bend(loop: Loop) -> float:
     """Bent part of the hysteresis force that spring and damper leave, as a share, for the notes."""
     whole, moved = loop.force_harmonics, loop.displacement_harmonics
     orders = np.arange(1, moved.size + 1)

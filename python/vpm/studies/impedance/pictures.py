@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,83 +13,14 @@ from vpm.plot.style import BLUE, INK, ORANGE, SOFT, label, panels, styled
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from vpm.studies.impedance.hysteresis_loop import Loop
+    from vpm.studies.impedance.repeated import Repeated, RepeatedTests
+
 Array = NDArray[np.float64]
 
 
-class LoopLike(Protocol):
-    """Hysteresis loop as `plot_loops` draws it."""
-
-    @property
-    def name(self) -> str:
-        """Title of a plotted hysteresis loop."""
-
-    @property
-    def frequency(self) -> float:
-        """Frequency of a plotted hysteresis loop, Hz."""
-
-    @property
-    def stiffness(self) -> float:
-        """Stiffness of a plotted hysteresis loop, N/m."""
-
-    @property
-    def damping(self) -> float:
-        """Damping of a plotted hysteresis loop, N s/m."""
-
-    @property
-    def displacement_harmonics(self) -> NDArray[np.complex128]:
-        """Harmonics of the motion of a plotted hysteresis loop, m."""
-
-    @property
-    def displacement(self) -> Array:
-        """Displacement over a plotted hysteresis loop, m."""
-
-    @property
-    def force(self) -> Array:
-        """Force over a plotted hysteresis loop, N."""
-
-
-class QuantityLike(Protocol):
-    """Mean and interval of a quantity of repeated tests, as plotted."""
-
-    @property
-    def mean(self) -> float:
-        """Plotted mean of repeated tests."""
-
-    @property
-    def half_width(self) -> float:
-        """Half of the plotted interval of repeated tests."""
-
-    @property
-    def values(self) -> Array:
-        """Plotted value of each repeated test."""
-
-
-class RowLike(Protocol):
-    """Row of an impedance table as `plot_impedances` draws it."""
-
-    @property
-    def joint(self) -> str:
-        """Name of the joint of a plotted impedance."""
-
-    @property
-    def impedance(self) -> str:
-        """Name of a plotted impedance."""
-
-    @property
-    def test(self) -> str:
-        """Name of the kind of test of a plotted impedance."""
-
-    @property
-    def stiffness(self) -> QuantityLike:
-        """Stiffness of a plotted impedance, N/m."""
-
-    @property
-    def damping(self) -> QuantityLike:
-        """Damping of a plotted impedance, N s/m."""
-
-
 @styled
-def plot_loops(loops: Sequence[LoopLike]) -> Figure:
+def plot_loops(loops: Sequence[Loop]) -> Figure:
     """Draw impedance loops, measured and of the fitted spring and damper, with and without slope."""
     figure, axes = panels(len(loops), 2, height=2.6)
     angle = np.linspace(0.0, 2.0 * np.pi, 721)
@@ -113,14 +44,14 @@ def plot_loops(loops: Sequence[LoopLike]) -> Figure:
 
 
 @styled
-def plot_impedances(rows: Sequence[RowLike]) -> Figure:
+def plot_impedances(rows: Sequence[RepeatedTests]) -> Figure:
     """Draw each row's tests, mean and interval, stiffness on the left and damping on the right."""
     figure, axes = panels(1, 2, height=0.9 + 0.28 * len(rows))
     places = np.arange(len(rows))
     names = [f"{row.joint}, {row.impedance}, {row.test}" for row in rows]
     for axis, name, unit in ((axes[0][0], "stiffness", "N/m"), (axes[0][1], "damping", "N s/m")):
         for place, row in zip(places, rows, strict=True):
-            one: QuantityLike = getattr(row, name)
+            one: Repeated = getattr(row, name)
             axis.plot(one.values, np.full(one.values.size, place), ".", color=SOFT, markersize=3)
             axis.errorbar(one.mean, place, xerr=one.half_width, fmt="o", color=BLUE, markersize=4, capsize=3)
         axis.set_yticks(places, names if axis is axes[0][0] else [""] * len(rows))

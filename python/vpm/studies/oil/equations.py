@@ -12,14 +12,13 @@ A`` times the second is the equation of the force, 5.34 to 5.39 integrated.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError, near_match
+from vpm.model import Model
 from vpm.results import Storable
 
 Array = NDArray[np.float64]
@@ -29,12 +28,6 @@ RULES = ("steady", "symmetric")
 
 #: Of free air and its change of state, for the column "air" (Pa, 1).
 AIR_PRESSURE, AIR_EXPONENT = 101325.0, 1.4
-
-
-class _Machine(Protocol):
-    @property
-    def parameters(self) -> Mapping[str, Any]:
-        """Parameters for the oil equations by their dotted names."""
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -82,7 +75,7 @@ class CylinderGeometry(Storable):
             )
 
     @classmethod
-    def of(cls, model: _Machine, actuator: str) -> CylinderGeometry:
+    def of(cls, model: Model, actuator: str) -> CylinderGeometry:
         """Areas, stroke and line volumes for the oil equations, from a model's hydraulic actuator.
 
         Parameters
