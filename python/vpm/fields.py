@@ -14,12 +14,7 @@ _KINDS = {"f": "biuf", "c": "biufc", "i": "biu", "b": "b"}
 
 
 def misfit(value: object) -> str:
-    """Name of the first field of a dataclass whose value is not of its type; "" where all are, and of what is none.
-
-    Parameters
-    ----------
-    value : object
-    """
+    """Name of the first field of a dataclass whose value is not of its type; "" where all are, and of what is none."""
     if not is_dataclass(value):
         return ""
     try:

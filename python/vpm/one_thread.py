@@ -58,14 +58,6 @@ def in_one_thread(work: Callable[P, R]) -> Callable[P, R]:
 
     Its matrices are long and narrow: on a busy machine a product of a millisecond waits half a second for the second
     thread. Cores are for candidates, side by side.
-
-    Parameters
-    ----------
-    work : callable
-
-    Returns
-    -------
-    callable
     """
 
     @wraps(work)

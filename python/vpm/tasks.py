@@ -357,12 +357,7 @@ def done_by(executor: Executor | Callable[[], Executor], job: Callable[[], T], s
 
 
 def processes(count: int) -> ProcessPoolExecutor:
-    """New processes for tasks that leave Ctrl-C to this one.
-
-    Parameters
-    ----------
-    count : int
-    """
+    """New processes for tasks that leave Ctrl-C to this one."""
     return ProcessPoolExecutor(count, multiprocessing.get_context("spawn"), _deaf)
 
 

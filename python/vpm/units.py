@@ -232,10 +232,6 @@ def parse_unit(text: str) -> Unit:
     text : str
         For example ``"N s/m"``; ``""`` and ``"1"`` mean no unit.
 
-    Returns
-    -------
-    Unit
-
     Raises
     ------
     UnitError

@@ -26,10 +26,6 @@ def parse_channel_table(content: Mapping[str, object], *, path: str | None = Non
     path : str, optional
         File that it comes from, for messages.
 
-    Returns
-    -------
-    mapping of str to ChannelEntry
-
     Raises
     ------
     ModelError
@@ -44,14 +40,6 @@ def parse_channel_table(content: Mapping[str, object], *, path: str | None = Non
 
 def load_channel_table(path: str | PathLike[str]) -> Mapping[str, ChannelEntry]:
     """Read a channel table from a TOML file of its own.
-
-    Parameters
-    ----------
-    path : path-like
-
-    Returns
-    -------
-    mapping of str to ChannelEntry
 
     Raises
     ------

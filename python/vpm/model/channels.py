@@ -33,13 +33,7 @@ def _readable(unit: str) -> str:
 
 
 class ColumnPart(BaseModel):
-    """Column that a value is built from; as a name alone it holds pure numbers.
-
-    Attributes
-    ----------
-    column : str
-    unit : str
-    """
+    """Column that a value is built from; as a name alone it holds pure numbers."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 

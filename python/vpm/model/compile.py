@@ -46,10 +46,6 @@ def described(structure: str, theta: NDArray[np.float64]) -> str:
 def structure_text(checked: Checked) -> str:
     """Compiled description of a model without parameter values, as JSON text.
 
-    Parameters
-    ----------
-    checked : Checked
-
     Returns
     -------
     str

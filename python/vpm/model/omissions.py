@@ -10,12 +10,7 @@ from vpm.model.structure import Structure
 
 
 def omissions(structure: Structure) -> Mapping[str, list[int]]:
-    """Omissions of a model, by the numbers of bodies, joints and beams of the core.
-
-    Parameters
-    ----------
-    structure : Structure
-    """
+    """Omissions of a model, by the numbers of bodies, joints and beams of the core."""
     document = structure.document
     # A joint of several coordinates is several joints with massless carriers, which go with the body at their end.
     children = {name: joint.child for name, joint in document.joints.items()}
@@ -34,13 +29,7 @@ def omissions(structure: Structure) -> Mapping[str, list[int]]:
 
 
 def omission_problems(document: Document, structure: Structure) -> Iterator[Problem]:
-    """Problems of omissions: terms that a part does not have by itself.
-
-    Parameters
-    ----------
-    document : Document
-    structure : Structure
-    """
+    """Problems of omissions: terms that a part does not have by itself."""
     carriers = {joint.child: joint.parent for joint in document.joints.values() if joint.type == "fixed"}
     for name in structure.welds:
         if not document.bodies[name].velocity_terms:

@@ -57,12 +57,7 @@ def plot_parameters(
 
 @styled
 def plot_gap(gaps: Mapping[str, ChannelGap]) -> Figure:
-    """Draw bars of each channel's error at each stage as a share of the signal, with the noise floor.
-
-    Parameters
-    ----------
-    gaps : mapping of str to ChannelGap
-    """
+    """Draw bars of each channel's error at each stage as a share of the signal, with the noise floor."""
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 

@@ -32,12 +32,7 @@ MOST_NUMBERS = 14
 
 @styled
 def plot_traces(traces: Sequence[Trace]) -> Figure:
-    """Draw the findings' channels over time: measured pale and broad, simulated before and after.
-
-    Parameters
-    ----------
-    traces : sequence of Trace
-    """
+    """Draw the findings' channels over time: measured pale and broad, simulated before and after."""
     figure, axes = panels(max(1, len(traces)), height=2.1, share_x=True)
     for row, trace in zip(axes, traces, strict=False):
         axis = row[0]

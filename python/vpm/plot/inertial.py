@@ -26,12 +26,7 @@ WIDEST = 3.0
 
 @styled
 def plot_inertial(fit: InertialFit) -> Figure:
-    """Draw bars of estimates over the CAD values with 95 % intervals; above parameters, below base parameters.
-
-    Parameters
-    ----------
-    fit : InertialFit
-    """
+    """Draw bars of estimates over the CAD values with 95 % intervals; above parameters, below base parameters."""
     shown = np.array([k for k, word in enumerate(fit.identifiable) if word != "no"], dtype=int)
     rows = max(len(shown), len(fit.base_words))
     combined = tuple(fit.base_words) != tuple(fit.names[k] for k in shown)

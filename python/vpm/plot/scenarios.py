@@ -59,10 +59,6 @@ def plot_scenario(result: ScenarioRun) -> Figure:
     """Draw all runs of a scenario: a colour for each run, a line style for each channel.
 
     Columns of the scenario stand side by side with common axes.
-
-    Parameters
-    ----------
-    result : ScenarioRun
     """
     columns = result.columns or {"": tuple(result.runs)}
     width = 8.0 if len(columns) == 1 else 5.0 * len(columns)

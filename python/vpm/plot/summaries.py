@@ -22,12 +22,7 @@ Array = NDArray[np.float64]
 
 @styled
 def plot_comparison(comparison: Comparison) -> Figure:
-    """Draw a summary of a comparison: measured and simulated channels, residuals over time and velocity.
-
-    Parameters
-    ----------
-    comparison : Comparison
-    """
+    """Draw a summary of a comparison: measured and simulated channels, residuals over time and velocity."""
     channels = comparison.channels
     figure, axes = panels(len(channels), 3, height=2.6, width=13.0)
     for row, each in zip(axes, channels, strict=True):
@@ -55,12 +50,7 @@ def plot_comparison(comparison: Comparison) -> Figure:
 
 @styled
 def plot_pictures(pictures: Sequence[Picture]) -> Figure:
-    """Draw a summary of stages: the residual of each joint over time, velocity and position.
-
-    Parameters
-    ----------
-    pictures : sequence of Picture
-    """
+    """Draw a summary of stages: the residual of each joint over time, velocity and position."""
     figure, axes = panels(max(1, len(pictures)), 3, height=2.9, width=13.0)
     for row, each in zip(axes, pictures, strict=False):
         stages = {"before": each.before, "recalibrated": each.recalibrated, "with the effects": each.after}

@@ -99,10 +99,6 @@ def reduce_structure(structure: Structure, modes: int = 8) -> Reduction:
     modes : int
         How many modes to keep, 1 to 64.
 
-    Returns
-    -------
-    Reduction
-
     Raises
     ------
     ReductionError

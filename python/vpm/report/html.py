@@ -63,11 +63,6 @@ def report(diagnosis: Diagnosis, ladder: Ladder | None = None) -> Report:
 def render_html(diagnosis: Diagnosis, ladder: Ladder | None = None) -> str:
     """Render the report as one HTML page.
 
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    ladder : Ladder, optional
-
     Returns
     -------
     str

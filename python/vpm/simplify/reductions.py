@@ -87,10 +87,6 @@ class Reduction(Storable):
     def applied(self, model: Model) -> Model:
         """Model with one reduction done.
 
-        Parameters
-        ----------
-        model : Model
-
         Raises
         ------
         ModelError

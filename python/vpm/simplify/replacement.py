@@ -41,12 +41,7 @@ class Replacement(Reduction):
         return f"{self.at} as {self.name}"
 
     def applied(self, model: Model) -> Model:
-        """Model with a replacement in the place of its servo-cylinder.
-
-        Parameters
-        ----------
-        model : Model
-        """
+        """Model with a replacement in the place of its servo-cylinder."""
         return replaced(model, self.at, self.entry)
 
 

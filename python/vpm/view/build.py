@@ -24,13 +24,7 @@ RAISED, TURNED = 0.30, 0.75
 
 
 def scene_of(model: Model, course: Course) -> Scene:
-    """Build the scene of a machine in a motion, as shapes.
-
-    Parameters
-    ----------
-    model : Model
-    course : Course
-    """
+    """Build the scene of a machine in a motion, as shapes."""
     skeleton = Skeleton(model)
     pose = skeleton.pose(course.coordinates)
     if not pose.size < LARGEST:

@@ -36,13 +36,7 @@ SPEEDS = ("0.01", "0.02", "0.05", "0.1", "0.2", "0.5", "1", "2", "5", "10")
 
 
 class Stage:
-    """What of a scene a browser shows: one mesh for each role.
-
-    Parameters
-    ----------
-    server : ViserServer
-    dark : bool
-    """
+    """What of a scene a browser shows: one mesh for each role."""
 
     def __init__(self, server: ViserServer, *, dark: bool) -> None:
         self._server, self._dark = server, dark

@@ -38,12 +38,7 @@ Draw = Callable[[Pose], Iterator[Shape]]
 
 
 class Skeleton:
-    """The parts of a machine that are drawn.
-
-    Parameters
-    ----------
-    model : Model
-    """
+    """The parts of a machine that are drawn."""
 
     def __init__(self, model: Model) -> None:
         self.frames = Frames(model)

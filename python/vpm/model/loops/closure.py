@@ -55,10 +55,6 @@ class Loops:
     Positions ``q``, velocities ``v`` and accelerations ``a`` have one number per coordinate, in the order of
     ``model.coordinates``.
 
-    Parameters
-    ----------
-    model : Model
-
     Examples
     --------
     >>> q = model.loops.assembled({"crank": 0.3})
