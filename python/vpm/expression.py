@@ -10,12 +10,10 @@ from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import VpmError, near_match
+from vpm.numbers import Array
 from vpm.units import BASE_UNITS, Power, Unit
-
-Array = NDArray[np.float64]
 
 #: Expressions with more characters mean nothing.
 LONGEST = 300

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import SimulationError, near_match, needs
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import AUTOMATIC
 from vpm.stepping import Simulation
 
@@ -17,8 +18,6 @@ with needs("gymnasium", "gym"):
     import gymnasium
     from gymnasium.vector import AutoresetMode, VectorEnv
     from gymnasium.vector.utils import batch_space
-
-Array = NDArray[np.float64]
 #: Rewards (E,) of actions (E, nu) that led to observations (E, m).
 Reward = Callable[[Array, Array], Array]
 

@@ -15,8 +15,7 @@ from vpm.experiment import Experiment, Motion, joints_from_sensors, motion
 from vpm.model import Model
 from vpm.model.drives.states import commanded_states, follow, rest
 from vpm.model.loops.states import kept, measured
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: How the size of a piston is given: two diameters, or an area and the share of it on the side of the rod.
 _SIZES = ("bore", "rod", "area", "area_ratio")

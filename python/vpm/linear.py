@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import SimulationError, near_match, needs
+from vpm.numbers import Array
 from vpm.results import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 

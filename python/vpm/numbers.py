@@ -7,6 +7,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import VpmError
 
+#: Real numbers.
+Array = NDArray[np.float64]
+
 #: No quantity of a machine is larger in SI units; squares and products of three are still finite numbers.
 LARGEST = 1e100
 #: Two-sided 95 % quantile of the normal distribution.
@@ -15,7 +18,7 @@ NORMAL_95 = 1.959963984540054
 UNKNOWN = "–"
 
 
-def array_of(given: ArrayLike, what: str, error: type[VpmError] = VpmError) -> NDArray[np.float64]:
+def array_of(given: ArrayLike, what: str, error: type[VpmError] = VpmError) -> Array:
     """Array of numbers.
 
     Parameters

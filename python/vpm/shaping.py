@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import ModelError, SimulationError
 from vpm.model import Model
-from vpm.numbers import array_of
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array, array_of
 
 #: How often each kind convolves the shaper that cancels a mode once.
 KINDS = {"zv": 1, "zvd": 2}

@@ -8,11 +8,11 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import DivergedError, SimulationError, near_match
 from vpm.model import Model
-from vpm.numbers import array_of
+from vpm.numbers import Array, array_of
 from vpm.simulate import AUTOMATIC, Resolution, Run, Setup, judged
 from vpm.simulate.resolution import outermost, resolution
 
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
     from vpm._core import Simulation as Core
     from vpm._core import Snapshot
 
-Array = NDArray[np.float64]
 
 #: What drives a simulation: it sees the simulation and gives one command per actuator.
 Controller = Callable[["Simulation"], ArrayLike | Mapping[str, float]]

@@ -15,13 +15,11 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import SimulationError
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import Setup
-
-Array = NDArray[np.float64]
 
 #: Steps of the one process.
 FEW = 100

@@ -8,16 +8,14 @@ from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import SimulationError, ValidityWarning
 from vpm.experiment import Experiment
 from vpm.initial import initial_state
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.realtime import Loop
 from vpm.simulate import Setup, simulate
-
-Array = NDArray[np.float64]
 
 #: The command that is repeated when no record is given: samples, and frequencies in Hz.
 SWEEP_SAMPLES = 10_000

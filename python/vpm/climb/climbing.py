@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.climb.result import Climb, Level
 from vpm.errors import IdentificationError, VpmError
@@ -15,9 +14,8 @@ from vpm.experiment import Experiment, as_records
 from vpm.identify import Estimate, OutputErrorProblem, estimate, gain, gaps, segments
 from vpm.model import Model
 from vpm.model.beams.level import size_of
+from vpm.numbers import Array
 from vpm.simulate import Setup, judging_mode
-
-Array = NDArray[np.float64]
 
 #: A level pays where it predicts validation records better by so many standard deviations, and by more than this share.
 SURE, WORTH = 2.0, 0.02

@@ -7,17 +7,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.compare.correlation import Correlation
 from vpm.compare.regions import Where
 from vpm.errors import ExperimentError, near_match
+from vpm.numbers import Array
 from vpm.results import Result, Storable, html_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False, eq=False)

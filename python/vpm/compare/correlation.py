@@ -6,12 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vpm.numbers import NORMAL_95
+from vpm.numbers import NORMAL_95, Array
 from vpm.results import Storable
-
-Array = NDArray[np.float64]
 
 #: Most lags that are kept.
 MOST_LAGS = 200

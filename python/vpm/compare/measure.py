@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.compare.comparison import ChannelComparison, Comparison
 from vpm.compare.correlation import Correlation, autocorrelation, cross_correlation, effective_samples
@@ -15,9 +14,8 @@ from vpm.errors import ExperimentError, near_match
 from vpm.experiment import Experiment, choose_cutoff, differentiate, lowpass
 from vpm.experiment.cutoff import FEWEST_SAMPLES
 from vpm.experiment.signal import anti_alias
+from vpm.numbers import Array
 from vpm.simulate.run import Run
-
-Array = NDArray[np.float64]
 
 #: Endings of channels that drive a machine.
 INPUTS = ("command", "reference", "disturbance")

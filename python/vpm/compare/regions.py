@@ -6,11 +6,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vpm.numbers import Array
 from vpm.results import Storable
-
-Array = NDArray[np.float64]
 
 #: A region that holds this much more of the energy than of the samples is worth naming.
 WORTH_NAMING = 0.1

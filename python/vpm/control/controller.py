@@ -7,19 +7,18 @@ from time import perf_counter
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.control.feedback import StateFeedback, at_axes
 from vpm.control.plan import FlexibleFeedforward
 from vpm.errors import SimulationError, near_match
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.observer import Noise, Observer
 from vpm.simulate import AUTOMATIC
 
 if TYPE_CHECKING:
     from vpm.stepping import Simulation
-
-Array = NDArray[np.float64]
 
 
 class FlexibleController:

@@ -13,9 +13,8 @@ from vpm.control.schedule import TIME, Schedule
 from vpm.errors import SimulationError, near_match
 from vpm.linear import LinearModel
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.results import Result
-
-Array = NDArray[np.float64]
 
 #: Points along a motion.
 POINTS = 60

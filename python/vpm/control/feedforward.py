@@ -14,10 +14,8 @@ from vpm.control.target import TargetMotion
 from vpm.control.task import Task, task_of
 from vpm.errors import SimulationError, near_match
 from vpm.model import Model
-from vpm.numbers import array_of, number_of
+from vpm.numbers import Array, array_of, number_of
 from vpm.simulate import Setup
-
-Array = NDArray[np.float64]
 
 #: From the cheapest to the exact one.
 METHODS = ("rigid", "quasi_static", "inertial", "inversion")

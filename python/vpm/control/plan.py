@@ -12,12 +12,11 @@ from numpy.typing import NDArray
 from vpm.errors import SimulationError, near_match
 from vpm.experiment import Experiment
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.results import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False, eq=False)

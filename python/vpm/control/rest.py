@@ -5,12 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.control.task import Task
 from vpm.errors import SimulationError
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Newton's method ends where steps are this small, rad or m, and gives up after so many.
 CLOSE, STEPS = 1e-11, 60

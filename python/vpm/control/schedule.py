@@ -12,10 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from vpm.control.plan import FlexibleFeedforward
 from vpm.errors import SimulationError, near_match
 from vpm.model import Model
-from vpm.numbers import array_of
+from vpm.numbers import Array, array_of
 from vpm.results import Storable
-
-Array = NDArray[np.float64]
 
 #: The axis of schedules along a motion.
 TIME = "time"

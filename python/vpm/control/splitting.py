@@ -9,8 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import SimulationError
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 
 #: Rates ``x' = f(times, x)`` of many rows (N, nx), with their derivatives (N, nx, nx).

@@ -7,13 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import ExperimentError, SimulationError
 from vpm.experiment import Experiment
-from vpm.numbers import array_of
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array, array_of
 
 #: Derivatives that are zero at both ends of a motion from rest to rest: an inversion asks for two, splines add two.
 FLAT = 4

@@ -8,13 +8,11 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.control.target import TargetMotion
 from vpm.errors import SimulationError, near_match
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Step of difference quotients of fourth order, rad or m: its fourth power is as small as what rounding leaves.
 STEP = 1e-3

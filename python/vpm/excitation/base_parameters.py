@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExcitationError, near_match
 from vpm.identify.identifiability import find_base
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.results import Storable
 from vpm.simulate import check_balance
-
-Array = NDArray[np.float64]
 
 #: Random states at which a regressor shows its rank.
 STATES = 400

@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExcitationError, near_match
 from vpm.excitation.base_parameters import base_parameters, free_names
@@ -15,8 +14,7 @@ from vpm.excitation.fourier import FourierTrajectory, motion_at
 from vpm.excitation.limits import JointLimits
 from vpm.excitation.worth import Worth
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Called with (evaluations so far, criterion of the best motion so far).
 Progress = Callable[[int, float], None]

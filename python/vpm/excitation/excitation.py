@@ -10,17 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExcitationError, near_match
 from vpm.experiment import Experiment
 from vpm.files import replacing
+from vpm.numbers import Array
 from vpm.results import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 #: Fewest samples that make an excitation.
 FEWEST_SAMPLES = 10

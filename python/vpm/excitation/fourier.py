@@ -6,12 +6,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.excitation.excitation import Excitation
 from vpm.excitation.limits import JointLimits
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Points for every period of the highest harmonic where bounds are taken.
 POINTS = 24

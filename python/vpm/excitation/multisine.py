@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import ExcitationError
 from vpm.excitation.excitation import Excitation, check_band, check_positive, clock
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 #: Called with (iterations so far, crest factor).

@@ -6,13 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExcitationError
 from vpm.excitation.excitation import Excitation, check_positive
 from vpm.excitation.limits import JointLimits
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 class Move(NamedTuple):

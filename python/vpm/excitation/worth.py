@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.excitation.base_parameters import parameter_scales, regressor
 from vpm.excitation.fourier import at_rest, bound_grid, motion_at, within_limits
 from vpm.excitation.limits import JointLimits
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Weight of an effort beyond its limit, in the logarithm of the criterion.
 PENALTY = 20.0

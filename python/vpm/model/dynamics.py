@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from vpm.model.model import Model
-
-Array = NDArray[np.float64]
 
 
 class Dynamics:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import CoreError, ModelError, near_match
 from vpm.linear import LinearModel
@@ -13,9 +13,7 @@ from vpm.model.drives.states import follow, rest
 from vpm.model.loops.closure import Loops
 from vpm.model.loops.states import close, reduced, resting
 from vpm.model.motions import Motions
-from vpm.numbers import array_of, number_of
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array, array_of, number_of
 
 
 class Evaluations(Motions):

@@ -9,18 +9,16 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import CoreError, ModelError
 from vpm.model.component_names import Components
 from vpm.model.standard import OF_FILE, PLAIN, STANDARD, standard_parameters
-from vpm.numbers import array_of
+from vpm.numbers import Array, array_of
 
 if TYPE_CHECKING:
     from vpm._core import Dynamics, System
     from vpm.model.parameters import Parameter
-
-Array = NDArray[np.float64]
 Shape = tuple[int, ...]
 
 #: Difference of efforts, relative to their size, below which they agree: rounding of long sums.

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: The ten standard parameters of a body, in this order, and their units.
 STANDARD = (

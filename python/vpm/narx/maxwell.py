@@ -8,14 +8,13 @@ from functools import cached_property
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm._core import Diverged
 from vpm._core import MaxwellNarx as Compiled
 from vpm.errors import DivergedError, IdentificationError, SimulationError
+from vpm.numbers import Array
 from vpm.results import Result
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from math import comb
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.narx.maxwell_recursion import POWERS, surface_columns
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Coefficients of a polynomial of total degree d in two variables: the first so many of the ten.
 COUNTS = (1, 3, 6, 10)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.compare import autocorrelation
 from vpm.narx.maxwell import MaxwellNarx
@@ -12,8 +11,7 @@ from vpm.narx.maxwell_problem import OutputErrors, Parameters
 from vpm.narx.maxwell_records import MaxwellSignals, Samples
 from vpm.narx.maxwell_recursion import POWER_NAMES, POWERS
 from vpm.narx.run import inside
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: A combination of parameters that moves the force by less than this share of what each of them does is not seen.
 UNSEEN = 1e-7

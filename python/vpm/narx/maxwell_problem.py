@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.narx.maxwell_basis import Basis
 from vpm.narx.maxwell_records import Samples
 from vpm.narx.maxwell_recursion import Recursion, Scheme, seen, stretch
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Relaxation times that records can show: half a step, below which samples alternate in the trapezoidal form, and so
 #: many times the longest record.

@@ -6,14 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
 from vpm.narx.records import RecordLike, as_list, series
+from vpm.numbers import Array
 from vpm.results import Storable
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.narx.maxwell import MaxwellNarx
@@ -17,7 +16,6 @@ from vpm.narx.maxwell_records import MaxwellSignals, Samples, element_samples
 from vpm.narx.maxwell_result import MaxwellFit, training_rmse, unrefined
 from vpm.narx.records import RecordLike
 
-Array = NDArray[np.float64]
 Records: TypeAlias = "RecordLike | Sequence[RecordLike]"
 
 #: Fewest samples of a record or window in motion.

@@ -6,15 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import DivergedError
 from vpm.narx.maxwell import MaxwellNarx
 from vpm.narx.maxwell_records import Samples
 from vpm.narx.maxwell_recursion import POWER_NAMES
+from vpm.numbers import Array
 from vpm.results import Result
-
-Array = NDArray[np.float64]
 
 #: A free run beyond so many times the largest measured force counts as diverged.
 FAR = 1e3

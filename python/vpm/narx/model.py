@@ -8,7 +8,6 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm._core import Diverged, NarxStepper
 from vpm._core import Narx as Compiled
@@ -16,12 +15,11 @@ from vpm.errors import DivergedError, IdentificationError, SimulationError
 from vpm.experiment import Experiment
 from vpm.narx.records import RecordLike, Series, series
 from vpm.narx.run import NarxRun
+from vpm.numbers import Array
 from vpm.results import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -7,12 +7,11 @@ from dataclasses import dataclass, replace
 from typing import TypeAlias, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: A log, or arrays by name, which have no clock: their time counts samples.
 RecordLike: TypeAlias = "Experiment | Mapping[str, ArrayLike]"

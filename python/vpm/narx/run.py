@@ -8,16 +8,13 @@ from statistics import NormalDist
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.compare import Correlation, autocorrelation, cross_correlation
-from vpm.numbers import NORMAL_95
+from vpm.numbers import NORMAL_95, Array
 from vpm.results import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 
 def inside(correlation: Correlation) -> bool:

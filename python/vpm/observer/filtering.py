@@ -7,19 +7,18 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, ExperimentError, SimulationError, near_match
 from vpm.experiment import Experiment
 from vpm.initial import initial_state
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import Setup
 from vpm.simulate.inputs import held_inputs
 
 if TYPE_CHECKING:
     from vpm.observer.noise import Noise
 
-Array = NDArray[np.float64]
 
 #: How far coordinates and rates may be from the first state, SI; states of drives by this share of themselves.
 COORDINATES, RATES, DRIVES = 1e-2, 1.0, 0.1

@@ -6,15 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, SimulationError, near_match
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.observer.filtering import Record, filtered, first_deviations
 from vpm.results import Storable
 from vpm.simulate import Setup
-
-Array = NDArray[np.float64]
 
 #: Samples of each record that decide on the noise: second moments need no more.
 SAMPLES = 4000

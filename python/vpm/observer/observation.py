@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.experiment import Experiment
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.observer.filtering import Record, filtered
 from vpm.observer.noise import Noise, likely_noise
 from vpm.results import Result
@@ -19,7 +19,6 @@ from vpm.simulate import Setup
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 #: Lags whose correlations tell whether innovations are white.
 LAGS = 20

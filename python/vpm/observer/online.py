@@ -6,16 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import DivergedError, SimulationError, near_match
 from vpm.model import Model
-from vpm.numbers import array_of
+from vpm.numbers import Array, array_of
 from vpm.observer.filtering import first_deviations
 from vpm.observer.noise import Noise
 from vpm.simulate import AUTOMATIC, Setup
-
-Array = NDArray[np.float64]
 
 
 class SteadyGain(NamedTuple):

@@ -5,12 +5,10 @@ from __future__ import annotations
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vpm.numbers import Array
 from vpm.optimise.equations import Equations, Expression, casadi
 from vpm.optimise.task import RATE, Limit
-
-Array = NDArray[np.float64]
 
 
 class Channels:

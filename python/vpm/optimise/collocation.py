@@ -8,9 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Points in each interval.
 STAGES = 3

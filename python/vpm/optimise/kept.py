@@ -6,14 +6,13 @@ import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vpm.numbers import Array
 from vpm.optimise.channels import Channels
 from vpm.optimise.equations import casadi
 from vpm.optimise.motion import MeshMotion
 from vpm.optimise.task import Fitted, Limit
 
-Array = NDArray[np.float64]
 #: Instants of each phase where limits are looked at, and the share of a limit's width that is no difference.
 LOOKS, HAIR = 1001, 1e-3
 

@@ -10,15 +10,14 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.polynomial import legendre
-from numpy.typing import NDArray
 
+from vpm.numbers import Array
 from vpm.optimise.channels import Channels
 from vpm.optimise.collocation import STAGES
 from vpm.optimise.motion import MeshMotion
 from vpm.optimise.task import RATE, Fitted
 from vpm.optimise.transcription import Scales
 
-Array = NDArray[np.float64]
 #: Intervals that a phase may have.
 MOST = 400
 #: Shares of an interval where the equations are looked at, and their weights (Gauss, exact up to degree 9).

@@ -6,11 +6,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vpm.numbers import Array
 from vpm.optimise.collocation import STAGES, at_times, spread
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,18 +8,16 @@ from dataclasses import replace
 from os import PathLike
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import OptimisationError, VpmError
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.optimise.channels import Channels
 from vpm.optimise.kept import binding, passed
 from vpm.optimise.motion import MeshMotion
 from vpm.optimise.optimum import Optimum
 from vpm.optimise.solve import Progress, Search, SearchInterruptedError, search
 from vpm.optimise.task import Fitted, Task, as_task
-
-Array = NDArray[np.float64]
 
 
 class OptimisationInterruptedError(KeyboardInterrupt):

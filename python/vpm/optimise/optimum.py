@@ -9,10 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import OptimisationError, near_match
 from vpm.experiment import Experiment
+from vpm.numbers import Array
 from vpm.results import Result
 
 if TYPE_CHECKING:
@@ -20,8 +20,6 @@ if TYPE_CHECKING:
 
     from vpm.model import Model
     from vpm.simulate import Run
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array
 
+from vpm.numbers import Array
 from vpm.optimise.equations import Expression, casadi
 
-Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 
 

@@ -11,10 +11,10 @@ from types import FrameType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import OptimisationError, VpmError
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.optimise.channels import Channels
 from vpm.optimise.equations import casadi, equations
 from vpm.optimise.kept import binding
@@ -24,7 +24,6 @@ from vpm.optimise.start import complete, ends, scales, simulated, way
 from vpm.optimise.task import Fitted, Limit
 from vpm.optimise.transcription import Scales, Transcription
 
-Array = NDArray[np.float64]
 #: Called with a sentence about what is being done.
 Progress = Callable[[str], object]
 #: Iterations of IPOPT on one mesh.

@@ -8,12 +8,12 @@ from contextlib import suppress
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm, matrix_balance
 
 from vpm.errors import VpmError
 from vpm.model import Model
 from vpm.model.drives.states import rest as settled
+from vpm.numbers import Array
 from vpm.optimise.channels import Channels
 from vpm.optimise.collocation import spread
 from vpm.optimise.equations import casadi
@@ -21,7 +21,6 @@ from vpm.optimise.motion import MeshMotion
 from vpm.optimise.task import End, Fitted, Limit
 from vpm.optimise.transcription import LARGE, Scales
 
-Array = NDArray[np.float64]
 #: Steps of the response that tells how far commands move a state.
 RESPONSE = 60
 #: Samples of a guess that is simulated.

@@ -12,9 +12,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse import coo_array, csc_array, csr_array
 
+from vpm.numbers import Array
 from vpm.optimise.channels import Channels
 from vpm.optimise.collocation import DERIVATIVE, POINTS, STAGES, WEIGHTS
 from vpm.optimise.equations import Equations, Expression, casadi
@@ -22,7 +22,6 @@ from vpm.optimise.motion import MeshMotion
 from vpm.optimise.program import Group, Program
 from vpm.optimise.task import RATE, End, Fitted, Limit
 
-Array = NDArray[np.float64]
 LARGE = 1e19  # IPOPT takes it for infinite
 
 

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.numbers import percent, short
 from vpm.plot.style import BLUE, GREEN, INK, LINE, ORANGE, SOFT, panels, styled
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
 
     from vpm.climb.result import Level
     from vpm.discrepancy.diagnosis import ChannelGap, RankedCandidate
-
-Array = NDArray[np.float64]
 
 
 #: Candidates that are drawn.

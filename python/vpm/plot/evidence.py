@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vpm.numbers import short
+from vpm.numbers import Array, short
 from vpm.plot.style import BLUE, INK, LINE, ORANGE, SOFT, label, panels, styled
 
 if TYPE_CHECKING:
@@ -17,7 +16,6 @@ if TYPE_CHECKING:
 
     from vpm.discrepancy.evidence import Evidence
 
-Array = NDArray[np.float64]
 
 #: Points that a cloud keeps.
 MOST_DOTS = 1200

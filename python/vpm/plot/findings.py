@@ -5,9 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-from numpy.typing import NDArray
-
+from vpm.numbers import Array
 from vpm.plot.signals import (
     amplitude_density,
     draw_correlation,
@@ -22,7 +20,6 @@ if TYPE_CHECKING:
 
     from vpm.discrepancy.diagnosis import Picture, Trace
 
-Array = NDArray[np.float64]
 
 #: Samples of a segment of a spectrum: a picture shows no finer lines; and points that are few enough to have a mark.
 MOST_IN_SEGMENT, FEW = 2048, 40

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vpm.numbers import Array
 from vpm.plot.style import BLUE, INK, LINE, ORANGE, SOFT, panels, styled
 
 if TYPE_CHECKING:
@@ -16,7 +16,6 @@ if TYPE_CHECKING:
 
     from vpm.identify.inertial_fit import InertialFit
 
-Array = NDArray[np.float64]
 
 #: Half width of a 95 % interval, relative to the value, up to which a base parameter is drawn as known.
 KNOWN = 0.2

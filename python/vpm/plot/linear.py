@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.numbers import Array
 from vpm.plot.style import BLUE, LINE, ORANGE, SOFT, STAGES, label, panels, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 

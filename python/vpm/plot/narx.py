@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vpm.numbers import Array
 from vpm.plot.signals import draw_overlay, legend_above
 from vpm.plot.style import BLUE, INK, label, panels, styled, thinned
 
@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from vpm.narx.run import NarxRun
-
-Array = NDArray[np.float64]
 
 
 @styled

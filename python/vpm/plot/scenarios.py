@@ -11,8 +11,8 @@ from textwrap import fill
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vpm.numbers import Array
 from vpm.plot.style import BLUE, GREEN, INK, ORANGE, PURPLE, SKY, SOFT, label, panels, styled, thinned
 from vpm.units import convert
 
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
     from vpm.scenario.outcome import ScenarioRun
 
-Array = NDArray[np.float64]
 
 #: Colours of runs and styles of the channels of a panel, each in the order of their use.
 RUNS = (BLUE, ORANGE, GREEN, PURPLE, SKY, SOFT)

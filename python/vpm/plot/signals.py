@@ -8,9 +8,8 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vpm.numbers import stretches
+from vpm.numbers import Array, stretches
 from vpm.plot.style import BLUE, INK, ORANGE, SOFT, STAGES, label, panels, styled, thinned
 
 if TYPE_CHECKING:
@@ -19,7 +18,6 @@ if TYPE_CHECKING:
 
     from vpm.simulate.run import Run
 
-Array = NDArray[np.float64]
 
 #: Bins of the running mean over a state, and samples that one has in the mean where there are fewer bins.
 MEAN_BINS, TYPICAL_IN_BIN = 40, 10

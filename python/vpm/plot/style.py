@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import needs
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -22,7 +23,6 @@ if TYPE_CHECKING:
     from matplotlib.projections.polar import _AxisWrapper
     from matplotlib.ticker import _DummyAxis
 
-Array = NDArray[np.float64]
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.plot.signals import draw_overlay, draw_residual_against, draw_residual_time
 from vpm.plot.style import label, panels, styled
@@ -16,8 +15,6 @@ if TYPE_CHECKING:
 
     from vpm.compare.comparison import Comparison
     from vpm.discrepancy.diagnosis import Picture
-
-Array = NDArray[np.float64]
 
 
 @styled

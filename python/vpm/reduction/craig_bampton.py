@@ -13,10 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
-from numpy.typing import NDArray
 
 from vpm.errors import ReductionError
 from vpm.model.beams.reduced import MODES, ReducedLink
+from vpm.numbers import Array
 from vpm.reduction.structure import (
     Structure,
     check_structure,
@@ -26,8 +26,6 @@ from vpm.reduction.structure import (
     with_real_bodies,
 )
 from vpm.reduction.tied import Tied
-
-Array = NDArray[np.float64]
 
 #: Signs of the cross product: ``(a x b)_k = CROSS_kij a_i b_j``.
 _CROSS = np.array([[np.cross(a, b)[k] for a in np.eye(3) for b in np.eye(3)] for k in range(3)]).reshape(3, 3, 3)

@@ -16,13 +16,13 @@ from pydantic import Field, ValidationError
 from vpm.errors import ReductionError, VpmError
 from vpm.model.beams.reduced import read_bytes
 from vpm.model.entry import Entry, Number, Switch, Text, Vector
+from vpm.numbers import Array
 from vpm.reduction.craig_bampton import Reduction, reduce_structure
 from vpm.reduction.labelled import COMPONENTS, Labelled, read_labelled, read_labelled_nodes
 from vpm.reduction.matrices import read_matrix, read_nodes
 from vpm.reduction.solid import box_mesh, read_mesh, solid
 from vpm.reduction.structure import Interface, Matrix, Structure, Tie
 
-Array = NDArray[np.float64]
 _Positive = Annotated[Number, Field(gt=0.0)]
 _Count = Annotated[int, Field(strict=True, ge=1, le=1000)]
 

@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from vpm.errors import ReductionError, VpmError
 from vpm.model.beams.reduced import read_bytes
+from vpm.numbers import Array
 from vpm.reduction.structure import Matrix
-
-Array = NDArray[np.float64]
 
 #: Components of a node, and the highest label that programs give.
 COMPONENTS, HIGHEST = 6, 2**40

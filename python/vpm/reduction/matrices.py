@@ -7,13 +7,11 @@ from pathlib import Path
 import numpy as np
 import scipy.io
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from vpm.errors import ReductionError, VpmError
 from vpm.model.beams.reduced import read_bytes
+from vpm.numbers import Array
 from vpm.reduction.structure import Matrix
-
-Array = NDArray[np.float64]
 
 
 def read_matrix(path: Path, *, triangle: bool = False) -> Matrix:

@@ -8,13 +8,12 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from vpm.errors import ReductionError
+from vpm.numbers import Array
 from vpm.reduction.library import finite_elements
 from vpm.reduction.structure import Interface, Structure
 
-Array = NDArray[np.float64]
 #: Meshes, tensors and modules of scikit-fem, which has no types.
 Mesh = Any
 Tensor = Any

@@ -12,8 +12,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from vpm.errors import ReductionError
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 #: Sparse arrays of scipy, whose types say more than is needed here.
 Matrix = Any
 Tie = Literal["rigid", "averaged"]

@@ -11,9 +11,8 @@ import scipy.sparse.linalg as spla
 from numpy.typing import NDArray
 
 from vpm.errors import ReductionError
+from vpm.numbers import Array
 from vpm.reduction.structure import Interface, Matrix, Structure, rigid_motions
-
-Array = NDArray[np.float64]
 
 #: Masses up to which their flexibility is a matrix.
 _FEW = 300

@@ -8,13 +8,12 @@ from math import isnan
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS, signature_of
 from vpm.compare.correlation import gapped_autocorrelation
 from vpm.discrepancy import Diagnosis, Evidence
 from vpm.discrepancy.diagnosis import Picture, Trace
-from vpm.numbers import percent, short
+from vpm.numbers import Array, percent, short
 from vpm.plot import figure_to_svg, plot_candidates, plot_evidence, plot_gap, plot_parameters
 from vpm.plot.bars import drawn_candidates
 from vpm.plot.findings import (
@@ -31,7 +30,6 @@ from vpm.report.messages import last_stage
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 #: Joints, channels and effects that a page shows pictures of: those with the largest errors.
 MOST_JOINTS, MOST_TRACES = 4, 4

@@ -6,12 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.model.joint import JointType
 from vpm.model.pose import Pose
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 Vector = tuple[float, ...]
 
 #: Joints with one coordinate.

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import near_match
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.scenario import signals
 from vpm.scenario.clock import Clock
 from vpm.scenario.messages import Keys, refuse
 from vpm.scenario.schema import Chirp, Constant, Document, Given, Listed, Points, Signal, Sine
 from vpm.scenario.values import si_value
 from vpm.units import parse_unit
-
-Array = NDArray[np.float64]
 
 
 def given_inputs(document: Document, owner: str, model: Model, clock: Clock) -> Mapping[str, Array]:

@@ -7,17 +7,15 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ScenarioError, near_match
 from vpm.experiment import Experiment
+from vpm.numbers import Array
 from vpm.results import Result, html_table
 from vpm.simulate import Run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 
 class Extremes(NamedTuple):

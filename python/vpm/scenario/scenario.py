@@ -11,7 +11,6 @@ from types import MappingProxyType
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import ValidationError
 
 from vpm.batch import side_by_side
@@ -19,6 +18,7 @@ from vpm.errors import DivergedError, ScenarioError, SimulationError, VpmError, 
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.model.reading import parse_toml, read_toml
+from vpm.numbers import Array
 from vpm.results import html_table
 from vpm.scenario.clock import check_numbers, clock_of
 from vpm.scenario.form import schema_problems
@@ -31,8 +31,6 @@ from vpm.scenario.schema import Document
 from vpm.scenario.start import held_inputs, start_state
 from vpm.simulate import Run, Setup, simulate
 from vpm.tasks import BatchInterruptedError
-
-Array = NDArray[np.float64]
 
 
 class Scenario:

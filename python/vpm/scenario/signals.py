@@ -8,9 +8,8 @@ and by properties that hold for all numbers: bounds, ends, jumps.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Share of a sampling interval by which a sample may miss a jump and still show the value behind it.
 SLACK = 1e-6

@@ -5,18 +5,16 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ModelError, near_match
 from vpm.model import Model
 from vpm.model.drives.states import rest
 from vpm.model.loops.states import close, kept
+from vpm.numbers import Array
 from vpm.scenario.messages import refuse
 from vpm.scenario.schema import Document
 from vpm.scenario.values import si_value
 from vpm.stepping import Simulation
-
-Array = NDArray[np.float64]
 
 
 def start_state(document: Document, owner: str, model: Model, inputs: Mapping[str, Array]) -> Array:

@@ -14,7 +14,6 @@ from dataclasses import replace
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from vpm.errors import VpmError
@@ -22,10 +21,10 @@ from vpm.experiment import Experiment
 from vpm.identify import OutputErrorProblem
 from vpm.model import Model
 from vpm.narx import MaxwellNarx, MaxwellSignals, Narx, identify, refine_maxwell
+from vpm.numbers import Array
 from vpm.simplify.replacement import Replacement, commanded
 from vpm.simulate import Setup
 
-Array = NDArray[np.float64]
 #: Force that pulls the ends together (N), length (m), its rate (m/s), drive signal.
 Record = Mapping[str, Array]
 Entry = dict[str, object]

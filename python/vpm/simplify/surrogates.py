@@ -11,10 +11,10 @@ import json
 from collections.abc import Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.experiment import Experiment
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simplify.hydraulics import hydraulic_drives
 from vpm.simplify.learnt import maxwell_entry, narx_entry, trained
 from vpm.simplify.reductions import Reduction
@@ -22,7 +22,6 @@ from vpm.simplify.replacement import Replacement
 from vpm.simplify.tables import tables
 from vpm.simulate import Run, simulate
 
-Array = NDArray[np.float64]
 Record = dict[str, Array]
 
 

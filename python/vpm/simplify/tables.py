@@ -10,16 +10,14 @@ import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
 from vpm.errors import VpmError
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simplify.hydraulics import CLEARANCE, NO_STATE, hydraulic_drives, simpler
 from vpm.simplify.replacement import TABLE, Replacement
 from vpm.simulate import Run
-
-Array = NDArray[np.float64]
 
 #: Nodes along commands and velocities; odd, so that zero is one of them.
 NODES = (41, 25)

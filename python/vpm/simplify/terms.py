@@ -13,18 +13,17 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.model.beams.level import size_of
+from vpm.numbers import Array
 from vpm.simulate import Setup, simulate_arrays
 
 if TYPE_CHECKING:
     from vpm.simplify.reductions import Reduction
 
-Array = NDArray[np.float64]
 
 #: What all of it is called in the place of single parts.
 MACHINE = "the machine"

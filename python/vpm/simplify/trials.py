@@ -8,20 +8,18 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.budget import commands, start_state, step_times
 from vpm.errors import ExecutorError, SimulationError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simplify.judge import Judge
 from vpm.simplify.pareto_front import Rung
 from vpm.simplify.reductions import Reduction, reduced
 from vpm.simplify.replacement import commanded
 from vpm.simulate import FIXED_STEP, Setup
 from vpm.tasks import outcomes
-
-Array = NDArray[np.float64]
 
 #: Steps timed for each rung: as many as these seconds allow, within these numbers. A 99.9 % quantile needs the least.
 TIMED_SECONDS = 0.05

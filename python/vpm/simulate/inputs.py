@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from vpm.errors import ExperimentError, SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 def held_inputs(model: Model, experiment: Experiment, mode: str) -> Array:

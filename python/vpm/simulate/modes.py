@@ -26,12 +26,11 @@ from vpm.experiment import Experiment, Motion
 from vpm.initial import initial_state as start
 from vpm.initial import joint_motion, measured_states, whole_motion
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate.inputs import check_controllers, held_inputs, references_of, restart_grid, uncontrolled
 from vpm.simulate.resolution import resolution
 from vpm.simulate.run import Run, SimulatedArrays, judged, run_of
 from vpm.simulate.setup import AUTOMATIC, HOLDS, Setup
-
-Array = NDArray[np.float64]
 
 MODES = ("free_run", "inverse_dynamics", "restarts", "closed_loop", "prescribed_motion")
 #: Those whose commands come from the log.

@@ -7,13 +7,11 @@ from functools import cached_property
 from typing import Any, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.results import Storable
 from vpm.simulate.setup import Setup
-
-Array = NDArray[np.float64]
 
 
 class Modes(NamedTuple):

@@ -14,6 +14,7 @@ from vpm.errors import SimulationError, ValidityWarning
 from vpm.experiment import Experiment
 from vpm.initial import passive_joints
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.results import Result
 from vpm.simulate.inputs import uncontrolled
 from vpm.simulate.resolution import Resolution
@@ -21,8 +22,6 @@ from vpm.simulate.setup import HOLDS, Setup
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -8,9 +8,9 @@ from importlib.resources import files
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import VpmError
+from vpm.numbers import Array
 from vpm.studies.carton_pictures import pictures
 from vpm.studies.crease import Damage, damaged, elastica
 from vpm.studies.study import Compared, Study, Table
@@ -19,7 +19,6 @@ from vpm.units import convert
 if TYPE_CHECKING:
     from vpm.model import Model
 
-Array = NDArray[np.float64]
 
 #: Equation B.2: stiffness of a crease per length, in its two readings.
 PER_LENGTH = 0.009375

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import VpmError
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from vpm.model import Model
-
-Array = NDArray[np.float64]
 Folded = TypeVar("Folded")
 
 NAME = "damaged_crease"

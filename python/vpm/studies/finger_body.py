@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import VpmError
+from vpm.numbers import Array
 from vpm.reduction.library import finite_elements
 from vpm.studies.material import Material
 from vpm.studies.soft import SoftBody
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vpm.numbers import Array
 from vpm.studies.finger_body import Finger
 from vpm.studies.pictures import curves, field
 from vpm.studies.press import Pressed
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from vpm.studies.fingertip import Curve
-
-Array = NDArray[np.float64]
 
 
 def equivalent_stress(body: SoftBody, state: State) -> Array:

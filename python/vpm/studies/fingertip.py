@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vpm.numbers import Array
 from vpm.studies.finger_body import Finger, block, check_fineness, hertz, layer_factor
 from vpm.studies.finger_pictures import pictures
 from vpm.studies.material import Material
 from vpm.studies.press import Pressed, press
 from vpm.studies.study import Cell, Compared, Study, Table
-
-Array = NDArray[np.float64]
 
 #: Table B.3: force (N) at 1, 2 and 3 mm in five trials, and that of the thesis' model.
 TRIALS = np.array(

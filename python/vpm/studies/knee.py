@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import VpmError
+from vpm.numbers import Array
 from vpm.studies.knee_pictures import pictures
 from vpm.studies.solid import Solid, von_mises
 from vpm.studies.study import Cell, Compared, Study, Table
 from vpm.studies.yoke import Yoke, frame
-
-Array = NDArray[np.float64]
 
 #: Table B.1: Young's modulus (GPa) as printed and as it has to be, yield stress (MPa) likewise.
 MATERIALS = {

@@ -11,12 +11,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import VpmError
+from vpm.numbers import Array
 from vpm.studies.jet import Jet, variables
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,12 +8,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from vpm.numbers import Array
 from vpm.plot.style import INK, STAGES, label, panels, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 #: Name, abscissae, ordinates, and how it is drawn ("-", "--", "o", "o-").
 Curve = tuple[str, ArrayLike, ArrayLike, str]
 

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import VpmError
+from vpm.numbers import Array
 from vpm.studies.jet import Jet
 from vpm.studies.soft import Obstacle, SoftBody, State
-
-Array = NDArray[np.float64]
 
 #: Newton steps, halvings of a step, halvings of a load step, rounds of contact.
 STEPS, HALVINGS, CUTS, ROUNDS = 30, 6, 6, 12

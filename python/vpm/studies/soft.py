@@ -15,14 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import bmat, csc_matrix, csr_matrix
 
+from vpm.numbers import Array
 from vpm.reduction.library import finite_elements
 from vpm.studies.jet import Jet
 from vpm.studies.material import Material, invariants
 
 if TYPE_CHECKING:
     from skfem import MeshQuad2
-
-Array = NDArray[np.float64]
 #: Points of integration: exact for polynomials of this order on each element.
 ORDER = 5
 #: The same for contact: three points on an edge, about its freedoms; more could not all be without overlap.

@@ -10,12 +10,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.numbers import Array
 from vpm.reduction.library import finite_elements
 
 if TYPE_CHECKING:
     from skfem import MeshHex2
-
-Array = NDArray[np.float64]
 Facets = NDArray[np.int64]
 #: Traction (Pa) at points of a face, shape (3, ...), from places, shape (3, ...).
 Traction = Callable[[Array], Array]

@@ -9,12 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import VpmError
+from vpm.numbers import Array
 from vpm.studies.solid import Solid, brick, moved
 
 if TYPE_CHECKING:
     from skfem import MeshHex2
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -5,9 +5,8 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Density of aluminium (kg/m^3), of which most links of robots are.
 DENSITY = 2700.0

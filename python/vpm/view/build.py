@@ -5,15 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import SimulationError
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.view.course import Course
 from vpm.view.scene import Arrow, Scene, Shape
 from vpm.view.skeleton import Pose, Skeleton, plane, round_down
-
-Array = NDArray[np.float64]
 
 #: Length of the longest arrow of its kind, as a share of the size of the machine.
 LONGEST = 0.45

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Half the angle of view across the shorter side of a picture (rad): that of a lens of 70 mm before 24 mm of film.
 HALF_ANGLE = math.atan(12.0 / 70.0)

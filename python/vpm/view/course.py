@@ -7,17 +7,16 @@ from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, SimulationError, near_match
 from vpm.experiment import Experiment, joints_from_sensors
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import Run, simulate
 
 if TYPE_CHECKING:
     from vpm.scenario import ScenarioRun
 
-Array = NDArray[np.float64]
 
 #: Channels whose numbers are drawn as arrows.
 LOADS = (".fx", ".fy", ".fz", ".tension", ".effort")

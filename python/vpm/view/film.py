@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import VpmError, needs
 from vpm.files import replacing
+from vpm.numbers import Array
 from vpm.view.looks import GROUND, INK, LOOKS, SOFT, colour
 from vpm.view.mesh import mesh_of
 from vpm.view.scene import Scene
@@ -26,7 +27,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.text import Text
 
-Array = NDArray[np.float64]
 
 #: Size of a film in pixels, its pictures per second, and how long it may be (s).
 WIDTH, HEIGHT, RATE, LONGEST = 1280, 720, 25, 120.0

@@ -7,14 +7,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.model import Model
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from vpm._core import System
-
-Array = NDArray[np.float64]
 Content = dict[str, Any]
 
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import VpmError, needs
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.view.build import scene_of
 from vpm.view.course import Course, resting
 from vpm.view.looks import GROUND, LOOKS, colour
@@ -26,7 +27,6 @@ from vpm.view.scene import Scene
 if TYPE_CHECKING:
     from viser import GuiCheckboxHandle, GuiEvent, GuiSliderHandle, MeshHandle, ViserServer
 
-Array = NDArray[np.float64]
 
 #: Where a page is served, by default at the first free port from here on: this machine alone can see it.
 HOST, FIRST_PORT, PORTS = "127.0.0.1", 8080, 100

@@ -7,9 +7,9 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.numbers import Array
 from vpm.view.scene import Arrow, Box, Shape, Sphere, Tube
 
-Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 #: Corners around a tube, and rows of a sphere.

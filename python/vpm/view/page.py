@@ -11,13 +11,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.files import write_text
 from vpm.view.looks import GROUND, INK, LOOKS, SOFT, Look
 from vpm.view.scene import Arrow, Box, Scene, Shape, Sphere, Tube
-
-Array = NDArray[np.float64]
 
 #: Bytes of text that the places may take, and samples that an eye tells apart.
 ROOM, MOST = 1_400_000, 1500

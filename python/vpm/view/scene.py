@@ -10,11 +10,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vpm.numbers import Array
 from vpm.view.camera import Camera
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

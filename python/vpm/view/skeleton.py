@@ -6,15 +6,13 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import SimulationError
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.view.bodies import box_of, sphere_radius
 from vpm.view.frames import Content, Frames
 from vpm.view.scene import Arrow, Box, Shape, Sphere, Tube
-
-Array = NDArray[np.float64]
 
 #: Places along a bending link at which its centreline is asked for.
 STATIONS = 33

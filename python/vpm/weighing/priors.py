@@ -5,15 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import log_ndtr
 
 from vpm.catalogue import EffectParameter
 from vpm.errors import IdentificationError
 from vpm.identify import PredictionErrorProblem
 from vpm.model import Effect, Model
-
-Array = NDArray[np.float64]
 
 #: What an effect may amount to, as a share of what the records show of its kind.
 SHARE = 0.3

@@ -12,19 +12,17 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, as_records
 from vpm.identify import Block, PredictionErrorProblem, estimate
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.observer import Record
 from vpm.results import Result
 from vpm.simulate import Setup
 from vpm.weighing.priors import Prior, log_share, priors_of
-
-Array = NDArray[np.float64]
 
 #: Times that an observer gets the gains of the values that it led to, and the gain (nats) after which it need not.
 RENEWALS, SETTLED = 5, 0.05

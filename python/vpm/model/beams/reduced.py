@@ -18,12 +18,10 @@ from pathlib import Path
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ModelError
 from vpm.files import replacing, unreadable
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: What the text of a solid begins with in a model; everything else is the name of a file.
 EMBEDDED = "data:"

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 
-import numpy as np
-from numpy.typing import NDArray
-
 from vpm.catalogue import EFFECTS
 from vpm.errors import ModelError, near_match
 from vpm.model.checked_document import Checked
@@ -16,8 +13,7 @@ from vpm.model.drives.spring import Compliant
 from vpm.model.drives.table import Table, beyond
 from vpm.model.pose import Mount, Pose
 from vpm.model.structure import Structure
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 class DriveComponents:

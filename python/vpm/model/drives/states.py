@@ -11,12 +11,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from vpm.model.evaluation import Evaluations
-
-Array = NDArray[np.float64]
 #: Value of a parameter by its dotted name; the second number where the model has none.
 Value = Callable[[str, float], float]
 

@@ -7,17 +7,15 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.model.component import Described, Index
 from vpm.model.drives.drive import Drive
 from vpm.model.entry import Number, Text
 from vpm.model.messages import Problem, place
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from vpm.model.structure import Structure
-
-Array = NDArray[np.float64]
 
 
 class Table(Drive):

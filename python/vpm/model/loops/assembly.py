@@ -9,12 +9,12 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from vpm.model.loops.closure import Loops
 
-Array = NDArray[np.float64]
 
 #: A closed loop has no larger gap (m, or the cosine of an angle that has to be a right one).
 CLOSED = 1e-12

@@ -14,12 +14,10 @@ from vpm.errors import ModelError, near_match
 from vpm.model.loops.assembly import CLOSED, NOTHING, assembled, least, mirrored, null_space, pivots
 from vpm.model.loops.path import Path, Singularity
 from vpm.model.loops.states import rest
-from vpm.numbers import array_of, number_of
+from vpm.numbers import Array, array_of, number_of
 
 if TYPE_CHECKING:
     from vpm.model.evaluation import Evaluations
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

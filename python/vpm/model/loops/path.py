@@ -7,15 +7,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ModelError
 from vpm.model.loops.assembly import least, null_space
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from vpm.model.loops.closure import Loops
 
-Array = NDArray[np.float64]
 
 #: Length of a step along the way, in units of the coordinates; shorter ones follow sharp bends.
 _STEP, _SHORTEST = 0.02, 1e-7

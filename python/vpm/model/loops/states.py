@@ -13,13 +13,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import ModelError
 from vpm.model.loops.assembly import least
-from vpm.numbers import array_of
+from vpm.numbers import Array, array_of
 
 if TYPE_CHECKING:
     from vpm.model.evaluation import Evaluations
     from vpm.model.loops.closure import Loops
 
-Array = NDArray[np.float64]
 
 #: Newton steps before a rest counts as lost, and the last of them beside coordinates of one.
 _STEPS, _LAST = 60, 1e-11

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import ExperimentError, IdentificationError, near_match
 from vpm.experiment import Experiment
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: A log, or arrays by name with their clock under ``"time"``.
 RecordLike: TypeAlias = "Experiment | Mapping[str, ArrayLike]"

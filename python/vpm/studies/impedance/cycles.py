@@ -6,10 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
+from vpm.numbers import Array
 from vpm.studies.impedance.channels import Columns
 from vpm.studies.impedance.harmonics import Complex, Series, fundamental
-
-Array = NDArray[np.float64]
 
 #: Fewest samples in a cycle: two harmonics with twice as many samples as coefficients.
 FEWEST_PER_CYCLE = 8

@@ -7,17 +7,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.experiment import noise_std
+from vpm.numbers import Array
 from vpm.results import Result
 from vpm.studies.impedance.channels import RecordLike, check_moves, columns
 
 if TYPE_CHECKING:
     from scipy.optimize import OptimizeResult
 
-Array = NDArray[np.float64]
 
 #: Fewest samples of a decay.
 FEWEST = 20

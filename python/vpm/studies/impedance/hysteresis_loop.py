@@ -20,9 +20,9 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
+from vpm.numbers import Array
 from vpm.results import Result
 from vpm.studies.impedance.channels import RecordLike, Sense, check_moves, check_sense, columns
 from vpm.studies.impedance.cycles import FEWEST_PER_CYCLE, Sums, parts, visible, whole_cycles
@@ -32,7 +32,6 @@ from vpm.studies.impedance.hysteresis_notes import loop_notes
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 #: Most harmonics that are looked for.
 MOST_HARMONICS = 20

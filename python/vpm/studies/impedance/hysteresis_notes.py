@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.experiment import quantisation_step
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from vpm.studies.impedance.hysteresis_loop import Loop
-
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
 #: Share of the damping beyond which a possible error is worth a sentence.

@@ -13,14 +13,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, IdentificationError
 from vpm.experiment import noise_std
+from vpm.numbers import Array
 from vpm.results import Result
 from vpm.studies.impedance.channels import RecordLike, Sense, check_moves, check_sense, columns
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -12,13 +12,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
+from vpm.numbers import Array
 from vpm.results import Result
 from vpm.studies.impedance.hysteresis_loop import Loop
-
-Array = NDArray[np.float64]
 
 #: Laws with the unit of their coefficient.
 LAWS: Mapping[str, str] = {"viscous": "N s/m", "structural": "N/m", "Coulomb": "N"}

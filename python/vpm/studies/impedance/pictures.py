@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.plot.style import BLUE, INK, ORANGE, SOFT, label, panels, styled
 
@@ -15,8 +14,6 @@ if TYPE_CHECKING:
 
     from vpm.studies.impedance.hysteresis_loop import Loop
     from vpm.studies.impedance.repeated import Repeated, RepeatedTests
-
-Array = NDArray[np.float64]
 
 
 @styled

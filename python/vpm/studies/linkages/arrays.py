@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import ModelError
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 def rowwise(question: Callable[..., Array], *tables: ArrayLike, what: str) -> Array:

@@ -7,16 +7,16 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import ModelError
+from vpm.numbers import Array
 from vpm.results import Result
 from vpm.studies.linkages.leg import Leg
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Array = NDArray[np.float64]
 
 #: Values of each rate and acceleration: an odd number has standstill and zero acceleration among them, where a term
 #: that is left out weighs most against the others.

@@ -7,18 +7,17 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm._core import Karl as _Karl
 from vpm.errors import ModelError
+from vpm.numbers import Array
 from vpm.results import Storable
 from vpm.studies.linkages.arrays import rowwise
 from vpm.studies.linkages.karl_results import KarlPoses, KarlSingularities, KarlWorkspace
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 Pair = tuple[float, float]
 
 #: Below this share of a rod's length, a slope of the constraint counts as zero.

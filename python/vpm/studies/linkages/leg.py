@@ -6,10 +6,11 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Literal, Self
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm._core import Leg as _Leg
 from vpm.errors import ModelError, near_match
+from vpm.numbers import Array
 from vpm.studies.linkages.arrays import rowwise
 from vpm.studies.linkages.leg_parameters import Cylinder, HyqSet, LegParameters, LegPart, Segment
 from vpm.studies.linkages.leg_regressor import leg_regressor
@@ -17,8 +18,6 @@ from vpm.studies.linkages.leg_results import LegReactions, LegStrokes, LegTerms,
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 Derivation = Literal["virtual_work", "lagrange", "newton_euler"]
 ShareDefinition = Literal["sum_of_norms", "norm_of_absolute_sum", "root_of_squares", "torque"]
 

@@ -6,14 +6,14 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from vpm.numbers import Array
 from vpm.studies.linkages.leg_parameters import Cylinder, LegParameters, LegPart, Segment
 
 if TYPE_CHECKING:
     from vpm.studies.linkages.leg import Leg
 
-Array = NDArray[np.float64]
 
 #: The parameters of D'Imperio (2016), Table 5.1: seven masses (kg), then four moments of inertia (kg m^2).
 INERTIAL_NAMES = (

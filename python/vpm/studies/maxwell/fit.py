@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.narx.maxwell import MaxwellNarx
@@ -18,8 +17,6 @@ from vpm.studies.maxwell.maps import MaxwellMap, fit_maxwell_map
 from vpm.studies.maxwell.motion import descend_motion, element_values, motion_covariance
 from vpm.studies.maxwell.smoothing import smoothed
 from vpm.studies.maxwell.windows import static_windows
-
-Array = NDArray[np.float64]
 
 
 def identify_maxwell(

@@ -7,17 +7,15 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.narx.maxwell_basis import COUNTS, EXACT, Basis
 from vpm.narx.maxwell_recursion import POWER_NAMES, POWERS, surface_columns
+from vpm.numbers import Array
 from vpm.results import Result
 
 if TYPE_CHECKING:
     from vpm.studies.maxwell.windows import MaxwellWindows
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False, eq=False)

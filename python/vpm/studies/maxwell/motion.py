@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.narx.maxwell_problem import OutputErrors, Parameters
@@ -15,11 +14,11 @@ from vpm.narx.maxwell_records import MaxwellSignals, Samples, element_samples
 from vpm.narx.maxwell_recursion import WEIGHTS, Recursion, Scheme, seen, stretch
 from vpm.narx.maxwell_refinement import LEAST
 from vpm.narx.records import RecordLike
+from vpm.numbers import Array
 from vpm.studies.maxwell.maps import MaxwellMap
 from vpm.studies.maxwell.smoothing import smoothed
 from vpm.studies.maxwell.windows import MaxwellWindows
 
-Array = NDArray[np.float64]
 Method = Literal["output_error", "instrumental", "least_squares"]
 
 #: Relaxation times that a descent may start from, in samples.

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import IdentificationError
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 def static_regressors(force: ArrayLike, length: ArrayLike, step: float) -> tuple[Array, Array]:

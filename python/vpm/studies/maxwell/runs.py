@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, SimulationError
 from vpm.narx.maxwell import MaxwellNarx
@@ -15,10 +14,9 @@ from vpm.narx.maxwell_recursion import Recursion, seen, stretch, surface_columns
 from vpm.narx.maxwell_result import FAR
 from vpm.narx.records import RecordLike
 from vpm.narx.run import NarxRun
+from vpm.numbers import Array
 from vpm.results import Result
 from vpm.studies.maxwell.smoothing import smoothed
-
-Array = NDArray[np.float64]
 
 
 def maxwell_one_step(element: MaxwellNarx, record: RecordLike, signals: MaxwellSignals | None = None) -> NarxRun:

@@ -6,14 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.narx.maxwell_records import MaxwellSignals, Samples, element_samples
 from vpm.narx.records import RecordLike
+from vpm.numbers import Array
 from vpm.results import Result
-
-Array = NDArray[np.float64]
 
 #: Largest change over a test at rest, as a share of its noise's standard error of that change.
 UNSETTLED = 4.0

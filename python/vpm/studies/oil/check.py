@@ -6,17 +6,16 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import IdentificationError, near_match
-from vpm.numbers import NORMAL_95
+from vpm.numbers import NORMAL_95, Array
 from vpm.studies.oil.equations import CylinderGeometry
 from vpm.studies.oil.solve import Rows, unexplained
 
 if TYPE_CHECKING:
     from vpm.studies.oil.fit import OilFit
 
-Array = NDArray[np.float64]
 
 ESTIMATORS = ("instrument", "integral", "filtered", "differences")
 BALANCES = ("chambers", "force")

@@ -15,13 +15,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError, near_match
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.results import Storable
-
-Array = NDArray[np.float64]
 
 #: Ways to have both pressures from one force.
 RULES = ("steady", "symmetric")

@@ -7,10 +7,10 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import IdentificationError
-from vpm.numbers import NORMAL_95
+from vpm.numbers import NORMAL_95, Array
 from vpm.results import Result
 from vpm.studies.oil.check import Channels, check_answer, check_choices, check_record
 from vpm.studies.oil.equations import (
@@ -21,8 +21,6 @@ from vpm.studies.oil.equations import (
     through_spool,
 )
 from vpm.studies.oil.solve import integral_rows, noise_share, rate_rows, solve
-
-Array = NDArray[np.float64]
 
 _UNITS = {"compliance": "1/Pa", "flow_gain": "m^3/(s Pa^0.5)", "leakage": "m^3/(s Pa)", "air": "1", "offset": ""}
 #: Absolute pressure (Pa) below which dissolved air comes out of oil or the oil boils.

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.experiment.signal import differentiate, lowpass, settling_samples
 from vpm.identify.statistics import correlation_length, window_sums
+from vpm.numbers import Array
 from vpm.studies.oil.equations import Equation
-
-Array = NDArray[np.float64]
 
 #: Lags (s) of the command that serve as instruments: a chamber fills within some milliseconds after the valve reverses.
 LAGS = (0.0, 1e-3, 2e-3, 4e-3, 8e-3, 16e-3, 32e-3)
