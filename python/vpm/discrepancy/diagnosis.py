@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.evidence import Evidence
 from vpm.discrepancy.provenance import Provenance
@@ -17,6 +16,7 @@ from vpm.files import write_text
 from vpm.identify import Fit
 from vpm.json_values import plain
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.results import Result, Storable
 
 if TYPE_CHECKING:
@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 
     from vpm.excitation import Excitation
 
-Array = NDArray[np.float64]
 
 #: Mode of a gap that a tracker leaves, as results and reports write it.
 OBSERVED = "observed"

@@ -12,15 +12,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.site_states import View
 from vpm.errors import VpmError
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.results import Storable
-
-Array = NDArray[np.float64]
 
 #: Samples that the curve of a law keeps.
 LAW_SAMPLES = 3000

@@ -29,12 +29,11 @@ from vpm.experiment import Experiment
 from vpm.identify import gain, segments
 from vpm.identify.response_along_motion import bends
 from vpm.model import Effect, Model
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from vpm.ranking import Ranked, Ranking
     from vpm.ranking import Settings as RankingSettings
-
-Array = NDArray[np.float64]
 #: Part of the name of a parameter that acts behind a joint that is split.
 BEHIND = ".link."
 

@@ -11,8 +11,7 @@ from vpm.catalogue import EFFECTS, signature_of
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.response_along_motion import Response, respond
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Axis, words, unit and values at each sample.
 ExcitationRange = tuple[str, str, str, Array]

@@ -12,13 +12,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
 from vpm.experiment.noise import quantisation_step
 from vpm.experiment.signal import MOTION_FILTER_ORDER, differentiator_gain, interpolation_gain
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: A spectrum stands clearly above its floor at this ratio of power (10 dB).
 CLEARLY_ABOVE = 10.0

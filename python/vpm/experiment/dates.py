@@ -7,9 +7,8 @@ from collections.abc import Sequence
 from datetime import date
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Year first (ISO 8601), day first with points, or slashes, of which only the order of day and month is unknown.
 _DAY = r"(?P<iso>\d{4}-\d{1,2}-\d{1,2})|(?P<points>\d{1,2}\.\d{1,2}\.(?:\d{2}|\d{4}))|(?P<slashes>\d+/\d+/\d+)"

@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, UnitError, VpmError
 from vpm.experiment.grid import Source, check_finite
@@ -18,12 +17,12 @@ from vpm.experiment.readers import open_log
 from vpm.experiment.readers.base import Log, bracketed
 from vpm.experiment.table import Table
 from vpm.expression import PURE, Quantity, read_expression
+from vpm.numbers import Array
 from vpm.units import Unit, parse_unit
 
 if TYPE_CHECKING:
     from vpm.model import ChannelEntry, Model
 
-Array = NDArray[np.float64]
 
 #: Names of a clock column where no channel table says which it is.
 TIME_COLUMNS = ("time", "time_s", "t")

@@ -9,9 +9,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
 from vpm.experiment.signal import interpolate
-from vpm.numbers import LARGEST
-
-Array = NDArray[np.float64]
+from vpm.numbers import LARGEST, Array
 
 #: Fewest samples that make a log.
 FEWEST_SAMPLES = 10

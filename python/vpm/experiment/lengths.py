@@ -7,14 +7,12 @@ from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
 from vpm.experiment.record import Experiment
 from vpm.experiment.shafts import joints_from_shafts
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Places of a joint at which the length of a line is worked out, over a turn or over the way that the length allows.
 PLACES = 4097

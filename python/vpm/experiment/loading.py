@@ -7,7 +7,7 @@ from os import PathLike
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import ExperimentError, near_match
 from vpm.experiment.draft import Draft, mapped_draft, plain_draft, understood
@@ -24,13 +24,11 @@ from vpm.experiment.grid import (
 from vpm.experiment.merge import merge_clocks
 from vpm.experiment.record import Experiment
 from vpm.experiment.repeated import fresh_samples
-from vpm.numbers import array_of
+from vpm.numbers import Array, array_of
 
 if TYPE_CHECKING:
     from vpm.experiment.readers.base import Log
     from vpm.model import ChannelEntry, Model
-
-Array = NDArray[np.float64]
 
 
 class Parts(NamedTuple):

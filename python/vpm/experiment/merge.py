@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
 from vpm.experiment.grid import (
@@ -20,8 +19,7 @@ from vpm.experiment.grid import (
     make_uniform,
 )
 from vpm.experiment.signal import anti_alias, interpolate
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 def merge_clocks(

@@ -21,9 +21,8 @@ from vpm.experiment.signal import (
     parallel_filter,
     settling_samples,
 )
+from vpm.numbers import Array
 from vpm.results import Result
-
-Array = NDArray[np.float64]
 
 #: A record begins or ends at rest where its joints are slower than this share of their largest speed.
 REST_SHARE = 0.01

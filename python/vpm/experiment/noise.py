@@ -6,16 +6,15 @@ from math import comb, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
 from vpm.experiment.grid import is_smooth
 from vpm.experiment.signal import interpolation_gain
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from vpm.experiment.record import Experiment
 
-Array = NDArray[np.float64]
 
 #: Ratio of the standard deviation of a normal distribution to its median absolute deviation.
 NORMAL_MAD = 1.4826

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self, TypedDict, TypeVar, Unpack
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import ExperimentError, near_match
 from vpm.experiment.grid import (
@@ -25,7 +25,7 @@ from vpm.experiment.grid import (
 )
 from vpm.experiment.signal import anti_alias, differentiate, interpolate, lowpass
 from vpm.files import replacing
-from vpm.numbers import array_of
+from vpm.numbers import Array, array_of
 from vpm.results import Result
 from vpm.units import parse_unit
 
@@ -34,8 +34,6 @@ if TYPE_CHECKING:
 
     from vpm.experiment.readers.frame import Frame
     from vpm.model import ChannelEntry, Model
-
-Array = NDArray[np.float64]
 
 
 class _Changes(TypedDict, total=False):

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.experiment.noise import FEWEST_SAMPLES, quantisation_step
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 def fresh_samples(time: Array, values: Array) -> NDArray[np.int64] | None:

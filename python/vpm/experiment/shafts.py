@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
 from vpm.experiment.record import Experiment
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: A matrix of ratios whose condition number is above this, its columns of equal length, tells no joints.
 REGULAR = 1e6

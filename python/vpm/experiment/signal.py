@@ -6,11 +6,9 @@ from functools import lru_cache
 from math import ceil
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Highest order of one pass of a filter: beyond, sections of second order overflow.
 HIGHEST_ORDER = 20

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from vpm.errors import ExperimentError, near_match
 from vpm.experiment.dates import is_date, seconds_of_dates
 from vpm.experiment.dialect import Dialect, is_number, read_dialect
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,6 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from vpm.errors import VpmError
@@ -30,10 +29,9 @@ from vpm.identify.response_along_motion import bends, has_hidden, has_own_drives
 from vpm.identify.settings import OwnSimulation
 from vpm.initial import initial_state, measured_states
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import HOLDS, Setup
 from vpm.stepping import Simulation
-
-Array = NDArray[np.float64]
 
 #: Order of the differences, and draws that tell what noise leaves of them.
 ORDER, TRIALS = 2, 3

@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
@@ -20,9 +19,8 @@ from vpm.identify.problem import Problem, tied
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem, state_channel
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import MODES, Setup
-
-Array = NDArray[np.float64]
 
 #: Modes of a fit: those of a simulation, the model turned round, and the model that follows the log.
 FIT_MODES = (*MODES, "input_error", "prediction_error")

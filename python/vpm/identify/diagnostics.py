@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.experiment import Experiment
 from vpm.identify.estimation import touching
@@ -16,8 +15,6 @@ from vpm.model import Model
 
 if TYPE_CHECKING:
     from vpm.identify.fit_result import Fit
-
-Array = NDArray[np.float64]
 
 
 #: Correlation of two estimates beyond which they are called collinear.

@@ -7,14 +7,12 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.experiment import Experiment, Motion
 from vpm.initial import measured_states
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import AUTOMATIC, Setup
-
-Array = NDArray[np.float64]
 
 #: Where drives are run by one step per sample, derivatives are taken by steps of up to this, s: what is compared
 #: of them is ten times as slow, and each costs as much as the run itself.

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri
 
 from vpm.errors import ExecutorError, IdentificationError
@@ -22,10 +21,10 @@ from vpm.identify.settings import Fitting
 from vpm.identify.solver import Box, Descent, Point, descend
 from vpm.identify.statistics import record_groups, sandwich
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.sending import Parcel
 from vpm.tasks import Done, outcomes, until_interrupted
 
-Array = NDArray[np.float64]
 Progress = Callable[[int, float], None]
 
 #: A start agrees with the best if its cost is within this share of it (and of rounding, beside where it began).

@@ -21,8 +21,7 @@ from scipy.linalg import solve_triangular
 from vpm.errors import IdentificationError
 from vpm.identify.identifiability import column_lengths
 from vpm.identify.inertial_regression import InertialRegression
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Radius of gyration that a body without extent gets as a start, m.
 LEAST_RADIUS = 0.01

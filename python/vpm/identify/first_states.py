@@ -25,8 +25,8 @@ from vpm.identify.problem import Block
 from vpm.identify.settings import Checks
 from vpm.identify.whiteness import DEPENDENT, basis, explained_by, explained_size
 from vpm.model import Model
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 #: Index of one entry of an array, or of entries of all rows.
 Place = int | tuple[slice, int]

@@ -8,7 +8,6 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, as_records, joints_from_sensors
@@ -38,10 +37,9 @@ from vpm.identify.settings import Checks, Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.statistics import freedom, record_groups, sandwich
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.one_thread import in_one_thread
 from vpm.simulate import Setup
-
-Array = NDArray[np.float64]
 
 #: Modes in which the model follows the measured motion of its joints.
 FOLLOWING = frozenset({"inverse_dynamics", "prescribed_motion", "input_error"})

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtri, stdtrit
 
 from vpm.errors import IdentificationError
@@ -17,13 +16,12 @@ from vpm.identify.problem import Problem, gaps
 from vpm.identify.settings import Fitting
 from vpm.identify.whiteness import Whiteness
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.results import Result
 from vpm.simulate import Setup
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, repr=False, eq=False)

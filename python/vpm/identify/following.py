@@ -17,15 +17,14 @@ from threading import Lock
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.experiment import Experiment, Motion
 from vpm.experiment.signal import differentiate, lowpass
 from vpm.identify.parts import Part
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import AUTOMATIC
 
-Array = NDArray[np.float64]
 #: Numbers (n, k) along a record, and their derivatives (n, k, columns).
 Pair = tuple[Array, Array]
 #: From (N, k) to the (n, k) that are compared.

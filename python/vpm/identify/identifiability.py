@@ -13,12 +13,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr, solve_triangular
 
+from vpm.numbers import Array
 from vpm.results import Storable
-
-Array = NDArray[np.float64]
 
 #: Relative singular value below which a direction counts as unseen.
 RANK_TOLERANCE = 1e-6

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from vpm.errors import IdentificationError, near_match
@@ -31,8 +30,7 @@ from vpm.identify.inertial_solve import (
     weighted,
 )
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Relative singular value, columns of equal length, below which a direction counts as none: far above rounding (1e-15),
 #: far below what any noise leaves visible.

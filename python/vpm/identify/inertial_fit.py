@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import IdentificationError, near_match
+from vpm.numbers import Array
 from vpm.results import Result
 
 if TYPE_CHECKING:
@@ -19,7 +20,6 @@ if TYPE_CHECKING:
     from vpm.identify.problem import Gaps
     from vpm.model import Model
 
-Array = NDArray[np.float64]
 
 #: What data can say about a parameter.
 KNOWN, VAGUE, TOGETHER, UNSEEN = "yes", "too uncertain", "only in combination", "no"

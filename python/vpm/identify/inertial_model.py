@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment, as_records
@@ -14,8 +13,7 @@ from vpm.identify.inertial_regression import InertialRegression
 from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.model.standard import OF_FILE, PLAIN, STANDARD, UNITS, of_file
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Difference of efforts, relative to their size, below which they agree: rounding of long sums.
 AGREE = 1e-8

@@ -6,15 +6,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import next_fast_len, rfft
 
 from vpm.identify.feasibility import Distance, nearest
 from vpm.identify.identifiability import Base, column_lengths
 from vpm.identify.inertial_regression import InertialRegression
 from vpm.identify.statistics import autoregression
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 #: Residuals below this share of the effort are rounding.
 ROUNDING = 1e-11
 

@@ -26,9 +26,8 @@ from vpm.identify.parallel import in_order
 from vpm.identify.problem import FEWEST_SAMPLES, Block
 from vpm.initial import initial_state, measured_states
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import Setup, restart_grid, simulation_inputs
-
-Array = NDArray[np.float64]
 
 #: Share of a command's size by which it is moved to find what the outputs do.
 DIFFERENCE = 1e-4

@@ -8,7 +8,6 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, as_records
@@ -22,13 +21,12 @@ from vpm.identify.problem import Block, tied, untied
 from vpm.identify.settings import Fitting
 from vpm.identify.solver import Point
 from vpm.identify.statistics import correlation_length
-from vpm.numbers import NORMAL_95
+from vpm.numbers import NORMAL_95, Array
 from vpm.results import Result
 
 if TYPE_CHECKING:
     from vpm.identify.fit_result import Fit
 
-Array = NDArray[np.float64]
 
 #: Relative error of an interval's half width, and steps towards it.
 SHARP, MOST_STEPS = 0.01, 12

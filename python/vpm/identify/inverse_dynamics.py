@@ -8,7 +8,6 @@ from functools import partial
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import DivergedError, IdentificationError
 from vpm.experiment import Experiment, Motion
@@ -31,10 +30,9 @@ from vpm.identify.response_along_motion import (
 from vpm.identify.sample_mask import SampleMask, settled
 from vpm.initial import joint_motion
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import AUTOMATIC
 from vpm.simulate.setup import HOLDS
-
-Array = NDArray[np.float64]
 
 #: One step of second order for each sample, and the share of what drives answer that it may be off by: noise of
 #: pressures and currents is ten times as large on the best of logs.

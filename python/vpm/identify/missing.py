@@ -7,7 +7,6 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.catalogue import effects_for_site
 from vpm.errors import VpmError
@@ -29,8 +28,7 @@ from vpm.identify.whiteness import (
 )
 from vpm.initial import joint_motion
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 class _Law(NamedTuple):

@@ -12,11 +12,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 AXES, PAIRS = ("xx", "yy", "zz"), ("xy", "xz", "yz")
 #: Share of a sum of moments that a moment may lack and still be as large.

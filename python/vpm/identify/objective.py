@@ -6,15 +6,13 @@ from collections.abc import Callable, Mapping, Sequence
 from threading import Lock
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.identify.problem import Block, Problem, untied
 from vpm.identify.settings import Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.solver import Point
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Median of absolute values of a normal variable, in standard deviations.
 NORMAL_MEDIAN = 0.6744897501960817

@@ -23,12 +23,12 @@ from vpm.identify.problem import FEWEST_SAMPLES, Block, Problem, less_means, tie
 from vpm.identify.statistics import record_groups, sandwich
 from vpm.initial import initial_state, joint_motion
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import Setup, SimulatedArrays, copied_channels, simulate_arrays, simulated_rows
 
 if TYPE_CHECKING:
     from vpm.identify.fit_result import Fit
 
-Array = NDArray[np.float64]
 
 #: Modes that simulate a record as a whole from its first sample.
 WHOLE = ("free_run", "closed_loop")

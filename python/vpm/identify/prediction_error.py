@@ -6,17 +6,15 @@ from collections.abc import Sequence
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.experiment import Experiment
 from vpm.identify.parallel import in_order
 from vpm.identify.problem import Block
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.observer import Noise, Record, filtered, likely_noise
 from vpm.observer.filtering import Pass, whitened
 from vpm.simulate import Setup
-
-Array = NDArray[np.float64]
 
 
 class PredictionErrorProblem:

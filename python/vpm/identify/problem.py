@@ -11,13 +11,12 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError, near_match
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.units import parse_unit
 
-Array = NDArray[np.float64]
 #: By channel: root mean square, its share of the measured signal, unit.
 Gaps = dict[str, tuple[float, float, str]]
 

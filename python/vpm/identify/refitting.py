@@ -7,7 +7,6 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import VpmError
 from vpm.experiment import Experiment, as_records
@@ -22,8 +21,7 @@ from vpm.identify.problem import Gaps, Problem, gaps, tied, untied
 from vpm.identify.settings import Checks, OwnSimulation
 from vpm.identify.statistics import pooled
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 AnyEstimate = TypeVar("AnyEstimate", bound=Estimate)
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import CoreError, DivergedError, SimulationError
 from vpm.experiment import Experiment, Motion
@@ -22,9 +21,8 @@ from vpm.identify.following import Following, Pair
 from vpm.identify.parts import Bending, Drives, Part, bending, carried, drives_of, whole
 from vpm.initial import whole_motion
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import Setup, copied_channels
-
-Array = NDArray[np.float64]
 
 #: Drives that go by samples of their own and remember the last ones.
 SAMPLED_TYPES = ("narx", "maxwell_narx")

@@ -18,8 +18,7 @@ from vpm.experiment import Experiment, Motion
 from vpm.identify.problem import FEWEST_SAMPLES
 from vpm.identify.response_along_motion import bends
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: A joint stands still where it is slower than this share of its largest speed for one decimated sample on end: the
 #: filter of the motion shows no shorter rest.

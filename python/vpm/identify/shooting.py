@@ -24,9 +24,8 @@ from vpm.identify.problem import FEWEST_SAMPLES
 from vpm.identify.settings import Fitting
 from vpm.initial import initial_state, measured_states
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import Setup, simulate_arrays, simulation_inputs
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Damping at the start, and beyond which no step is left to try.
 DAMPING, MOST_DAMPING = 1e-3, 1e12

@@ -13,16 +13,13 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import irfft, next_fast_len, rfft
 from scipy.linalg import solve_toeplitz
 from scipy.special import fdtri
 
 from vpm.identify.identifiability import column_lengths
 from vpm.identify.problem import Block
-from vpm.numbers import NORMAL_95
-
-Array = NDArray[np.float64]
+from vpm.numbers import NORMAL_95, Array
 
 #: Largest order of the noise's autoregression.
 MOST_ORDER = 30

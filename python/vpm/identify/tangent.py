@@ -6,15 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import DivergedError
 from vpm.identify.estimation import Estimate, Worth, estimate
 from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.identify.response_along_motion import bends, has_hidden, has_own_drives, shows_drives_alone
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Tangents that are tried one after the other, and shares of the way to where the fit on one of them ends.
 TANGENTS, SHARES = 8, (1.0, 0.5, 0.25, 0.125)

@@ -26,9 +26,8 @@ from scipy.special import chdtrc, fdtrc
 from vpm.identify.identifiability import column_lengths
 from vpm.identify.problem import FEWEST_SAMPLES
 from vpm.identify.statistics import autoregression, white_sandwich
+from vpm.numbers import Array
 from vpm.results import Storable
-
-Array = NDArray[np.float64]
 
 #: Columns of which others leave less than this share of their length are left out.
 DEPENDENT = 1e-3

@@ -6,18 +6,17 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.experiment import Experiment
 from vpm.log_check.correction import Correction
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.settings import Settings
 from vpm.ranking.tracked_records import TrackedRecords, Tracker, among_parameters
 from vpm.simulate import Setup
 from vpm.weighing.priors import Prior
 
-Array = NDArray[np.float64]
 #: What a structure calls the delay, which no model has.
 DELAY = "delay"
 #: By how much a delay is moved for its derivative, in samples.

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.experiment import Experiment, choose_cutoff
 from vpm.experiment.signal import differentiate, lowpass, settling_samples
@@ -14,8 +13,7 @@ from vpm.log_check.correction import Correction
 from vpm.log_check.settings import Settings
 from vpm.log_check.tried_corrections import scales
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,6 +19,7 @@ from vpm.log_check.correction import Correction
 from vpm.log_check.delay import Delayed, with_delay, without_delay
 from vpm.log_check.settings import Settings
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.observer import measured_outputs
 from vpm.ranking.fit import ASTRAY, Fitter, Followed, View
 from vpm.ranking.model_structure import Structure
@@ -31,7 +32,6 @@ from vpm.ranking.tracked_records import TrackedRecords, Tracker, is_position
 from vpm.simulate import Setup
 from vpm.weighing.priors import Prior, natural_sizes
 
-Array = NDArray[np.float64]
 #: Friction that a joint may have without being described: nothing of it passes for a mistake of a log.
 FRICTION = tuple(effect.name for effect in BUILT_IN if effect.usual == "friction")
 #: Nor do these, unless a sign is in doubt: where a machine is heavy, a constant force is its mirror image.

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from vpm.experiment import Experiment, noise_std, quantisation_step
 from vpm.log_check.finding import Finding
 from vpm.log_check.settings import Settings
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 #: Differences that take the motion out of a spectrum, its octaves that are looked at, and pieces of the record.
 ORDER, OCTAVES, PIECES = 4, 4, 5
 

@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Judged, Trial, is_clear
@@ -32,8 +31,6 @@ from vpm.ranking.substitute_records import shown
 from vpm.ranking.tracked_records import TrackedRecords
 from vpm.ranking.tracker_residual import TrackerResidual
 from vpm.simulate import Setup
-
-Array = NDArray[np.float64]
 
 #: Said of machines whose efforts do not follow from their motion.
 BY_TRACKER = (

@@ -10,14 +10,12 @@ from math import log
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize
 
 from vpm.errors import DiagnosisError
 from vpm.files import write_text
+from vpm.numbers import Array
 from vpm.ranking.posterior import robust_probabilities
-
-Array = NDArray[np.float64]
 
 #: The numbers that are shipped.
 SHIPPED = Path(__file__).with_name("calibration.json")

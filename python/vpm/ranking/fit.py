@@ -8,17 +8,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import lsq_linear
 
 from vpm.errors import VpmError
+from vpm.numbers import Array
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.noise_model import NoiseModel, Parts, white_noise
 from vpm.ranking.posterior import log_volume
 from vpm.ranking.settings import FAINT, SHARES, Settings
 from vpm.ranking.tracked_records import NOTHING, By, TrackedRecords, Tracker
 
-Array = NDArray[np.float64]
 #: Residuals and derivatives that no record has; their squares are still numbers.
 RUNAWAY = 1e100
 #: What is raised of structures that the records contradict, that cannot be computed, or whose bodies are not real.

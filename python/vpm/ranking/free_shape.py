@@ -7,16 +7,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.screening.candidates import Key
+from vpm.numbers import Array
 from vpm.ranking.fit import ASTRAY, Fitter, View
 from vpm.ranking.look import Look, same_curve
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.settings import OCTAVE
 from vpm.ranking.tried_effect import Trial
-
-Array = NDArray[np.float64]
 
 
 def against_free_shapes(trial: Trial, fitter: Fitter) -> Trial:

@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.weighing.priors import Prior
-
-Array = NDArray[np.float64]
 
 #: By which share of its size a first state is moved for a derivative.
 STEP = 1e-3

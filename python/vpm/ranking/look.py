@@ -8,18 +8,16 @@ from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.screening.candidates import Key
 from vpm.model import Effect
+from vpm.numbers import Array
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.model_structure import Structure, approximate
 from vpm.ranking.noise_model import white_noise
 from vpm.ranking.settings import PARTS, SURE
-
-Array = NDArray[np.float64]
 
 
 class Look:

@@ -8,16 +8,14 @@ from functools import cached_property
 from types import MappingProxyType
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.catalogue.kinds import Side
 from vpm.discrepancy.screening.candidates import Key
 from vpm.discrepancy.screening.location_parameter import ANYWHERE
 from vpm.model import Effect, Model
+from vpm.numbers import Array
 from vpm.ranking.settings import MOVE, OVERTONE
 from vpm.weighing.priors import Prior
-
-Array = NDArray[np.float64]
 
 
 def sides_taken(model: Model, joint: str) -> set[Side]:

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.fft import dct, idct
 from scipy.linalg import solve_toeplitz
 from scipy.special import gammaln
 
+from vpm.numbers import Array
 from vpm.ranking.settings import LINES, PER_OCTAVE, SURE, TAILS
 
-Array = NDArray[np.float64]
 #: Stretches of samples that belong together: the records without their beginnings.
 Parts = Sequence[slice]
 

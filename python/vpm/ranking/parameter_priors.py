@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.catalogue import EffectParameter
 from vpm.discrepancy.screening.candidates import Candidate, joint_at, shares_at, slow_speeds
@@ -11,11 +10,10 @@ from vpm.discrepancy.screening.compliance_and_stop_start import moved
 from vpm.discrepancy.stuck_channels import is_moving
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.ranking.settings import DELAY
 from vpm.ranking.tracked_records import TrackedRecords
 from vpm.weighing.priors import FACTOR, NATURAL, NEAR, SHARE, Prior, natural_sizes
-
-Array = NDArray[np.float64]
 
 #: What an effect may amount to, as a share of the size of its kind, where that is not `SHARE`: what is near a value by
 #: nature, and what has a size that matters rather than one that records show.

@@ -9,21 +9,19 @@ from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.catalogue.kinds import Side
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.discrepancy.screening.candidates import Candidate, Key, candidates
 from vpm.identify import InverseDynamicsProblem
 from vpm.initial import invertible
+from vpm.numbers import Array
 from vpm.ranking.fit import ASTRAY, Fitter, Followed, View
 from vpm.ranking.look import Look
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.settings import Settings
 from vpm.ranking.start_values import started
 from vpm.ranking.structure_extensions import Extensions, sides_of
-
-Array = NDArray[np.float64]
 
 #: Derivatives that a pass works out at a time.
 AT_ONCE = 16

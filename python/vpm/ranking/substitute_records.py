@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.following import Following
 from vpm.identify.response_along_motion import SAMPLED_TYPES, Response
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.ranking.tracked_records import TrackedRecords, Tracker
-
-Array = NDArray[np.float64]
 
 #: What tells where an actuator acts.
 PLACES = ("joint", "line", "transmission")

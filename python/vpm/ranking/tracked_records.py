@@ -18,6 +18,7 @@ from vpm.errors import VpmError
 from vpm.experiment import Experiment, read_noise
 from vpm.initial import initial_state
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.observer import Record
 from vpm.ranking.hidden_first_states import STEP, HiddenFirstStates, hidden_states
 from vpm.ranking.noise_model import NoiseModel, Parts, Structured, frequencies
@@ -34,7 +35,6 @@ from vpm.ranking.settings import (
 from vpm.simulate import Setup
 from vpm.simulate.setup import AUTOMATIC
 
-Array = NDArray[np.float64]
 #: Places of parameters by which there are derivatives, and by how much these may be moved; exact ones if not given.
 By: TypeAlias = tuple[Sequence[int], Array | None]
 NOTHING: By = ((), None)

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.diagnosis import OBSERVED
 from vpm.identify.problem import Block
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.ranking.tracked_records import TrackedRecords, Tracker
-
-Array = NDArray[np.float64]
 
 
 class TrackerResidual:

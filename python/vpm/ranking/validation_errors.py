@@ -5,16 +5,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.ranking.fit import ASTRAY
 from vpm.ranking.model_structure import approximate, without_sizes
 from vpm.ranking.noise_model import Parts, Structured
 from vpm.ranking.result import Gap
 from vpm.ranking.tracked_records import TrackedRecords, Tracker
-
-Array = NDArray[np.float64]
 
 
 def gaps(held_out: TrackedRecords, stages: tuple[Model, Model, Model], band: float) -> dict[str, Gap]:

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.confirmation.delay_in_closed_loop import gain_in_closed_loop, timed_in_closed_loop
 from vpm.discrepancy.confirmation.delay_in_motion import CREEPING, Timed, is_dry, is_late
@@ -34,8 +33,7 @@ from vpm.identify.identifiability import COPY_SHARE, closest_column, explained_s
 from vpm.identify.response_along_motion import bends
 from vpm.identify.tangent import Tangent, drives_on_tangent, estimate_on_tangent, has_tangent
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: A refit stops when the sum of squares changes by less than this share: far below what a verdict rests on.
 TOLERANCE = 1e-6

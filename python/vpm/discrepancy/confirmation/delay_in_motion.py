@@ -12,15 +12,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter1d
 
 from vpm.catalogue import EffectType
 from vpm.identify import Gain, InverseDynamicsProblem, estimate, gain, segments
 from vpm.identify.identifiability import column_lengths
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Share of its largest speed below which a joint may stick.
 CREEPING = 0.05

@@ -12,7 +12,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.confirmation.delay_in_motion import WITHIN
@@ -34,8 +33,6 @@ from vpm.errors import VpmError
 from vpm.identify import Gain
 from vpm.identify.response_along_motion import bends, has_own_drives
 from vpm.model import Model
-
-Array = NDArray[np.float64]
 
 #: Share of the change from one prediction to another from which on records support it rather than no change.
 LEAST_SUPPORT = 0.5

@@ -7,13 +7,9 @@ over many impacts is right: the mean effort through a contact does not depend on
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Time over which residuals are averaged, twice, s: several swings of the softest contact, parts of a stroke.
 AVERAGED = 0.25

@@ -10,13 +10,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.confirmation.confirmation import Data, Trial
 from vpm.discrepancy.confirmation.refusal import NORMAL_95_ONE_SIDED, WORTH_A_NAME
 from vpm.identify import InverseDynamicsProblem, gain, segments
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 def preferred_sensor(chosen: Trial, equals: Sequence[Trial], data: Data) -> Trial:

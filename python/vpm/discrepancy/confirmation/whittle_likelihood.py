@@ -24,9 +24,9 @@ from vpm.identify import OutputErrorProblem
 from vpm.identify.identifiability import column_lengths
 from vpm.identify.response_along_motion import bends
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import Setup
 
-Array = NDArray[np.float64]
 Spectra = list[NDArray[np.complex128]]
 
 #: Steps of the integration in one delay or lag, those beside dry friction, where a step blurs the break-away, and at

@@ -7,7 +7,6 @@ Its size follows from simulations of the model with noise like that of the recor
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial
 from vpm.discrepancy.confirmation.refusal import refuse_ringing
@@ -15,8 +14,7 @@ from vpm.discrepancy.noise.noise_floor import noise_floor
 from vpm.identify import gaps
 from vpm.identify.response_along_motion import bends
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Ratio of a residual to the noise in it up to which it is noise alone.
 NOISE_ONLY = 1.2

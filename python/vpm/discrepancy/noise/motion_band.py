@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Share of the power of the efforts that lies in the band.
 SHARE = 0.99

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.noise.noise_spectrum import noise_shapes, noise_spectrum, with_noise
 from vpm.errors import VpmError
@@ -15,9 +14,8 @@ from vpm.experiment import Experiment, instrument_noise
 from vpm.experiment.signal import RETAINED_BAND
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import Setup, simulate_arrays
-
-Array = NDArray[np.float64]
 
 #: Seed of the noise that is carried through; any would do.
 SEED = 20160331

@@ -11,7 +11,6 @@ from threading import Lock
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter1d
 
 from vpm.experiment import Experiment, Motion, instrument_noise
@@ -21,8 +20,7 @@ from vpm.identify.following import Following
 from vpm.identify.parts import moves_drives
 from vpm.identify.response_along_motion import has_own_drives, respond
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Seed and number of the noises that are sent through the drives; size of each, as a share of the commands.
 SEED, TIMES, SHARE = 20160331, 6, 0.01

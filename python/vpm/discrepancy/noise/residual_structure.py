@@ -5,14 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.noise.noise_floor import QUIET_SHARE, white_level
 from vpm.discrepancy.noise.noise_spectrum import noise_shapes, noise_spectrum
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Bins of position and of velocity in the state map.
 BINS = 8

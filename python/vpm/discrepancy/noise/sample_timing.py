@@ -9,13 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.identify import gain, segments
 from vpm.identify.identifiability import column_lengths
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: A shift matters if it takes so much of the mean square of the residual, on training and on validation records.
 MATTERS = 0.02

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.confirmation.confirmation import Judged
 from vpm.identify import InverseDynamicsProblem
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Shortest and longest period that is looked for, as parts and multiples of the whole travel.
 SHORTEST, LONGEST = 1.0 / 40.0, 1.5

@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.confirmation.refusal import WORTH_A_NAME, Thresholds
@@ -22,8 +21,7 @@ from vpm.discrepancy.remainder.empirical_formula import describe
 from vpm.discrepancy.remainder.seal_friction import Seals, seals
 from vpm.identify import gain, segments
 from vpm.identify.parallel import in_order
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: A later description has to leave less than this share of what an earlier one leaves to be taken in its place.
 CLEARLY = 0.9

@@ -12,7 +12,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.remainder.sparse_formula import TRANSITION_SHARES
@@ -21,9 +20,7 @@ from vpm.identify import InverseDynamicsProblem
 from vpm.identify.drives import driven, first_drives
 from vpm.identify.response_along_motion import has_hidden
 from vpm.model import Model
-from vpm.numbers import NORMAL_95
-
-Array = NDArray[np.float64]
+from vpm.numbers import NORMAL_95, Array
 
 #: Pressure under which the effort of a piston is asked for, Pa.
 UNIT_PRESSURE = 1e5

@@ -13,7 +13,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.catalogue import without_law
 from vpm.catalogue.empirical import TERMS
@@ -21,8 +20,7 @@ from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.remainder.position_periods import harmonic_periods
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Parts of each training record; every one is predicted once from the others.
 FOLDS = 5

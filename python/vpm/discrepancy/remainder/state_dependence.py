@@ -12,9 +12,7 @@ from numpy.typing import NDArray
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.statistics import robust_covariance
-from vpm.numbers import NORMAL_95
-
-Array = NDArray[np.float64]
+from vpm.numbers import NORMAL_95, Array
 
 #: A state, the direction of the motion (0 or 1) and what is to be predicted.
 Cells = tuple[Array, NDArray[np.int64], Array]

@@ -7,12 +7,10 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.rivals.excitation_range import ExcitationRange
 from vpm.excitation import Excitation, JointLimits, chirp, multisine, trapezoid
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Longest experiment, s, and most samples of one.
 LONGEST, MOST_SAMPLES = 60.0, 20000

@@ -13,7 +13,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.confirmation.confirmation import Judged
 from vpm.discrepancy.diagnosis import ProposedExperiment
@@ -24,8 +23,7 @@ from vpm.errors import ExcitationError
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.response_along_motion import has_hidden, has_own_drives
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: A difference below this many times the noise discriminates nothing.
 TELLING = 1.0

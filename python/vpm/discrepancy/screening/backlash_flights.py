@@ -10,15 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm._core import soft_flights
 from vpm.experiment import Motion
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.model.splitting import name_behind
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 @dataclass(frozen=True)

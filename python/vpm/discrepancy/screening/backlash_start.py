@@ -14,7 +14,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.screening.backlash_flights import flights
 from vpm.discrepancy.screening.candidates import Candidate
@@ -23,8 +22,7 @@ from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.response_along_motion import bends, has_own_drives
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Widths tried, as shares of the half travel: 23 % apart, as near as the flights of neighbours end together.
 SHARES = np.geomspace(5e-5, 5e-2, 34)

@@ -8,7 +8,6 @@ from functools import partial
 from itertools import product
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS, EffectType
 from vpm.catalogue.shared import SLOW
@@ -25,8 +24,7 @@ from vpm.discrepancy.screening.drive_limit_start import limit_start
 from vpm.errors import DiagnosisError, near_match
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Name of an effect and where it sits.
 Key = tuple[str, str]

@@ -9,7 +9,6 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS, EffectType
 from vpm.experiment.signal import differentiate
@@ -17,8 +16,7 @@ from vpm.identify import InverseDynamicsProblem
 from vpm.identify.response_along_motion import has_own_drives
 from vpm.model import Model
 from vpm.model.splitting import name_behind
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Springs in series with a motion of their own, which lie between motor and link, so that a softer one does more.
 SERIES = "stiffness"

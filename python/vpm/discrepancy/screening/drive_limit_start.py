@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.identify import InverseDynamicsProblem
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Limits compared, the largest share of the samples that may lie beyond one, and the fewest.
 LIMITS, BEYOND_MOST, BEYOND_LEAST = 30, 0.5, 3

@@ -12,7 +12,6 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.screening.candidates import Candidate
 from vpm.discrepancy.screening.compliance_and_stop_start import moved
@@ -20,8 +19,7 @@ from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.response_along_motion import bends, has_own_drives
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Frequencies at which what a joint moves swings on the spring while the motor stands, Hz, and damping ratios.
 FREQUENCIES = np.geomspace(4.0, 64.0, 16)

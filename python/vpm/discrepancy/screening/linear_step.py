@@ -5,13 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
 from vpm.identify.identifiability import column_lengths
 from vpm.model import Parameter
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 def linear_step(data: InverseDynamicsProblem, jacobian: Array, residual: Array) -> tuple[Array, Array, float]:

@@ -11,13 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.discrepancy.screening.candidates import Candidate
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Numbers of an effect that has a size and a place, and bounds of a place that may lie anywhere.
 PLACED, ANYWHERE = 2, (-np.inf, np.inf)

@@ -10,7 +10,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from vpm.discrepancy.screening.backlash_start import is_read_off, near_prior, read_off
@@ -24,8 +23,7 @@ from vpm.identify.identifiability import closest_column, is_alias
 from vpm.identify.response_along_motion import bends
 from vpm.identify.tangent import has_tangent
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Significance asked of an effect's size on the training data.
 SIZE_LEVEL = 0.05

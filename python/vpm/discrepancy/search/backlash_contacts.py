@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge
@@ -29,8 +28,7 @@ from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import OutputErrorProblem, gain, segments
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Contacts between which the model runs first: frequencies, Hz, and damping ratios.
 CONTACTS, DAMPINGS = (10.0, 14.0, 20.0, 30.0, 45.0, 65.0), (0.03, 0.1, 0.3)

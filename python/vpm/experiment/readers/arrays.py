@@ -8,12 +8,10 @@ from collections.abc import Iterator, Mapping, Sequence
 from os import PathLike
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.experiment.readers.base import Log
 from vpm.experiment.table import Table
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: ``name[:, 2]``, ``name[2, :]`` and ``name.2``; indices count from zero.
 _COLUMN = re.compile(r"^(?P<name>.+?)\s*(?:\[\s*:\s*,\s*(?P<index>\d+)\s*\]|\.(?P<short>\d+))$")

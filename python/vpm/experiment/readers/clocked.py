@@ -9,15 +9,11 @@ from contextlib import AbstractContextManager, contextmanager, nullcontext
 from os import PathLike
 from typing import ClassVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from vpm.errors import ExperimentError, UnitError
 from vpm.experiment.readers.base import Log
 from vpm.experiment.table import Table
+from vpm.numbers import Array
 from vpm.units import parse_unit
-
-Array = NDArray[np.float64]
 
 #: The clock of whichever group is read.
 TIME = "time"

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from vpm.experiment.readers.base import Log
 from vpm.experiment.table import Table
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 class Frame(Protocol):

@@ -21,14 +21,13 @@ from typing import Any
 from weakref import finalize
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, MissingExtraError
 from vpm.experiment.readers.base import Log
 from vpm.experiment.readers.clocked import ClockedLog, broken
 from vpm.experiment.table import Table
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 Answer = dict[str, Any]
 
 #: Processor time of a reader, s: to start, and for each byte. The slowest library reads more than 1 MB in a second.

@@ -7,15 +7,14 @@ from os import PathLike
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, needs
 from vpm.experiment.readers.arrays import ArrayLog, shape_of_vector
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     import h5py
 
-Array = NDArray[np.float64]
 
 #: Attributes of a data set that may name its unit.
 UNIT_ATTRIBUTES = ("unit", "units")

@@ -10,13 +10,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, needs
 from vpm.experiment.readers.base import Log
 from vpm.experiment.table import Table
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Columns that every data set has.
 CLOCK, EPISODE, FRAME = "timestamp", "episode_index", "frame_index"

@@ -12,8 +12,7 @@ from vpm.errors import ExperimentError
 from vpm.experiment.readers.arrays import ArrayLog, shape_of_vector
 from vpm.experiment.readers.base import Log
 from vpm.experiment.readers.mat_tags import check_tags
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 def open_mat(path: str | PathLike[str]) -> Log:

@@ -8,14 +8,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
 from vpm.experiment.readers.base import Log
 from vpm.experiment.readers.clocked import TIME, ClockedLog, broken, readable_unit
 from vpm.experiment.readers.ros import BagLog
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 def open_mcap(path: str | PathLike[str]) -> Log:

@@ -19,11 +19,11 @@ from vpm.experiment.readers import guarded
 from vpm.experiment.readers.base import Log
 from vpm.experiment.readers.clocked import TIME, ClockedLog, broken, readable_unit, silent
 from vpm.expression import Quantity, read_expression
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from asammdf import MDF
 
-Array = NDArray[np.float64]
 
 #: Synchronisation of a master channel by time, in both versions; the others count angles, lengths or samples.
 BY_TIME = 1

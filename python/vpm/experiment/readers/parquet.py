@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from os import PathLike
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, needs
 from vpm.experiment.readers.base import Log
 from vpm.experiment.table import Table
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 class ParquetLog(Log):

@@ -10,17 +10,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, MissingExtraError, needs
 from vpm.experiment.readers.base import Log
 from vpm.experiment.readers.message import Field, has_stamp, leaves, parse_field, stamp_of, value_of
 from vpm.experiment.table import Table
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from rosbags.highlevel import AnyReader
 
-Array = NDArray[np.float64]
 
 #: Fields that every topic has beside those of its messages: when the sender stamped them, when they were recorded.
 STAMP, RECEIVED = "header.stamp", "time"

@@ -9,16 +9,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.errors import VpmError, needs
 from vpm.experiment.readers.clocked import TIME, ClockedLog, broken, readable_unit, silent
 from vpm.experiment.table import Table
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from nptdms import TdmsChannel, TdmsFile
 
-Array = NDArray[np.float64]
 
 #: First bytes of every TDMS file.
 TAG = b"TDSm"

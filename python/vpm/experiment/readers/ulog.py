@@ -13,11 +13,11 @@ from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, needs
 from vpm.experiment.readers.clocked import TIME, ClockedLog, broken
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from pyulog import ULog
 
-Array = NDArray[np.float64]
 
 #: Field of every topic that holds the time of its messages, us.
 STAMP = "timestamp"
