@@ -6,7 +6,6 @@ from typing import Any
 import numpy as np
 import pytest
 from hypothesis import given, settings
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.optimize import root
 from scipy.spatial.transform import Rotation
@@ -15,8 +14,8 @@ from random_trees import trees
 from test_beam_files import ARM
 from vpm._core import Dynamics
 from vpm.model import Model
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 G = 9.81
 
 

@@ -7,17 +7,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from vpm.compare import compare
 from vpm.errors import ModelError, SimulationError, ValidityWarning
 from vpm.experiment import Experiment
 from vpm.identify import identify
 from vpm.model import Dynamics, Model
+from vpm.numbers import Array
 from vpm.simulate import Run, simulate
 from vpm.stepping import Simulation
-
-Array = NDArray[np.float64]
 
 LENGTH, WIDTH, HEIGHT, YOUNG, DENSITY, GRAVITY = 0.5, 0.015, 0.004, 206e9, 7850.0, 9.81
 STIFFNESS = YOUNG * WIDTH * HEIGHT**3 / 12.0

@@ -10,13 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import vpm
 from vpm.errors import ReductionError
+from vpm.numbers import Array
 from vpm.reduction import Reduction, read_structure, reduce_structure
-
-Array = NDArray[np.float64]
 
 YOUNG, SHEAR, DENSITY = 206e9, 80e9, 7850.0
 LENGTH, WIDTH, HEIGHT = 0.6, 0.012, 0.008

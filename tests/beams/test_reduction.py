@@ -11,16 +11,14 @@ import numpy as np
 import pytest
 import scipy.io
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 import vpm
 from brick import bar_archive, bricks, write_archive
 from vpm.errors import ModelError, ReductionError
 from vpm.model.beams.reduced import ReducedLink
+from vpm.numbers import Array
 from vpm.reduction import Interface, Reduction, Structure, read_structure, reduce_structure
 from vpm.reduction.structure import rigid_motions
-
-Array = NDArray[np.float64]
 
 STEEL = {"young": 206e9, "poisson": 0.0, "density": 7850.0}
 SIZE = (0.02, 0.01, 0.4)

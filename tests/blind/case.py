@@ -16,7 +16,6 @@ from pathlib import Path
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from blind.batch import NUDGE, Hidden, Plan, Truth, batches, simulated
 from blind.effects import EFFECTS
@@ -25,8 +24,7 @@ from blind.machines import MACHINES
 from blind.oracle import Oracle, judge
 from vpm.experiment import Experiment
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Kinds of the records of a case.
 RECORDS = ("train", "train", "validate")

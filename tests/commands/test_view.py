@@ -9,7 +9,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import vpm
 from command_line import vpm as command
@@ -17,6 +16,7 @@ from textbook_arm import FILE, LENGTHS
 from view_scenes import AHEAD, ROOT, arm_scene, hits, tubes
 from vpm.errors import ExperimentError, SimulationError, VpmError
 from vpm.experiment import Experiment
+from vpm.numbers import Array
 from vpm.scenario import Scenario, ScenarioRun
 from vpm.view import Arrow, Box, Course, Sphere, Tube, course_of, scene_of
 from vpm.view.bodies import DENSITY, box_of, sphere_radius
@@ -24,8 +24,6 @@ from vpm.view.film import draw, film_samples, picture, write_film
 from vpm.view.frames import Frames
 from vpm.view.mesh import mesh_of
 from vpm.view.page import page_of
-
-Array = NDArray[np.float64]
 
 #: One joint, and one link whose strain is constant along it: its axis is an arc.
 ARC = """

@@ -14,7 +14,6 @@ from types import ModuleType
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.linalg import expm
 from typer.testing import CliRunner
 
@@ -26,10 +25,10 @@ from vpm import Model, Simulation
 from vpm.cli import app
 from vpm.errors import SimulationError, VpmError
 from vpm.linear import LinearModel
+from vpm.numbers import Array
 from vpm.realtime import CSource, c_source
 
 ROOT = Path(__file__).parents[2]
-Array = NDArray[np.float64]
 EXAMPLES = ROOT / "examples"
 #: Levels of flexible links whose derivatives take a compiler seconds; those of the files take it a minute, or ten.
 COARSE = {

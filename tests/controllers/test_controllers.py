@@ -6,7 +6,6 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import two_link_arm
 from drive_texts import RIG
@@ -14,9 +13,8 @@ from model_texts import TWO_LINKS, changed, described
 from vpm.errors import ModelError, SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import simulate, simulate_arrays
-
-Array = NDArray[np.float64]
 
 AXIS = """
 name = "axis"

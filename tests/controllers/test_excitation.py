@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from typer.testing import CliRunner
 
 import vpm
@@ -29,9 +28,9 @@ from vpm.excitation import (
 from vpm.excitation.base_parameters import regressor
 from vpm.excitation.multisine import schroeder_phases
 from vpm.experiment import Experiment
+from vpm.numbers import Array
 from vpm.scenario.schema import Points
 
-Array = NDArray[np.float64]
 RUNNER = CliRunner()
 
 

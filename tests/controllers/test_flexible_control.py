@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve, solve_continuous_are
 
 import vpm
@@ -15,9 +14,8 @@ from vpm.control.splitting import solve, split
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.realtime import Loop
-
-Array = NDArray[np.float64]
 
 #: Two rods of 0.5 m and 0.3 kg in the horizontal plane; a spring holds the second one, which nothing drives.
 LINK, MASS, INERTIA, STIFFNESS = 0.5, 0.3, 0.3 * 0.5**2 / 12.0, 20.0

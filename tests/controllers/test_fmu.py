@@ -12,12 +12,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from nightly import at_night
 from test_c_source import STRICT, places
 from vpm import Model, Simulation, write_fmu
 from vpm.linear import LinearModel
+from vpm.numbers import Array
 from vpm.realtime import Fmu
 
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed (pip install fmpy)")
@@ -25,7 +25,7 @@ validation = pytest.importorskip("fmpy.validation", reason="FMPy is not installe
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler `cc` here")
 
 ROOT = Path(__file__).parents[2]
-Array = NDArray[np.float64]
+
 
 #: Rigid, with three joints, with coupled shafts, flexible, hydraulic, and a leg that lands; with levels of detail.
 SIX = {

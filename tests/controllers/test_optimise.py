@@ -9,13 +9,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import fsolve
 
 import vpm
 from command_line import vpm as command
 from vpm.errors import OptimisationError
+from vpm.numbers import Array
 
 pytest.importorskip("casadi", reason='CasADi is not installed (pip install "vpm-dynamics[optimise]")')
 
@@ -24,7 +24,6 @@ from vpm.optimise.channels import Channels
 from vpm.optimise.collocation import DERIVATIVE, NODES, POINTS, WEIGHTS
 from vpm.optimise.equations import casadi, equations
 
-Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
 

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from test_batched import BEAM
 from vpm.errors import ModelError, SimulationError
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.shaping import Shaper, shaper, vibrations
 
-Array = NDArray[np.float64]
 DAMPED = BEAM.replace("density = 7850.0 }", "density = 7850.0 }\ndamping = { stiffness = 1e-3 }")
 
 

@@ -9,7 +9,6 @@ from importlib import import_module
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from shared_cases import shared_case
 from vpm.discrepancy.noise.noise_floor import noise_floor
@@ -21,8 +20,8 @@ from vpm.identify.following import Memo
 from vpm.identify.parts import carried, drives_of
 from vpm.identify.response_along_motion import Response
 from vpm.model import Model
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 Exact = tuple[Model, InverseDynamicsProblem, InverseDynamicsProblem]
 
 

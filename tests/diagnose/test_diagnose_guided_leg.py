@@ -7,15 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import vpm
 from vpm.discrepancy import ranked_effects
 from vpm.discrepancy.ranked_effects import free_joints, why_not_ranked
 from vpm.experiment import Experiment
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 HYL = Path(__file__).resolve().parents[2] / "examples" / "hyl"
 RECORDS = ("squat", "bounce", "sway")

@@ -7,13 +7,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from second_suite import arm, loop
 from second_suite.cases import NONE, Case, make_case
 from vpm import Diagnosis, diagnose
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 #: Joints of the wrist and the arm that only rub.
 OTHERS = tuple(name for name in arm.NAMES if name != "j4")
 

@@ -9,13 +9,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import vpm
 from vpm import Diagnosis, Experiment, diagnose
 from vpm.errors import ExperimentError
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 #: Time between samples, s, and error of the encoder, rad.
 DT, NOISE = 5e-3, 2e-5

@@ -7,14 +7,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import vpm
 from model_texts import DAMPED_AXIS
 from vpm.discrepancy import ProposedExperiment
 from vpm.discrepancy.rivals.discriminating_experiment import _imitation
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 STEP, NOISE = 1e-3, 0.02
 

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.stats import t as student_t
 
 import vpm
@@ -19,9 +18,8 @@ from vpm.discrepancy.confirmation.refusal import NEGLIGIBLE
 from vpm.discrepancy.confirmation.whittle_likelihood import fit_prediction, predict, spectra, weighted
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import Setup
-
-Array = NDArray[np.float64]
 
 #: A lag, and the delays that it may be taken for.
 LATE = ("actuator_lag", "input_delay", "sensor_delay")

@@ -6,15 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import vpm
 from model_texts import DAMPED_AXIS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge
 from vpm.discrepancy.noise.sample_timing import in_time
 from vpm.identify import InverseDynamicsProblem
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 STEP, NOISE = 2e-3, 0.02
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from vpm import Experiment, Model, diagnose
 from vpm._core import soft_flights
@@ -14,8 +13,7 @@ from vpm.discrepancy.screening.backlash_start import only_compliant, read_off
 from vpm.discrepancy.screening.candidates import Candidate
 from vpm.discrepancy.search.backlash_contacts import beginnings, with_contact
 from vpm.identify import InverseDynamicsProblem
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 GAP, MASS, ROTOR, VISCOUS = 4e-4, 12.0, 3.0, 30.0
 STIFFNESS, DAMPING = 1.5e6, 900.0

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import vpm
@@ -17,9 +16,8 @@ from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.identify.sample_mask import SETTLING, at_stops
 from vpm.initial import joint_motion, measured_states
 from vpm.model.drives.states import commanded_states
+from vpm.numbers import Array
 from vpm.ranking.parameter_priors import Sizes
-
-Array = NDArray[np.float64]
 
 ROOT = Path(__file__).resolve().parents[2]
 DT = 1e-3

@@ -7,7 +7,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 import vpm
@@ -17,8 +16,8 @@ from vpm.catalogue import effect_type
 from vpm.catalogue.empirical import TERMS
 from vpm.discrepancy.remainder.state_dependence import _other_half
 from vpm.errors import ModelError
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 Force = Callable[[Array, Array, Array], Array]
 
 STEP, NOISE = 2e-3, 0.02

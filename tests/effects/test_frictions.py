@@ -4,7 +4,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from test_sides import TIMES, elastic, force
 from test_split_joints import commanded, slide
@@ -13,7 +12,6 @@ from vpm.discrepancy.screening.candidates import candidates
 from vpm.errors import ModelError, SimulationError
 from vpm.identify import InverseDynamicsProblem, identify
 
-Array = NDArray[np.float64]
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 #: Values that matter beside forces of 20 N on 2 kg.

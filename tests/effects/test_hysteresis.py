@@ -6,14 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import vpm
 from vpm.errors import ModelError
 from vpm.experiment import Experiment
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 RATE = 1000.0
 FORCE, DISPLACEMENT, SHAPE = 8.0, 1.5e-3, 0.4

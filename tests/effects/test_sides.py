@@ -5,7 +5,6 @@ from typing import Literal
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from nightly import at_night
@@ -13,9 +12,9 @@ from test_split_joints import ARM, SPLITS, J, K, L, commanded, slide
 from vpm import Model
 from vpm.errors import ModelError
 from vpm.identify import InverseDynamicsProblem
+from vpm.numbers import Array
 from vpm.simplify import reductions
 
-Array = NDArray[np.float64]
 #: Damping of the spring, N s/m.
 D = 8.0
 

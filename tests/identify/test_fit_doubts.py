@@ -7,7 +7,6 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
 import vpm
@@ -21,9 +20,9 @@ from vpm.identify.estimation import _linear_step
 from vpm.identify.export import told
 from vpm.identify.inertial_model import InertialModel, repaired
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import Setup
 
-Array = NDArray[np.float64]
 Machine = Axis | Arm
 
 KINDS = ("white", "coloured", "counted")

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from synthetic import Truth, nominal, simulate_axis
 from vpm.errors import DivergedError, IdentificationError
@@ -21,9 +20,8 @@ from vpm.identify.objective import Objective, losses_and_weights
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.solver import Box, Point, descend
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import Setup, simulate
-
-Array = NDArray[np.float64]
 
 MASS, VISCOUS, STIFFNESS = "block.mass", "slide.friction.viscous", "slide.spring.stiffness"
 FREE = (MASS, VISCOUS, STIFFNESS)

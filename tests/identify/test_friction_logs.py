@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from vpm.diagnosing import diagnose
 from vpm.discrepancy import Diagnosis
@@ -20,8 +19,7 @@ from vpm.identify import identify
 from vpm.model import Model
 from vpm.narx import Narx, split_in_time, validate
 from vpm.narx import identify as identify_narx
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 DATA = Path(__file__).resolve().parents[3] / "shared" / "data" / "mr_damper_hysteresis"
 

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.linalg import toeplitz
 from scipy.optimize import check_grad, nnls
 from scipy.signal import lfilter
@@ -25,8 +24,8 @@ from vpm.identify.inertial_model import InertialModel, inertial_regression
 from vpm.identify.inertial_solve import score_covariance
 from vpm.linkages import INERTIAL_NAMES, Leg, inertial_values, with_inertial_values
 from vpm.model.standard import standard_parameters
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 # D'Imperio (2016), Table 5.1, CAD column: seven masses, four inertias.

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import vpm
 from vpm.errors import ExperimentError, ModelError, SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.observer import Noise, Record, likely_noise
-
-Array = NDArray[np.float64]
 
 #: Carriage with springs at both sides that a motor pushes; unknown forces move it, an encoder errs.
 CARRIAGE = """

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from two_link_arm import nominal
 from vpm.errors import SimulationError
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.observer import Noise, Observer
-
-Array = NDArray[np.float64]
 
 CHANNELS = ["shoulder.position", "elbow.position"]
 CART = """

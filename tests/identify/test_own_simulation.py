@@ -11,7 +11,6 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from fit_machines import sines
 from vpm import Experiment, Model, Setup, Simulation, identify
@@ -19,8 +18,7 @@ from vpm.errors import SimulationError
 from vpm.identify import Fitting, InverseDynamicsProblem, gaps, profile_intervals
 from vpm.identify.closed_loop_prediction import commands_to_draw, own_residual
 from vpm.identify.estimation import _refine
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 DT, STEPS, NOISE, MACHINES = 0.002, 8, 2e-5, 40
 #: Inertia about the hinge (kg m^2), viscous (N m s) and dry friction (N m).

@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from fit_machines import sines
 from vpm import Experiment, Model, identify
 from vpm.identify import Fit, Fitting, judged_on, profile_intervals
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 DT, STEPS, NOISE, SECONDS, GRAVITY = 0.004, 4, 1e-5, 8.0, 9.81
 #: Masses of cart and bob (kg), viscous friction of rail (N s/m) and pivot (N m s).

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import quad
 
 import vpm
@@ -15,8 +14,6 @@ from vpm.identify import PredictionErrorProblem, estimate
 from vpm.model import Model
 from vpm.weighing import Prior, priors_of
 from vpm.weighing.weigh import _evidence, _Known
-
-Array = NDArray[np.float64]
 
 
 def held_model(*, bias: float) -> Model:

@@ -9,15 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from vpm.compare import Comparison, autocorrelation, compare, cross_correlation, effective_samples
 from vpm.errors import ExperimentError
 from vpm.experiment import Experiment
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import Run, simulate
-
-Array = NDArray[np.float64]
 
 RATE = 200.0
 

@@ -12,13 +12,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, ModelError, UnitError
 from vpm.experiment import Experiment, Motion, common_cutoff, motion
 from vpm.model import ChannelEntry, Model, load_channel_table
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 TABLE = {
     "time": ChannelEntry(column="t", unit="ms"),

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import geared_turntables
 import textbook_arm
@@ -20,8 +19,8 @@ from vpm.log_check import Finding, Settings
 from vpm.log_check.correction import Correction
 from vpm.log_check.stretches import odd_stretches
 from vpm.log_check.table import corrected_text, line_of
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 Columns = dict[str, Array]
 
 MODEL = vpm.Model.from_toml(textbook_arm.FILE)

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.io import savemat
 from typer.testing import CliRunner
 
@@ -20,9 +19,9 @@ from vpm.errors import ExperimentError, MissingExtraError
 from vpm.experiment import Experiment
 from vpm.experiment.readers import open_log
 from vpm.model import ChannelEntry, Model
+from vpm.numbers import Array
 from written_logs import COUNT, TIME, Q, check, needs, table
 
-Array = NDArray[np.float64]
 RUNNER = CliRunner()
 
 MATRIX = np.column_stack([np.cos(TIME), Q, TIME**2])

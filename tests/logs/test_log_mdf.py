@@ -11,16 +11,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from test_log_recorders import FAST, U, check_merged
 from vpm.errors import ExperimentError
 from vpm.experiment import Experiment
 from vpm.experiment.readers import guarded, open_log
 from vpm.experiment.readers.clocked import ClockedLog
+from vpm.numbers import Array
 from written_logs import COUNT, TIME, Q, check, needs, table
-
-Array = NDArray[np.float64]
 
 pytestmark = needs("asammdf")
 

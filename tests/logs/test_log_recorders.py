@@ -9,15 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, MissingExtraError
 from vpm.experiment import Experiment
 from vpm.experiment.readers import guarded, open_log
 from vpm.model import ChannelEntry
 from written_logs import COUNT, TIME, Q, check, needs, table
-
-Array = NDArray[np.float64]
 
 FAST = 0.001 + 0.0025 * np.arange(4 * COUNT)
 U = 2.0 * FAST

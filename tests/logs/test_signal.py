@@ -7,7 +7,6 @@ import pytest
 import scipy.signal
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
 from vpm.experiment import (
@@ -27,8 +26,7 @@ from vpm.experiment.signal import (
     interpolation_gain,
     settling_samples,
 )
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 RATE = 1000.0
 

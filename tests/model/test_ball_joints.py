@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 from scipy.special import ellipj, ellipk
@@ -17,8 +16,7 @@ from scipy.special import ellipj, ellipk
 import vpm
 from vpm import Experiment, Model, Simulation, simulate
 from vpm.errors import CoreError, DivergedError, VpmError
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 MOMENTS = np.array([1.0, 2.0, 2.5])
 STEP = 1e-3

@@ -7,12 +7,10 @@ from importlib.util import find_spec
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from vpm.errors import CoreError, ModelError
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 AXES = ([0.0, 0.0, 1.0], [0.0, 0.6, 0.8], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.36, 0.48, 0.8])
 KINDS = ("revolute", "revolute", "prismatic", "revolute", "revolute")

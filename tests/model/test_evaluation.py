@@ -9,15 +9,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from two_link_arm import Arm, nominal
 from vpm.errors import ModelError, SimulationError
 from vpm.linear import LinearModel
 from vpm.model import Dynamics, Model
+from vpm.numbers import Array
 from vpm.stepping import Simulation
-
-Array = NDArray[np.float64]
 
 BODY = """
 [bodies.b{k}]

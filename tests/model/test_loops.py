@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
@@ -20,10 +20,10 @@ from vpm.errors import CoreError, ModelError, VpmError
 from vpm.experiment import Experiment
 from vpm.identify import identify
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.scenario import Scenario
 from vpm.simulate import Setup
 
-Array = NDArray[np.float64]
 EXAMPLES = Path(__file__).parents[2] / "examples"
 G = 9.81
 

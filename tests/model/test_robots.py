@@ -13,16 +13,15 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 import robot_texts as texts
 import vpm
 from command_line import vpm as run_command
 from vpm.errors import MissingExtraError, ModelError
+from vpm.numbers import Array
 from vpm.robots import ImportedRobot
 from written_logs import needs
 
-Array = NDArray[np.float64]
 #: Relative to the size of what is compared.
 TOLERANCE = 1e-10
 

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 import vpm
 import wrist
@@ -17,8 +16,7 @@ from model_texts import described
 from vpm.errors import ExperimentError, ModelError
 from vpm.experiment import Experiment, joints_from_shafts
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 RANDOM = np.random.default_rng(3)
 STATES = [(RANDOM.uniform(-1.5, 1.5, 2), RANDOM.uniform(-4.0, 4.0, 2)) for _ in range(25)]

@@ -8,7 +8,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from blind import EFFECTS, MACHINES, Case, hideable, make_case, make_cases
 from blind import case as case_module
@@ -22,8 +21,6 @@ from nightly import at_night
 from vpm.catalogue import EFFECTS as CATALOGUE
 from vpm.model import Model
 from vpm.simulate import simulate
-
-Array = NDArray[np.float64]
 
 #: For each machine a seed whose base has no dry friction, which the two simulations write differently, and the largest
 #: difference of both simulations relative to the largest value of the channel. That of the flexible arm is the error

@@ -9,7 +9,6 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import vpm
 from nightly import at_night
@@ -39,8 +38,8 @@ from second_suite.score import Answer, Named, Solver, answered, table
 from second_suite.solvers import found
 from vpm import Experiment, Model
 from vpm.errors import ValidityWarning
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 #: Without those of `test_second_suite_beam.py`: how they bend has other coordinates than in a file.
 NAMES = sorted({*MACHINES} - {"slewer", "sweeper"})
 #: Largest difference of the positions of both programs over the way that is made, in free runs of one or two seconds:

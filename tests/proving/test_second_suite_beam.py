@@ -9,7 +9,6 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 import vpm
@@ -25,8 +24,8 @@ from second_suite.machine import Joint, Machine, columns_of
 from second_suite.plant import Hidden, Plant
 from vpm import Experiment, Model
 from vpm.errors import ValidityWarning
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 MACHINES = {"slewer": (slewer.MACHINE, slewer.STRIP), "sweeper": (sweeper.MACHINE, sweeper.BLADE)}
 NAMES = list(MACHINES)
 #: What no catalogue has.

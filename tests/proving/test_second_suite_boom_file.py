@@ -8,7 +8,6 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import vpm
 from nightly import at_night
@@ -20,8 +19,8 @@ from second_suite.loop import Signals
 from second_suite.plant import Hidden
 from vpm import Model
 from vpm.errors import ValidityWarning
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 #: Short records in steps of a millisecond, twice those of the cases.
 M = replace(boom.MACHINE, lengths=(2.2,) * 4, substeps=2)
 V = dict(boom.VALUES)

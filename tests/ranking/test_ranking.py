@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 from scipy.stats import norm
 from scipy.stats import t as student
@@ -18,12 +17,11 @@ from sledge import DRY, MASS, OIL, READING, SEEN, SLEDGE, TURN, WAVE, pushed, sw
 from vpm.errors import DiagnosisError, ExperimentError
 from vpm.experiment import Experiment
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.noise_model import Colour, NoiseModel, Structured, fitted_noise, log_student, scale_of, white_noise
 from vpm.ranking.settings import DAMPING, PARTS, Settings
 from vpm.ranking.tracked_records import TrackedRecords, Tracker, tracker_gain
-
-Array = NDArray[np.float64]
 
 
 def test_an_autoregression_is_found_again_and_its_density_is_the_exact_one() -> None:

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 from scipy.stats import norm
 
 from sledge import SLEDGE, pushed
@@ -19,7 +18,6 @@ from vpm.ranking.settings import Settings
 from vpm.ranking.tracked_records import TrackedRecords, Tracker
 from vpm.weighing import Prior
 
-Array = NDArray[np.float64]
 NATS = st.floats(-1e5, 1e5)
 
 

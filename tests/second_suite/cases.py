@@ -29,8 +29,7 @@ from second_suite.loop import Inputs, Signals, simulated
 from second_suite.machine import Machine, columns_of, drawn
 from second_suite.plant import Hidden
 from vpm import Experiment, Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 MACHINES: dict[str, Machine] = {
     m.MACHINE.name: m.MACHINE for m in (belt, rotary, cart, scara, hoist, arm, boom, slewer, sweeper)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from second_suite.loop import Inputs, Signals
 from second_suite.machine import Machine
 from vpm import Experiment
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 
 def flat(m: Machine, signals: Signals) -> Array:

@@ -7,14 +7,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from vpm import Climb, Experiment, Model, Setup, climb, simulate
 from vpm.climb.climbing import ACTUATORS, RIGID, families
 from vpm.errors import IdentificationError
 from vpm.identify import OutputErrorProblem
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 ARM = """
 name = "one flexible link"

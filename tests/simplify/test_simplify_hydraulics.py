@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import vpm
 from vpm.errors import ModelError
+from vpm.numbers import Array
 from vpm.simplify import Ladder, reductions, simplify
 from vpm.simplify.hydraulics import BOTH, LOAD, NO_STATE, QUASI_STATIC, SIMPLER, STATIC, simpler
 from vpm.simplify.judge import Judge, by_the_model
@@ -18,7 +18,6 @@ from vpm.simplify.learnt import maxwell_entry, narx_entry, trained
 from vpm.simplify.replacement import commanded, replaced
 from vpm.simplify.surrogates import _learnt, _taught, surrogates
 
-Array = NDArray[np.float64]
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CHANNELS = ("slider.position", "hip_drive.force", "knee_drive.force")
 SPRING = json.dumps(

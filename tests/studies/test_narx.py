@@ -10,14 +10,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm import narx
 from vpm.errors import DivergedError, IdentificationError, SimulationError
 from vpm.experiment import Experiment
 from vpm.narx import MaxwellNarx, Narx, NarxRun, identify, split_in_time, validate
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 Term = tuple[tuple[int, int], ...]
 
 # y[k] = 0.5 y[k-1] + u[k-2] + 0.1 u[k-2]^2 + 0.05 y[k-1] u[k-2]

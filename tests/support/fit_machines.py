@@ -10,13 +10,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from vpm.experiment import Experiment
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 DT, FINE, GRAVITY = 0.002, 4, 9.81
 #: Size of a step of an encoder, and of the noise that stands for fine instruments, m or rad.

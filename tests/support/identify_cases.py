@@ -8,14 +8,12 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.experiment import Experiment
 from vpm.identify import Fit, Fitting, identify
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import Setup, simulate
-
-Array = NDArray[np.float64]
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 

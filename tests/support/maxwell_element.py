@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.narx import MaxwellNarx, MaxwellSignals
+from vpm.numbers import Array
 
-Array = NDArray[np.float64]
 Record = dict[str, Array]
 
 STEP = 1e-3

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from vpm.numbers import Array
 from vpm.studies.solid import Solid, brick, moved
-
-Array = NDArray[np.float64]
 
 #: Radii of a curved bar, m; it is bent by 1 N m per metre of its width.
 INNER, OUTER = 1.0, 2.0

@@ -10,12 +10,10 @@ from dataclasses import dataclass
 from math import copysign, cos, exp, inf, pi
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.experiment import Experiment
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 DT = 0.002
 FINE = 20

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 import vpm
 from textbook_arm import FILE
+from vpm.numbers import Array
 from vpm.scenario import Scenario
 from vpm.view import Course, Scene, Tube, course_of, scene_of
 from vpm.view.looks import LOOKS, colour
 
-Array = NDArray[np.float64]
 ROOT = Path(__file__).resolve().parents[2]
 
 #: How far the measured arm is ahead of the simulated one (rad).

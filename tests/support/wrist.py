@@ -15,13 +15,11 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from vpm.experiment import Experiment
 from vpm.model import Model
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 FILE = Path(__file__).parents[2] / "examples" / "wrist" / "wrist.toml"
 GRAVITY = 9.81

@@ -6,12 +6,10 @@ import importlib.util
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from vpm.experiment import Experiment
 from vpm.model import ChannelEntry
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 COUNT = 60
 TIME = 0.01 * np.arange(COUNT)

@@ -7,9 +7,10 @@ from numpy.typing import ArrayLike
 
 import vpm
 from drive_texts import RIG
-from hydraulic_reference import AREA, CHIRP, RATIO, STEP, VALUES, Array, chirp, held
+from hydraulic_reference import AREA, CHIRP, RATIO, STEP, VALUES, chirp, held
 from model_texts import changed
 from validation.row import Row, accepted, against, row
+from vpm.numbers import Array
 
 CHANNELS = ("servo.pressure_a", "servo.pressure_b", "axis.position", "axis.velocity")
 BARE = RIG[: RIG.index("[[effects]]")].replace("internal_leakage = 1.7e-13", "")

@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 from validation.row import Row, accepted, against, row
 from vpm import narx
 from vpm.narx import MaxwellNarx
-
-Array = NDArray[np.float64]
+from vpm.numbers import Array
 
 VALUES = accepted("maxwell_narx")
 K0, S0, K1, C1 = 1e5, 0.30, 5e5, 2e3
