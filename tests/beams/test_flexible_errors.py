@@ -1,7 +1,5 @@
 """Errors and warnings of flexible machines, as a user meets them: which, where, how much, and what to do."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from pathlib import Path

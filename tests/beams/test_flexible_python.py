@@ -1,7 +1,5 @@
 """What Python asks of machines with flexible links: rest, vibrations, Jacobians, linear models, prescribed motion."""
 
-from __future__ import annotations
-
 import warnings
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Matrices of nodes with rotations, as Nastran and Abaqus write them: a bar of beam elements against closed forms."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise

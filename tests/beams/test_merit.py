@@ -1,7 +1,5 @@
 """The measured TUDOR arm: its record where it is at hand, and the whole way on a simulated one."""
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import sys

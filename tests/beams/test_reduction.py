@@ -1,7 +1,5 @@
 """Reduced solids: against an independent assembly, the whole solid, beams, conservation laws, and what is refused."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 from pathlib import Path

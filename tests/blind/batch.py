@@ -4,8 +4,6 @@ A column is one record of one machine. Columns that are the same in several case
 hidden effect where the cases have one seed, are simulated once.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ with each calibratable parameter a little different. All cases of a seed have on
 columns without an effect, which are most of them, are simulated once for all (`blind.batch`).
 """
 
-from __future__ import annotations
-
 import json
 import zlib
 from collections.abc import Iterable, Mapping, Sequence

@@ -7,8 +7,6 @@ that of Kelvin and Voigt with the same time. Places are complex numbers; both li
 (2, segments, columns). Forces are exact gradients of the energy, steps those of a leapfrog.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -5,8 +5,6 @@ velocities by a whole step, dry friction as an impulse that at most stops the jo
 of second order where nothing sticks or hits.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Protocol
 

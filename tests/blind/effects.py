@@ -5,8 +5,6 @@ known effects are named as in the catalogue, in the end at least; an effect with
 not in it, so that "unexplained" is the right answer.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from types import MappingProxyType

@@ -7,8 +7,6 @@ is known in the middle; with the leapfrog of the mechanics in between, the oil's
 Arrays have the shape (cylinders, columns); a spool is counted in the unit of the command.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -8,8 +8,6 @@ end stop is a contact after Hunt and Crossley (J. Appl. Mech. 42, 1975).
 Arrays have the shape (joints, columns); a column is one record of one case.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np

@@ -4,8 +4,6 @@ Order within a sample: the true outputs are there; the sensors read them, late, 
 the controllers compute from the readings; the drives work on the held commands until the next sample.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol

@@ -1,7 +1,5 @@
 """What a machine of the proving ground has to say of itself, and what it draws for one case."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol

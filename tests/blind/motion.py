@@ -1,7 +1,5 @@
 """References: sums of sines that never repeat, and moves with rests, from rest at zero."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray

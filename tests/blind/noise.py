@@ -1,7 +1,5 @@
 """Noise and counts of sensors, drawn per case from what is on the market."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray

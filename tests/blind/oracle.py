@@ -7,8 +7,6 @@ Both are compared with what noise does to the same channel in the same loop, all
 difference quotients of a controller make noise that is mostly above.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

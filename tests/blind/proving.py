@@ -1,7 +1,5 @@
 """The proving ground at work: chooses cases, makes them, diagnoses them on all cores, and keeps what is done."""
 
-from __future__ import annotations
-
 import json
 import os
 import time

@@ -1,7 +1,5 @@
 """How answers are scored: what counts as right, rates with their intervals, errors of parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 

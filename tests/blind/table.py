@@ -1,7 +1,5 @@
 """What the proving ground found, as lists and tables of Markdown that read well in a console too."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from functools import partial
 

@@ -1,7 +1,5 @@
 """The commands as a user types them: exit codes, one sentence for an error, files where they were asked for."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,7 +1,5 @@
 """How commands speak: one JSON document of what they found, less with --quiet, more with --verbose."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

@@ -1,7 +1,5 @@
 """``vpm demo --hide``: other effects in the demo's machine, true to their equations, and named on both records."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from collections.abc import Callable

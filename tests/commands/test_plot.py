@@ -1,7 +1,5 @@
 """Pictures: what is drawn, that it is readable text and no window, and that pages can hold it."""
 
-from __future__ import annotations
-
 import sys
 import xml.etree.ElementTree as ET
 from collections.abc import Callable

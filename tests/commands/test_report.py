@@ -1,7 +1,5 @@
 """The page for people: complete, self-contained, and true to the diagnosis."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 import xml.etree.ElementTree as ET

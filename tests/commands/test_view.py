@@ -1,7 +1,5 @@
 """What is drawn of a machine is where other formulas say it is, and in the colours that the legend says."""
 
-from __future__ import annotations
-
 import base64
 import json
 import re

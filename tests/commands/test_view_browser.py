@@ -1,7 +1,5 @@
 """Pictures of the page in headless Chromium, and the page that viser serves."""
 
-from __future__ import annotations
-
 import shutil
 import socket
 import subprocess

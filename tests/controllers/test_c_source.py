@@ -1,7 +1,5 @@
 """Models in C99: compiled with all warnings as errors, called from C, CasADi and as acados does, against the core."""
 
-from __future__ import annotations
-
 import ctypes
 import re
 import runpy

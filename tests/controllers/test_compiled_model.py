@@ -1,7 +1,5 @@
 """Compiled models hold all that a step needs; the C library's own tests step them (crates/vpm-c/tests)."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

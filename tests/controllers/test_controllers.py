@@ -1,7 +1,5 @@
 """Controllers in model files: against exact solutions, in the linear dynamics of an error, and what is refused."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

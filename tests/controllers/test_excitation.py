@@ -1,7 +1,5 @@
 """Excitations: spectra where they are asked for, known crest factors, limits at all times, better than random."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The flexible model in the controller: against closed forms, Riccati equations, a batch smoother and its own plays."""
 
-from __future__ import annotations
-
 from functools import cache
 from pathlib import Path
 

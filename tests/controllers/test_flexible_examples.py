@@ -1,7 +1,5 @@
 """What the flexible model in the controller is worth on TUDOR and on the leg: the examples, and their targets."""
 
-from __future__ import annotations
-
 import re
 import runpy
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The flexible model in the controller: what cannot work is refused in one sentence."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """FMUs of the examples, as other programs load them: validated, simulated and differentiated through FMPy."""
 
-from __future__ import annotations
-
 import ctypes
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """FMUs as files: the same bytes again, what the command says, and what is refused; nothing of it is compiled."""
 
-from __future__ import annotations
-
 import zipfile
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Environments: gymnasium's own check, and a batch that is its single copies bit for bit."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

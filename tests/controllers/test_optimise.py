@@ -1,7 +1,5 @@
 """Motions that make a goal least, against closed forms, other solvers and the machine itself."""
 
-from __future__ import annotations
-
 import math
 import runpy
 import signal

@@ -1,7 +1,5 @@
 """A loop at a fixed rate: its deadlines, what it reports, and what it is refused."""
 
-from __future__ import annotations
-
 import os
 import time
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Input shapers: closed forms, sampled trains at any step, and the vibration that a shaped motion leaves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike

@@ -1,7 +1,5 @@
 """Simulations that somebody else drives: the same machine as in a free run, for controllers."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import ArrayLike

@@ -1,7 +1,5 @@
 """State spaces for python-control: flexible and hydraulic machines with the names of all their states."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What parts of a machine answered before is what they answer again; noise of drives has the colour they give it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial

@@ -1,7 +1,5 @@
 """Backward elimination: what a later effect says as well, with a parameter that was held for the sake of the first."""
 
-from __future__ import annotations
-
 import pytest
 
 import vpm

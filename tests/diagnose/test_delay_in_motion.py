@@ -1,7 +1,5 @@
 """Late drives beside dry friction: timed where the joint moves, for where it turns round friction is late by itself."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """A diagnosis that takes its names from a ranking: which machines, what is refitted, what is said of the others."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Diagnoses of closed loops and of drives that go by their own samples; records are other code's, in shorter steps."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Friction close to rest, judged by closed-loop predictions where the inverse-dynamics residual shows too little."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Two missing effects: the inverse-dynamics residual leaves one open, closed-loop predictions do not."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import cast
 

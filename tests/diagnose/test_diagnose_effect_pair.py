@@ -1,7 +1,5 @@
 """Two effects that are missing at once: each alone is refused or imitated, both together are named."""
 
-from __future__ import annotations
-
 import pytest
 
 import vpm

@@ -1,7 +1,5 @@
 """What keeps a diagnosis short: refits that creep end, the longest work begins first, and nothing depends on either."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from threading import Barrier
 

@@ -1,7 +1,5 @@
 """Diagnosis of joints behind gears, of which a robot description tells inertia and no friction."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import geared_turntables

@@ -1,7 +1,5 @@
 """A hydraulic leg on a guide that has no drive: no inverse-dynamics residual shows what acts there."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

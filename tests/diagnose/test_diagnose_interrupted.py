@@ -1,7 +1,5 @@
 """A diagnosis that Ctrl-C ends, at each of its stages: it says what is known until then."""
 
-from __future__ import annotations
-
 import io
 import json
 import re

@@ -1,7 +1,5 @@
 """The low-frequency part of a residual, and what a bound lets a candidate do in screening."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

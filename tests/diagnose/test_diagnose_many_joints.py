@@ -1,7 +1,5 @@
 """An arm with six joints and no friction in its file: it is named at each joint, whatever another one does."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

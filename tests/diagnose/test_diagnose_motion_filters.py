@@ -1,7 +1,5 @@
 """Filters of a diagnosis: states as quick as their noise allows, and the same band."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Effects with a motion of their own: the step of their screening, their size, and what has to meet them."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The floor of a gap, what counts as structure, and how a diagnosis ends: small cases with a known answer."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What a model file believes of its parameters, and effects that would take them far from it."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

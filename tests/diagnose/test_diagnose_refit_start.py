@@ -1,7 +1,5 @@
 """Where refits begin: at what the recalibration left, or at what the model file states."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What a refitted candidate is refused for."""
 
-from __future__ import annotations
-
 import re
 from types import SimpleNamespace
 from typing import cast

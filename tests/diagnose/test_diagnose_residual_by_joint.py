@@ -1,7 +1,5 @@
 """Joints at which effects explain the gap, and others at which they do not."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any, cast
 

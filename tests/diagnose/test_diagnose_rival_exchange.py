@@ -1,7 +1,5 @@
 """Accepted effects when the search has ended: what takes the place of a plainer name, and the order they stand in."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from importlib import import_module
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Friction of seals that grows with the pressures: it passes for a constant force, and is told from it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The offset of a pressure gauge and a constant force: one inverse-dynamics residual, two different readings."""
 
-from __future__ import annotations
-
 import pytest
 
 from inverse_dynamics import inverse_dynamics_data

@@ -1,7 +1,5 @@
 """Ends of a way: where the search looks for them, and what it leaves alone."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

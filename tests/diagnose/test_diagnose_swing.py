@@ -1,7 +1,5 @@
 """A spring behind a joint that swings within the whole band leaves what looks like noise; it is named all the same."""
 
-from __future__ import annotations
-
 import pytest
 
 from shared_cases import shared_case

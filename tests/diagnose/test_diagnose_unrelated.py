@@ -5,8 +5,6 @@ better than masses on which nothing acts, which an observer draws along, and if 
 those that were measured.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """What counts as left: a channel that is above its noise and more than nothing beside its signal."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 from typing import Any
 

@@ -4,8 +4,6 @@ Records: see docs/diagnosis_logs.md. Fitted are training records or first halves
 magneto-rheological damper have test files of their own: test_emps.py and tests/identify/test_friction_logs.py.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Effects hidden in an axis that was simulated by other code: named, or not, as they should be."""
 
-from __future__ import annotations
-
 import json
 from functools import cache
 from pathlib import Path

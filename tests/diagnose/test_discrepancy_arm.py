@@ -1,7 +1,5 @@
 """Effects hidden in a machine whose joints disturb each other: the right effect at the right joint."""
 
-from __future__ import annotations
-
 import pytest
 
 from two_link_arm import Arm, nominal, record

@@ -1,7 +1,5 @@
 """Two effects that one record does not discriminate, and the experiment that does."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from types import SimpleNamespace
 

@@ -1,7 +1,5 @@
 """Limits of drives: where the search looks for them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

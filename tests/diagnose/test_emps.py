@@ -4,8 +4,6 @@ Data: A. Janot, M. Gautier, M. Brunot, "Data Set and Reference Models of EMPS", 
 Identification Benchmarks. Published values: mass 95.109 kg, viscous 203.50 N s/m, Coulomb 20.39 N, offset -3.165 N.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path

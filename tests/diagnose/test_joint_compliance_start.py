@@ -1,7 +1,5 @@
 """A joint compliance, looked for among the frequencies at which it may swing."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,7 +1,5 @@
 """LISDD, the baseline of `benches/diagnosis`: what it finds on closed forms, and how often its test rejects noise."""
 
-from __future__ import annotations
-
 import sys
 from functools import lru_cache
 from importlib import import_module

@@ -1,7 +1,5 @@
 """A delay and a lag, discriminated by the response to the reference alone."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

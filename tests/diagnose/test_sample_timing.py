@@ -1,7 +1,5 @@
 """What a shift of the commands within one sampling interval explains is no physics that is missing."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

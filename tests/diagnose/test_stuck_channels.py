@@ -1,7 +1,5 @@
 """Channels that stand still although the machine moves are refused; those of what may stand are not."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import partial
 from pathlib import Path

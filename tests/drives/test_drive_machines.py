@@ -1,7 +1,5 @@
 """Motors, limits and springs of model files, simulated, against closed forms."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """The servo-cylinder on its bench, identified as a grey box: acceptance, coverage, the start of the listing."""
 
-from __future__ import annotations
-
 import runpy
 from types import SimpleNamespace
 

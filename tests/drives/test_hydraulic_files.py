@@ -1,7 +1,5 @@
 """Hydraulic drives from model files against reference values and closed forms, through every door of the package."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Two measured hydraulic machines where their records are at hand, and the starts and loops that they rest on."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Quasi-static pressures and tables of efforts in model files, and both as what a servo-cylinder is made simpler to."""
 
-from __future__ import annotations
-
 import copy
 import json
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Valves that follow at once and quasi-static pressures in model files."""
 
-from __future__ import annotations
-
 import copy
 from pathlib import Path
 from typing import Any

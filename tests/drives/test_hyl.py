@@ -1,7 +1,5 @@
 """The HyL leg: the witness against published numbers, the package against both, and what its scenarios show."""
 
-from __future__ import annotations
-
 import runpy
 import tomllib
 from dataclasses import replace

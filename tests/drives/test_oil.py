@@ -1,7 +1,5 @@
 """Oil and valve by least squares: exact where nothing is wrong, biased as computed elsewhere, and noise is owned."""
 
-from __future__ import annotations
-
 import runpy
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """The page that adds an effect, taken literally: each block goes where its sentence says, in a copy of the sources."""
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

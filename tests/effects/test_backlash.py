@@ -1,7 +1,5 @@
 """Backlash between motor and load, found along the motion of the motor alone; the machine is written out here."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Friction of one of two drives of a joint: seals under pressure, the gear of one of two motors."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Forces without a law: what they compute, and what a diagnosis says of physics that the catalogue does not have."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache
 

@@ -1,7 +1,5 @@
 """The effect `hysteresis`: in files, by one call, in simulation, balance of efforts, fit and diagnosis."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

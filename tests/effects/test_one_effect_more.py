@@ -1,7 +1,5 @@
 """An effect more is checked alone: the model is that of the whole document, and so is every error."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """An effect is one file of the catalogue: nothing else in the package decides by its name."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator
 from importlib import import_module

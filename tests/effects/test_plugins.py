@@ -1,7 +1,5 @@
 """Effects, readers and importers of other packages, made in a folder as an installer leaves them."""
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,7 +1,5 @@
 """The doors of vpm, and how often a case goes through each."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """How documents, tables and bytes are damaged: with a sense of their structure, by numbers from a seed."""
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Models, scenarios and compiled models: how they are damaged, and what has to hold of what vpm makes of them."""
 
-from __future__ import annotations
-
 import json
 import math
 import tomllib

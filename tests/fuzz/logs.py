@@ -1,7 +1,5 @@
 """Logs: in every format, damaged byte by byte; tables of numbers and channel tables with a sense of their structure."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 import struct

@@ -1,7 +1,5 @@
 """Files of results: their bytes, and the document and the arrays in them."""
 
-from __future__ import annotations
-
 import io
 import json
 from functools import cache

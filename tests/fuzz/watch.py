@@ -1,7 +1,5 @@
 """Runs cases in processes of their own, so that an end of a process is a finding too."""
 
-from __future__ import annotations
-
 import os
 import resource
 import signal

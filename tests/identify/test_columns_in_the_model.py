@@ -1,7 +1,5 @@
 """A model file may hold the table of its logged columns, also where a fit takes the machine apart."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A fit knows when it is wrong: false and missed warnings counted, intervals that cover, gains that do not collapse."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any, cast
 

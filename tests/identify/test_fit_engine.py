@@ -1,7 +1,5 @@
 """The fitting engine: weights, losses, priors, starts, first states, pieces, intervals, warnings, interruption."""
 
-from __future__ import annotations
-
 import signal
 import time
 from dataclasses import replace

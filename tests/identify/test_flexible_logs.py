@@ -5,8 +5,6 @@ root mean square of the hub's torque, 100 norm(tau - tau*) / norm(tau), tau the 
 constant; both sides pass the zero-phase low-pass that the package chooses for the record (54.5 Hz).
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -4,8 +4,6 @@ Data: github.com/DanielMaurelE/vRTHS_AMBC_MRdamper (MIT licence), measured at UT
 mean squares of the force, 100 norm(F - F*) / norm(F) with the Euclidean norm over the samples of one record.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Identification against known truth: values, intervals that cover, and what cannot be seen."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Each example with parameters to fit finds the truth from a noisy log, from Python and on the command line."""
 
-from __future__ import annotations
-
 import csv
 import tomllib
 from pathlib import Path

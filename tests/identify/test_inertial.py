@@ -1,7 +1,5 @@
 """Inertial parameters: exact without noise, base parameters of the textbooks, honest intervals, feasible bodies."""
 
-from __future__ import annotations
-
 import runpy
 from collections.abc import Callable
 from dataclasses import replace

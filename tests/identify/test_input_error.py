@@ -1,7 +1,5 @@
 """Input error: the model turned round, against truth on simulated machines, and where it cannot be."""
 
-from __future__ import annotations
-
 import runpy
 from types import SimpleNamespace
 

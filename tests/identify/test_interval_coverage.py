@@ -1,7 +1,5 @@
 """Intervals and warnings of fits on the machines of `benches/coverage.py`, and the statistics that they rest on."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """A model that follows its log: noise found again, innovations that are white, fits of prediction errors."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

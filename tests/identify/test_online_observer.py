@@ -1,7 +1,5 @@
 """An observer fed sample by sample: the record's filter to rounding, consistent with simulated noise."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -3,8 +3,6 @@
 Its drive gives the torque that it is told, or is a motor with a winding that is told a voltage.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from importlib import import_module
 from typing import Any, cast

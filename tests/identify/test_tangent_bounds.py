@@ -1,7 +1,5 @@
 """A fit on a tangent that ends at a bound stays there: the way to it is a sum that rounding carries beyond."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from types import SimpleNamespace
 from typing import Any

@@ -1,7 +1,5 @@
 """A fit of drives without a chance beside another one ends after a whole step; one that has it goes on."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from importlib import import_module
 from types import SimpleNamespace

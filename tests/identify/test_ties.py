@@ -1,7 +1,5 @@
 """Parameters that share a value, samples that do not count, effects that no diagnosis tries."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Fits of a cart whose pendulum nobody measures, and which already swings where its log begins; numpy integrates it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray

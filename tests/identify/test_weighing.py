@@ -1,7 +1,5 @@
 """Models weighed by their evidence: against exact integrals, and by what they say of machines that are known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import quad

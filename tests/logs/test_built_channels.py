@@ -1,7 +1,5 @@
 """Channels that are built from several columns of a log."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

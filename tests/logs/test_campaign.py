@@ -1,7 +1,5 @@
 """Campaigns: several records as one, divided by whole records or by time."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Comparisons of runs whose difference from the record is known."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Comparisons as MCAP: read back by the library and by vpm they are what was compared."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Records: what is read, what is done to it, what is written down about that, and what is refused."""
 
-from __future__ import annotations
-
 import time as stopwatch
 from dataclasses import FrozenInstanceError
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Expressions over columns: right numbers, checked units, and nothing that runs."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

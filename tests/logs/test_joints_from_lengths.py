@@ -1,7 +1,5 @@
 """Joint angles from the wire sensors of cylinders, by the law of cosines."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Logs with a wrong unit, sign, name or clock, of a machine that was written by a textbook's equations."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 

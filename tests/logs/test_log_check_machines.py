@@ -1,7 +1,5 @@
 """Mistakes planted into logs of the machines of the proving ground, as `benches/log_check.py` counts them."""
 
-from __future__ import annotations
-
 import sys
 from importlib import import_module
 from pathlib import Path

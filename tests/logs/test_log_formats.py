@@ -1,7 +1,5 @@
 """Logs as they come: every format gives the numbers that were written, and what cannot be read is one sentence."""
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Data sets of LeRobot, in the layouts of versions 2.1 and 3.0, are campaigns of episodes."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

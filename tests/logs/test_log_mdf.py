@@ -1,7 +1,5 @@
 """MDF files give the numbers that were written, or one sentence; their library works in a process of its own."""
 
-from __future__ import annotations
-
 import os
 import struct
 import subprocess

@@ -1,7 +1,5 @@
 """Logs of measurement systems: TDMS and ULog give the numbers that were written, or one sentence."""
 
-from __future__ import annotations
-
 import struct
 import sys
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Filters, differences, cut-off frequency and noise, against signals whose truth is known."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 import scipy.signal

@@ -1,7 +1,5 @@
 """Logs of controllers: dates as clocks, channels with empty cells, and channels that repeat what a slow sensor read."""
 
-from __future__ import annotations
-
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
 

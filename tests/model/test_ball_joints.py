@@ -1,7 +1,5 @@
 """Spherical and free joints through all orientations, against solutions by other methods; what needs their angles."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

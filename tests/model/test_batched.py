@@ -1,7 +1,5 @@
 """Many motions in one call: against single evaluations, Pinocchio, difference quotients and closed kinematics."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib.util import find_spec
 

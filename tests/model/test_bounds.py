@@ -1,7 +1,5 @@
 """No state is shown that no machine can be in: one bound of the model, in every way of simulating."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A value that is changed gives the model, the file and the refusal that building from the changed file gives."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from functools import cached_property, partial

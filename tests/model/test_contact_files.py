@@ -1,7 +1,5 @@
 """Contacts, bushings, load cells and free joints from model files, against closed forms and through every door."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,7 +1,5 @@
 """Models without products of rates: what is missing, what share of the efforts that is, and where a search tries it."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Single evaluations: against closed forms, against each other, over random states and machines; linear models."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from threading import Thread
 

@@ -1,7 +1,5 @@
 """Closed loops of model files: closed forms, `vpm.linkages`, null spaces, stiff bushings in their place, refusals."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable, Sequence

@@ -1,7 +1,5 @@
 """Robots of URDF, xacro and MJCF against the libraries that know these formats, and values back into a URDF."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

@@ -1,7 +1,5 @@
 """Transmissions: shafts that turn with several joints, against hand-derived equations, reflected numbers and MuJoCo."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The table of ``make coverage``: rooms, shares, and the bound."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Limits of the tests themselves: what goes beyond them fails by name, the run goes on, and nothing is left running."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

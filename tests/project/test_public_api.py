@@ -1,7 +1,5 @@
 """What users may rely on changes by intention alone."""
 
-from __future__ import annotations
-
 from public_api import LIST, lines
 
 

@@ -1,7 +1,5 @@
 """Wheels from dist/: of these sources and for this machine, or none; recipes say what pyproject says."""
 
-from __future__ import annotations
-
 import importlib.util
 import platform
 import re

@@ -1,7 +1,5 @@
 """Every row of the validation table is within its tolerance, and the documents have every row."""
 
-from __future__ import annotations
-
 import pytest
 
 from validation import table

@@ -1,7 +1,5 @@
 """One concept, one word: pages, modules and public names use the terms of robotics and system identification."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

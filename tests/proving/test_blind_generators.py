@@ -1,7 +1,5 @@
 """The blind proving ground: its machines agree with the package if nothing is hidden, its effects do as they say."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from functools import cache

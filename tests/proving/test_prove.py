@@ -1,7 +1,5 @@
 """The proving ground counts what it says: scoring on made-up answers, and one case from its seed to the table."""
 
-from __future__ import annotations
-
 import json
 import signal
 from dataclasses import replace

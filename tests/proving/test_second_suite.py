@@ -1,7 +1,5 @@
 """The second suite of blind cases: its machines keep the laws of mechanics, and agree with vpm if nothing is hidden."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterator
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The second suite's flexible links: closed forms, energy, convergence, and vpm's exact beam in free runs."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 from functools import lru_cache, partial

@@ -1,7 +1,5 @@
 """The boom of the second suite keeps the laws of mechanics, of oil and of valves."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from scipy.integrate import quad

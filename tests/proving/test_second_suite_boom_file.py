@@ -1,7 +1,5 @@
 """The boom of the second suite moves as its model file does, whatever is hidden in both."""
 
-from __future__ import annotations
-
 import warnings
 from dataclasses import replace
 from functools import lru_cache

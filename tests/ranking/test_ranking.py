@@ -1,7 +1,5 @@
 """What is missing, ranked by evidence: the parts against closed forms, the whole on machines of elementary laws."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Numbers that make probabilities true: found again from outcomes that were drawn with them."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

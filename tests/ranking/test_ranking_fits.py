@@ -1,7 +1,5 @@
 """Fits of a ranking: what is known while it searches, secants, sides, steps, and what counts as an effect."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """First states that nobody measures: a load on a spring of which friction holds the first place."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

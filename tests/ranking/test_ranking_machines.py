@@ -1,7 +1,5 @@
 """Rankings of machines without a balance of efforts, and of logs that hold a deflection; witnesses by other code."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

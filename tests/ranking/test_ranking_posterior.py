@@ -1,7 +1,5 @@
 """Probabilities of a ranking, and effects that records cannot tell apart."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given

@@ -1,7 +1,5 @@
 """Rankings where nobody knows the shape of a law of friction: how it turns round, and how it fades from rest."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import cache
 

@@ -6,8 +6,6 @@ Denavit-Hartenberg).
 The published moments of the third link are none that a body can have: its smallest is 0.0225 kg m^2 here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A carriage on a toothed belt: mm and A, on a level rail; a dry and viscous carriage guide behind the belt."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The boom of a loader crane, luffed by a cylinder below it through a proportional valve: degrees, V and bar."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A cart that a pendulum hangs on: the pendulum has an encoder and no drive, the cart a controller that is known."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -12,8 +12,6 @@ squares on the training records, and the same values are then tried on the recor
 "not solvable" and does not count as missed. Of several effects each one is taken out beside the others.
 """
 
-from __future__ import annotations
-
 import zlib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass

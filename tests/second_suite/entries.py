@@ -1,7 +1,5 @@
 """What a model file says of a hidden effect, in the numbers of vpm's catalogue: to check that both mean the same."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import numpy as np

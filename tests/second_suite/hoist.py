@@ -1,7 +1,5 @@
 """A hoist: a platform is driven up and down, a load hangs below it on a springy rope that nobody measures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -4,8 +4,6 @@ Forces that dry friction may take up to a limit are no functions of the velocity
 `second_suite.plant` finds within them the force that lets the contact stick, or slide (Coulomb's law as an inclusion).
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What is logged of a machine: the channels side by side, the least noise that counts, and records in its units."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from second_suite.loop import Inputs, Signals

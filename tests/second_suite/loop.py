@@ -4,8 +4,6 @@ At sample k the encoders are read; the controller answers with a command that th
 the log keeps both in row k. A controller with a latency answers to earlier readings; its log holds what it gave out.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """References and torques: moves from place to place with rests, sums of sines, chirps."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

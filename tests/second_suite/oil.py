@@ -12,8 +12,6 @@ with air a = r (p0 / p)^(1 / n) per oil (H. Merritt, Hydraulic Control Systems, 
 no drop the root is a cubic with a finite slope (A. Ellman and R. Piche, 1999). Pressures are absolute.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The textbook's PID, for machines whose controller the model file knows."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

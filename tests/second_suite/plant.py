@@ -6,8 +6,6 @@ projected Gauss-Seidel sweeps (J. Moreau, "Numerical aspects of the sweeping pro
 stick. Without dry friction the rule is of second order.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """An arm that hangs on a gear of 50: degrees and A; one record swings under torques alone, without a controller."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -8,8 +8,6 @@ A solver is a function of the model, the records to learn from and those to judg
 (effect, site). ``diagnose`` and ``rank`` are those of vpm. One process works on one core; run several side by side.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

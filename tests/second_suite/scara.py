@@ -1,7 +1,5 @@
 """A SCARA: two joints that turn in a level plane, a quill that slides down; computed torque; friction at the motors."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a solver answered to a case, how many points that makes, and the table of many answers."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

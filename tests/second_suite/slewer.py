@@ -1,7 +1,5 @@
 """A slewing arm: a motor with gear and hub turns a steel strip with a heavy tip; a strain gauge sits near the root."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Solvers that can be scored: each answers with the (effect, site) of what is missing."""
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 

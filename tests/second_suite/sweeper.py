@@ -1,7 +1,5 @@
 """A light slewing arm: a blade of aluminium on a gear, logged at 1 kHz, whose bending nobody measures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Whether a step fits the period, and what it is made of."""
 
-from __future__ import annotations
-
 import shutil
 from dataclasses import replace
 from pathlib import Path

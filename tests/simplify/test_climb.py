@@ -1,7 +1,5 @@
 """The way up: levels of detail, what is fitted at each, and where more detail stops to pay."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Terms left out part by part: what is missing by closed forms, in the file, in runs, in a search."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Walking down: what may be left out."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

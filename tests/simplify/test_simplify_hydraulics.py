@@ -1,7 +1,5 @@
 """Walking hydraulic drives down: what is offered, what is learnt, and what is chosen for the leg."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

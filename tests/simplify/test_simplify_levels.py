@@ -1,7 +1,5 @@
 """Walking down with flexible links: coarser levels, single deformations, ways to step, against the full model."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 

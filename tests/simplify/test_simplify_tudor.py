@@ -1,7 +1,5 @@
 """Walking an arm with two flexible links down from elements: what is cut, what is chosen, and what Ctrl-C leaves."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Batches: the same as one after the other, failures as values, stopped by Ctrl-C."""
 
-from __future__ import annotations
-
 import time
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A joint that grows without bound along a motion of a log: one error, with the state, the time and the bound."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """What steps damp, as every way of simulating says it: of a mass on a spring, whose runs show it."""
 
-from __future__ import annotations
-
 import copy
 from pathlib import Path
 

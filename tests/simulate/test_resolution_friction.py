@@ -1,7 +1,5 @@
 """Friction that steps do not bring to rest, of everything that rubs: told where a run shows it, and nowhere else."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Scenario files: what they drive, what they start from, what they refuse, and what comes out."""
 
-from __future__ import annotations
-
 import math
 import time
 import tomllib

@@ -1,7 +1,5 @@
 """The four modes against closed forms, against each other, and against bad input."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Work by executors: the answers of one process, workers that die, Ctrl-C, and what no executor can do."""
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import pickle

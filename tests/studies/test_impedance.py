@@ -1,7 +1,5 @@
 """Loops: closed forms, planted laws of loss, what noise and delay do, repeated tests, and bad input."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

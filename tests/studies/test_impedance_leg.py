@@ -1,7 +1,5 @@
 """Tests on the simulated HyL leg find the gains of its controllers."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from pathlib import Path

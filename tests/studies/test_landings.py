@@ -1,7 +1,5 @@
 """Stops, landings, free motion, decrements and impulses: closed forms, and motions by SciPy's DOP853."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 from hypothesis import given, settings

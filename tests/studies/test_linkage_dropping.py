@@ -1,7 +1,5 @@
 """Where a term of a leg's dynamics may be left out, and that no more is missing there than is said."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

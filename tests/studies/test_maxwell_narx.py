@@ -1,7 +1,5 @@
 """The Maxwell NARX element from records: recovery, noise on the force, what records cannot tell, maps."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

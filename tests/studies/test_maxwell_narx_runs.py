@@ -1,7 +1,5 @@
 """The Maxwell NARX element from records: runs and their errors, refinement, sentences, a machine from a model file."""
 
-from __future__ import annotations
-
 import runpy
 from pathlib import Path
 from types import SimpleNamespace

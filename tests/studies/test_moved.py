@@ -1,7 +1,5 @@
 """Studies that stood among the tool keep their public names, and files that older versions wrote are read."""
 
-from __future__ import annotations
-
 import json
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """NARX models: runs against a plain recursion, selection of terms, what records cannot tell, residual tests, files."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """NARX models and sampled Maxwell elements as actuators: the equation beside the machine, and what is refused."""
 
-from __future__ import annotations
-
 import copy
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """NARX models of public records, where they are at hand: structure from one part alone, judged on another."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 

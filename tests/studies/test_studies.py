@@ -1,7 +1,5 @@
 """The studies of appendix B: their elements by closed forms, their contact by Hertz, their figures and refusals."""
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """A witness of solids: a bar of bricks with 27 nodes, assembled by plain loops."""
 
-from __future__ import annotations
-
 from itertools import product
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """A command as a user types it, but in this process: starting one takes longer than most commands."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from contextlib import chdir, nullcontext, redirect_stderr, redirect_stdout

@@ -7,8 +7,6 @@
 The first is what ``coverage json`` writes, the second a summary of ``cargo llvm-cov --json``. Needs nothing but Python.
 """
 
-from __future__ import annotations
-
 import json
 import sys
 from collections.abc import Iterator

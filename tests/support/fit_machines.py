@@ -4,8 +4,6 @@ A linear axis (one mass, or two with a spring or a gap between them) and a verti
 proportional-derivative controller that follows a sum of sines. Friction holds where it can, delays are queues.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

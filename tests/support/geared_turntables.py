@@ -1,7 +1,5 @@
 """Two turntables behind gears whose friction takes many times the torque of their inertia, by Newton's law."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import vpm

@@ -4,8 +4,6 @@ Height, both motors and the ground's force are logged. The foot slides on smooth
 the guide.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from vpm.experiment import Experiment

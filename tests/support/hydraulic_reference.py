@@ -4,8 +4,6 @@ Cylinder 16/10/80 mm, 160 bar, 7.5 l/min at 35 bar per edge and 10 mA, spool 250
 2.9e-6 m^3, 3 kg, 700 N s/m, 589.927 N/m, leakage 1.7e-13 m^3/(s Pa); from rest in the middle.
 """
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Laws of the HyL leg, solved without vpm: the ground under its foot, and its servo-cylinders."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Points, bodies and lines in a plane, vectors as complex numbers: places, partial velocities, accelerations."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

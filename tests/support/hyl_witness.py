@@ -10,8 +10,6 @@ Masses: M. D'Imperio 2016, table 5.1, CAD column; geometry: IIT 2017, HyQ standa
 ``python tests/support/hyl_witness.py`` writes `values/hyl_witness.json`.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace

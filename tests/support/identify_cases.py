@@ -1,7 +1,5 @@
 """Examples with parameters to fit: a log with noise, simulated from the truth, and the fit that has to find it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cache

@@ -1,7 +1,5 @@
 """Records of a spring with a damper: ellipses and landings, with and without noise."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp

@@ -1,7 +1,5 @@
 """Programs and computations that a test stops by Ctrl-C: after some processor time, whatever else the machine does."""
 
-from __future__ import annotations
-
 import _thread
 import os
 import signal

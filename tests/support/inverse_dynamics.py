@@ -1,7 +1,5 @@
 """Inverse-dynamics problems of a blind case, without simulations."""
 
-from __future__ import annotations
-
 from blind import Case
 from vpm.discrepancy.confirmation.confirmation import Data
 from vpm.identify import InverseDynamicsProblem

@@ -3,8 +3,6 @@
 By the clock, a test takes as long as other work on the machine makes it; its processor time is its own.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

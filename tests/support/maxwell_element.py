@@ -1,7 +1,5 @@
 """Records of a known Maxwell NARX element, with noise on the force: poses at rest and sines."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

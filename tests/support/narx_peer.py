@@ -1,7 +1,5 @@
 """The same selection by sysidentpy, for comparison where it is installed."""
 
-from __future__ import annotations
-
 import warnings
 from typing import Any
 

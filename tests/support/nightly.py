@@ -1,7 +1,5 @@
 """Claims about many machines or effects, of which a few stand for all in every run; the others are tested at night."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterable
 from typing import Any
 

@@ -3,8 +3,6 @@
 Without ends of the stroke: at 0.6 Hz the piston passes 40 mm, as in the reference values of the pressure rule.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

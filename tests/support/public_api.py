@@ -3,8 +3,6 @@
 python tests/support/public_api.py    writes tests/support/public_api.txt anew, from the package
 """
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import fields, is_dataclass

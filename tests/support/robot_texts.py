@@ -1,7 +1,5 @@
 """Robots as URDF that tests write: five of them, and random trees."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

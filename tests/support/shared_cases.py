@@ -4,8 +4,6 @@ Side by side they take little longer than one alone, and each is what it would b
 `test_blind_generators.test_a_case_follows_from_its_seed_alone`.
 """
 
-from __future__ import annotations
-
 import os
 import pickle
 from functools import cache

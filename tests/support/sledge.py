@@ -1,7 +1,5 @@
 """A sledge that a motor pushes, by elementary laws in small explicit steps: dry friction, lag, delay and stops."""
 
-from __future__ import annotations
-
 from collections import deque
 
 import numpy as np

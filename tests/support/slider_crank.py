@@ -1,7 +1,5 @@
 """A slider-crank with a rigid rod, by its one equation of motion: dry friction on its guide, nothing on its pins."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@ A program of its own: ``python stalls.py COMMAND ...`` runs a command and ends i
 It counts looks, not time by the clock: a machine that is busy or asleep looks as seldom as it works.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

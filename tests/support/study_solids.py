@@ -1,7 +1,5 @@
 """Solids with closed forms, for the finite elements of the studies."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from vpm.numbers import Array

@@ -4,8 +4,6 @@ The friction here really sticks, the delay is a real queue and the encoder reall
 formulas is used, so that what the package finds is found in somebody else's data.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import copysign, cos, exp, inf, pi
 

@@ -1,7 +1,5 @@
 """What workers do in the tests of tasks: functions of a module that every process can import."""
 
-from __future__ import annotations
-
 import os
 import signal
 import time

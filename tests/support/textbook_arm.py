@@ -4,8 +4,6 @@ Source: M. Spong, S. Hutchinson, M. Vidyasagar, *Robot Modeling and Control*, Wi
 the ends of light links of lengths l, angles q from the x axis, gravity along -y.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ Lagrange's equations of two links in a vertical plane (M. Spong, S. Hutchinson, 
 Control*, section 6.4), angles counted downwards from the horizontal, driven by PD control with gravity feed-forward.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import cos, sin, tanh
 

@@ -1,7 +1,5 @@
 """Machines that the tests of the viewer look at, and where in a picture their parts have to be."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -8,8 +8,6 @@ centre hangs below the roll axis, a how far out that begins, and I its moments o
     V = -g (M b sin p + m (a sin p + e c cos p)),    c = cos r, s = sin r.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What tests of formats of logs share: what is written, which column is which, and whether it was read."""
 
-from __future__ import annotations
-
 import importlib.util
 
 import numpy as np

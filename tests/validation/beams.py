@@ -1,7 +1,5 @@
 """Beams at rest and vibrating, against closed forms and converged solutions."""
 
-from __future__ import annotations
-
 import numpy as np
 
 import vpm

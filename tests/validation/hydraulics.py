@@ -1,7 +1,5 @@
 """The servo-cylinder of a model file: closed forms, and responses that a Radau method solved."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

@@ -1,7 +1,5 @@
 """The HyL leg from its model files: against recomputed values, and against a solution that was made without vpm."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Parameters of the examples from noisy simulated logs, beside the truth that the logs were simulated with."""
 
-from __future__ import annotations
-
 from identify_cases import CASES, fit_of
 from validation.row import Row, row
 

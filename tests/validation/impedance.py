@@ -1,7 +1,5 @@
 """Stiffness and damping of joints: factors of stops, gains of controllers seen at cylinders, laws from loops."""
 
-from __future__ import annotations
-
 import numpy as np
 from scipy.integrate import solve_ivp
 

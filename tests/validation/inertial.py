@@ -1,7 +1,5 @@
 """Masses and inertias by least squares: Table 5.1, its recovery, ranks, and the textbooks' base parameters."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """KARL and the HyQ leg, read from the example files, against published and recomputed values."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

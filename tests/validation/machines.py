@@ -1,7 +1,5 @@
 """The machines of the table, as model files say them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """The Maxwell element as a difference equation and from records: closed forms, ranks, published constants."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Beams in large overall motion, against converged solutions of other codes."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """What a model shows in one state."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

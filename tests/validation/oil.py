@@ -1,7 +1,5 @@
 """Bulk modulus and gain of the valve by least squares, on records of the cylinder that were solved without vpm."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from hydraulic_reference import NO_LOAD_IN, NO_LOAD_OUT, SUPPLY, TANK

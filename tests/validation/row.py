@@ -1,7 +1,5 @@
 """One row of the table: a name, what was found, what is expected, and how far they may part."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The studies: what is printed of carton and fingertip, and their solvers beside solutions without them."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

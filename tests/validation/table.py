@@ -1,7 +1,5 @@
 """The whole table, and the page that sums it up."""
 
-from __future__ import annotations
-
 import csv
 import io
 import json

@@ -1,7 +1,5 @@
 """The arm of examples/tudor against solutions of other code: a chain of rigid segments, made finer and finer."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The machines of the proving ground, one file each."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 

@@ -3,8 +3,6 @@
 M. Spong, S. Hutchinson and M. Vidyasagar, *Robot Modeling and Control*, section 6.4; the angles count from hanging.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """One driven axis: a carriage on rails, or an unbalanced rotor turning in a vertical plane, behind a cascade."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

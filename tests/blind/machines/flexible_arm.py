@@ -1,7 +1,5 @@
 """An arm with two flexible links in a level plane, motors with gears in both hubs, strain gauges near both roots."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 Geometry of HyL (examples/hyl/hydraulic.toml); the length of a cylinder and its lever arm by the law of cosines.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

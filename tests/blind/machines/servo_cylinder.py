@@ -3,8 +3,6 @@
 Numbers around those of D'Imperio (2016), section 4.2 and appendix A.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
