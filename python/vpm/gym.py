@@ -18,6 +18,7 @@ with needs("gymnasium", "gym"):
     import gymnasium
     from gymnasium.vector import AutoresetMode, VectorEnv
     from gymnasium.vector.utils import batch_space
+
 #: Rewards (E,) of actions (E, nu) that led to observations (E, m).
 Reward = Callable[[Array, Array], Array]
 

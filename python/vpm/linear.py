@@ -15,6 +15,7 @@ from vpm.results import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
 Complex = NDArray[np.complex128]
 
 

@@ -34,6 +34,7 @@ from vpm.numbers import Array
 if TYPE_CHECKING:
     from vpm.ranking import Ranked, Ranking
     from vpm.ranking import Settings as RankingSettings
+
 #: Part of the name of a parameter that acts behind a joint that is split.
 BEHIND = ".link."
 

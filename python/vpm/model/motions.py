@@ -19,6 +19,7 @@ from vpm.numbers import Array, array_of
 if TYPE_CHECKING:
     from vpm._core import Dynamics, System
     from vpm.model.parameters import Parameter
+
 Shape = tuple[int, ...]
 
 #: Difference of efforts, relative to their size, below which they agree: rounding of long sums.

@@ -13,6 +13,7 @@ from vpm.plot.style import BLUE, LINE, ORANGE, SOFT, STAGES, label, panels, styl
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
 Complex = NDArray[np.complex128]
 
 

@@ -13,6 +13,7 @@ from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from vpm.model import Model
+
 Folded = TypeVar("Folded")
 
 NAME = "damaged_crease"

@@ -13,6 +13,7 @@ from vpm.plot.style import INK, STAGES, label, panels, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
 #: Name, abscissae, ordinates, and how it is drawn ("-", "--", "o", "o-").
 Curve = tuple[str, ArrayLike, ArrayLike, str]
 

@@ -22,6 +22,7 @@ from vpm.studies.material import Material, invariants
 
 if TYPE_CHECKING:
     from skfem import MeshQuad2
+
 #: Points of integration: exact for polynomials of this order on each element.
 ORDER = 5
 #: The same for contact: three points on an edge, about its freedoms; more could not all be without overlap.

@@ -15,6 +15,7 @@ from vpm.reduction.library import finite_elements
 
 if TYPE_CHECKING:
     from skfem import MeshHex2
+
 Facets = NDArray[np.int64]
 #: Traction (Pa) at points of a face, shape (3, ...), from places, shape (3, ...).
 Traction = Callable[[Array], Array]

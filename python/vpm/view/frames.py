@@ -13,6 +13,7 @@ from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from vpm._core import System
+
 Content = dict[str, Any]
 
 _UPRIGHT = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)

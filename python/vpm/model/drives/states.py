@@ -16,6 +16,7 @@ from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from vpm.model.evaluation import Evaluations
+
 #: Value of a parameter by its dotted name; the second number where the model has none.
 Value = Callable[[str, float], float]
 

@@ -12,6 +12,7 @@ from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from vpm.studies.impedance.hysteresis_loop import Loop
+
 Complex = NDArray[np.complex128]
 
 #: Share of the damping beyond which a possible error is worth a sentence.

@@ -18,6 +18,7 @@ from vpm.studies.linkages.karl_results import KarlPoses, KarlSingularities, Karl
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
 Pair = tuple[float, float]
 
 #: Below this share of a rod's length, a slope of the constraint counts as zero.

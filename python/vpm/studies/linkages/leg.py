@@ -18,6 +18,7 @@ from vpm.studies.linkages.leg_results import LegReactions, LegStrokes, LegTerms,
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
+
 Derivation = Literal["virtual_work", "lagrange", "newton_euler"]
 ShareDefinition = Literal["sum_of_norms", "norm_of_absolute_sum", "root_of_squares", "torque"]
 
