@@ -3,7 +3,6 @@
 The files stand in `FOLDER`; ``README.md`` there tells what they are, and `vpm.demo.generate` makes them.
 """
 
-from vpm.demo.files import FOLDER, MODEL, TRAIN, TRUTH, VALIDATION
-from vpm.demo.story import print_list, run_demo
+from vpm.demo.story import FOLDER, MODEL, TRAIN, TRUTH, VALIDATION, print_list, run_demo
 
 __all__ = ["FOLDER", "MODEL", "TRAIN", "TRUTH", "VALIDATION", "print_list", "run_demo"]

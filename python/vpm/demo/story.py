@@ -10,7 +10,6 @@ from rich.console import Console
 
 from vpm.catalogue import EFFECTS
 from vpm.compare import compare
-from vpm.demo.files import FOLDER, MODEL, TRAIN, TRUTH, VALIDATION
 from vpm.demo.hidden import HIDDEN, LISTED, REFUSED
 from vpm.diagnosing import diagnose
 from vpm.discrepancy import Diagnosis
@@ -19,6 +18,21 @@ from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.report import print_story, write_report
 from vpm.simulate import simulate
+
+FOLDER = Path(__file__).parent
+"""The folder that holds the demo's files."""
+
+MODEL = FOLDER / "model.toml"
+"""What the machine's builder believes: rough values, and one effect missing."""
+
+TRAIN = FOLDER / "train.csv"
+"""The record that the diagnosis learns from."""
+
+VALIDATION = FOLDER / "validation.csv"
+"""Another motion of the same machine, for checking on validation data."""
+
+TRUTH = FOLDER / "truth.toml"
+"""The hidden effect and the true values. Only shown at the end, never read by the diagnosis."""
 
 
 def run_demo(

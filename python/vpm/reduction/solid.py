@@ -3,16 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from importlib import import_module
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from vpm.errors import ReductionError
+from vpm.errors import ReductionError, needs
 from vpm.numbers import Array
-from vpm.reduction.library import finite_elements
 from vpm.reduction.structure import Interface, Structure
+
+
+def finite_elements(module: str = "skfem") -> ModuleType:
+    """Library for finite elements: scikit-fem, a module of it, or meshio.
+
+    Raises
+    ------
+    MissingExtraError
+        It is not installed.
+    """
+    with needs("meshio" if module == "meshio" else "scikit-fem", "fem"):
+        return import_module(module)
+
 
 #: Meshes, tensors and modules of scikit-fem, which has no types.
 Mesh = Any

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from importlib.resources import files
@@ -9,8 +10,8 @@ from os import PathLike
 from pathlib import Path
 
 from vpm.discrepancy import Diagnosis
-from vpm.errors import needs
-from vpm.files import write_text
+from vpm.errors import MissingExtraError, MissingExtraWarning, needs
+from vpm.files import make_folder, write_text
 from vpm.numbers import percent, short
 from vpm.report.messages import VERDICT_WORDS, estimate, last_stage, probability, refitted, step_name, took
 from vpm.report.pictures import Drawn, drawn, finding, pictures, within
@@ -105,3 +106,31 @@ def _reduction(ladder: Ladder) -> Drawn:
         f"{percent(chosen.error)} at {short(1e6 * chosen.seconds)} µs."
     )
     return drawn("picture-ladder", "Model reduction", "Error against the time of a step", words, ladder.plot())
+
+
+def write_report(diagnosis: Diagnosis, folder: Path) -> tuple[Path, ...]:
+    """Write ``report.json``, ``report.html``, the repaired ``model.toml`` and ``diagnosis.npz`` into a folder.
+
+    The folder is made if need be; the last file holds everything, for `Diagnosis.load` and ``vpm report``.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    folder : Path
+
+    Returns
+    -------
+    tuple of Path
+        What was written: without the packages of the extra ``report`` no ``report.html``, and a warning says so.
+    """
+    make_folder(folder)
+    document = diagnosis.save_json(folder / "report.json")
+    repaired = folder / "model.toml"
+    diagnosis.model.save(repaired)
+    everything = diagnosis.save(folder / "diagnosis.npz")
+    try:
+        page = report(diagnosis).save(folder / "report.html")
+    except MissingExtraError as error:
+        warnings.warn(f"report.html was left out: {error}", MissingExtraWarning, stacklevel=2)
+        return document, repaired, everything
+    return document, page, repaired, everything

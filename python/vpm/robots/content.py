@@ -3,23 +3,73 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+import re
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from vpm.catalogue import POSITIVE
+from vpm.catalogue import EFFECTS, POSITIVE
 from vpm.catalogue.traits import Plain
-from vpm.model.joint import SUFFIXES
+from vpm.model.joint import SUFFIXES, JointType
 from vpm.model.pose import Pose
-from vpm.robots.joint_effects import plain_effect
 from vpm.robots.lumping import WORLD, Lump, Tree
 from vpm.robots.markup import clean
 from vpm.robots.parts import SINGLE, Drive, Inertial, Joint, Mimic, Robot, angles_of, rounded
-from vpm.robots.robot_names import Names
 from vpm.robots.transmissions import drives_of
 from vpm.robots.uncertain import Spread
+
+_RESERVED = ("world", "time")
+
+
+@dataclass
+class Names:
+    """Names of robot parts given so far, and notes of those that had to be changed."""
+
+    taken: set[str] = field(default_factory=lambda: set(_RESERVED))
+    notes: list[str] = field(default_factory=list)
+
+    def of(self, what: str, name: str, suffixes: Sequence[str] = ("",)) -> str:
+        """Model-file name for a robot's name.
+
+        Parameters
+        ----------
+        what : str
+            ``"joint"``, ``"link"``: what is put before or behind a name that will not do, and stands in the note.
+        name : str
+        suffixes : sequence of str
+            Of the names that it brings with it, such as the coordinates of a joint.
+        """
+        safe = re.sub(r"[^A-Za-z0-9_-]", "_", name)
+        if not safe[:1].isalpha():
+            safe = f"{what}_{safe.lstrip('_')}"
+        wanted, count = safe, 1
+        while any(f"{wanted}{suffix}" in self.taken for suffix in ("", *suffixes)):
+            wanted = f"{safe}_{what}" if count == 1 else f"{safe}_{what}_{count}"
+            count += 1
+        self.taken.update(f"{wanted}{suffix}" for suffix in ("", *suffixes))
+        if wanted != name:
+            self.notes.append(f'{what} "{clean(name)}" is called {wanted}')
+        return wanted
+
+    def joint(self, name: str, kind: JointType) -> str:
+        """Model-file name for a robot's joint, with those of its coordinates."""
+        return self.of("joint", name, SUFFIXES[kind])
+
+    def made(self, name: str) -> str:
+        """Model-file name of a part without a name in the robot file; it needs no note."""
+        before = len(self.notes)
+        given = self.of("part", name)
+        del self.notes[before:]
+        return given
+
+
+def plain_effect(plain: Plain) -> tuple[str, str]:
+    """Joint effect of the catalogue that a robot file gives as one number, and its parameter."""
+    effect = next(one for one in EFFECTS.values() if one.plain == plain)
+    return effect.name, effect.parameters[0].name
+
 
 Content = dict[str, Any]
 Remarks = dict[tuple[str, ...], str]

@@ -14,10 +14,9 @@ from vpm.files import replacing
 from vpm.model import Model
 from vpm.model.body import INERTIA_TOLERANCE
 from vpm.model.pose import Pose, pose
-from vpm.robots.content import Draft
+from vpm.robots.content import Draft, plain_effect
 from vpm.robots.edits import Changes, Edits
 from vpm.robots.importing import FLOATING, drafted, robot_of
-from vpm.robots.joint_effects import plain_effect
 from vpm.robots.lumping import Lump
 from vpm.robots.markup import Element, Markup, clean, read_markup
 from vpm.robots.parts import SINGLE, Inertial, Joint, Robot, moved, without

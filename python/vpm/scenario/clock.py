@@ -12,8 +12,7 @@ from numpy.typing import NDArray
 
 from vpm.model import Model
 from vpm.scenario.messages import refuse
-from vpm.scenario.schema import Document
-from vpm.scenario.values import si_value
+from vpm.scenario.schema import Document, si_value
 
 #: Samples that a scenario may have: more do not fit into a memory.
 MOST_SAMPLES = 10_000_000

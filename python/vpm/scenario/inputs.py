@@ -12,8 +12,7 @@ from vpm.numbers import Array
 from vpm.scenario import signals
 from vpm.scenario.clock import Clock
 from vpm.scenario.messages import Keys, refuse
-from vpm.scenario.schema import Chirp, Constant, Document, Given, Listed, Points, Signal, Sine
-from vpm.scenario.values import si_value
+from vpm.scenario.schema import Chirp, Constant, Document, Given, Listed, Points, Signal, Sine, si_value
 from vpm.units import parse_unit
 
 

@@ -13,8 +13,7 @@ from vpm.model import Model
 from vpm.model.messages import place
 from vpm.model.writer import plain
 from vpm.scenario.messages import Keys, refuse
-from vpm.scenario.schema import Given, RunEntry
-from vpm.scenario.values import si_value
+from vpm.scenario.schema import Given, RunEntry, si_value
 
 
 def machines(entries: tuple[RunEntry, ...], folder: Path) -> Mapping[str, Model]:

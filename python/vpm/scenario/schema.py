@@ -10,9 +10,12 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, BeforeValidator, Field
 
+from vpm.errors import UnitError
 from vpm.model.effects import EffectEntry
 from vpm.model.entry import Entry, Number, Text
+from vpm.scenario.messages import Keys, refuse
 from vpm.simulate import AUTOMATIC
+from vpm.units import convert
 
 
 class Given(Entry):
@@ -125,3 +128,19 @@ class Document(Entry):
 
 #: Tables of signals, by the name of what each drives.
 INPUTS = ("references", "commands", "supplies")
+
+
+def si_value(given: Given, unit: str, keys: Keys) -> float:
+    """SI value of a number that should be in a unit of this kind.
+
+    Raises
+    ------
+    ScenarioError
+        It has a unit of another kind.
+    """
+    if given.unit is None:
+        return given.value
+    try:
+        return convert(given.value, given.unit, unit)
+    except UnitError as error:
+        refuse(keys, f"is wrong: {error}")

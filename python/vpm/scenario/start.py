@@ -12,8 +12,7 @@ from vpm.model.drives.states import rest
 from vpm.model.loops.states import close, kept
 from vpm.numbers import Array
 from vpm.scenario.messages import refuse
-from vpm.scenario.schema import Document
-from vpm.scenario.values import si_value
+from vpm.scenario.schema import Document, si_value
 from vpm.stepping import Simulation
 
 

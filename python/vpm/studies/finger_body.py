@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import VpmError
 from vpm.numbers import Array
-from vpm.reduction.library import finite_elements
+from vpm.reduction.solid import finite_elements
 from vpm.studies.material import Material
 from vpm.studies.soft import SoftBody
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from scipy.sparse import bmat, csc_matrix, csr_matrix
 
 from vpm.numbers import Array
-from vpm.reduction.library import finite_elements
+from vpm.reduction.solid import finite_elements
 from vpm.studies.jet import Jet
 from vpm.studies.material import Material, invariants
 

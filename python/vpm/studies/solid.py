@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.numbers import Array
-from vpm.reduction.library import finite_elements
+from vpm.reduction.solid import finite_elements
 
 if TYPE_CHECKING:
     from skfem import MeshHex2
