@@ -30,15 +30,9 @@ TOLD = (ValidityWarning, PluginWarning, MissingExtraWarning)
 
 
 class Output(Console):
-    """Output console that falls silent where its file or disk takes no more; other work goes on.
+    """Output console that falls silent where its file or disk takes no more; other work goes on."""
 
-    Attributes
-    ----------
-    trouble : OSError or None
-        Why it fell silent.
-    """
-
-    trouble: OSError | None = None
+    trouble: OSError | None = None  #: Why it fell silent.
 
     def print(self, *objects: Any, **options: Any) -> None:  # noqa: ANN401
         """Print to the output console, until its file takes no more."""
@@ -65,29 +59,17 @@ FLAGS = {
 
 @dataclass
 class OutputOptions:
-    """Output options of the command that runs now, and what it has printed.
-
-    Attributes
-    ----------
-    json, quiet, verbose : bool
-    command : str
-        Its words, such as ``excite chirp``.
-    result : dict
-        What it found, by name.
-    files, notes : list of str
-        What it wrote, and warned of.
-    begin : float
-        When it began (s).
-    """
+    """Output options of the command that runs now, and what it has printed."""
 
     json: bool = False
     quiet: bool = False
     verbose: bool = False
-    command: str = ""
-    result: dict[str, object] = field(default_factory=dict)
+    command: str = ""  #: Its words, such as ``excite chirp``.
+    result: dict[str, object] = field(default_factory=dict)  #: What it found, by name.
+    #: What it wrote, and warned of.
     files: list[str] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
-    begin: float = field(default_factory=perf_counter)
+    begin: float = field(default_factory=perf_counter)  #: When it began (s).
 
 
 _now = OutputOptions()

@@ -308,15 +308,7 @@ def _measured(
 
 @dataclass(frozen=True)
 class _Known:
-    """Intermediate results of `diagnose` once effects are named: models, records, ranking and rivals.
-
-    Attributes
-    ----------
-    late : bool
-        Whether Ctrl-C left open what else would do.
-    began : float
-        When it began, by the clock of this process, s.
-    """
+    """Intermediate results of `diagnose` once effects are named: models, records, ranking and rivals."""
 
     model: Model
     records: Records
@@ -325,8 +317,8 @@ class _Known:
     recalibrated: Judged
     ranking: Ranking | None
     ambiguous: tuple[Rivals, ...]
-    late: bool
-    began: float
+    late: bool  #: Whether Ctrl-C left open what else would do.
+    began: float  #: When it began, by the clock of this process, s.
 
 
 @dataclass(frozen=True)

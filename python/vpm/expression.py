@@ -24,17 +24,10 @@ PURE: tuple[Power, ...] = (0,) * len(BASE_UNITS)
 
 
 class Quantity(NamedTuple):
-    """Numbers in SI with their dimension.
+    """Numbers in SI with their dimension."""
 
-    Attributes
-    ----------
-    values : ndarray, shape (N,) or ()
-    dimension : tuple of int or Fraction
-        Powers of `vpm.units.BASE_UNITS`.
-    """
-
-    values: Array
-    dimension: tuple[Power, ...] = PURE
+    values: Array  #: Shape (N,) or ().
+    dimension: tuple[Power, ...] = PURE  #: Powers of `vpm.units.BASE_UNITS`.
 
 
 def unwrap(angle: Array, period: Array) -> Array:
@@ -117,17 +110,10 @@ CONSTANTS: Mapping[str, float] = {"pi": math.pi}
 
 @dataclass(frozen=True)
 class Expression:
-    """An expression that was read.
-
-    Attributes
-    ----------
-    text : str
-    names : tuple of str
-        What it names beside constants, in order of first use.
-    """
+    """An expression that was read."""
 
     text: str
-    names: tuple[str, ...]
+    names: tuple[str, ...]  #: What it names beside constants, in order of first use.
     _tree: ast.expr
 
     def __call__(self, parts: Mapping[str, Quantity]) -> Quantity:

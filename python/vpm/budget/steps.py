@@ -28,27 +28,13 @@ NOT_ASKED = "machine code was not asked for"
 
 @dataclass(frozen=True)
 class Timed:
-    """Timed steps of a simulation: duration of each, stages, and how often they asked for memory.
+    """Timed steps of a simulation: duration of each, stages, and how often they asked for memory."""
 
-    Attributes
-    ----------
-    seconds : ndarray, shape (steps,)
-        Duration of each, s.
-    allocations : int
-        How often they asked for memory.
-    memory : int
-        Bytes that a simulation holds.
-    stages : list of tuple of str, float, float
-        Name, seconds of one call, calls in a step.
-    direct : str
-        Why they were evaluated directly; empty where they ran as machine code.
-    """
-
-    seconds: Array
-    allocations: int
-    memory: int
-    stages: list[tuple[str, float, float]]
-    direct: str
+    seconds: Array  #: Shape (steps,); duration of each, s.
+    allocations: int  #: How often they asked for memory.
+    memory: int  #: Bytes that a simulation holds.
+    stages: list[tuple[str, float, float]]  #: Name, seconds of one call, calls in a step.
+    direct: str  #: Why they were evaluated directly; empty where they ran as machine code.
 
 
 def step_times(

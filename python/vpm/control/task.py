@@ -30,20 +30,11 @@ class Answer(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Task:
-    """A machine whose outputs follow a target, as many as there are inputs.
-
-    Attributes
-    ----------
-    model : Model
-    inputs : tuple of str
-        Actuators at work.
-    outputs : tuple of str
-        Joints' positions, ``"joint_1.position"``, and markers' coordinates, ``"tip.x"``.
-    """
+    """A machine whose outputs follow a target, as many as there are inputs."""
 
     model: Model
-    inputs: tuple[str, ...]
-    outputs: tuple[str, ...]
+    inputs: tuple[str, ...]  #: Actuators at work.
+    outputs: tuple[str, ...]  #: Joints' positions, ``"joint_1.position"``, and markers' coordinates, ``"tip.x"``.
 
     def __post_init__(self) -> None:
         """Check the names of an inversion task."""

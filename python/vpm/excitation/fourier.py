@@ -21,36 +21,20 @@ class FourierTrajectory(Excitation):
 
     ``v(t) = sum_l a_l cos(l w t) + b_l sin(l w t)``, its integral about the offset is the position (J. Swevers et al.,
     "Optimal robot excitation and identification", *IEEE Trans. Robotics and Automation* 13, 1997).
-
-    Attributes
-    ----------
-    joints : tuple of str
-    offset : ndarray, shape (n,)
-        Position about which a joint moves, rad or m.
-    cosine, sine : ndarray, shape (n, harmonics)
-        ``a`` and ``b``, rad/s or m/s.
-    fundamental : float
-        ``w / 2 pi``, Hz.
-    parameters : tuple of str
-        Base parameters that the motion is for.
-    criterion : str
-        What was made least, ``"condition"`` or ``"determinant"``.
-    condition : float
-        Condition number of the regressor: of its columns for a change by the uncertainty of each parameter, of its
-        rows in shares of the effort limits.
-    start_conditions : ndarray
-        Condition numbers of the random motions that the search began with.
     """
 
     joints: tuple[str, ...]
-    offset: Array
+    offset: Array  #: Shape (n,); position about which a joint moves, rad or m.
+    #: Shape (n, harmonics); ``a`` and ``b``, rad/s or m/s.
     cosine: Array
     sine: Array
-    fundamental: float
-    parameters: tuple[str, ...]
-    criterion: str
+    fundamental: float  #: ``w / 2 pi``, Hz.
+    parameters: tuple[str, ...]  #: Base parameters that the motion is for.
+    criterion: str  #: What was made least, ``"condition"`` or ``"determinant"``.
+    #: Condition number of the regressor: of its columns for a change by the uncertainty of each parameter, of its rows
+    #: in shares of the effort limits.
     condition: float
-    start_conditions: Array
+    start_conditions: Array  #: Condition numbers of the random motions that the search began with.
 
     def at(self, time: Array) -> tuple[Array, Array, Array]:
         """Fourier motion at any times: position, velocity and acceleration, each of shape (N, n)."""

@@ -52,38 +52,21 @@ def _expression(text: str) -> str:
 
 
 class ChannelEntry(BaseModel):
-    """Column of a log that holds one channel, or columns that it is built from.
-
-    Attributes
-    ----------
-    column : str
-        Name of the column; none where there is a `value`.
-    value : str
-        Expression over `columns`, worked out in SI; see `vpm.expression`.
-    columns : dict of str to ColumnPart
-        Column of each name in `value`.
-    unit : str
-        Unit of ``scale column + offset``; a `value` has to be of its kind.
-    scale : float
-        Factor on the numbers of the column.
-    offset : float
-        Added after the scaling, in `unit`.
-    delay : float
-        How late the samples are stamped (s).
-    optional : bool
-        A log without the column holds zeros here.
-    """
+    """Column of a log that holds one channel, or columns that it is built from."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
-    column: str = ""
+    column: str = ""  #: Name of the column; none where there is a `value`.
+    #: Expression over `columns`, worked out in SI; see `vpm.expression`.
     value: Annotated[str, AfterValidator(_expression)] = ""
+    #: Column of each name in `value`.
     columns: dict[str, Annotated[ColumnPart, BeforeValidator(_part)]] = Field(default_factory=dict)
+    #: Unit of ``scale column + offset``; a `value` has to be of its kind.
     unit: Annotated[Text, AfterValidator(_readable)]
-    scale: Annotated[Number, AfterValidator(_not_zero)] = 1.0
-    offset: Number = 0.0
-    delay: Number = 0.0
-    optional: Switch = False
+    scale: Annotated[Number, AfterValidator(_not_zero)] = 1.0  #: Factor on the numbers of the column.
+    offset: Number = 0.0  #: Added after the scaling, in `unit`.
+    delay: Number = 0.0  #: How late the samples are stamped (s).
+    optional: Switch = False  #: A log without the column holds zeros here.
 
     @model_validator(mode="after")
     def _is_one(self) -> Self:

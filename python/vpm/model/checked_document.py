@@ -45,20 +45,12 @@ class _Read(Mapping[str, Parameter]):
 
 @dataclass(frozen=True)
 class Rule:
-    """A condition on several parameters.
+    """A condition on several parameters."""
 
-    Attributes
-    ----------
-    problems : callable
-        What breaks it, of a document and of its parameters by name.
-    of_effects : bool
-        Whether it is one on effects, so that one more can break it.
-    names : frozenset of str
-        Parameters that it read when it held: while these keep their values it holds.
-    """
-
+    #: What breaks it, of a document and of its parameters by name.
     problems: Callable[[Document, Parameters], Iterable[Problem]]
-    of_effects: bool = False
+    of_effects: bool = False  #: Whether it is one on effects, so that one more can break it.
+    #: Parameters that it read when it held: while these keep their values it holds.
     names: frozenset[str] = frozenset()
 
     def judge(self, document: Document, parameters: Parameters) -> tuple[Rule, list[Problem]]:
@@ -70,30 +62,14 @@ class Rule:
 
 @dataclass(frozen=True)
 class Checked:
-    """A document without problems, and what was found out on the way.
+    """A document without problems, and what was found out on the way."""
 
-    Attributes
-    ----------
-    base : Document
-        As it was checked, before values were changed.
-    structure : Structure
-        What does not depend on values; those in its document are the ones of `base`.
-    slots : tuple of Slot
-        Places of the parameters, in index order, as in `base`.
-    parameters : mapping of str to Parameter
-        With the values of now.
-    rules : tuple of Rule
-        What has to hold between them.
-    changed : frozenset of str
-        Parameters whose value is not the one of `base`.
-    """
-
-    base: Document
-    structure: Structure
-    slots: tuple[Slot, ...]
-    parameters: Parameters
-    rules: tuple[Rule, ...]
-    changed: frozenset[str] = frozenset()
+    base: Document  #: As it was checked, before values were changed.
+    structure: Structure  #: What does not depend on values; those in its document are the ones of `base`.
+    slots: tuple[Slot, ...]  #: Places of the parameters, in index order, as in `base`.
+    parameters: Parameters  #: With the values of now.
+    rules: tuple[Rule, ...]  #: What has to hold between them.
+    changed: frozenset[str] = frozenset()  #: Parameters whose value is not the one of `base`.
 
     def with_values(self, values: Mapping[str, float]) -> Checked:
         """The checked document with other values (SI) of parameters that there are; nothing is checked."""

@@ -149,16 +149,9 @@ def core_of(structure: str, theta: NDArray[np.float64]) -> System:
 
 @dataclass(frozen=True)
 class Shape:
-    """A model of which the structure counts alone: the key of answers that hold whatever the values are.
+    """A model of which the structure counts alone: the key of answers that hold whatever the values are."""
 
-    Attributes
-    ----------
-    model : Model
-        One of those that differ in values only.
-    structure : str
-    """
-
-    model: Model = field(compare=False)
+    model: Model = field(compare=False)  #: One of those that differ in values only.
     structure: str = field(init=False)
 
     def __post_init__(self) -> None:

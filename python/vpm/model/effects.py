@@ -29,22 +29,14 @@ SITES = frozenset({"joint", "body", "link", "beam", "world"})
 
 
 class EffectEntry(BaseModel):
-    """An effect of the catalogue at a site; the other keys are its parameters.
-
-    Attributes
-    ----------
-    type : str
-    at : str
-    side : {"motor", "link"}
-        Where at a joint with a compliance or backlash.
-    """
+    """An effect of the catalogue at a site; the other keys are its parameters."""
 
     model_config = ConfigDict(extra="allow", frozen=True)
     __pydantic_extra__: dict[str, ParameterValue] = Field(init=False)
 
     type: Text
     at: Text
-    side: Side = "motor"
+    side: Side = "motor"  #: Where at a joint with a compliance or backlash.
 
     @property
     def owner(self) -> str:
@@ -83,24 +75,12 @@ class EffectEntry(BaseModel):
 
 @dataclass(frozen=True)
 class Effect:
-    """An effect of a model.
+    """An effect of a model."""
 
-    Attributes
-    ----------
-    name : str
-        Type in the catalogue.
-    at : str
-        Component that it sits at.
-    side : {"motor", "link"}
-        Where at a joint with a compliance or backlash.
-    parameter_names : mapping of str to str
-        Short name to dotted name of each parameter.
-    """
-
-    name: str
-    at: str
-    side: Side
-    parameter_names: Mapping[str, str]
+    name: str  #: Type in the catalogue.
+    at: str  #: Component that it sits at.
+    side: Side  #: Where at a joint with a compliance or backlash.
+    parameter_names: Mapping[str, str]  #: Short name to dotted name of each parameter.
 
     @property
     def key(self) -> tuple[str, str] | tuple[str, str, Side]:

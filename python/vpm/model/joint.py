@@ -69,23 +69,12 @@ AXIS_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class Coordinate:
-    """One coordinate of a joint.
+    """One coordinate of a joint."""
 
-    Attributes
-    ----------
-    name : str
-        The joint's own, or with the suffix of the coordinate.
-    kind : {"prismatic", "revolute", "helical"}
-    direction : tuple of float
-        Unit vector in the joint frame.
-    pitch : float
-        Travel per angle of a helical joint (m/rad).
-    """
-
-    name: str
-    kind: JointKind
-    direction: Direction
-    pitch: float = 0.0
+    name: str  #: The joint's own, or with the suffix of the coordinate.
+    kind: JointKind  #: One of "prismatic", "revolute", "helical".
+    direction: Direction  #: Unit vector in the joint frame.
+    pitch: float = 0.0  #: Travel per angle of a helical joint (m/rad).
 
 
 class DenavitHartenberg(Entry):

@@ -12,18 +12,10 @@ from vpm.errors import ModelError
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong.
+    """One thing that is wrong."""
 
-    Attributes
-    ----------
-    where : str
-        Place in the file, ``"bodies.carriage.mass"``.
-    rest : str
-        The sentence that begins with the place.
-    """
-
-    where: str
-    rest: str
+    where: str  #: Place in the file, ``"bodies.carriage.mass"``.
+    rest: str  #: The sentence that begins with the place.
 
     def __str__(self) -> str:
         return f"{self.where} {self.rest}"

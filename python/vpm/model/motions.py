@@ -30,26 +30,16 @@ MOTION = ("position", "velocity", "acceleration or effort")
 
 @dataclass(frozen=True, eq=False)
 class EffortDerivatives:
-    """Efforts of an inverse dynamics with their exact derivatives; ``...`` is the shape of the motions.
+    """Efforts of an inverse dynamics with their exact derivatives; ``...`` is the shape of the motions."""
 
-    Attributes
-    ----------
-    effort : ndarray, shape (..., n)
-    by_position, by_velocity, by_acceleration : ndarray, shape (..., n, n)
-        Column j is the derivative by coordinate j; the last one is the mass matrix, where no effect takes a share of
-        the load.
-    by_parameters : ndarray, shape (..., n, k)
-        Column j is the derivative by parameter j of those asked for.
-    parameters : tuple of str
-        Their names.
-    """
-
-    effort: Array
+    effort: Array  #: Shape (..., n).
+    #: Shape (..., n, n); column j is the derivative by coordinate j; the last one is the mass matrix, where no effect
+    #: takes a share of the load.
     by_position: Array
     by_velocity: Array
     by_acceleration: Array
-    by_parameters: Array
-    parameters: tuple[str, ...]
+    by_parameters: Array  #: Shape (..., n, k); column j is the derivative by parameter j of those asked for.
+    parameters: tuple[str, ...]  #: Their names.
 
 
 class Motions(Components):

@@ -19,23 +19,12 @@ _MOVING = dict.fromkeys(("position", "velocity", "acceleration", "effort"), "")
 
 
 class Owners(NamedTuple):
-    """Components with the same channels.
+    """Components with the same channels."""
 
-    Attributes
-    ----------
-    what : str
-        What the core calls one of them.
-    names : tuple of str
-    units : mapping of str to str
-        SI units of their channels; "" where it is another one for each.
-    key : str
-        What the core calls the channel: nothing where it is the kind of the reading.
-    """
-
-    what: str
+    what: str  #: What the core calls one of them.
     names: tuple[str, ...]
-    units: Mapping[str, str]
-    key: str = ""
+    units: Mapping[str, str]  #: SI units of their channels; "" where it is another one for each.
+    key: str = ""  #: What the core calls the channel: nothing where it is the kind of the reading.
 
 
 def owners(structure: Structure) -> Iterator[Owners]:

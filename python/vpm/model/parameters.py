@@ -55,31 +55,17 @@ class Rule:
 
 @dataclass(frozen=True)
 class Parameter:
-    """One parameter of a model.
+    """One parameter of a model."""
 
-    Attributes
-    ----------
-    name : str
-        Dotted name, ``"axis.friction.viscous"``.
-    value : float
-        In `unit`.
-    unit : str
-        SI unit, ``"N s/m"``.
-    uncertainty : float or None
-        One standard deviation, in `unit`; infinite if nothing is known beforehand, None if the value is taken as known.
-    minimum, maximum : float
-        Bounds in `unit`: those of the file, inside what is physically possible.
-    kind : {"linear", "shape"}
-        Whether the effort that a motion needs is linear in the parameter.
-    """
-
-    name: str
-    value: float
-    unit: str
+    name: str  #: Dotted name, ``"axis.friction.viscous"``.
+    value: float  #: In `unit`.
+    unit: str  #: SI unit, ``"N s/m"``.
+    #: One standard deviation, in `unit`; infinite if nothing is known beforehand, None if the value is taken as known.
     uncertainty: float | None
+    #: Bounds in `unit`: those of the file, inside what is physically possible.
     minimum: float
     maximum: float
-    kind: ParameterKind
+    kind: ParameterKind  #: One of "linear", "shape"; whether the effort that a motion needs is linear in the parameter.
 
     @property
     def adjustable(self) -> bool:

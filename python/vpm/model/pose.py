@@ -13,17 +13,10 @@ _IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 @dataclass(frozen=True)
 class Pose:
-    """Place of one frame in another one, ``X_AB``.
+    """Place of one frame in another one, ``X_AB``."""
 
-    Attributes
-    ----------
-    translation : tuple of float
-        Origin of B in A (m).
-    rotation : tuple of float
-        Matrix that turns components in B into those in A, nine numbers row by row.
-    """
-
-    translation: tuple[float, ...] = (0.0, 0.0, 0.0)
+    translation: tuple[float, ...] = (0.0, 0.0, 0.0)  #: Origin of B in A (m).
+    #: Matrix that turns components in B into those in A, nine numbers row by row.
     rotation: tuple[float, ...] = _IDENTITY
 
     def __matmul__(self, other: Pose) -> Pose:
@@ -44,20 +37,11 @@ class Pose:
 
 @dataclass(frozen=True)
 class Mount:
-    """What of the core something is fixed to: the world, a body, or a section of a beam.
-
-    Attributes
-    ----------
-    kind : {"world", "body", "section"}
-    index : int
-        Of the body or the beam, in the order of the core.
-    at : float
-        Arc length of the section (m).
-    """
+    """What of the core something is fixed to: the world, a body, or a section of a beam."""
 
     kind: Literal["world", "body", "section"] = "world"
-    index: int = 0
-    at: float = 0.0
+    index: int = 0  #: Of the body or the beam, in the order of the core.
+    at: float = 0.0  #: Arc length of the section (m).
 
     def described(self) -> str | dict[str, Any]:
         """Mount of a pose as the core reads it."""

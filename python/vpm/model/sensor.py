@@ -24,20 +24,11 @@ _ROUNDED = 1.0 / 12.0
 
 
 class Sensor(Component):
-    """Sensor that reads one channel, with noise and resolution.
-
-    Attributes
-    ----------
-    measures : str
-    noise : Quantity, optional
-        Standard deviation of what is independent from sample to sample.
-    resolution : Quantity, optional
-        Step between two readings that it can show.
-    """
+    """Sensor that reads one channel, with noise and resolution."""
 
     measures: Text
-    noise: ParameterValue | None = None
-    resolution: ParameterValue | None = None
+    noise: ParameterValue | None = None  #: Standard deviation of what is independent from sample to sample.
+    resolution: ParameterValue | None = None  #: Step between two readings that it can show.
 
     def stated(self, name: str, structure: Structure) -> Iterator[Slot]:
         """Values that a sensor states and that are no parameters."""

@@ -17,26 +17,13 @@ from vpm.model.tree import WORLD
 
 @dataclass(frozen=True)
 class Axis:
-    """A joint of the core; axis k moves body k of the core.
-
-    Attributes
-    ----------
-    coordinate : Coordinate
-    frame : Frame
-        Its frame at coordinate zero.
-    joint : str
-        Joint of the file that it is a part of.
-    body : str or None
-        Body of the file that it carries; None for a massless carrier.
-    added : bool
-        Whether an effect has split it off the joint of the file.
-    """
+    """A joint of the core; axis k moves body k of the core."""
 
     coordinate: Coordinate
-    frame: Frame
-    joint: str
-    body: str | None
-    added: bool = False
+    frame: Frame  #: Its frame at coordinate zero.
+    joint: str  #: Joint of the file that it is a part of.
+    body: str | None  #: Body of the file that it carries; None for a massless carrier.
+    added: bool = False  #: Whether an effect has split it off the joint of the file.
 
     @property
     def name(self) -> str:
@@ -56,25 +43,12 @@ class Axis:
 
 @dataclass(frozen=True)
 class Structure:
-    """Components in the order of the core.
+    """Components in the order of the core."""
 
-    Attributes
-    ----------
-    axes : tuple of Axis
-        Joints with one coordinate each.
-    bodies : tuple of str
-        Bodies of the file, parents before children.
-    beams : tuple of str
-        Parents before children.
-    frames : mapping of str to Frame
-        Where the frames of bodies and the root frames of beams are.
-    document : Document
-    """
-
-    axes: tuple[Axis, ...]
-    bodies: tuple[str, ...]
-    beams: tuple[str, ...]
-    frames: Mapping[str, Frame]
+    axes: tuple[Axis, ...]  #: Joints with one coordinate each.
+    bodies: tuple[str, ...]  #: Bodies of the file, parents before children.
+    beams: tuple[str, ...]  #: Parents before children.
+    frames: Mapping[str, Frame]  #: Where the frames of bodies and the root frames of beams are.
     document: Document
 
     @cached_property

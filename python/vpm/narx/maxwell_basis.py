@@ -20,19 +20,12 @@ EXACT = 1e-9
 
 @dataclass(frozen=True)
 class Basis:
-    """Monomials of centred and scaled u and s, which rounding can tell apart where those of u and s cannot.
+    """Monomials of centred and scaled u and s, which rounding can tell apart where those of u and s cannot."""
 
-    Attributes
-    ----------
-    centre, scale : tuple of two floats
-        Of u and s.
-    terms : tuple of int
-        Which of the ten are used.
-    """
-
+    #: Of u and s.
     centre: tuple[float, float]
     scale: tuple[float, float]
-    terms: tuple[int, ...]
+    terms: tuple[int, ...]  #: Which of the ten are used.
 
     @classmethod
     def around(cls, drive: Array, length: Array) -> Basis:

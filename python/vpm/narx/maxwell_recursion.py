@@ -55,17 +55,10 @@ def stretch(scheme: Scheme, length: Array) -> Array:
 
 @dataclass(frozen=True)
 class Recursion:
-    """The equation at one relaxation time.
+    """The equation at one relaxation time."""
 
-    Attributes
-    ----------
-    scheme : {"trapezoidal", "printed", "central_mean"}
-    ratio : float
-        ``tau / h``.
-    """
-
-    scheme: Scheme
-    ratio: float
+    scheme: Scheme  #: One of "trapezoidal", "printed", "central_mean".
+    ratio: float  #: ``tau / h``.
 
     @property
     def weights(self) -> Weights:

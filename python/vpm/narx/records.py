@@ -19,23 +19,13 @@ RecordLike: TypeAlias = "Experiment | Mapping[str, ArrayLike]"
 
 @dataclass(frozen=True)
 class Series:
-    """Output and inputs of one record.
-
-    Attributes
-    ----------
-    name : str
-    time : ndarray, shape (N,)
-        s, or samples where the record has no clock.
-    dt : float
-    output : ndarray, shape (N,)
-    inputs : ndarray, shape (N, m)
-    """
+    """Output and inputs of one record."""
 
     name: str
-    time: Array
+    time: Array  #: Shape (N,); s, or samples where the record has no clock.
     dt: float
-    output: Array
-    inputs: Array
+    output: Array  #: Shape (N,).
+    inputs: Array  #: Shape (N, m).
 
 
 def series(record: RecordLike, output: str, inputs: Sequence[str], name: str = "record") -> Series:

@@ -26,30 +26,15 @@ COORDINATES, RATES, DRIVES = 1e-2, 1.0, 0.1
 
 @dataclass(frozen=True)
 class Record:
-    """Readings, inputs and first state of a log, as an observer takes them.
-
-    Attributes
-    ----------
-    name : str
-    time : ndarray, shape (N,)
-        s.
-    dt : float
-        Time between samples, s.
-    channels : tuple of str
-        Outputs of the model that the log holds.
-    readings : ndarray, shape (N, m)
-    inputs : ndarray, shape (N, inputs)
-    first : ndarray, shape (nx,)
-        State at the first sample as the log suggests it.
-    """
+    """Readings, inputs and first state of a log, as an observer takes them."""
 
     name: str
-    time: Array
-    dt: float
-    channels: tuple[str, ...]
-    readings: Array
-    inputs: Array
-    first: Array
+    time: Array  #: Shape (N,); s.
+    dt: float  #: Time between samples, s.
+    channels: tuple[str, ...]  #: Outputs of the model that the log holds.
+    readings: Array  #: Shape (N, m).
+    inputs: Array  #: Shape (N, inputs).
+    first: Array  #: Shape (nx,); state at the first sample as the log suggests it.
 
     @classmethod
     def of(cls, model: Model, experiment: Experiment, channels: Sequence[str] | None = None) -> Record:
@@ -86,19 +71,12 @@ class Record:
 
 @dataclass(frozen=True)
 class Pass:
-    """Innovations, gains and states of one pass of the Kalman filter over a record; see `vpm._core.System.filter`.
+    """Innovations, gains and states of one pass of the Kalman filter over a record; see `vpm._core.System.filter`."""
 
-    Attributes
-    ----------
-    innovations : ndarray, shape (N, m)
-    covariances : ndarray, shape (N, m, m)
-    gains : ndarray, shape (N, nx, m)
-    states, deviations : ndarray, shape (N, nx)
-    """
-
-    innovations: Array
-    covariances: Array
-    gains: Array
+    innovations: Array  #: Shape (N, m).
+    covariances: Array  #: Shape (N, m, m).
+    gains: Array  #: Shape (N, nx, m).
+    #: Shape (N, nx).
     states: Array
     deviations: Array
 

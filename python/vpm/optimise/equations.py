@@ -42,27 +42,19 @@ def casadi() -> ModuleType:
 
 @dataclass(frozen=True)
 class Equations:
-    """Equations of a model as CasADi expressions.
+    """Equations of a model as CasADi expressions."""
 
-    Attributes
-    ----------
-    states, commands, channels : tuple of str
-        Names; commands are channels too, ``motor.command``.
-    state_units, command_units, channel_units : tuple of str
-    x, u : Expression
-        Symbols, shapes (nx,) and (nu,).
-    rates, outputs : Expression
-        Shapes (nx,) and (ny,).
-    """
-
+    #: Names; commands are channels too, ``motor.command``.
     states: tuple[str, ...]
     commands: tuple[str, ...]
     channels: tuple[str, ...]
     state_units: tuple[str, ...]
     command_units: tuple[str, ...]
     channel_units: tuple[str, ...]
+    #: Symbols, shapes (nx,) and (nu,).
     x: Expression
     u: Expression
+    #: Shapes (nx,) and (ny,).
     rates: Expression
     outputs: Expression
 

@@ -13,25 +13,13 @@ from vpm.optimise.collocation import STAGES, at_times, spread
 
 @dataclass(frozen=True)
 class MeshMotion:
-    """States at the points of a mesh and commands at its nodes, between which they run straight.
+    """States at the points of a mesh and commands at its nodes, between which they run straight."""
 
-    Attributes
-    ----------
-    meshes : tuple of ndarray
-        Nodes of each phase as shares of its duration, from 0 to 1.
-    durations : ndarray, shape (phases,)
-        s.
-    states : ndarray, shape (points, nx)
-    commands : tuple of ndarray, shapes (nodes, nu)
-        Of each phase; they may jump between phases.
-    rests : tuple of ndarray or None
-        Constant commands of the rest at the beginning and at the end of each phase, where there is one.
-    """
-
-    meshes: tuple[Array, ...]
-    durations: Array
-    states: Array
-    commands: tuple[Array, ...]
+    meshes: tuple[Array, ...]  #: Nodes of each phase as shares of its duration, from 0 to 1.
+    durations: Array  #: Shape (phases,); s.
+    states: Array  #: Shape (points, nx).
+    commands: tuple[Array, ...]  #: Shapes (nodes, nu); of each phase; they may jump between phases.
+    #: Constant commands of the rest at the beginning and at the end of each phase, where there is one.
     rests: tuple[Array | None, ...]
 
     @cached_property

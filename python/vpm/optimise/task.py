@@ -27,17 +27,11 @@ Keys = tuple[str | int, ...]
 
 @dataclass(frozen=True)
 class Limit:
-    """A channel between two numbers, SI.
-
-    Attributes
-    ----------
-    channel, unit : str
-    least, most : float
-        Infinite where there is none.
-    """
+    """A channel between two numbers, SI."""
 
     channel: str
     unit: str
+    #: Infinite where there is none.
     least: float
     most: float
 
@@ -55,63 +49,35 @@ class Limit:
 
 @dataclass(frozen=True)
 class End:
-    """Conditions at the beginning of a motion or at the end of a phase.
+    """Conditions at the beginning of a motion or at the end of a phase."""
 
-    Attributes
-    ----------
-    rest : bool
-        Every rate of the machine is zero under some constant command, so elastic parts are at rest too.
-    conditions : tuple of Limit
-    """
-
-    rest: bool
+    rest: bool  #: Every rate of the machine is zero under some constant command, so elastic parts are at rest too.
     conditions: tuple[Limit, ...]
 
 
 @dataclass(frozen=True)
 class Phase:
-    """A part of the motion.
-
-    Attributes
-    ----------
-    name : str
-    shortest, longest : float
-        Bounds of its duration, s.
-    intervals : int
-        Of the first mesh.
-    limits : tuple of Limit
-    end : End
-    guess : tuple of Limit
-        Constant commands whose motion the search begins with; a smooth way between the ends without them.
-    """
+    """A part of the motion."""
 
     name: str
+    #: Bounds of its duration, s.
     shortest: float
     longest: float
-    intervals: int
+    intervals: int  #: Of the first mesh.
     limits: tuple[Limit, ...]
     end: End
+    #: Constant commands whose motion the search begins with; a smooth way between the ends without them.
     guess: tuple[Limit, ...] = ()
 
 
 @dataclass(frozen=True)
 class Fitted:
-    """A task in the numbers and names of one model.
-
-    Attributes
-    ----------
-    begin : End
-    phases : tuple of Phase
-    weights : dict of str to float
-        Of time, energy and channels at the end, in what is made least.
-    obstacles : tuple
-        Marker, center (m) and radius (m) of each ball.
-    """
+    """A task in the numbers and names of one model."""
 
     begin: End
     phases: tuple[Phase, ...]
-    weights: dict[str, float]
-    obstacles: tuple[tuple[str, tuple[float, ...], float], ...]
+    weights: dict[str, float]  #: Of time, energy and channels at the end, in what is made least.
+    obstacles: tuple[tuple[str, tuple[float, ...], float], ...]  #: Marker, center (m) and radius (m) of each ball.
     periodic: bool
     tolerance: float
     refinements: int

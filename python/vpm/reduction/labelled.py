@@ -31,13 +31,7 @@ _BARE = re.compile(r"(?<=[\d.])([+-]\d+)$")
 
 @dataclass(frozen=True, eq=False)
 class Labelled:
-    """Labelled matrix: its entries, by ``6 label + component - 1``.
-
-    Attributes
-    ----------
-    rows, columns : ndarray of int
-    entries : ndarray
-    """
+    """Labelled matrix: its entries, by ``6 label + component - 1``."""
 
     rows: NDArray[np.int64]
     columns: NDArray[np.int64]

@@ -26,19 +26,12 @@ FASTEST, SLOWEST = 2e4, 1.0
 
 @dataclass(frozen=True, eq=False)
 class Interface:
-    """Nodes of a solid that are tied to a frame.
-
-    Attributes
-    ----------
-    name : str
-    nodes : ndarray of int
-    tie : {"rigid", "averaged"}
-        Rigid: the nodes move with the frame (RBE2). Averaged: the frame moves as the nodes do on average, which
-        stiffens nothing (RBE3).
-    """
+    """Nodes of a solid that are tied to a frame."""
 
     name: str
     nodes: NDArray[np.intp]
+    #: One of "rigid", "averaged"; rigid: the nodes move with the frame (RBE2). Averaged: the frame moves as the nodes
+    #: do on average, which stiffens nothing (RBE3).
     tie: Tie = "rigid"
 
 
@@ -47,29 +40,18 @@ class Structure:
     """Matrices of a solid with three displacements per node; number ``3 node + axis``, SI.
 
     Rotations of nodes, as shells and beams have them, follow all displacements.
-
-    Attributes
-    ----------
-    stiffness, mass : sparse matrix
-    nodes : ndarray
-        Places, shape (N, 3).
-    interfaces : tuple of Interface
-        That of the root comes first.
-    stretching : callable, optional
-        For two displacement fields, the nodal forces of the stress of their Green-Lagrange strain, ``sym(A_i^T A_j)``
-        with the gradients A; without it nothing of second order is known of the solid.
-    rotations : ndarray of int
-        Numbers ``3 node + axis`` of the rotations, in their order.
-    labels : ndarray of int
-        What messages call the nodes; their numbers from 0 on if empty.
     """
 
     stiffness: Matrix
     mass: Matrix
-    nodes: Array
-    interfaces: tuple[Interface, ...]
+    nodes: Array  #: Places, shape (N, 3).
+    interfaces: tuple[Interface, ...]  #: That of the root comes first.
+    #: For two displacement fields, the nodal forces of the stress of their Green-Lagrange strain, ``sym(A_i^T A_j)``
+    #: with the gradients A; without it nothing of second order is known of the solid.
     stretching: Callable[[Array, Array], Array] | None = field(default=None, repr=False)
+    #: Numbers ``3 node + axis`` of the rotations, in their order.
     rotations: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
+    #: What messages call the nodes; their numbers from 0 on if empty.
     labels: NDArray[np.intp] = field(default_factory=lambda: np.zeros(0, dtype=np.intp))
 
     @property

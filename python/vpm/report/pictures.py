@@ -37,24 +37,13 @@ MOST_JOINTS, MOST_TRACES = 4, 4
 
 @dataclass(frozen=True)
 class Drawn:
-    """A picture on the page.
+    """A picture on the page."""
 
-    Attributes
-    ----------
-    anchor : str
-        Name to link to.
-    title, caption : str
-    svg : str
-        With its words inside.
-    joint : bool
-        Whether it is of one of several joints.
-    """
-
-    anchor: str
+    anchor: str  #: Name to link to.
     title: str
     caption: str
-    svg: str
-    joint: bool = False
+    svg: str  #: With its words inside.
+    joint: bool = False  #: Whether it is of one of several joints.
 
 
 def drawn(anchor: str, title: str, caption: str, words: str, figure: Figure, *, joint: bool = False) -> Drawn:

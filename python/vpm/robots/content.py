@@ -81,19 +81,12 @@ _ORDER = "xx yy zz xy xz yz, about the centre of mass"
 
 @dataclass
 class Draft:
-    """Content of a model file on its way.
-
-    Attributes
-    ----------
-    content : dict
-    remarks : dict
-        By place: of a component before its table, of a key behind its line.
-    bodies, joints : dict of str to str
-        Names in the model by names in the robot's file.
-    """
+    """Content of a model file on its way."""
 
     content: Content
+    #: By place: of a component before its table, of a key behind its line.
     remarks: Remarks = field(default_factory=dict)
+    #: Names in the model by names in the robot's file.
     bodies: dict[str, str] = field(default_factory=dict)
     joints: dict[str, str] = field(default_factory=dict)
     names: Names = field(default_factory=Names)

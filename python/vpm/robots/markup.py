@@ -28,22 +28,12 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?|[+-]?(nan|inf|infin
 
 @dataclass
 class Element:
-    """One element of an XML file.
-
-    Attributes
-    ----------
-    tag : str
-    attributes : dict of str to str
-    line : int
-        Where it begins, from 1.
-    start, close : int
-        Bytes at which its first tag and its last one begin; the latter says nothing of an empty element, ``<a/>``.
-    children : list of Element
-    """
+    """One element of an XML file."""
 
     tag: str
     attributes: dict[str, str]
-    line: int
+    line: int  #: Where it begins, from 1.
+    #: Bytes at which its first tag and its last one begin; the latter says nothing of an empty element, ``<a/>``.
     start: int
     close: int = -1
     children: list[Element] = field(default_factory=list)
@@ -59,14 +49,7 @@ class Element:
 
 @dataclass(frozen=True)
 class Markup:
-    """Elements of an XML file, with errors that name file and line.
-
-    Attributes
-    ----------
-    path : str
-    content : bytes
-    root : Element
-    """
+    """Elements of an XML file, with errors that name file and line."""
 
     path: str
     content: bytes

@@ -27,19 +27,12 @@ DIVISION_TOLERANCE = 1e-6
 
 @dataclass(frozen=True)
 class Clock:
-    """Samples at ``0, time_step, 2 time_step, ... duration``.
+    """Samples at ``0, time_step, 2 time_step, ... duration``."""
 
-    Attributes
-    ----------
-    duration, time_step : float
-        s.
-    steps : int
-        Steps between the first and the last sample.
-    """
-
+    #: s.
     duration: float
     time_step: float
-    steps: int
+    steps: int  #: Steps between the first and the last sample.
 
     @cached_property
     def time(self) -> NDArray[np.float64]:

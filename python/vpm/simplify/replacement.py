@@ -26,15 +26,9 @@ OPTIONAL = ("controllers", "supplies", "effects", "sensors")
 
 @dataclass(frozen=True)
 class Replacement(Reduction):
-    """Another drive in the place of a servo-cylinder: ``narx``, ``maxwell_narx`` or ``table``.
+    """Another drive in the place of a servo-cylinder: ``narx``, ``maxwell_narx`` or ``table``."""
 
-    Attributes
-    ----------
-    entry : str
-        The actuator of the model file as JSON, without what it acts on.
-    """
-
-    entry: str = ""
+    entry: str = ""  #: The actuator of the model file as JSON, without what it acts on.
 
     def __str__(self) -> str:
         """Label of a replacement."""

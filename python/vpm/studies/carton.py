@@ -69,21 +69,11 @@ def crease_torque(angle: float, reading: str = "per degree") -> float:
 
 @dataclass(frozen=True)
 class Fold:
-    """A fold from 0 to 90 degrees.
+    """A fold from 0 to 90 degrees."""
 
-    Attributes
-    ----------
-    angle : ndarray
-        Of the finger, rad.
-    force : ndarray
-        Of the contact, N.
-    crease : ndarray
-        Angle of the crease, rad.
-    """
-
-    angle: Array
-    force: Array
-    crease: Array
+    angle: Array  #: Of the finger, rad.
+    force: Array  #: Of the contact, N.
+    crease: Array  #: Angle of the crease, rad.
 
     def at(self, angle: float) -> float:
         """Force of a carton's fold at an angle, N."""

@@ -21,18 +21,10 @@ NAME = "damaged_crease"
 
 @dataclass(frozen=True)
 class Damage:
-    """Loss of stiffness by folding, ``D(q) = share (1 - exp(-q / scale))`` of the largest angle so far.
+    """Loss of stiffness by folding, ``D(q) = share (1 - exp(-q / scale))`` of the largest angle so far."""
 
-    Attributes
-    ----------
-    share : float
-        Part of the stiffness that is lost in the end, from 0 to below 1.
-    scale : float
-        rad.
-    """
-
-    share: float
-    scale: float
+    share: float  #: Part of the stiffness that is lost in the end, from 0 to below 1.
+    scale: float  #: rad.
 
     def __post_init__(self) -> None:
         if not (0.0 <= self.share < 1.0 and self.scale > 0.0):

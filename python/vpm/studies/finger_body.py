@@ -17,28 +17,19 @@ from vpm.studies.soft import SoftBody
 
 @dataclass(frozen=True)
 class Finger:
-    """Half a ball of tissue around a round bone.
+    """Half a ball of tissue around a round bone."""
 
-    Attributes
-    ----------
-    radius, bone : float
-        Outer radius and that of the bone, m.
-    epidermis, dermis : float
-        Thicknesses, m.
-    tissue, skin, surface : Material
-        Subcutaneous tissue, dermis and epidermis.
-    held : bool
-        Whether the nail holds the tissue at the rim too; without it the bone alone holds.
-    """
-
+    #: Outer radius and that of the bone, m.
     radius: float
     bone: float
+    #: Thicknesses, m.
     epidermis: float
     dermis: float
+    #: Subcutaneous tissue, dermis and epidermis.
     tissue: Material
     skin: Material
     surface: Material
-    held: bool
+    held: bool  #: Whether the nail holds the tissue at the rim too; without it the bone alone holds.
 
     @property
     def thickness(self) -> float:

@@ -73,17 +73,10 @@ def deviations() -> Array:
 
 @dataclass(frozen=True)
 class Curve:
-    """Force and area over the way since the touch.
-
-    Attributes
-    ----------
-    steps : sequence of Pressed
-    touch : float
-        Way to the force from which the indentation is counted, m.
-    """
+    """Force and area over the way since the touch."""
 
     steps: Sequence[Pressed]
-    touch: float
+    touch: float  #: Way to the force from which the indentation is counted, m.
 
     @property
     def way(self) -> Array:

@@ -11,18 +11,11 @@ from vpm.numbers import Array
 
 @dataclass(frozen=True)
 class Jet:
-    """A function of n variables, to second order.
+    """A function of n variables, to second order."""
 
-    Attributes
-    ----------
-    value : ndarray, shape (...)
-    gradient : ndarray, shape (n, ...)
-    hessian : ndarray, shape (n, n, ...)
-    """
-
-    value: Array
-    gradient: Array
-    hessian: Array
+    value: Array  #: Shape (...).
+    gradient: Array  #: Shape (n, ...).
+    hessian: Array  #: Shape (n, n, ...).
 
     def __add__(self, other: Jet | float | Array) -> Jet:
         if not isinstance(other, Jet):

@@ -26,17 +26,10 @@ POISSON = 0.30
 
 @dataclass(frozen=True)
 class Load:
-    """A force down along the leg, and where its line passes the top.
+    """A force down along the leg, and where its line passes the top."""
 
-    Attributes
-    ----------
-    force : float
-        N.
-    side, front : float
-        Offsets of the line, m.
-    """
-
-    force: float
+    force: float  #: N.
+    #: Offsets of the line, m.
     side: float = 0.0
     front: float = 0.0
 
@@ -61,26 +54,13 @@ ASSUMED = (
 
 @dataclass(frozen=True)
 class Stressed:
-    """A frame under one load.
-
-    Attributes
-    ----------
-    solid : Solid
-    stress : ndarray, shape (3, 3, corners)
-        Pa.
-    deflection : float
-        Largest way of a node, m.
-    support : float
-        Force along z at the held ends, N.
-    clear : ndarray of bool, shape (corners,)
-        Where stresses count.
-    """
+    """A frame under one load."""
 
     solid: Solid
-    stress: Array
-    deflection: float
-    support: float
-    clear: NDArray[np.bool_]
+    stress: Array  #: Shape (3, 3, corners); Pa.
+    deflection: float  #: Largest way of a node, m.
+    support: float  #: Force along z at the held ends, N.
+    clear: NDArray[np.bool_]  #: Shape (corners,); where stresses count.
 
     @property
     def equivalent(self) -> Array:

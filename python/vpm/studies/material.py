@@ -22,17 +22,10 @@ class Material:
     """``W = sum C_ij (I1 - 3)^i (I2 - 3)^j + K/2 (J - 1)^2`` with the invariants at constant volume (thesis, B.1).
 
     The invariants are those of ``F J^(-1/3)``, so that K alone answers to pressure.
-
-    Attributes
-    ----------
-    constants : mapping
-        C_ij in Pa, by (i, j).
-    bulk : float
-        K in Pa; infinite for a material that keeps its volume.
     """
 
-    constants: Mapping[tuple[int, int], float] = field(default_factory=dict)
-    bulk: float = np.inf
+    constants: Mapping[tuple[int, int], float] = field(default_factory=dict)  #: C_ij in Pa, by (i, j).
+    bulk: float = np.inf  #: K in Pa; infinite for a material that keeps its volume.
 
     def __post_init__(self) -> None:
         if not self.shear > 0.0:

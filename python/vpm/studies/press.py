@@ -26,36 +26,18 @@ class _StuckError(Exception):
 
 @dataclass(frozen=True)
 class Pressed:
-    """A body pressed so far.
+    """A body pressed so far."""
 
-    Attributes
-    ----------
-    indentation : float
-        Way of the obstacle since it touched, m.
-    force : float
-        N.
-    energy : float
-        Elastic, J.
-    radius, pressure : ndarray
-        Radius now (m) and mean true pressure (Pa) of the edges of the skin, from the axis outwards.
-    contact_radius : float
-        m.
-    overlap : float
-        Mean overlap, weighed by the pressure, m.
-    state : State
-    newton : int
-        Newton steps that it took.
-    """
-
-    indentation: float
-    force: float
-    energy: float
+    indentation: float  #: Way of the obstacle since it touched, m.
+    force: float  #: N.
+    energy: float  #: Elastic, J.
+    #: Radius now (m) and mean true pressure (Pa) of the edges of the skin, from the axis outwards.
     radius: Array
     pressure: Array
-    contact_radius: float
-    overlap: float
+    contact_radius: float  #: m.
+    overlap: float  #: Mean overlap, weighed by the pressure, m.
     state: State
-    newton: int
+    newton: int  #: Newton steps that it took.
 
     @property
     def area(self) -> float:

@@ -31,34 +31,19 @@ TOUCH = 5
 
 @dataclass(frozen=True)
 class Obstacle:
-    """A rigid surface below the body, ``z = level + curvature r^2 / 2``, without friction.
+    """A rigid surface below the body, ``z = level + curvature r^2 / 2``, without friction."""
 
-    Attributes
-    ----------
-    level : float
-        Height on the axis, m.
-    curvature : float
-        1/m; zero for a plate, ``-1/R`` for a ball of the radius R.
-    """
-
-    level: float
-    curvature: float = 0.0
+    level: float  #: Height on the axis, m.
+    curvature: float = 0.0  #: 1/m; zero for a plate, ``-1/R`` for a ball of the radius R.
 
 
 @dataclass
 class State:
-    """Displacements, pressures and contact multipliers of a soft body.
-
-    Attributes
-    ----------
-    displacement, pressure : ndarray
-    multiplier : ndarray, shape (facets, points)
-        Contact pressure of the last round, Pa of the undeformed surface.
-    """
+    """Displacements, pressures and contact multipliers of a soft body."""
 
     displacement: Array
     pressure: Array
-    multiplier: Array
+    multiplier: Array  #: Shape (facets, points); contact pressure of the last round, Pa of the undeformed surface.
 
     def copy(self) -> State:
         """Copy of a state of a soft body."""

@@ -23,19 +23,10 @@ Traction = Callable[[Array], Array]
 
 @dataclass(frozen=True)
 class Solid:
-    """A linear elastic body.
+    """A linear elastic body."""
 
-    Attributes
-    ----------
-    mesh : MeshHex2
-        Metres; its edges may be curved.
-    young : float
-        Pa.
-    poisson : float
-    """
-
-    mesh: MeshHex2
-    young: float
+    mesh: MeshHex2  #: Metres; its edges may be curved.
+    young: float  #: Pa.
     poisson: float
 
     @cached_property

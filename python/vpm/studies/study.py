@@ -20,26 +20,14 @@ Cell = str | float | None
 
 @dataclass(frozen=True)
 class Compared:
-    """A number beside the printed one.
-
-    Attributes
-    ----------
-    what, unit : str
-    ours : float
-    printed : float or None
-        None where nothing is printed.
-    source : str
-        Where it is printed.
-    mesh : str
-        What it was computed on.
-    """
+    """A number beside the printed one."""
 
     what: str
     ours: float
-    printed: float | None
+    printed: float | None  #: None where nothing is printed.
     unit: str
-    source: str
-    mesh: str = ""
+    source: str  #: Where it is printed.
+    mesh: str = ""  #: What it was computed on.
 
     @property
     def difference(self) -> float | None:
@@ -59,41 +47,22 @@ class Table:
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure, drawn when it is wanted.
+    """A figure, drawn when it is wanted."""
 
-    Attributes
-    ----------
-    name : str
-        Of its file.
-    words : str
-        What is to be seen.
-    draw : callable
-    """
-
-    name: str
-    words: str
+    name: str  #: Of its file.
+    words: str  #: What is to be seen.
     draw: Callable[[], Figure]
 
 
 @dataclass(frozen=True)
 class Study:
-    """A study that has been run.
-
-    Attributes
-    ----------
-    name, title : str
-    compared : tuple of Compared
-    tables : tuple of Table
-    assumed : tuple of str
-        What the source does not say.
-    pictures : tuple of Picture
-    """
+    """A study that has been run."""
 
     name: str
     title: str
     compared: tuple[Compared, ...]
     tables: tuple[Table, ...]
-    assumed: tuple[str, ...]
+    assumed: tuple[str, ...]  #: What the source does not say.
     pictures: tuple[Picture, ...] = ()
 
     def to_dict(self) -> dict[str, object]:

@@ -18,28 +18,15 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Yoke:
-    """Sizes of the frame, m: x to the side, y to the front, z up.
+    """Sizes of the frame, m: x to the side, y to the front, z up."""
 
-    Attributes
-    ----------
-    spacing : float
-        Between the middles of the legs.
-    height : float
-        From the held ends to the middle of the top.
-    corner : float
-        Inner radius of the corners.
-    thickness, width : float
-        Of the section: across the arch, and along y.
-    pad : float
-        Part of the top's length on which the adapter sits.
-    """
-
-    spacing: float = 0.060
-    height: float = 0.090
-    corner: float = 0.010
+    spacing: float = 0.060  #: Between the middles of the legs.
+    height: float = 0.090  #: From the held ends to the middle of the top.
+    corner: float = 0.010  #: Inner radius of the corners.
+    #: Of the section: across the arch, and along y.
     thickness: float = 0.010
     width: float = 0.030
-    pad: float = 0.020
+    pad: float = 0.020  #: Part of the top's length on which the adapter sits.
 
     def __post_init__(self) -> None:
         if min(self.corner, self.thickness, self.width, self.pad) <= 0.0 or self.top <= self.pad or self.leg <= 0.0:

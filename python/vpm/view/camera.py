@@ -16,21 +16,11 @@ HALF_ANGLE = math.atan(12.0 / 70.0)
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """A camera of a hole: what is twice as far away is half as large.
+    """A camera of a hole: what is twice as far away is half as large."""
 
-    Attributes
-    ----------
-    eye : ndarray, shape (3,)
-        Where it stands (m).
-    axes : ndarray, shape (3, 3)
-        Rows: to the right of the picture, up in it, and from the picture to the eye.
-    slopes : tuple of float
-        Tangents of half the angles of view, across and up.
-    """
-
-    eye: Array
-    axes: Array
-    slopes: tuple[float, float]
+    eye: Array  #: Shape (3,); where it stands (m).
+    axes: Array  #: Shape (3, 3); rows: to the right of the picture, up in it, and from the picture to the eye.
+    slopes: tuple[float, float]  #: Tangents of half the angles of view, across and up.
 
     @classmethod
     def about(cls, centre: Array, radius: float, front: Array, up: Array, aspect: float, room: float) -> Self:

@@ -24,30 +24,14 @@ LOADS = (".fx", ".fy", ".fz", ".tension", ".effort")
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """Coordinates of a machine over time.
+    """Coordinates of a machine over time."""
 
-    Attributes
-    ----------
-    subtitle : str
-        What moves it.
-    time : ndarray, shape (N,)
-        s.
-    coordinates : ndarray, shape (N, n)
-        Of joints and flexible links.
-    measured : ndarray, shape (N, n), or None
-        The same with the joints where they were measured.
-    loads : mapping of str to ndarray, shape (N,)
-        Forces and efforts by channel (SI).
-    notes : tuple of str
-        What to know before the picture is trusted.
-    """
-
-    subtitle: str
-    time: Array
-    coordinates: Array
-    measured: Array | None = None
-    loads: Mapping[str, Array] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    subtitle: str  #: What moves it.
+    time: Array  #: Shape (N,); s.
+    coordinates: Array  #: Shape (N, n); of joints and flexible links.
+    measured: Array | None = None  #: Shape (N, n); the same with the joints where they were measured.
+    loads: Mapping[str, Array] = field(default_factory=dict)  #: Each of shape (N,); forces and efforts by channel (SI).
+    notes: tuple[str, ...] = ()  #: What to know before the picture is trusted.
 
 
 def course_of(model: Model, source: Run | ScenarioRun | Experiment | None, mode: str | None = None) -> Course:

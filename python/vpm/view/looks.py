@@ -8,22 +8,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Look:
-    """Colours, word in the legend and transparency of a role in a scene.
+    """Colours, word in the legend and transparency of a role in a scene."""
 
-    Attributes
-    ----------
-    light, dark : str
-        Colours on light and on dark ground.
-    word : str
-        In the legend; "" for none.
-    solid : float
-        Less than 1 where one sees through it.
-    """
-
+    #: Colours on light and on dark ground.
     light: str
     dark: str
-    word: str
-    solid: float = 1.0
+    word: str  #: In the legend; "" for none.
+    solid: float = 1.0  #: Less than 1 where one sees through it.
 
 
 #: By role, in the order of the legend. Hues of M. Okabe and K. Ito, "Color Universal Design", 2008.

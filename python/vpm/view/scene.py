@@ -17,18 +17,10 @@ from vpm.view.camera import Camera
 
 @dataclass(frozen=True, eq=False)
 class Shape:
-    """Drawn shape of one component.
+    """Drawn shape of one component."""
 
-    Attributes
-    ----------
-    name : str
-        Of the component of the model.
-    role : str
-        What it is, by which its colour and its word in the legend go; see `vpm.view.looks`.
-    """
-
-    name: str
-    role: str
+    name: str  #: Of the component of the model.
+    role: str  #: What it is, by which its colour and its word in the legend go; see `vpm.view.looks`.
 
     @property
     def points(self) -> Array:
@@ -43,18 +35,10 @@ class Shape:
 
 @dataclass(frozen=True, eq=False)
 class Tube(Shape):
-    """A round bar along a curve.
+    """A round bar along a curve."""
 
-    Attributes
-    ----------
-    path : ndarray, shape (N or 1, K, 3)
-        Its centreline.
-    radius : ndarray, shape (K,)
-        At each point of it.
-    """
-
-    path: Array
-    radius: Array
+    path: Array  #: Shape (N or 1, K, 3); its centreline.
+    radius: Array  #: Shape (K,); at each point of it.
 
     @property
     def points(self) -> Array:
@@ -64,15 +48,9 @@ class Tube(Shape):
 
 @dataclass(frozen=True, eq=False)
 class Sphere(Shape):
-    """A sphere.
+    """A sphere."""
 
-    Attributes
-    ----------
-    centre : ndarray, shape (N or 1, 3)
-    radius : float
-    """
-
-    centre: Array
+    centre: Array  #: Shape (N or 1, 3).
     radius: float
 
     @property
@@ -83,20 +61,11 @@ class Sphere(Shape):
 
 @dataclass(frozen=True, eq=False)
 class Box(Shape):
-    """A box.
+    """A box."""
 
-    Attributes
-    ----------
-    centre : ndarray, shape (N or 1, 3)
-    axes : ndarray, shape (N or 1, 3, 3)
-        Row i is the direction of side i in the world.
-    size : ndarray, shape (3,)
-        Lengths of its sides.
-    """
-
-    centre: Array
-    axes: Array
-    size: Array
+    centre: Array  #: Shape (N or 1, 3).
+    axes: Array  #: Shape (N or 1, 3, 3); row i is the direction of side i in the world.
+    size: Array  #: Shape (3,); lengths of its sides.
 
     @property
     def points(self) -> Array:
@@ -107,19 +76,12 @@ class Box(Shape):
 
 @dataclass(frozen=True, eq=False)
 class Arrow(Shape):
-    """An arrow, such as a force in the scale of the scene.
+    """An arrow, such as a force in the scale of the scene."""
 
-    Attributes
-    ----------
-    start, end : ndarray, shape (N or 1, 3)
-        Where it begins, and where its head ends.
-    radius : float
-        Of its shaft.
-    """
-
+    #: Shape (N or 1, 3); where it begins, and where its head ends.
     start: Array
     end: Array
-    radius: float
+    radius: float  #: Of its shaft.
 
     @property
     def points(self) -> Array:
@@ -129,36 +91,18 @@ class Arrow(Shape):
 
 @dataclass(frozen=True, eq=False)
 class Scene:
-    """Shapes of a machine in motion.
+    """Shapes of a machine in motion."""
 
-    Attributes
-    ----------
-    title, subtitle : str
-        What is shown: the machine, and the run or log.
-    time : ndarray, shape (N,)
-        s.
-    shapes : tuple of Shape
-    up : ndarray, shape (3,)
-        Unit vector against gravity.
-    front : ndarray, shape (3,)
-        Unit vector from the machine to who looks at it.
-    scales : mapping of str to str
-        What lengths mean, by role: ``{"contact force": "0.1 m is 200 N"}``.
-    grid : float
-        Width of a square of the floor (m); zero without a floor.
-    notes : tuple of str
-        What to know before the picture is trusted, one sentence each.
-    """
-
+    #: What is shown: the machine, and the run or log.
     title: str
     subtitle: str
-    time: Array
+    time: Array  #: Shape (N,); s.
     shapes: tuple[Shape, ...]
-    up: Array
-    front: Array
-    scales: Mapping[str, str]
-    grid: float
-    notes: tuple[str, ...] = ()
+    up: Array  #: Shape (3,); unit vector against gravity.
+    front: Array  #: Shape (3,); unit vector from the machine to who looks at it.
+    scales: Mapping[str, str]  #: What lengths mean, by role: ``{"contact force": "0.1 m is 200 N"}``.
+    grid: float  #: Width of a square of the floor (m); zero without a floor.
+    notes: tuple[str, ...] = ()  #: What to know before the picture is trusted, one sentence each.
 
     def __getitem__(self, name: str) -> tuple[Shape, ...]:
         """Shapes of a component of the model in the scene."""

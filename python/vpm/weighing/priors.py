@@ -24,19 +24,12 @@ NATURAL = (0.0, 1.0)
 
 @dataclass(frozen=True)
 class Prior:
-    """Prior of a parameter: what is known of it before the records.
+    """Prior of a parameter: what is known of it before the records."""
 
-    Attributes
-    ----------
-    centre, spread : float
-        Mean and standard deviation, SI; of the logarithm where it is ``logarithmic``, centre being the median.
-    logarithmic : bool
-    low, high : float
-        What is possible, SI.
-    """
-
+    #: Mean and standard deviation, SI; of the logarithm where it is ``logarithmic``, centre being the median.
     centre: float
     spread: float
+    #: What is possible, SI.
     low: float
     high: float
     logarithmic: bool = False

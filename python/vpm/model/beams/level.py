@@ -47,18 +47,10 @@ LEVEL_NAMES: tuple[str, ...] = ("rigid", *FORMS)
 
 @dataclass(frozen=True)
 class Level:
-    """Level of detail of a beam.
+    """Level of detail of a beam."""
 
-    Attributes
-    ----------
-    name : str
-        One of `LEVEL_NAMES`.
-    number : int
-        Of segments, modes, elements or polynomials, or the degree of the curve; 0 for a rigid beam.
-    """
-
-    name: str
-    number: int = 0
+    name: str  #: One of `LEVEL_NAMES`.
+    number: int = 0  #: Of segments, modes, elements or polynomials, or the degree of the curve; 0 for a rigid beam.
 
     def __str__(self) -> str:
         return self.name if self.name == "rigid" else f"{self.name}({self.number})"

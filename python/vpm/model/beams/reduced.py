@@ -35,27 +35,16 @@ class ReducedLink:
 
     A material point is at ``x + sum_i shape_i q_i + 1/2 sum_ij curved_ij q_i q_j``; frames have the rotation vector
     before the place. Pairs ``i <= j`` stand at ``j (j + 1) / 2 + i``.
-
-    Attributes
-    ----------
-    squares : ndarray
-        Squared angular frequencies (1/s^2), ascending, shape (n,).
-    masses : ndarray
-        Point masses with the inertia of the solid (kg), shape (s,).
-    points, point_shapes, point_curved : ndarray
-        Their fields, shapes (s, 3), (s, n, 3), (s, n (n + 1) / 2, 3); no pairs where nothing is known of them.
-    interfaces : tuple of str
-        Names of the frames that carry something, but that of the root.
-    places, shapes, curved : ndarray
-        Their places, shape (m, 3), and fields, shapes (m, n, 6) and (m, n (n + 1) / 2, 6).
     """
 
-    squares: Array
-    masses: Array
+    squares: Array  #: Squared angular frequencies (1/s^2), ascending, shape (n,).
+    masses: Array  #: Point masses with the inertia of the solid (kg), shape (s,).
+    #: Their fields, shapes (s, 3), (s, n, 3), (s, n (n + 1) / 2, 3); no pairs where nothing is known of them.
     points: Array
     point_shapes: Array
     point_curved: Array
-    interfaces: tuple[str, ...]
+    interfaces: tuple[str, ...]  #: Names of the frames that carry something, but that of the root.
+    #: Their places, shape (m, 3), and fields, shapes (m, n, 6) and (m, n (n + 1) / 2, 6).
     places: Array
     shapes: Array
     curved: Array

@@ -22,24 +22,13 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class LoopState:
-    """Closure equations of all loops at a state: gap, Jacobian, drift, and which are independent.
+    """Closure equations of all loops at a state: gap, Jacobian, drift, and which are independent."""
 
-    Attributes
-    ----------
-    gap : ndarray, shape (m,)
-        Per loop the way from A to B in the world (m), then cosines of angles that have to be right ones.
-    jacobian : ndarray, shape (m, n)
-        Its derivative J by the coordinates.
-    drift : ndarray, shape (m,)
-        ``J' v``.
-    independent : ndarray of bool, shape (m,)
-        Equations that say something that the others do not.
-    """
-
+    #: Shape (m,); per loop the way from A to B in the world (m), then cosines of angles that have to be right ones.
     gap: Array
-    jacobian: Array
-    drift: Array
-    independent: NDArray[np.bool_]
+    jacobian: Array  #: Shape (m, n); its derivative J by the coordinates.
+    drift: Array  #: Shape (m,); ``J' v``.
+    independent: NDArray[np.bool_]  #: Shape (m,); equations that say something that the others do not.
 
     @property
     def rank(self) -> int:

@@ -26,21 +26,11 @@ _TURNS = 12
 
 @dataclass(frozen=True)
 class Singularity:
-    """A configuration in which a coordinate loses control of the others.
+    """A configuration in which a coordinate loses control of the others."""
 
-    Attributes
-    ----------
-    coordinate : str
-        The one that loses control: it stands still while the others move.
-    value : float
-        Where it stands (m, rad).
-    position : mapping of str to float
-        All coordinates there.
-    """
-
-    coordinate: str
-    value: float
-    position: Mapping[str, float]
+    coordinate: str  #: The one that loses control: it stands still while the others move.
+    value: float  #: Where it stands (m, rad).
+    position: Mapping[str, float]  #: All coordinates there.
 
     def __repr__(self) -> str:
         where = ", ".join(f"{name} = {value:.6g}" for name, value in self.position.items() if name != self.coordinate)

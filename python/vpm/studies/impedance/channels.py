@@ -23,20 +23,11 @@ Sense: TypeAlias = Literal["applied", "reaction"]
 
 @dataclass(frozen=True)
 class Columns:
-    """Clock and channels of one record.
-
-    Attributes
-    ----------
-    name : str
-    time : ndarray, shape (N,)
-        s, strictly increasing.
-    values : tuple of ndarray, shape (N,)
-        In the order of the names asked for, finite.
-    """
+    """Clock and channels of one record."""
 
     name: str
-    time: Array
-    values: tuple[Array, ...]
+    time: Array  #: Shape (N,); s, strictly increasing.
+    values: tuple[Array, ...]  #: Each of shape (N,); in the order of the names asked for, finite.
 
 
 def columns(record: RecordLike, names: tuple[str, ...], fewest: int) -> Columns:

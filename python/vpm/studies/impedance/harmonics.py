@@ -14,24 +14,12 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Series:
-    """``y = drift + Re sum_n Y_n exp(i n omega (t - t0))``.
+    """``y = drift + Re sum_n Y_n exp(i n omega (t - t0))``."""
 
-    Attributes
-    ----------
-    amplitudes : ndarray of complex, shape (H,)
-        Y_1 ... Y_H.
-    drift : ndarray, shape (N,)
-        Mean and drift at the samples.
-    mean : float
-        Of the drift.
-    noise : float
-        Standard deviation of what the series leaves.
-    """
-
-    amplitudes: Complex
-    drift: Array
-    mean: float
-    noise: float
+    amplitudes: Complex  #: Shape (H,); Y_1 ... Y_H.
+    drift: Array  #: Shape (N,); mean and drift at the samples.
+    mean: float  #: Of the drift.
+    noise: float  #: Standard deviation of what the series leaves.
 
 
 def basis(time: Array, frequency: float, count: int) -> Array:

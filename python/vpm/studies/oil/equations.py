@@ -148,28 +148,16 @@ class Equation:
     """One balance of oil: stored volume, flow, leakage and air.
 
     ``stored/beta - Kv int(flow u) + Ci int(leakage) = c - place``.
-
-    Attributes
-    ----------
-    name : str
-    stored : ndarray, shape (N,)
-        Pressure (Pa) or force (N).
-    flow, leakage : ndarray, shape (N,)
-        By unit opening, and by unit leakage.
-    air : ndarray, shape (N,)
-        By unit of entrained air; zeros for the force, whose two sides hold air of two pressures.
-    place : ndarray, shape (N,)
-        Logarithms of volumes.
-    scale : ndarray, shape (N,)
-        Rate of `place` by the piston's place, 1/m: what noise of the place does to the balance.
     """
 
     name: str
-    stored: Array
+    stored: Array  #: Shape (N,); pressure (Pa) or force (N).
+    #: Shape (N,); by unit opening, and by unit leakage.
     flow: Array
     leakage: Array
-    air: Array
-    place: Array
+    air: Array  #: Shape (N,); by unit of entrained air; zeros for the force, whose two sides hold air of two pressures.
+    place: Array  #: Shape (N,); logarithms of volumes.
+    #: Shape (N,); rate of `place` by the piston's place, 1/m: what noise of the place does to the balance.
     scale: Array
 
 

@@ -25,30 +25,16 @@ OUTLYING = 6.0
 
 @dataclass(frozen=True)
 class Rows:
-    """Regression of one or several balances on the same instants.
+    """Regression of one or several balances on the same instants."""
 
-    Attributes
-    ----------
-    regressors, instruments : ndarray, shape (e, n, p)
-        Columns of the unknowns; and what stands in for them in the normal equations.
-    target : ndarray, shape (e, n)
-    constants : ndarray, shape (n, c)
-        Columns that each balance has for itself.
-    scale : ndarray, shape (e, n)
-        Unit of the residual by that of the piston's place or speed.
-    kept : slice
-        Which samples of the record the rows stand for.
-    steps : ndarray, shape (e, n, p) or (0, 0, 0)
-        Of integrals: what each sample adds to them, whose noise they gather.
-    """
-
+    #: Shape (e, n, p); columns of the unknowns; and what stands in for them in the normal equations.
     regressors: Array
     instruments: Array
-    target: Array
-    constants: Array
-    scale: Array
-    kept: slice
-    steps: Array
+    target: Array  #: Shape (e, n).
+    constants: Array  #: Shape (n, c); columns that each balance has for itself.
+    scale: Array  #: Shape (e, n); unit of the residual by that of the piston's place or speed.
+    kept: slice  #: Which samples of the record the rows stand for.
+    steps: Array  #: Shape (e, n, p) or (0, 0, 0); of integrals: what each sample adds to them, whose noise they gather.
 
 
 def _columns(equation: Equation, opening: Array, columns: Sequence[str]) -> tuple[list[Array], list[Array]]:
