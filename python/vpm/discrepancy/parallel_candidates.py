@@ -29,18 +29,11 @@ class Failure:
 
 @dataclass(frozen=True)
 class ParallelCandidates:
-    """Number of candidates computed in parallel, and where progress is reported.
+    """Number of candidates computed in parallel, and where progress is reported."""
 
-    Attributes
-    ----------
-    workers : int or None
-        Threads; None for one per core. The core lets go of the interpreter while it computes.
-    progress : callable or None
-        See `Progress`; called from the threads, one at a time.
-    """
-
+    #: Threads; None for one per core. The core lets go of the interpreter while it computes.
     workers: int | None = None
-    progress: Progress | None = None
+    progress: Progress | None = None  #: See `Progress`; called from the threads, one at a time.
 
     def __call__(
         self,

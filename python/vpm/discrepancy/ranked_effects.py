@@ -41,21 +41,12 @@ BEHIND = ".link."
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Settings by which a diagnosis takes names from a ranking and refits them.
+    """Settings by which a diagnosis takes names from a ranking and refits them."""
 
-    Attributes
-    ----------
-    joints : int
-        Most joints of a machine that a ranking covers, beside those that effects split off.
-    worse : float
-        Share of the mean square of a simulation that a refit may add to that of the values of the ranking.
-    sure : float
-        Standard deviations by which it has to be worse to count as worse.
-    """
-
-    joints: int = 3
+    joints: int = 3  #: Most joints of a machine that a ranking covers, beside those that effects split off.
+    #: Share of the mean square of a simulation that a refit may add to that of the values of the ranking.
     worse: float = LEAST_GAIN
-    sure: float = NORMAL_95_ONE_SIDED
+    sure: float = NORMAL_95_ONE_SIDED  #: Standard deviations by which it has to be worse to count as worse.
 
 
 SETTINGS = Settings()

@@ -39,25 +39,15 @@ NEAR_BEST = 1.1
 
 @dataclass(frozen=True)
 class CutoffChoice:
-    """A cut-off frequency and what it rests on.
+    """A cut-off frequency and what it rests on."""
 
-    Attributes
-    ----------
-    cutoff : float
-        Hz.
-    noise : tuple of float
-        Standard deviation of the white noise that the floor of each position spectrum stands for.
-    band : tuple of float
-        Highest frequency, up to the highest that is offered, at which each position spectrum stands clearly above its
-        floor, Hz; zero where it nowhere does.
-    limited : bool
-        The choice is the lowest or the highest frequency that is offered.
-    """
-
-    cutoff: float
+    cutoff: float  #: Hz.
+    #: Standard deviation of the white noise that the floor of each position spectrum stands for.
     noise: tuple[float, ...]
+    #: Highest frequency, up to the highest that is offered, at which each position spectrum stands clearly above its
+    #: floor, Hz; zero where it nowhere does.
     band: tuple[float, ...]
-    limited: bool
+    limited: bool  #: The choice is the lowest or the highest frequency that is offered.
 
 
 def choose_cutoff(position: Array, rate: float, read: Sequence[float] | None = None) -> CutoffChoice:

@@ -27,32 +27,15 @@ _ENCODINGS = ("utf-8-sig", "cp1252")
 
 @dataclass(frozen=True)
 class Dialect:
-    """How a text file writes its table.
-
-    Attributes
-    ----------
-    encoding : str
-    header : tuple of str
-        Names of the columns.
-    units : tuple of str
-        Their units, where a row below the names states them; else empty.
-    named : int
-        Line of the names, which counts from 1.
-    skipped : int
-        Lines above the numbers.
-    delimiter : str or None
-        None where blanks separate.
-    comma : bool
-        Numbers have decimal commas.
-    """
+    """How a text file writes its table."""
 
     encoding: str
-    header: tuple[str, ...]
-    units: tuple[str, ...]
-    named: int
-    skipped: int
-    delimiter: str | None
-    comma: bool
+    header: tuple[str, ...]  #: Names of the columns.
+    units: tuple[str, ...]  #: Their units, where a row below the names states them; else empty.
+    named: int  #: Line of the names, which counts from 1.
+    skipped: int  #: Lines above the numbers.
+    delimiter: str | None  #: None where blanks separate.
+    comma: bool  #: Numbers have decimal commas.
 
     def rows(self, path: str | PathLike[str]) -> Iterator[tuple[int, list[str]]]:
         """Cells of each row of numbers in a dialect, as they stand there, with its line."""

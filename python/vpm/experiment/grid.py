@@ -38,21 +38,12 @@ SMOOTH_QUANTITIES = ("position", "velocity", "acceleration", "length", "rate", "
 
 @dataclass(frozen=True)
 class Source:
-    """File or record that numbers came from, so that an error can name file and line.
+    """File or record that numbers came from, so that an error can name file and line."""
 
-    Attributes
-    ----------
-    name : str
-        File, or name of the record.
-    lines : ndarray of int or None
-        Line of the file for each sample; None for arrays, whose samples are counted from zero.
-    path : str or None
-        File.
-    """
-
-    name: str
+    name: str  #: File, or name of the record.
+    #: Line of the file for each sample; None for arrays, whose samples are counted from zero.
     lines: NDArray[np.int64] | None = None
-    path: str | None = None
+    path: str | None = None  #: File.
 
     def at(self, sample: int) -> str:
         """Place of a grid's sample in its file, in words, such as ``log.csv, line 12``."""

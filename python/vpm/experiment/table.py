@@ -19,30 +19,16 @@ from vpm.numbers import Array
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of a text file of numbers.
+    """Columns of a text file of numbers."""
 
-    Attributes
-    ----------
-    header : tuple of str
-        All column names.
-    columns : dict of str to ndarray, shape (N,)
-        Those that were asked for.
-    lines : ndarray of int, shape (N,), or None
-        Line of the file for each row, which counts from 1; None where a file has no lines.
-    stamps : frozenset of str
-        Columns that are times and so are in seconds already.
-    clocks : dict of str to ndarray
-        Times of the samples of a column that has a clock of its own, s; such columns differ in length.
-    notes : tuple of str
-        Sentences for the history of the record.
-    """
-
-    header: tuple[str, ...]
-    columns: dict[str, Array]
+    header: tuple[str, ...]  #: All column names.
+    columns: dict[str, Array]  #: Each of shape (N,); those that were asked for.
+    #: Shape (N,); line of the file for each row, which counts from 1; None where a file has no lines.
     lines: NDArray[np.int64] | None
-    stamps: frozenset[str] = frozenset()
+    stamps: frozenset[str] = frozenset()  #: Columns that are times and so are in seconds already.
+    #: Times of the samples of a column that has a clock of its own, s; such columns differ in length.
     clocks: dict[str, Array] = field(default_factory=dict)
-    notes: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()  #: Sentences for the history of the record.
 
 
 def read_header(path: str | PathLike[str]) -> Dialect:

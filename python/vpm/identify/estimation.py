@@ -148,18 +148,10 @@ def standing(model: Model, data: Problem, free: Sequence[str]) -> Estimate:
 
 @dataclass(frozen=True)
 class Worth:
-    """Sum of squares that a fit has to reach within so many evaluations to be worth its time.
+    """Sum of squares that a fit has to reach within so many evaluations to be worth its time."""
 
-    Attributes
-    ----------
-    cost : float
-        Sum of squares that it is to reach.
-    evaluations : int
-        Number of evaluations after which it ends if it has not, and hardly comes nearer.
-    """
-
-    cost: float
-    evaluations: int
+    cost: float  #: Sum of squares that it is to reach.
+    evaluations: int  #: Number of evaluations after which it ends if it has not, and hardly comes nearer.
 
     def lost(self, reached: Sequence[float]) -> bool:
         """Whether an estimation is lost: its sums of squares are far from the goal and hardly come nearer."""

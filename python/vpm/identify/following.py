@@ -108,31 +108,14 @@ class Memo:
 
 @dataclass(frozen=True, eq=False)
 class Following:
-    """How machines follow one record, and what they answered to it before.
+    """How machines follow one record, and what they answered to it before."""
 
-    Attributes
-    ----------
-    keep : callable
-        Filter of the record.
-    integrator : str
-        How drives are run along the motion, as `vpm.simulate.Setup` names it.
-    commands : int
-        Which commands they are given: 0 for those of the record.
-    hold : Hold, optional
-        Gauges that hold the links along the record.
-    departure : ndarray, optional
-        By how much what is free begins away from rest.
-    record : int
-        Its number, among those that share the memo.
-    memo : Memo
-    """
-
-    keep: Filter
-    integrator: str = AUTOMATIC
-    commands: int = 0
-    hold: Hold | None = None
-    departure: Array | None = None
-    record: int = 0
+    keep: Filter  #: Filter of the record.
+    integrator: str = AUTOMATIC  #: How drives are run along the motion, as `vpm.simulate.Setup` names it.
+    commands: int = 0  #: Which commands they are given: 0 for those of the record.
+    hold: Hold | None = None  #: Gauges that hold the links along the record.
+    departure: Array | None = None  #: By how much what is free begins away from rest.
+    record: int = 0  #: Its number, among those that share the memo.
     memo: Memo = field(default_factory=Memo)
 
     def filtered(self, values: Array, slopes: Array) -> Pair:
@@ -206,20 +189,12 @@ class Following:
 
 @dataclass(frozen=True)
 class Hold:
-    """Strain gauges that hold the flexible links of a machine along one record: rates and gains.
+    """Strain gauges that hold the flexible links of a machine along one record: rates and gains."""
 
-    Attributes
-    ----------
-    gauges : tuple of str
-        Those that hold.
-    rate : ndarray, shape (N, gauges)
-        Measured rates of strain, 1/s, through the filter of the motion.
-    gain : ndarray, shape (gauges,)
-        How firmly, J s: force on the coordinates of the link per missing rate of strain and strain per coordinate.
-    """
-
-    gauges: tuple[str, ...]
-    rate: Array
+    gauges: tuple[str, ...]  #: Those that hold.
+    rate: Array  #: Shape (N, gauges); measured rates of strain, 1/s, through the filter of the motion.
+    #: Shape (gauges,); how firmly, J s: force on the coordinates of the link per missing rate of strain and strain per
+    #: coordinate.
     gain: Array
 
     def arguments(self, model: Model) -> tuple[Array, Array]:

@@ -143,22 +143,16 @@ def _combination(direction: Array, lengths: Array, names: Sequence[str], value: 
 
 @dataclass(frozen=True, eq=False)
 class Base:
-    """Independent columns of a regressor.
+    """Independent columns of a regressor."""
 
-    Attributes
-    ----------
-    kept, dropped, unseen : tuple of int
-        Columns that are independent, that hang on those, and that are zero.
-    weights : ndarray, shape (kept, dropped)
-        In parameter units: what is seen in place of parameter i is ``p_i + sum_j weights_ij p_j``.
-    singular_values : ndarray, shape (columns - unseen,)
-        Of the columns scaled to equal length, relative to the largest.
-    """
-
+    #: Columns that are independent, that hang on those, and that are zero.
     kept: tuple[int, ...]
     dropped: tuple[int, ...]
     unseen: tuple[int, ...]
+    #: Shape (kept, dropped); in parameter units: what is seen in place of parameter i is ``p_i + sum_j weights_ij
+    #: p_j``.
     weights: Array
+    #: Shape (columns - unseen,); of the columns scaled to equal length, relative to the largest.
     singular_values: Array
 
     @property

@@ -25,56 +25,32 @@ Content = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Part:
-    """A machine that answers for a part of another one; the values of its model mean nothing.
-
-    Attributes
-    ----------
-    model : Model
-    places : ndarray of int
-        Its parameters among those of the whole machine.
-    felt : ndarray of bool
-        Which of them change its answer.
-    inputs, states : ndarray of int
-        Its inputs, and its states of drives and supplies, among those of the whole machine, or of the bare one of
-        `Drives`.
-    """
+    """A machine that answers for a part of another one; the values of its model mean nothing."""
 
     model: Model
-    places: Indices
-    felt: NDArray[np.bool_]
+    places: Indices  #: Its parameters among those of the whole machine.
+    felt: NDArray[np.bool_]  #: Which of them change its answer.
+    #: Its inputs, and its states of drives and supplies, among those of the whole machine, or of the bare one of
+    #: `Drives`.
     inputs: Indices
     states: Indices
 
 
 @dataclass(frozen=True)
 class Bending:
-    """A machine of which not all that moves was measured: what moves it, and what adds to its efforts.
+    """A machine of which not all that moves was measured: what moves it, and what adds to its efforts."""
 
-    Attributes
-    ----------
-    bare : Part
-        Without the laws of its joints and the faults of its drives.
-    laws, shell : Part, optional
-        Both with rigid links and no play: their difference in effort is that of the laws. None without laws.
-    """
-
-    bare: Part
+    bare: Part  #: Without the laws of its joints and the faults of its drives.
+    #: Both with rigid links and no play: their difference in effort is that of the laws. None without laws.
     laws: Part | None = None
     shell: Part | None = None
 
 
 @dataclass(frozen=True)
 class Drives:
-    """Drives on joints that were all measured, those together that share a supply that gives way.
+    """Drives on joints that were all measured, those together that share a supply that gives way."""
 
-    Attributes
-    ----------
-    bare : Part
-        The machine with rigid links, without joints that effects have split off.
-    parts : tuple of Part
-    """
-
-    bare: Part
+    bare: Part  #: The machine with rigid links, without joints that effects have split off.
     parts: tuple[Part, ...]
 
 

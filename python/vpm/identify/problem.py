@@ -28,32 +28,17 @@ ROUNDING = 1e-12
 
 @dataclass(frozen=True)
 class Block:
-    """One channel of one record inside the residual vector.
+    """One channel of one record inside the residual vector."""
 
-    Attributes
-    ----------
-    experiment, channel, unit : str
-        Where the samples come from and their unit.
-    samples : slice
-        Their place in the residual vector.
-    time : ndarray
-        Time of each sample, s.
-    scale : float
-        Size of the measured signal (root mean square), in ``unit``; relative errors refer to it.
-    weight : float
-        What the residual was multiplied by, 1/``unit``, so that channels of different units can be added.
-    moving : ndarray
-        1 for samples that count, 0 for those at standstill, whose residual is zero.
-    """
-
+    #: Where the samples come from and their unit.
     experiment: str
     channel: str
     unit: str
-    samples: slice
-    time: Array
-    scale: float
-    weight: float
-    moving: Array
+    samples: slice  #: Their place in the residual vector.
+    time: Array  #: Time of each sample, s.
+    scale: float  #: Size of the measured signal (root mean square), in ``unit``; relative errors refer to it.
+    weight: float  #: What the residual was multiplied by, 1/``unit``, so that channels of different units can be added.
+    moving: Array  #: 1 for samples that count, 0 for those at standstill, whose residual is zero.
 
 
 class Problem(Protocol):

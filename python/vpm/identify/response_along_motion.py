@@ -35,25 +35,15 @@ IN_PLAY = 5e-4
 
 @dataclass(frozen=True)
 class Response:
-    """Response along one record: efforts required and applied, other outputs, and their derivatives.
+    """Response along one record: efforts required and applied, other outputs, and their derivatives."""
 
-    Attributes
-    ----------
-    required, applied : ndarray, shape (n, joints)
-        Effort that the motion needs at each measured joint, and that the drives deliver there, N or N m.
-    balance : ndarray, shape (n, joints, columns)
-        Derivative of required - applied.
-    seen : ndarray, shape (n, channels)
-        Outputs beside the motion.
-    slopes : ndarray, shape (n, channels, columns)
-        Their derivative.
-    """
-
+    #: Shape (n, joints); effort that the motion needs at each measured joint, and that the drives deliver there, N or N
+    #: m.
     required: Array
     applied: Array
-    balance: Array
-    seen: Array
-    slopes: Array
+    balance: Array  #: Shape (n, joints, columns); derivative of required - applied.
+    seen: Array  #: Shape (n, channels); outputs beside the motion.
+    slopes: Array  #: Shape (n, channels, columns); their derivative.
 
 
 def has_own_drives(model: Model) -> bool:

@@ -38,22 +38,12 @@ _GEOMETRY = ("name", "gravity", "bodies", "joints", "beams", "lines")
 
 @dataclass(frozen=True)
 class SampleMask:
-    """Which samples of some records count.
-
-    Attributes
-    ----------
-    experiments : sequence of Experiment
-    motions : sequence of Motion
-    joints : sequence of str
-        Those whose balance is drawn up.
-    places : sequence of int
-        Their columns in the motions.
-    """
+    """Which samples of some records count."""
 
     experiments: Sequence[Experiment]
     motions: Sequence[Motion]
-    joints: Sequence[str]
-    places: Sequence[int]
+    joints: Sequence[str]  #: Those whose balance is drawn up.
+    places: Sequence[int]  #: Their columns in the motions.
 
     @property
     def _largest(self) -> Array:

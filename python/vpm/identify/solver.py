@@ -22,24 +22,14 @@ MANY = 24
 
 @dataclass(frozen=True)
 class Point:
-    """Coordinates of a fit with cost, residual and derivatives there.
+    """Coordinates of a fit with cost, residual and derivatives there."""
 
-    Attributes
-    ----------
-    x : ndarray, shape (n,)
-    cost : float
-        Sum of losses.
-    residual, jacobian : ndarray
-        With the weights of noise and loss in them, so that ``jacobian' residual`` is half the gradient of the cost.
-    raw : tuple of ndarray
-        Residual and derivative by the coordinates before weighting.
-    """
-
-    x: Array
-    cost: float
+    x: Array  #: Shape (n,).
+    cost: float  #: Sum of losses.
+    #: With the weights of noise and loss in them, so that ``jacobian' residual`` is half the gradient of the cost.
     residual: Array
     jacobian: Array
-    raw: tuple[Array, Array]
+    raw: tuple[Array, Array]  #: Residual and derivative by the coordinates before weighting.
 
 
 @dataclass(frozen=True)
@@ -59,21 +49,13 @@ class Descent:
 
 @dataclass(frozen=True)
 class Box:
-    """Bounds, scales and largest steps of the coordinates of a descent.
+    """Bounds, scales and largest steps of the coordinates of a descent."""
 
-    Attributes
-    ----------
-    low, high : ndarray, shape (n,)
-    scale : ndarray, shape (n,)
-        Size of each coordinate, that a change is compared with.
-    reach : ndarray, shape (n,), or float
-        Largest change of each in one step.
-    """
-
+    #: Shape (n,).
     low: Array
     high: Array
-    scale: Array
-    reach: Array | float = np.inf
+    scale: Array  #: Shape (n,); size of each coordinate, that a change is compared with.
+    reach: Array | float = np.inf  #: Shape (n,), or float; largest change of each in one step.
 
 
 def descend(

@@ -100,26 +100,16 @@ def window_sums(score: Array, length: int) -> Array:
 
 @dataclass(frozen=True)
 class Gain:
-    """How much smaller one residual is than another on the same samples, and how sure that is.
+    """How much smaller one residual is than another on the same samples, and how sure that is."""
 
-    Attributes
-    ----------
-    before, after : float
-        Root mean square of the two residuals.
-    weight : float
-        Share of the change from one prediction to the other that the data ask for: 1 if the second prediction is
-        right, 0 if the change has nothing to do with the data.
-    score : float
-        That weight in standard deviations.
-    pieces : int
-        Independent pieces of the records that the standard deviation rests on.
-    """
-
+    #: Root mean square of the two residuals.
     before: float
     after: float
+    #: Share of the change from one prediction to the other that the data ask for: 1 if the second prediction is right,
+    #: 0 if the change has nothing to do with the data.
     weight: float
-    score: float
-    pieces: int
+    score: float  #: That weight in standard deviations.
+    pieces: int  #: Independent pieces of the records that the standard deviation rests on.
 
     @property
     def relative(self) -> float:

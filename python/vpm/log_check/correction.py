@@ -19,26 +19,13 @@ TIME = "time"
 
 @dataclass(frozen=True)
 class Correction:
-    """A change of a channel table.
+    """A change of a channel table."""
 
-    Attributes
-    ----------
-    channels : tuple of str
-        What it changes; two channels that change places where `swap` is set.
-    factor : float
-        By which their values are multiplied.
-    delay : float
-        By how much later than the others they were stamped, s.
-    swap : bool
-    unit : str
-        Unit that the column is in, where it is another one than the table says; else "".
-    """
-
-    channels: tuple[str, ...]
-    factor: float = 1.0
-    delay: float = 0.0
+    channels: tuple[str, ...]  #: What it changes; two channels that change places where `swap` is set.
+    factor: float = 1.0  #: By which their values are multiplied.
+    delay: float = 0.0  #: By how much later than the others they were stamped, s.
     swap: bool = False
-    unit: str = ""
+    unit: str = ""  #: Unit that the column is in, where it is another one than the table says; else "".
 
     def applied(self, record: Experiment) -> Experiment:
         """The record with this correction done.

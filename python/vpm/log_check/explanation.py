@@ -21,30 +21,17 @@ Change = TypeVar("Change", Correction, Pair)
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """A correction that explains a record.
-
-    Attributes
-    ----------
-    correction : Correction
-    before, after : Shares
-        What is left of the record without it and with it.
-    affected : tuple of str
-        Channels that the mistake affects.
-    rivals : tuple of Correction
-        Others that do as well.
-    is_of_values : bool
-        The model explains the record without it as well, but with values that its file rules out.
-    at_once : bool
-        Another correction has to be made with it; alone it explains nothing.
-    """
+    """A correction that explains a record."""
 
     correction: Correction
+    #: What is left of the record without it and with it.
     before: Shares
     after: Shares
-    affected: tuple[str, ...]
-    rivals: tuple[Correction, ...] = ()
+    affected: tuple[str, ...]  #: Channels that the mistake affects.
+    rivals: tuple[Correction, ...] = ()  #: Others that do as well.
+    #: The model explains the record without it as well, but with values that its file rules out.
     is_of_values: bool = False
-    at_once: bool = False
+    at_once: bool = False  #: Another correction has to be made with it; alone it explains nothing.
 
     @property
     def is_possible(self) -> bool:

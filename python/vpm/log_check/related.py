@@ -18,17 +18,11 @@ from vpm.numbers import Array
 
 @dataclass(frozen=True, eq=False)
 class Related:
-    """Values of a channel beside those that another channel says it should have, shape (N,).
-
-    Attributes
-    ----------
-    channel, teller : str
-    values, expected : ndarray, shape (N,)
-        What the channel holds, and what it should.
-    """
+    """Values of a channel beside those that another channel says it should have, shape (N,)."""
 
     channel: str
     teller: str
+    #: Shape (N,); what the channel holds, and what it should.
     values: Array
     expected: Array
 

@@ -49,40 +49,21 @@ class Shares:
     """What is left of each channel, between 0 and 1: a model that leaves more than no model is not used.
 
     A share does not depend on the scale of its channel, so that records in other units can be compared by it.
-
-    Attributes
-    ----------
-    by_channel : mapping of str to float
-    values : ndarray
-        Parameters by which it was found.
-    residual : ndarray, shape (N, m), or None
-        What is left of the channels; None where the model runs away from the record.
-    free : ndarray, shape (m,)
-        What free masses leave of each channel, as a sum of squares.
-    seen : ndarray of int
-        Samples that count.
-    far : float
-        By how many of its stated deviations a parameter of the model was moved, the farthest one.
-    farthest : str
-        Its name.
-    unlikely : float
-        How unlikely the model file makes its parameters, as half the sum of the squares of these deviations (nats).
-    chance : float
-        Of deviations as large as these.
-    floor : float
-        Shares below this are as good as nothing.
     """
 
     by_channel: Mapping[str, float]
-    values: Array
+    values: Array  #: Parameters by which it was found.
+    #: Shape (N, m); what is left of the channels; None where the model runs away from the record.
     residual: Array | None = None
+    #: Shape (m,); what free masses leave of each channel, as a sum of squares.
     free: Array = field(default_factory=lambda: np.ones(1))
-    seen: NDArray[np.intp] = field(default_factory=lambda: np.arange(0))
-    far: float = 0.0
-    farthest: str = ""
+    seen: NDArray[np.intp] = field(default_factory=lambda: np.arange(0))  #: Samples that count.
+    far: float = 0.0  #: By how many of its stated deviations a parameter of the model was moved, the farthest one.
+    farthest: str = ""  #: Its name.
+    #: How unlikely the model file makes its parameters, as half the sum of the squares of these deviations (nats).
     unlikely: float = 0.0
-    chance: float = 1.0
-    floor: float = 0.0
+    chance: float = 1.0  #: Of deviations as large as these.
+    floor: float = 0.0  #: Shares below this are as good as nothing.
 
     @property
     def cost(self) -> float:
@@ -360,22 +341,12 @@ class Judge:
 
 @dataclass(frozen=True, eq=False)
 class Tangent:
-    """What is left of a record near fitted values of the parameters, as far as it is linear.
-
-    Attributes
-    ----------
-    structure : Structure
-    residual : ndarray, shape (N, m)
-    slopes : ndarray, shape (N, m, k)
-        Derivatives by deviations of the priors.
-    shares : Shares
-        Of the fit.
-    """
+    """What is left of a record near fitted values of the parameters, as far as it is linear."""
 
     structure: Structure
-    residual: Array
-    slopes: Array
-    shares: Shares
+    residual: Array  #: Shape (N, m).
+    slopes: Array  #: Shape (N, m, k); derivatives by deviations of the priors.
+    shares: Shares  #: Of the fit.
 
     def followed(self, tracker: Tracker) -> Followed:
         """Residual with derivatives from which a fit of the error share begins."""

@@ -27,24 +27,12 @@ BINS = (0.5, 0.7, 0.8, 0.9, 0.95, 0.98)
 
 @dataclass(frozen=True)
 class Calibration:
-    """Calibration numbers that turn evidence into true probabilities.
+    """Calibration numbers that turn evidence into true probabilities."""
 
-    Attributes
-    ----------
-    tempering : float
-        Power of evidence in probabilities: no model is exact.
-    astray : float
-        How often evidence leads astray.
-    cases : int
-        How many cases they were fitted to.
-    seeds : str
-        Of these cases.
-    """
-
-    tempering: float
-    astray: float
-    cases: int = 0
-    seeds: str = ""
+    tempering: float  #: Power of evidence in probabilities: no model is exact.
+    astray: float  #: How often evidence leads astray.
+    cases: int = 0  #: How many cases they were fitted to.
+    seeds: str = ""  #: Of these cases.
 
     def save(self, path: Path) -> Path:
         """Write a calibration as JSON."""
@@ -64,21 +52,11 @@ def shipped() -> Calibration:
 
 @dataclass(frozen=True)
 class Round:
-    """Round for the calibration: effects that were weighed against each other in a case with known truth.
+    """Round for the calibration: effects that were weighed against each other in a case with known truth."""
 
-    Attributes
-    ----------
-    gains : tuple of float
-        Evidence of each beyond that at which it is as probable as none, nats.
-    right : tuple of bool
-        Whether each is what was missing.
-    missing : bool
-        Whether anything was.
-    """
-
-    gains: tuple[float, ...]
-    right: tuple[bool, ...]
-    missing: bool
+    gains: tuple[float, ...]  #: Evidence of each beyond that at which it is as probable as none, nats.
+    right: tuple[bool, ...]  #: Whether each is what was missing.
+    missing: bool  #: Whether anything was.
 
     def likelihood(self, tempering: float, astray: float) -> float:
         """Probability that a calibration gives to the true effect of a round."""
@@ -113,16 +91,9 @@ def calibrated(rounds: Sequence[Round], seeds: str, cases: int) -> Calibration:
 
 @dataclass(frozen=True)
 class Reliability:
-    """Reliability of a calibration in one bin: stated probabilities, and how often they were right.
+    """Reliability of a calibration in one bin: stated probabilities, and how often they were right."""
 
-    Attributes
-    ----------
-    stated : float
-        Mean of the probabilities.
-    right, count : int
-    """
-
-    stated: float
+    stated: float  #: Mean of the probabilities.
     right: int
     count: int
 

@@ -26,59 +26,32 @@ ASTRAY = (ValueError, ArithmeticError)
 
 @dataclass(frozen=True, eq=False)
 class Followed:
-    """Residual that a tracker leaves under a structure, with derivatives for a fit.
-
-    Attributes
-    ----------
-    structure : Structure
-    tracker : Tracker
-    names : tuple of str
-        Unknown parameters by which there are derivatives.
-    residual : ndarray, shape (N, m)
-    jacobian : ndarray, shape (N, m, len(names))
-    """
+    """Residual that a tracker leaves under a structure, with derivatives for a fit."""
 
     structure: Structure
     tracker: Tracker
-    names: tuple[str, ...]
-    residual: Array
-    jacobian: Array
+    names: tuple[str, ...]  #: Unknown parameters by which there are derivatives.
+    residual: Array  #: Shape (N, m).
+    jacobian: Array  #: Shape (N, m, len(names)).
 
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """Fit of a structure under a tracker: its most probable values.
-
-    Attributes
-    ----------
-    structure : Structure
-    tracker : Tracker
-    residual : ndarray, shape (N, m)
-    cost : float
-        See `Fitter.cost`, under the view of the fit.
-    ended : bool
-        Whether all its derivatives, worked out anew under that view, lead nowhere any more.
-    """
+    """Fit of a structure under a tracker: its most probable values."""
 
     structure: Structure
     tracker: Tracker
-    residual: Array
-    cost: float
-    ended: bool = False
+    residual: Array  #: Shape (N, m).
+    cost: float  #: See `Fitter.cost`, under the view of the fit.
+    ended: bool = False  #: Whether all its derivatives, worked out anew under that view, lead nowhere any more.
 
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """View for a fit: the noise model of residuals, and derivatives that are taken as known.
-
-    Attributes
-    ----------
-    noise : NoiseModel
-    known : mapping of str to ndarray, shape (n,)
-        Prediction errors by a unit of parameters, where a fit begins.
-    """
+    """View for a fit: the noise model of residuals, and derivatives that are taken as known."""
 
     noise: NoiseModel
+    #: Each of shape (n,); prediction errors by a unit of parameters, where a fit begins.
     known: Mapping[str, Array] = field(default_factory=dict)
 
     def errors(self, followed: Followed, parts: Parts) -> tuple[Array, Array]:

@@ -29,18 +29,10 @@ def hidden_states(model: Model, channels: Sequence[str]) -> tuple[str, ...]:
 
 @dataclass(frozen=True)
 class HiddenFirstStates:
-    """Hidden first states of each record, as differences from equilibrium.
-
-    Attributes
-    ----------
-    states : tuple of str
-    sizes : tuple of float
-        How far each of them moves in the records: it may begin as far from balance.
-    records : int
-    """
+    """Hidden first states of each record, as differences from equilibrium."""
 
     states: tuple[str, ...] = ()
-    sizes: tuple[float, ...] = ()
+    sizes: tuple[float, ...] = ()  #: How far each of them moves in the records: it may begin as far from balance.
     records: int = 0
 
     @property

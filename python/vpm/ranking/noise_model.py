@@ -32,16 +32,11 @@ class Colour:
     Law: P. Whittle, *Arkiv for Matematik* 2, 1953: lines of the spectrum are independent, whatever the spectrum is. A
     short autoregression does not see what is slow beside its length, but goes first, so that no line leaks into others
     (R. Blackman and J. Tukey, *Bell System Technical Journal* 37, 1958).
-
-    Attributes
-    ----------
-    edges : ndarray, shape (b - 1,)
-        Where the next band begins, cycles per sample.
-    sizes : ndarray, shape (b,)
     """
 
+    #: Shape (b - 1,); where the next band begins, cycles per sample.
     edges: Array = field(default_factory=lambda: np.zeros(0))
-    sizes: Array = field(default_factory=lambda: np.ones(1))
+    sizes: Array = field(default_factory=lambda: np.ones(1))  #: Shape (b,).
 
     @classmethod
     def of(cls, pieces: Sequence[Array]) -> Colour:
@@ -81,20 +76,11 @@ class Structured:
     that leaves least of noise and takes least of a signal. The quietest band of the spectrum says how strong that is.
     Of a band with few lines little is known, so that it is kept: nothing may grow there unseen. The lines are those of
     a cosine transform, which mirrors a piece at its ends: no jump there leaks into others.
-
-    Attributes
-    ----------
-    edges : ndarray, shape (b - 1,)
-        Where the next band begins, cycles per sample.
-    kept : ndarray, shape (b,)
-        Share of the amplitude that is kept in each band.
-    noise : float
-        Root mean square of the noise.
     """
 
-    edges: Array
-    kept: Array
-    noise: float
+    edges: Array  #: Shape (b - 1,); where the next band begins, cycles per sample.
+    kept: Array  #: Shape (b,); share of the amplitude that is kept in each band.
+    noise: float  #: Root mean square of the noise.
 
     @classmethod
     def of(cls, pieces: Sequence[Array], passed: Sequence[Array] | None = None) -> Structured:
@@ -137,24 +123,13 @@ def _banded(places: Array, powers: Array) -> tuple[Array, list[Array]]:
 
 @dataclass(frozen=True)
 class NoiseModel:
-    """Noise model: an autoregression of each channel with Student errors.
+    """Noise model: an autoregression of each channel with Student errors."""
 
-    Attributes
-    ----------
-    filters : tuple of ndarray
-        Coefficients of the prediction error, the first one 1.
-    colours : tuple of Colour
-        Of these errors.
-    deviations : tuple of float
-        Scales of these errors.
-    tails : tuple of float
-        Degrees of freedom of their density, Student's: impacts and stiction leave errors that are no bell (K. Lange,
-        R. Little and J. Taylor, *J. American Statistical Association* 84, 1989).
-    """
-
-    filters: tuple[Array, ...]
-    colours: tuple[Colour, ...]
-    deviations: tuple[float, ...]
+    filters: tuple[Array, ...]  #: Coefficients of the prediction error, the first one 1.
+    colours: tuple[Colour, ...]  #: Of these errors.
+    deviations: tuple[float, ...]  #: Scales of these errors.
+    #: Degrees of freedom of their density, Student's: impacts and stiction leave errors that are no bell (K. Lange, R.
+    #: Little and J. Taylor, *J. American Statistical Association* 84, 1989).
     tails: tuple[float, ...]
 
     def whitened(self, values: Array, parts: Parts) -> Array:

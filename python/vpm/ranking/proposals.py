@@ -29,20 +29,11 @@ AT_ONCE = 16
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """Proposal of an effect at start values, as screened under a tracker.
-
-    Attributes
-    ----------
-    structure : Structure
-    gain : float
-        What one step of a fit is predicted to gain, nats.
-    neutral : bool
-        The effect does nothing where it begins.
-    """
+    """Proposal of an effect at start values, as screened under a tracker."""
 
     structure: Structure
-    gain: float
-    neutral: bool
+    gain: float  #: What one step of a fit is predicted to gain, nats.
+    neutral: bool  #: The effect does nothing where it begins.
 
     @property
     def key(self) -> Key:

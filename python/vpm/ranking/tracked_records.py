@@ -42,17 +42,10 @@ NOTHING: By = ((), None)
 
 @dataclass(frozen=True)
 class Tracker:
-    """Tracker: an observer of fixed bandwidth; `vpm.observer` has that of least variance.
+    """Tracker: an observer of fixed bandwidth; `vpm.observer` has that of least variance."""
 
-    Attributes
-    ----------
-    band : float
-        Bandwidth, Hz.
-    fine : bool
-        Whether its steps are exact enough to compare structures by what they leave, or cost as little as they can.
-    """
-
-    band: float
+    band: float  #: Bandwidth, Hz.
+    #: Whether its steps are exact enough to compare structures by what they leave, or cost as little as they can.
     fine: bool = True
 
     @property

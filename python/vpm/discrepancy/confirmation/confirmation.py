@@ -51,19 +51,12 @@ HOPELESS = 10.0
 
 @dataclass(frozen=True)
 class Data:
-    """Records of a diagnosis as problems for refits and their confirmation, set up once.
+    """Records of a diagnosis as problems for refits and their confirmation, set up once."""
 
-    Attributes
-    ----------
-    training, validation : InverseDynamicsProblem
-        Inverse-dynamics residual on the records that are fitted and on those that are not.
-    simulation : OutputErrorProblem or None
-        Simulation of the validation records, the second criterion.
-    """
-
+    #: Inverse-dynamics residual on the records that are fitted and on those that are not.
     training: InverseDynamicsProblem
     validation: InverseDynamicsProblem
-    simulation: OutputErrorProblem | None
+    simulation: OutputErrorProblem | None  #: Simulation of the validation records, the second criterion.
 
 
 @dataclass(frozen=True)

@@ -48,17 +48,10 @@ class InMotion:
 
 @dataclass(frozen=True)
 class Timed:
-    """Delay that was fitted in motion, with its interval.
+    """Delay that was fitted in motion, with its interval."""
 
-    Attributes
-    ----------
-    bounds : dict
-        Of its own parameters, by dotted name.
-    validation : Gain
-        On validation samples in motion, against the model without it that was fitted to the same samples.
-    """
-
-    bounds: Mapping[str, tuple[float, float]]
+    bounds: Mapping[str, tuple[float, float]]  #: Of its own parameters, by dotted name.
+    #: On validation samples in motion, against the model without it that was fitted to the same samples.
     validation: Gain
 
 

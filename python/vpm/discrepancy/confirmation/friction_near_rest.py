@@ -44,20 +44,13 @@ SIZES = (0.1, 0.4, 1.6)
 
 @dataclass(frozen=True)
 class Support:
-    """Support of records for friction near rest: share of the change between two predictions.
+    """Support of records for friction near rest: share of the change between two predictions."""
 
-    Attributes
-    ----------
-    training, validation : Gain
-        Gain on the error of the run without the effect, relative to the noise at each frequency. The weight is the
-        supported share of the change, beside all other parameters.
-    run : ClosedLoopPrediction
-        With the effect, fitted to the training records.
-    """
-
+    #: Gain on the error of the run without the effect, relative to the noise at each frequency. The weight is the
+    #: supported share of the change, beside all other parameters.
     training: Gain
     validation: Gain
-    run: ClosedLoopPrediction
+    run: ClosedLoopPrediction  #: With the effect, fitted to the training records.
 
 
 def needs_prediction(current: Judged, data: Data, probe: Probe) -> bool:

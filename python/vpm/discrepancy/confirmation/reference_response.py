@@ -34,19 +34,13 @@ ODDS = 2.0
 
 @dataclass(frozen=True)
 class Verdict:
-    """Verdict of the reference response on two models.
+    """Verdict of the reference response on two models."""
 
-    Attributes
-    ----------
-    apart : float
-        By how many standard deviations of the noise they differ along it, the smaller of both views; 0 where it cannot
-        be said.
-    first, second : float
-        Estimated part of the rival in the error of each model, in standard deviations, with an error of one. It is zero
-        for the right model, and the whole difference for the wrong one.
-    """
-
+    #: By how many standard deviations of the noise they differ along it, the smaller of both views; 0 where it cannot
+    #: be said.
     apart: float
+    #: Estimated part of the rival in the error of each model, in standard deviations, with an error of one. It is zero
+    #: for the right model, and the whole difference for the wrong one.
     first: float
     second: float
 

@@ -47,17 +47,11 @@ LEAST_SCREENED = 0.005
 
 @dataclass(frozen=True)
 class Thresholds:
-    """Thresholds below which an effect is refused.
+    """Thresholds below which an effect is refused."""
 
-    Attributes
-    ----------
-    candidates : int
-        Number of candidates tried in the whole diagnosis; the false-alarm level is divided by it (Bonferroni).
-    interval : float
-        Sampling interval of the coarsest record, s; delays and lags below it that explain little are part of sampling.
-    """
-
+    #: Number of candidates tried in the whole diagnosis; the false-alarm level is divided by it (Bonferroni).
     candidates: int
+    #: Sampling interval of the coarsest record, s; delays and lags below it that explain little are part of sampling.
     interval: float
 
     def score(self, pieces: int) -> float:

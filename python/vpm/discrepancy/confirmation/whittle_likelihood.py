@@ -52,26 +52,13 @@ LEAP, TRIES, SHORTER = 3.0, 3, 0.4
 
 @dataclass(frozen=True)
 class ClosedLoopPrediction:
-    """Closed-loop prediction of records by a model, fitted by the Whittle likelihood.
-
-    Attributes
-    ----------
-    model : Model
-    free : tuple of str
-        Parameters that were fitted.
-    problem : OutputErrorProblem
-        All records in closed loop.
-    left : ndarray, shape (n,)
-        What the run leaves of the logs.
-    slopes : ndarray, shape (n, free)
-        Derivatives of that by the fitted parameters.
-    """
+    """Closed-loop prediction of records by a model, fitted by the Whittle likelihood."""
 
     model: Model
-    free: tuple[str, ...]
-    problem: OutputErrorProblem
-    left: Array
-    slopes: Array
+    free: tuple[str, ...]  #: Parameters that were fitted.
+    problem: OutputErrorProblem  #: All records in closed loop.
+    left: Array  #: Shape (n,); what the run leaves of the logs.
+    slopes: Array  #: Shape (n, free); derivatives of that by the fitted parameters.
 
     def spectra(self) -> Spectra:
         """Spectra of the prediction error and of its derivatives, for the Whittle likelihood."""

@@ -32,29 +32,17 @@ GROWING = 4.0
 
 @dataclass(frozen=True)
 class Structure:
-    """Structure of a residual: tests on states, frequency, white noise, effort and validation records.
+    """Structure of a residual: tests on states, frequency, white noise, effort and validation records."""
 
-    Attributes
-    ----------
-    predicted : float
-        Share of the validation residual's mean square that a map of position, velocity, acceleration and effort, drawn
-        from the training residual, predicts.
-    low_frequency : float
-        Share of its power in the lowest tenth of the retained band.
-    above_white : float
-        Ratio of the residual to its white part, on the records where that is smaller.
-    growing : float
-        Rank correlation of its size with that of the effort, in standard deviations: noise of sensors and drives does
-        not depend on the effort.
-    new : float
-        Relative gap on validation records over that on training records.
-    """
-
+    #: Share of the validation residual's mean square that a map of position, velocity, acceleration and effort, drawn
+    #: from the training residual, predicts.
     predicted: float
-    low_frequency: float
-    above_white: float
+    low_frequency: float  #: Share of its power in the lowest tenth of the retained band.
+    above_white: float  #: Ratio of the residual to its white part, on the records where that is smaller.
+    #: Rank correlation of its size with that of the effort, in standard deviations: noise of sensors and drives does
+    #: not depend on the effort.
     growing: float
-    new: float
+    new: float  #: Relative gap on validation records over that on training records.
 
     @property
     def present(self) -> bool:

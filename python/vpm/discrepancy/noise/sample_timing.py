@@ -21,19 +21,12 @@ MATTERS = 0.02
 
 @dataclass(frozen=True)
 class InTime:
-    """Residuals of a fitted model with the best shift in the timing of all commands, within one interval.
+    """Residuals of a fitted model with the best shift in the timing of all commands, within one interval."""
 
-    Attributes
-    ----------
-    fitted, validation : ndarray
-        Residuals on training and validation records.
-    shift : float
-        How much later the commands hold, in sampling intervals; 0 where a shift does not matter.
-    """
-
+    #: Residuals on training and validation records.
     fitted: Array
     validation: Array
-    shift: float
+    shift: float  #: How much later the commands hold, in sampling intervals; 0 where a shift does not matter.
 
 
 def in_time(judged: Judged, data: Data) -> InTime:

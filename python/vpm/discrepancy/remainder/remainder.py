@@ -42,29 +42,17 @@ class Described:
 
 @dataclass(frozen=True)
 class Remainder:
-    """Remainder of validation records under the model with all accepted effects.
+    """Remainder of validation records under the model with all accepted effects."""
 
-    Attributes
-    ----------
-    choices : tuple of Described
-        The model with the effects, and the recalibrated one where there are effects.
-    repeats : bool
-        Whether a fit without physics predicts a part of it that is worth a name.
-    open : float
-        Share that the effects leave of the mean square that a fit finds in the recalibrated residual; 0 where nothing
-        repeats.
-    instead : bool
-        Whether a fit in the place of the effects, with no more numbers, leaves less than ``HALF`` of their error. Also
-        true if friction of seals, a single number, clearly leaves less.
-    seals : Seals or None
-        That friction, if it does.
-    """
-
-    choices: tuple[Described, ...]
-    repeats: bool
+    choices: tuple[Described, ...]  #: The model with the effects, and the recalibrated one where there are effects.
+    repeats: bool  #: Whether a fit without physics predicts a part of it that is worth a name.
+    #: Share that the effects leave of the mean square that a fit finds in the recalibrated residual; 0 where nothing
+    #: repeats.
     open: float
+    #: Whether a fit in the place of the effects, with no more numbers, leaves less than ``HALF`` of their error. Also
+    #: true if friction of seals, a single number, clearly leaves less.
     instead: bool
-    seals: Seals | None = None
+    seals: Seals | None = None  #: That friction, if it does.
 
     @property
     def best(self) -> Described:

@@ -28,21 +28,11 @@ MOSTLY_OPEN = 0.15
 
 @dataclass(frozen=True)
 class Joints:
-    """Joints with a clear residual: open ones, and closed ones that effects explain.
+    """Joints with a clear residual: open ones, and closed ones that effects explain."""
 
-    Attributes
-    ----------
-    open : mapping of str to float
-        Joints at which most of the gap is left, and the share of its mean square that is.
-    closed : tuple of str
-        Joints at which they explain it.
-    worst : str
-        The joint with the largest gap beside its effort, "" without any.
-    """
-
-    open: Mapping[str, float]
-    closed: tuple[str, ...]
-    worst: str
+    open: Mapping[str, float]  #: Joints at which most of the gap is left, and the share of its mean square that is.
+    closed: tuple[str, ...]  #: Joints at which they explain it.
+    worst: str  #: The joint with the largest gap beside its effort, "" without any.
 
     @classmethod
     def of(cls, gap: Mapping[str, ChannelGap], left: Structure | None, tracked: Mapping[str, float]) -> Joints:

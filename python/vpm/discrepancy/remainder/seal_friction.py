@@ -28,20 +28,13 @@ UNIT_PRESSURE = 1e5
 
 @dataclass(frozen=True)
 class Seals:
-    """Friction of one cylinder's seals in the place of all accepted effects.
-
-    Attributes
-    ----------
-    drive : str
-    share, std : float
-        Of the piston's area that the seals press with, friction coefficient and all.
-    fitted, validation : ndarray
-        Residuals on training and validation records.
-    """
+    """Friction of one cylinder's seals in the place of all accepted effects."""
 
     drive: str
+    #: Of the piston's area that the seals press with, friction coefficient and all.
     share: float
     std: float
+    #: Residuals on training and validation records.
     fitted: Array
     validation: Array
 

@@ -31,18 +31,11 @@ MOST_SAMPLES = 3000
 
 @dataclass(frozen=True)
 class Shares:
-    """Shares of a validation residual that each state predicts.
+    """Shares of a validation residual that each state predicts."""
 
-    Attributes
-    ----------
-    of : dict of str to float
-        Share of the mean square on validation data by state, the largest first.
-    alike : tuple of str
-        States whose share these data do not discriminate from the largest, the largest itself among them; none if they
-        cannot tell the largest from zero.
-    """
-
-    of: dict[str, float]
+    of: dict[str, float]  #: Share of the mean square on validation data by state, the largest first.
+    #: States whose share these data do not discriminate from the largest, the largest itself among them; none if they
+    #: cannot tell the largest from zero.
     alike: tuple[str, ...]
 
 

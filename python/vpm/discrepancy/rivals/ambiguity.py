@@ -29,24 +29,13 @@ AS_GOOD = 0.05
 
 @dataclass(frozen=True)
 class Rivals:
-    """Rivals of an accepted effect: trials in its place that predict the validation records as well.
-
-    Attributes
-    ----------
-    effect, site : str
-    trials : tuple of Trial
-        Those that predict the validation data as well.
-    tried : tuple of Trial
-        All that were refitted in its place.
-    without : Judged or None
-        The model without it; None where that cannot be computed.
-    """
+    """Rivals of an accepted effect: trials in its place that predict the validation records as well."""
 
     effect: str
     site: str
-    trials: tuple[Trial, ...]
-    tried: tuple[Trial, ...] = ()
-    without: Judged | None = None
+    trials: tuple[Trial, ...]  #: Those that predict the validation data as well.
+    tried: tuple[Trial, ...] = ()  #: All that were refitted in its place.
+    without: Judged | None = None  #: The model without it; None where that cannot be computed.
 
     @property
     def label(self) -> str:

@@ -11,36 +11,19 @@ from vpm.identify import InverseDynamicsProblem
 
 @dataclass(frozen=True)
 class ExcitationRange:
-    """Excitation range of one joint: way, speed and acceleration; other joints stay at ``hold``.
-
-    Attributes
-    ----------
-    joint : str
-    unit : str
-        rad or m.
-    low, high : float
-    speed, acceleration : float
-        99.9 % quantiles of the absolute values.
-    time_step : float
-        s.
-    hold : dict of str to float
-        Mean position of every joint.
-    command : float
-        Largest command of any actuator.
-    effort : float
-        What the weighted residual has to be multiplied by to be an effort of this joint.
-    """
+    """Excitation range of one joint: way, speed and acceleration; other joints stay at ``hold``."""
 
     joint: str
-    unit: str
+    unit: str  #: rad or m.
     low: float
     high: float
+    #: 99.9 % quantiles of the absolute values.
     speed: float
     acceleration: float
-    time_step: float
-    hold: dict[str, float]
-    command: float
-    effort: float
+    time_step: float  #: s.
+    hold: dict[str, float]  #: Mean position of every joint.
+    command: float  #: Largest command of any actuator.
+    effort: float  #: What the weighted residual has to be multiplied by to be an effort of this joint.
 
 
 def excitation_range(data: InverseDynamicsProblem, joint: str) -> ExcitationRange:

@@ -21,21 +21,11 @@ from vpm.numbers import Array
 
 @dataclass(frozen=True)
 class _Course:
-    """Data along one record from which backlash flights are simulated.
+    """Data along one record from which backlash flights are simulated."""
 
-    Attributes
-    ----------
-    pull : ndarray, shape (N,)
-        Acceleration of the link against the motor while nothing holds it.
-    column : ndarray, shape (N, joints)
-        Effort at each measured joint per such acceleration.
-    interval : float
-        s.
-    """
-
-    pull: Array
-    column: Array
-    interval: float
+    pull: Array  #: Shape (N,); acceleration of the link against the motor while nothing holds it.
+    column: Array  #: Shape (N, joints); effort at each measured joint per such acceleration.
+    interval: float  #: s.
 
 
 def flights(

@@ -37,27 +37,16 @@ PERIODS = 3
 
 @dataclass(frozen=True)
 class Candidate:
-    """Candidate of the screening: one effect at one site, with its start values and bounds.
-
-    Attributes
-    ----------
-    effect : EffectType
-    site : str
-    starts : tuple of dict
-        Start values by short parameter name; several where the effect has a shape to be searched.
-    bounds : dict
-        Data-driven bounds of shape parameters by short name, within the physical range.
-    fixed : tuple of str
-        Short names of shape parameters that stay at their start.
-    neutral : bool
-        Whether the effect does nothing at its start values, so that the current residual still holds.
-    """
+    """Candidate of the screening: one effect at one site, with its start values and bounds."""
 
     effect: EffectType
     site: str
+    #: Start values by short parameter name; several where the effect has a shape to be searched.
     starts: tuple[Mapping[str, float], ...]
+    #: Data-driven bounds of shape parameters by short name, within the physical range.
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    fixed: tuple[str, ...] = ()
+    fixed: tuple[str, ...] = ()  #: Short names of shape parameters that stay at their start.
+    #: Whether the effect does nothing at its start values, so that the current residual still holds.
     neutral: bool = True
 
     @property

@@ -39,33 +39,17 @@ class Alias:
 
 @dataclass(frozen=True)
 class Probe:
-    """Probe of a candidate: estimates and gain of one linearised step.
-
-    Attributes
-    ----------
-    candidate : Candidate
-    model : Model
-        The model with the effect at the start values of the best shape tried.
-    free : tuple of str
-        Dotted names of the effect's parameters that the data can see.
-    held : tuple of Alias
-        Those that they do not discriminate from others.
-    invisible : tuple of str
-        Those without any influence at the start values.
-    values, std : dict
-        Linearised estimate by dotted name, unbounded.
-    drop : float
-        Share of the training residual's mean square that would go.
-    """
+    """Probe of a candidate: estimates and gain of one linearised step."""
 
     candidate: Candidate
-    model: Model
-    free: tuple[str, ...]
-    held: tuple[Alias, ...]
-    invisible: tuple[str, ...]
+    model: Model  #: The model with the effect at the start values of the best shape tried.
+    free: tuple[str, ...]  #: Dotted names of the effect's parameters that the data can see.
+    held: tuple[Alias, ...]  #: Those that they do not discriminate from others.
+    invisible: tuple[str, ...]  #: Those without any influence at the start values.
+    #: Linearised estimate by dotted name, unbounded.
     values: Mapping[str, float]
     std: Mapping[str, float]
-    drop: float
+    drop: float  #: Share of the training residual's mean square that would go.
 
     @property
     def score(self) -> float:

@@ -26,19 +26,10 @@ CLEARLY_LESS = 0.5
 
 @dataclass(frozen=True)
 class Pair:
-    """Pair of effects that the search accepts together.
+    """Pair of effects that the search accepts together."""
 
-    Attributes
-    ----------
-    first : Accepted
-        With the model that has this one alone, and what it gains beside the other one.
-    outcome : Round
-        The round in which the second one came in beside it.
-    second : Accepted
-    """
-
-    first: Accepted
-    outcome: Round
+    first: Accepted  #: With the model that has this one alone, and what it gains beside the other one.
+    outcome: Round  #: The round in which the second one came in beside it.
     second: Accepted
 
 

@@ -26,20 +26,10 @@ from vpm.model import Model
 
 @dataclass(frozen=True)
 class Tried:
-    """Candidates that the search tried in the round before an effect came in.
+    """Candidates that the search tried in the round before an effect came in."""
 
-    Attributes
-    ----------
-    key : Key
-        The effect.
-    without : Judged
-        The model without it, everything else fitted.
-    probes : tuple of Probe
-    trials : tuple of Trial
-    """
-
-    key: Key
-    without: Judged
+    key: Key  #: The effect.
+    without: Judged  #: The model without it, everything else fitted.
     probes: tuple[Probe, ...]
     trials: tuple[Trial, ...]
 

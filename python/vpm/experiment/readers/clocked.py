@@ -23,28 +23,16 @@ class ClockedLog(Log):
     """A file of groups with clocks.
 
     A clock is one of `clocks`, or ``time``: that of the group with the most samples among those that are read.
-
-    Attributes
-    ----------
-    groups : mapping of str to str
-        Group of each column.
-    sizes : mapping of str to int
-        Number of samples of each group that has a clock.
-    clocks : mapping of str to str
-        Names of clocks, and the group of each; they are no channels.
-    remarks : tuple of str
-        Sentences about the whole file, for the history of the record.
-    package, extra, kind : str
-        Library that reads such files, the extra that installs it, and what a file is called: ``"a TDMS file"``.
     """
 
+    #: Library that reads such files, the extra that installs it, and what a file is called: ``"a TDMS file"``.
     package: ClassVar[str]
     extra: ClassVar[str]
     kind: ClassVar[str]
-    groups: Mapping[str, str]
-    sizes: Mapping[str, int]
-    clocks: Mapping[str, str]
-    remarks: tuple[str, ...] = ()
+    groups: Mapping[str, str]  #: Group of each column.
+    sizes: Mapping[str, int]  #: Number of samples of each group that has a clock.
+    clocks: Mapping[str, str]  #: Names of clocks, and the group of each; they are no channels.
+    remarks: tuple[str, ...] = ()  #: Sentences about the whole file, for the history of the record.
 
     def find(self, column: str) -> str | None:
         """Name of a column or clock; see `Log.find`."""
