@@ -62,15 +62,6 @@ FIGURES: dict[str, tuple[Callable[[], Figure], list[str]]] = {
         lambda: plot.plot_run(RUN),
         ["time [s]", "[m]", "axis.position", "measured", "simulated", "slide on log, free run"],
     ),
-    "residual_time": (
-        lambda: plot.plot_residual_time(TIME, {"recalibrated": WAVE, "after": 0.1 * WAVE}, "N"),
-        ["residual [N]", "time [s]", "recalibrated", "after"],
-    ),
-    "residual_against": (
-        lambda: plot.plot_residual_against(WAVE, {"recalibrated": WAVE, "after": 0.1 * WAVE}, "velocity [m/s]", "N"),
-        ["residual [N]", "velocity [m/s]", "recalibrated, mean", "after, mean"],
-    ),
-    "spectrum": (lambda: plot.plot_spectrum({"a": WAVE}, 100.0, "N"), ["frequency [Hz]", "density [N/√Hz]", "a"]),
     "traces": (
         lambda: findings.plot_traces([TRACE, replace(TRACE, channel="b.position")]),
         ["axis.position [m]", "b.position [m]", "time [s]", "measured", "simulated before", "simulated after"],
@@ -217,7 +208,7 @@ def test_a_step_of_dry_friction_stays_a_step() -> None:
     """Means of forward and backward motion are apart, and no bin of a law reaches over zero velocity."""
     velocity = np.random.default_rng(0).uniform(-1.0, 1.0, 400)
     residual = 0.5 * np.sign(velocity)
-    figure = plot.plot_residual_against(velocity, {"a": residual}, "velocity", "N", velocity)
+    figure = findings.plot_joint_over_state(replace(PICTURE, position=velocity, velocity=velocity), {"a": residual})
     means = [line for line in figure.axes[0].get_lines() if line.get_marker() in {">", "<"}]
     assert len(means) == 2
     for line, side in zip(means, (0.5, -0.5), strict=True):
@@ -268,7 +259,7 @@ def test_powers_of_ten_are_letters() -> None:
     assert plain_power(r"$\mathdefault{2\times10^{-3}}$") == "2×10⁻³"
     assert plain_power(r"$\mathdefault{10^{12}}$") == "10¹²"
     assert plain_power("plain") == "plain"
-    figure = plot.plot_spectrum({"a": WAVE}, 100.0, "N")
+    figure = FIGURES["joint_noise"][0]()
     assert "mathdefault" not in plot.figure_to_svg(figure)
 
 

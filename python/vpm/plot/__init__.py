@@ -6,15 +6,7 @@ from vpm.plot.inertial import plot_inertial
 from vpm.plot.linear import plot_bode, plot_poles
 from vpm.plot.narx import plot_narx_run, plot_narx_terms
 from vpm.plot.scenarios import plot_scenario
-from vpm.plot.signals import (
-    plot_channels,
-    plot_correlation,
-    plot_innovations,
-    plot_residual_against,
-    plot_residual_time,
-    plot_run,
-    plot_spectrum,
-)
+from vpm.plot.signals import plot_channels, plot_correlation, plot_innovations, plot_run
 from vpm.plot.style import figure_to_svg
 from vpm.plot.summaries import plot_comparison, plot_pictures
 
@@ -36,10 +28,7 @@ __all__ = [
     "plot_parameters",
     "plot_pictures",
     "plot_poles",
-    "plot_residual_against",
-    "plot_residual_time",
     "plot_run",
     "plot_scenario",
-    "plot_spectrum",
     "plot_step_cost",
 ]
