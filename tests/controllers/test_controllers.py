@@ -7,37 +7,21 @@ import pytest
 
 import two_link_arm
 from drive_texts import RIG
-from model_texts import TWO_LINKS, changed, described
+from model_texts import TWO_LINKS, changed, described, on_rail
 from vpm.errors import ModelError, SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.simulate import simulate, simulate_arrays
 
-AXIS = """
-name = "axis"
-gravity = [0.0, 0.0, 0.0]
-
-[bodies.slide]
-mass = 2.0
-
-[joints.axis]
-type = "prismatic"
-parent = "world"
-child = "slide"
-axis = [1.0, 0.0, 0.0]
-
-[actuators.drive]
-joint = "axis"
-gain = { value = 40.0, unit = "N/V" }
-command_unit = "V"
+AXIS = f"""{on_rail("slide", gain='{ value = 40.0, unit = "N/V" }')}command_unit = "V"
 
 [controllers.servo]
 type = "pd"
 actuator = "drive"
 measures = "axis.position"
-proportional = { value = 5.0, unit = "V/m" }
-derivative = { value = 0.6, unit = "V s/m" }
+proportional = {{ value = 5.0, unit = "V/m" }}
+derivative = {{ value = 0.6, unit = "V s/m" }}
 """
 
 LEG = f"""

@@ -12,6 +12,7 @@ from scipy.optimize import fsolve
 
 import vpm
 from command_line import vpm as command
+from model_texts import effect_text, on_rail
 from vpm.errors import OptimisationError
 from vpm.numbers import Array
 
@@ -26,29 +27,9 @@ ROOT = Path(__file__).resolve().parents[2]
 EXAMPLES = ROOT / "examples"
 
 #: A cart of 2 kg on a rail, pushed by a motor.
-CART = """
-name = "cart"
-gravity = [0.0, 0.0, 0.0]
-
-[bodies.cart]
-mass = 2.0
-
-[joints.rail]
-type = "prismatic"
-parent = "world"
-child = "cart"
-axis = [1.0, 0.0, 0.0]
-
-[markers.nose]
-parent = "cart"
-
-[actuators.motor]
-joint = "rail"
-gain = 1.0
-command_unit = "N"
-"""
+CART = on_rail("cart", joint="rail", drive="motor") + 'command_unit = "N"\n[markers.nose]\nparent = "cart"\n'
 #: The same, held by a spring of 50 N/m.
-SPRUNG = CART + '\n[[effects]]\ntype = "spring"\nat = "rail"\nstiffness = 50.0\n'
+SPRUNG = CART + effect_text("spring", "rail", stiffness=50.0)
 #: A cart of 1 kg that pulls a load of 1 kg by a spring of 1 N/m.
 PAIR = (
     CART.replace("mass = 2.0", "mass = 1.0")

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from model_texts import on_rail
 from vpm import Experiment, Model
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.low_frequency import AVERAGED, has_impacts, low_frequency
@@ -12,23 +13,15 @@ from vpm.discrepancy.screening.candidates import Candidate, candidates
 from vpm.discrepancy.screening.probe import Baseline, probe
 from vpm.identify import InverseDynamicsProblem
 
-TEXT = """name = "slide"
-gravity = [0.0, 0.0, -9.81]
-
-[bodies.body]
-mass = { value = 2.0, uncertainty = 0.2, unit = "kg" }
-
-[joints.axis]
-type = "prismatic"
-parent = "world"
-child = "body"
-axis = [1.0, 0.0, 0.0]
-
-[actuators.drive]
-joint = "axis"
-gain = { value = 1.0, unit = "N/N" }
-command_unit = "N"
-"""
+TEXT = (
+    on_rail(
+        "body",
+        '{ value = 2.0, uncertainty = 0.2, unit = "kg" }',
+        gain='{ value = 1.0, unit = "N/N" }',
+        gravity="[0.0, 0.0, -9.81]",
+    )
+    + 'command_unit = "N"\n'
+)
 
 
 @pytest.fixture(scope="module")

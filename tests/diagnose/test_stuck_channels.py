@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from command_line import vpm
+from model_texts import effect_text, on_rail
 from shared_cases import shared_case
 from vpm import diagnose, identify, rank
 from vpm.discrepancy.stuck_channels import check_moving
@@ -91,25 +92,8 @@ def coasting(model: Model, speed: float, seed: int) -> Experiment:
 
 def test_friction_is_found_while_a_machine_coasts() -> None:
     """Nothing is large beside a drive that is off: the model was said to agree with the data."""
-    model = Model.from_toml("""
-        name = "axis"
-        gravity = [0.0, 0.0, 0.0]
-        [bodies.block]
-        mass = 2.0
-        [joints.slide]
-        type = "prismatic"
-        parent = "world"
-        child = "block"
-        axis = [1.0, 0.0, 0.0]
-        [actuators.motor]
-        joint = "slide"
-        gain = 1.0
-        command_unit = "N"
-        [[effects]]
-        type = "viscous_friction"
-        at = "slide"
-        viscous = { value = 1.0, unit = "N s/m", uncertainty = 0.5 }
-        """)
+    oil = effect_text("viscous_friction", "slide", viscous='{ value = 1.0, unit = "N s/m", uncertainty = 0.5 }')
+    model = Model.from_toml(on_rail("block", joint="slide", drive="motor") + 'command_unit = "N"\n' + oil)
     make = partial(coasting, model)
     for names in ("ranking", "search"):
         found = diagnose(model, [make(1.0, 0), make(2.0, 1)], make(1.5, 2), workers=1, names=names)

@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+from model_texts import on_rail
 from vpm import Experiment, Model, simulate
 from vpm.diagnosing import diagnose
 from vpm.discrepancy.screening.compliance_and_stop_start import logged_swing
@@ -13,24 +14,9 @@ from vpm.identify import InverseDynamicsProblem, identify
 
 J, L, K = 0.5, 2.0, 3000.0
 
-SLIDE = """
-name = "slide"
-gravity = [0.0, 0.0, 0.0]
-
-[bodies.link]
-mass = { value = 2.0, uncertainty = 0.2 }
-
-[joints.axis]
-type = "prismatic"
-parent = "world"
-child = "link"
-axis = [1.0, 0.0, 0.0]
-
-[actuators.drive]
-joint = "axis"
-gain = { value = 1.0, unit = "N/A" }
-command_unit = "A"
-"""
+SLIDE = (
+    on_rail("link", "{ value = 2.0, uncertainty = 0.2 }", gain='{ value = 1.0, unit = "N/A" }') + 'command_unit = "A"\n'
+)
 
 ARM = """
 name = "arm"

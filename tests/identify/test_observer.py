@@ -4,35 +4,18 @@ import numpy as np
 import pytest
 
 import vpm
+from model_texts import effect_text, on_rail
 from vpm.errors import ExperimentError, ModelError, SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.observer import Noise, Record, likely_noise
 
 #: Carriage with springs at both sides that a motor pushes; unknown forces move it, an encoder errs.
-CARRIAGE = """
-name = "carriage"
-gravity = [0, 0, 0]
-[bodies.carriage]
-mass = { value = 2.0, uncertainty = 0.2 }
-[joints.axis]
-type = "prismatic"
-parent = "world"
-child = "carriage"
-axis = [1, 0, 0]
-[actuators.drive]
-joint = "axis"
-gain = 1.0
-[[effects]]
-type = "viscous_friction"
-at = "axis"
-viscous = { value = 6.0, uncertainty = 2.0 }
-[[effects]]
-type = "spring"
-at = "axis"
-stiffness = { value = 50.0, uncertainty = 10.0 }
-rest = 0.0
-"""
+CARRIAGE = (
+    on_rail("carriage", "{ value = 2.0, uncertainty = 0.2 }")
+    + effect_text("viscous_friction", "axis", viscous="{ value = 6.0, uncertainty = 2.0 }")
+    + effect_text("spring", "axis", stiffness="{ value = 50.0, uncertainty = 10.0 }", rest=0.0)
+)
 
 #: Two links in a level plane, of which one encoder sees the first alone.
 TWO_LINKS = """

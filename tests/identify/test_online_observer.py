@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from model_texts import effect_text, on_rail
 from two_link_arm import nominal
 from vpm.errors import SimulationError
 from vpm.model import Model
@@ -10,29 +11,7 @@ from vpm.numbers import Array
 from vpm.observer import Noise, Observer
 
 CHANNELS = ["shoulder.position", "elbow.position"]
-CART = """
-name = "cart"
-gravity = [0.0, 0.0, 0.0]
-
-[bodies.cart]
-mass = 2.0
-
-[joints.axis]
-type = "prismatic"
-parent = "world"
-child = "cart"
-axis = [1.0, 0.0, 0.0]
-
-[actuators.drive]
-joint = "axis"
-gain = 1.0
-
-[[effects]]
-type = "spring"
-at = "axis"
-stiffness = 50.0
-rest = 0.0
-"""
+CART = on_rail("cart") + effect_text("spring", "axis", stiffness=50.0, rest=0.0)
 STEP = 0.01
 CART_NOISE = Noise({"axis.position": 1e-3}, {"axis": 2.0}, {"axis.position": 1e-5, "axis.velocity": 1e-4})
 

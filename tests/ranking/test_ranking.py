@@ -11,6 +11,7 @@ from scipy.stats import t as student
 
 import vpm
 from hopper import HOPPER, hopped
+from model_texts import effect_text, on_rail
 from sledge import DRY, MASS, OIL, READING, SEEN, SLEDGE, TURN, WAVE, pushed, swung
 from vpm.errors import DiagnosisError, ExperimentError
 from vpm.experiment import Experiment
@@ -329,24 +330,9 @@ def test_commands_that_were_read_and_not_sent_hide_no_effect() -> None:
 
 
 #: A rod without a mass to speak of, that a press moves through a damper.
-ROD = """
-name = "rod"
-gravity = [0, 0, 0]
-[bodies.rod]
-mass = 1e-3
-[joints.way]
-type = "prismatic"
-parent = "world"
-child = "rod"
-axis = [1, 0, 0]
-[actuators.press]
-joint = "way"
-gain = 1.0
-[[effects]]
-type = "viscous_friction"
-at = "way"
-viscous = { value = 1000.0, uncertainty = 10000.0, min = 0.0 }
-"""
+ROD = on_rail("rod", "1e-3", joint="way", drive="press") + effect_text(
+    "viscous_friction", "way", viscous="{ value = 1000.0, uncertainty = 10000.0, min = 0.0 }"
+)
 
 
 def test_dry_friction_is_seen_where_nothing_has_inertia() -> None:

@@ -240,7 +240,7 @@ def test_a_view_prefers_derivatives_that_are_there() -> None:
 
 #: A pendulum that hangs on the sledge and that nobody measures.
 HANGING = (
-    SLEDGE.replace("[0, 0, 0]", "[0, 0, -9.81]")
+    SLEDGE.replace("[0.0, 0.0, 0.0]", "[0.0, 0.0, -9.81]")
     + """
 [bodies.bob]
 mass = 0.4

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from command_line import vpm
+from model_texts import effect_text, on_rail
 from vpm.batch import Trial, simulate_batch
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -16,25 +17,7 @@ from vpm.stepping import Simulation
 
 STEP, SECONDS, HERTZ = 1e-3, 0.2, 200.0
 
-CARRIAGE = f"""
-name = "carriage"
-gravity = [0.0, 0.0, 0.0]
-[bodies.carriage]
-mass = 2.0
-[joints.axis]
-type = "prismatic"
-parent = "world"
-child = "carriage"
-axis = [1.0, 0.0, 0.0]
-[actuators.drive]
-joint = "axis"
-gain = 1.0
-[[effects]]
-type = "spring"
-at = "axis"
-stiffness = {2.0 * (2.0 * np.pi * HERTZ) ** 2}
-rest = 0.0
-"""
+CARRIAGE = on_rail("carriage") + effect_text("spring", "axis", stiffness=2.0 * (2.0 * np.pi * HERTZ) ** 2, rest=0.0)
 
 
 @pytest.fixture

@@ -16,27 +16,17 @@ from hypothesis.extra.numpy import arrays
 import vpm
 from command_line import vpm as command
 from interrupting import pressed
+from model_texts import on_rail
 from vpm.errors import ModelError, ScenarioError
 from vpm.plot.scenarios import readable_unit
 from vpm.scenario import Scenario, ScenarioInterruptedError, ScenarioRun, signals
 
 ROOT = Path(__file__).resolve().parents[2]
 
-SLED = """
-name = "sled"
-gravity = [0.0, 0.0, -9.81]
-[bodies.sled]
-mass = 2.0
-[joints.axis]
-type = "prismatic"
-parent = "world"
-child = "sled"
-axis = [0.0, 0.0, 1.0]
-[actuators.drive]
-joint = "axis"
-gain = { value = 3.0, unit = "N/V" }
-command_unit = "V"
-"""
+SLED = (
+    on_rail("sled", gain='{ value = 3.0, unit = "N/V" }', gravity="[0.0, 0.0, -9.81]", along="[0.0, 0.0, 1.0]")
+    + 'command_unit = "V"\n'
+)
 
 SERVO = """
 [controllers.servo]

@@ -45,23 +45,42 @@ def described(model: Model) -> Any:
     return json.loads(model.description())
 
 
-#: Carriage on a rail with an ideal drive, its mass and its viscous friction uncertain.
-DAMPED_AXIS = """
-name = "axis"
-gravity = [0, 0, 0]
-[bodies.carriage]
-mass = { value = 2.0, uncertainty = 0.2 }
-[joints.axis]
+def on_rail(
+    body: str,
+    mass: str = "2.0",
+    *,
+    joint: str = "axis",
+    drive: str = "drive",
+    gain: str = "1.0",
+    gravity: str = "[0.0, 0.0, 0.0]",
+    along: str = "[1.0, 0.0, 0.0]",
+) -> str:
+    """Model file of a body on a rail with an ideal drive, whose table stands last."""
+    return f"""
+name = "{body}"
+gravity = {gravity}
+[bodies.{body}]
+mass = {mass}
+[joints.{joint}]
 type = "prismatic"
 parent = "world"
-child = "carriage"
-axis = [1, 0, 0]
-[actuators.drive]
-joint = "axis"
-gain = 1.0
-command_unit = "N"
-[[effects]]
-type = "viscous_friction"
-at = "axis"
-viscous = { value = 3.0, uncertainty = 1.0 }
+child = "{body}"
+axis = {along}
+[actuators.{drive}]
+joint = "{joint}"
+gain = {gain}
 """
+
+
+def effect_text(kind: str, at: str, **parameters: object) -> str:
+    """Table of an effect."""
+    lines = [f"{name} = {value}" for name, value in parameters.items()]
+    return "\n".join(["[[effects]]", f'type = "{kind}"', f'at = "{at}"', *lines, ""])
+
+
+#: Carriage on a rail with an ideal drive, its mass and its viscous friction uncertain.
+DAMPED_AXIS = (
+    on_rail("carriage", "{ value = 2.0, uncertainty = 0.2 }")
+    + 'command_unit = "N"\n'
+    + effect_text("viscous_friction", "axis", viscous="{ value = 3.0, uncertainty = 1.0 }")
+)

@@ -5,46 +5,18 @@ from collections import deque
 import numpy as np
 from scipy.signal import lfilter
 
+from model_texts import effect_text, on_rail
 from vpm.experiment import Experiment
 from vpm.model import Model
 
 #: A sledge that a motor pushes, with friction of oil; the file is a tenth off.
-SLEDGE = """
-name = "sledge"
-gravity = [0, 0, 0]
-[bodies.sledge]
-mass = { value = 3.3, uncertainty = 0.33 }
-[joints.way]
-type = "prismatic"
-parent = "world"
-child = "sledge"
-axis = [1, 0, 0]
-[actuators.motor]
-joint = "way"
-gain = 4.0
-[[effects]]
-type = "viscous_friction"
-at = "way"
-viscous = { value = 7.0, uncertainty = 1.5 }
-"""
+SLEDGE = on_rail("sledge", "{ value = 3.3, uncertainty = 0.33 }", joint="way", drive="motor", gain="4.0") + effect_text(
+    "viscous_friction", "way", viscous="{ value = 7.0, uncertainty = 1.5 }"
+)
 #: The sledge with an encoder, which may show too much.
-SEEN = (
-    SLEDGE
-    + """
-[sensors.encoder]
-measures = "way.position"
-"""
-)
+SEEN = SLEDGE + '[sensors.encoder]\nmeasures = "way.position"\n'
 #: The sledge with dry friction.
-DRY = (
-    SLEDGE
-    + """
-[[effects]]
-type = "coulomb_friction"
-at = "way"
-coulomb = { value = 3.4, uncertainty = 0.4 }
-"""
-)
+DRY = SLEDGE + effect_text("coulomb_friction", "way", coulomb="{ value = 3.4, uncertainty = 0.4 }")
 #: Way after which dry friction repeats, and the torque constant of the motor, m.
 WAVE, TURN = 1.5, 0.4
 #: Speed at which an excess of friction close to rest has faded to a part, m/s.
