@@ -31,7 +31,7 @@ from vpm.errors import IdentificationError, near_match
 
 if TYPE_CHECKING:
     from vpm.experiment import Experiment
-    from vpm.identify import Fit, Fitting
+    from vpm.identify import Fit
     from vpm.model import Model
     from vpm.simulate import Setup
 
@@ -98,6 +98,7 @@ def identify(
 ) -> None:
     """Fit parameters to one or several logs. Ctrl-C ends a fit and keeps the best until then."""
     from vpm.identify import Fitting
+    from vpm.identify import identify as fit_logs
     from vpm.simulate import Setup
 
     settings = Fitting(
@@ -126,9 +127,19 @@ def identify(
     setup = Setup(integrator, substeps, horizon, settling, hold)
     if check:
         _refuse(machine, [*records, *unseen], setup, workers)
-    fit = _fitted(
-        machine, records, _without(machine, free, fix), mode, cutoff, setup, tie, settings if asked else None, starts
-    )
+    ties = options.names(tie, "--tie", "FOLLOWER=LEADER")
+    with fitting(starts) as tell:
+        fit = fit_logs(
+            machine,
+            records,
+            _without(machine, free, fix),
+            mode=mode,
+            cutoff=cutoff,
+            setup=setup,
+            ties=ties,
+            progress=tell,
+            fitting=settings if asked else None,
+        )
     lines = _told(fit, machine, unseen, cutoff)
     lines += _more(fit, records, profile or [], replicates, seed, cutoff)
     save_plot(fit.plot, plot)
@@ -143,35 +154,6 @@ def _refuse(machine: Model, records: list[Experiment], setup: Setup, workers: in
 
     check_stuck(machine, records)
     refuse_mistakes(machine, records, setup=setup, workers=workers or None)
-
-
-def _fitted(
-    machine: Model,
-    records: list[Experiment],
-    free: list[str] | None,
-    mode: str,
-    cutoff: float | None,
-    setup: Setup,
-    tie: list[str] | None,
-    settings: Fitting | None,
-    starts: int,
-) -> Fit:
-    """The fit, with its progress on the screen."""
-    from vpm.identify import identify as fit_logs
-
-    ties = options.names(tie, "--tie", "FOLLOWER=LEADER")
-    with fitting(starts) as tell:
-        return fit_logs(
-            machine,
-            records,
-            free,
-            mode=mode,
-            cutoff=cutoff,
-            setup=setup,
-            ties=ties,
-            progress=tell,
-            fitting=settings,
-        )
 
 
 def _told(fit: Fit, machine: Model, unseen: list[Experiment], cutoff: float | None) -> list[str]:

@@ -76,17 +76,22 @@ def prove(
     text = table.tables(found)
     console.print(text, markup=False)
     if out is not None:
-        proving.save_json(found, out.with_suffix(".json"))
-        write_text(out, page(out, text))
-        out.with_suffix(".partial.json").unlink(missing_ok=True)
-        written = [out, out.with_suffix(".json")]
-        if reliability.stated(found):
-            written.append(reliability.draw(found, out.with_suffix(".svg")))
-        wrote(*written)
+        _write(proving, reliability, found, out, text)
     if calibrate is not None:
         fitted, told = reliability.report(found)
         console.print(told, markup=False)
         wrote(fitted.save(calibrate))
+
+
+def _write(proving: ModuleType, reliability: ModuleType, found: list[Any], out: Path, text: str) -> None:
+    """Write the page with the tables, and beside it the answers and how often probabilities were right."""
+    proving.save_json(found, out.with_suffix(".json"))
+    write_text(out, page(out, text))
+    out.with_suffix(".partial.json").unlink(missing_ok=True)
+    written = [out, out.with_suffix(".json")]
+    if reliability.stated(found):
+        written.append(reliability.draw(found, out.with_suffix(".svg")))
+    wrote(*written)
 
 
 def _maker(text: str) -> Callable[[], Executor]:

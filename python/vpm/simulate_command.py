@@ -63,13 +63,8 @@ def simulate(
     from vpm.simulate import simulate as simulate_log
 
     if "scenario" in read_toml(model):
-        for value, name in (
-            (log, "LOG"),
-            (mode, "--mode"),
-            (integrator, "--integrator"),
-            (hold, "--hold"),
-            (channels, "--channels"),
-        ):
+        given = {"LOG": log, "--mode": mode, "--integrator": integrator, "--hold": hold, "--channels": channels}
+        for name, value in given.items():
             if value is not None:
                 raise VpmError(f"{model} is a scenario, which needs no {name}; leave it out, or name a model file")
         _simulate_scenario(model, out, plot)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import ast
 import math
-from collections.abc import Mapping, Sequence
+import operator
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from vpm.errors import ModelError
@@ -17,6 +18,14 @@ _OPERATIONS: Mapping[type[ast.operator], str] = {
     ast.Sub: "subtract",
     ast.Mult: "multiply",
     ast.Div: "divide",
+}
+
+#: What the instructions on two numbers and on one compute.
+_OF_TWO = {"add": operator.add, "subtract": operator.sub, "multiply": operator.mul, "divide": operator.truediv}
+_OF_ONE: Mapping[str, Callable[[float], float]] = {
+    "negate": operator.neg,
+    "abs": abs,
+    **{name: getattr(math, name) for name in FUNCTIONS if name != "abs"},
 }
 
 Instruction = str | dict[str, int]
@@ -49,35 +58,19 @@ class Formula:
             In the order in which they were declared.
         """
         stack: list[float] = []
+        numbers = {"parameter": parameters, "constant": self.constants}
         for instruction in self.program:
             if isinstance(instruction, dict):
                 ((kind, place),) = instruction.items()
-                numbers = {"parameter": parameters, "constant": self.constants}
-                if kind == "power":
-                    stack.append(stack.pop() ** place)
-                else:
-                    stack.append(numbers[kind][place])
-            elif instruction in {"position", "velocity"}:
-                stack.append(q if instruction == "position" else v)
-            elif instruction in _OPERATIONS.values():
-                second, first = stack.pop(), stack.pop()
-                stack.append(_combined(instruction, first, second))
-            elif instruction == "negate":
-                stack.append(-stack.pop())
+                stack.append(stack.pop() ** place if kind == "power" else numbers[kind][place])
+            elif instruction in _OF_TWO:
+                second = stack.pop()
+                stack.append(_OF_TWO[instruction](stack.pop(), second))
+            elif instruction in _OF_ONE:
+                stack.append(_OF_ONE[instruction](stack.pop()))
             else:
-                stack.append(abs(stack.pop()) if instruction == "abs" else getattr(math, instruction)(stack.pop()))
+                stack.append(q if instruction == "position" else v)
         return stack[0]
-
-
-def _combined(operation: str, first: float, second: float) -> float:
-    match operation:
-        case "add":
-            return first + second
-        case "subtract":
-            return first - second
-        case "multiply":
-            return first * second
-    return first / second
 
 
 def compile_formula(text: str, names: Sequence[str]) -> Formula:

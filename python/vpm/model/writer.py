@@ -78,19 +78,21 @@ def toml_of(document: Document, remarks: Remarks = MappingProxyType({}), head: I
 def _lines(content: Mapping[str, Any], remarks: Remarks) -> Iterator[str]:
     sections = {key: value for key, value in content.items() if isinstance(value, dict) or key == "effects"}
     yield from (_pair(key, value, remarks.get((key,))) for key, value in content.items() if key not in sections)
-    for section, components in sections.items():
+    for place, head, table in _tables(sections):
+        above = [f"# {remarks[place]}"] if place in remarks else []
+        yield from ("", *above, head)
+        yield from (_pair(key, value, remarks.get((*place, key))) for key, value in table.items())
+
+
+def _tables(sections: Mapping[str, Any]) -> Iterator[tuple[tuple[str, ...], str, Mapping[str, Any]]]:
+    """Place, heading and content of each table of a model file."""
+    for section, content in sections.items():
         if section == "channels":
-            yield from ("", "[channels]", *(_pair(name, table) for name, table in components.items()))
+            yield (section,), "[channels]", content
         elif section == "effects":
-            for effect in components:
-                yield from ("", "[[effects]]", *(_pair(key, value) for key, value in effect.items()))
+            yield from (((section,), "[[effects]]", effect) for effect in content)
         else:
-            for name, table in components.items():
-                if (section, name) in remarks:
-                    yield from ("", f"# {remarks[section, name]}", f"[{section}.{_key(name)}]")
-                else:
-                    yield from ("", f"[{section}.{_key(name)}]")
-                yield from (_pair(key, value, remarks.get((section, name, key))) for key, value in table.items())
+            yield from (((section, name), f"[{section}.{_key(name)}]", table) for name, table in content.items())
 
 
 def _pair(key: str, value: object, remark: str | None = None) -> str:

@@ -199,23 +199,16 @@ def identify_loop(
     time, x, f = found.time[used], found.values[0][used], sign * found.values[1][used]
     most = min(MOST_HARMONICS, int(time.size / cycles) // 4)
     degree = drift if cycles > 1 else 0
-    seen = fourier(time, x, rate, most, degree)
-    count = visible(seen, time.size)
-    moved, pushed = fourier(time, x, rate, most, degree), fourier(time, f, rate, most, degree)
+    moved, pushed = (fourier(time, y, rate, most, degree) for y in (x, f))
+    count = visible(moved, time.size)
     turn = np.exp(2j * np.pi * rate * np.arange(1, most + 1) * delay)
     total = Sums(moved, pushed, turn, rate, count, time.size)
-    each = [
-        Sums(
-            fourier(time[part], (x - moved.drift)[part], rate, most, 0),
-            fourier(time[part], (f - pushed.drift)[part], rate, most, 0),
-            # The phases of a cycle count from its own first sample, which is the same sample for both channels.
-            turn,
-            rate,
-            count,
-            int(part.sum()),
-        )
-        for part in parts(time, rate, cycles)
-    ]
+    bent, felt = x - moved.drift, f - pushed.drift
+    # The phases of a cycle count from its own first sample, which is the same sample for both channels.
+    each = []
+    for part in parts(time, rate, cycles):
+        x_n, f_n = (fourier(time[part], y[part], rate, most, 0) for y in (bent, felt))
+        each.append(Sums(x_n, f_n, turn, rate, count, int(part.sum())))
     k_std, c_std, e_std = total.spread(moved.noise, pushed.noise)
     phase = np.linspace(0.0, 2.0 * np.pi, 721)
     wave = evaluate(moved.amplitudes[:count], phase)
@@ -241,9 +234,9 @@ def identify_loop(
         force_harmonics=(pushed.amplitudes * turn)[:most],
         displacement_noise=moved.noise,
         force_noise=pushed.noise,
-        displacement=x - moved.drift,
-        force=f - pushed.drift,
+        displacement=bent,
+        force=felt,
     )
     step = float(np.median(np.diff(time)))
-    left = 1.0 - seen.noise**2 / float(np.var(x - seen.drift))
+    left = 1.0 - moved.noise**2 / float(np.var(bent))
     return replace(loop, notes=loop_notes(loop, x, step, delay_std, left))
