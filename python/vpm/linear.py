@@ -7,16 +7,14 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from vpm.errors import SimulationError, near_match, needs
-from vpm.numbers import Array
+from vpm.numbers import Array, Complex
 from vpm.results import Result
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -7,8 +7,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import VpmError
 
-#: Real numbers.
+#: Real and complex numbers.
 Array = NDArray[np.float64]
+Complex = NDArray[np.complex128]
 
 #: No quantity of a machine is larger in SI units; squares and products of three are still finite numbers.
 LARGEST = 1e100

@@ -13,8 +13,6 @@ from vpm.errors import ExcitationError
 from vpm.excitation.excitation import Excitation, check_band, check_positive, clock
 from vpm.numbers import Array
 
-Complex = NDArray[np.complex128]
-
 #: Called with (iterations so far, crest factor).
 Progress = Callable[[int, float], None]
 

@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vpm.numbers import Array
+from vpm.numbers import Array, Complex
 from vpm.plot.style import BLUE, LINE, ORANGE, SOFT, STAGES, label, panels, styled
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
-
-Complex = NDArray[np.complex128]
 
 
 @styled

@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import IdentificationError
-from vpm.numbers import Array
+from vpm.numbers import Array, Complex
 from vpm.studies.impedance.channels import Columns
-from vpm.studies.impedance.harmonics import Complex, Series, fundamental
+from vpm.studies.impedance.harmonics import Series, fundamental
 
 #: Fewest samples in a cycle: two harmonics with twice as many samples as coefficients.
 FEWEST_PER_CYCLE = 8

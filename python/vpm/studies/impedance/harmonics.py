@@ -5,11 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from vpm.numbers import Array
-
-Complex = NDArray[np.complex128]
+from vpm.numbers import Array, Complex
 
 
 @dataclass(frozen=True)

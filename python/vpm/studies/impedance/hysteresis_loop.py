@@ -22,11 +22,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vpm.errors import IdentificationError
-from vpm.numbers import Array
+from vpm.numbers import Array, Complex
 from vpm.results import Result
 from vpm.studies.impedance.channels import RecordLike, Sense, check_moves, check_sense, columns
 from vpm.studies.impedance.cycles import FEWEST_PER_CYCLE, Sums, parts, visible, whole_cycles
-from vpm.studies.impedance.harmonics import Complex, evaluate, fourier
+from vpm.studies.impedance.harmonics import evaluate, fourier
 from vpm.studies.impedance.hysteresis_notes import loop_notes
 
 if TYPE_CHECKING:
@@ -189,10 +189,7 @@ def identify_loop(
         A channel holds values that are no numbers, or time does not increase.
     """
     sign = check_sense(sense)
-    if not (np.isfinite(delay) and np.isfinite(delay_std) and delay_std >= 0.0):
-        raise IdentificationError(f"delay is {delay} s with a standard deviation of {delay_std} s; give finite numbers")
-    if not 0 <= drift <= 5:
-        raise IdentificationError(f"drift is {drift}; give a degree of 0 to 5, higher ones would take the loop away")
+    _check_settings(delay, delay_std, drift)
     found = columns(record, (displacement, force), FEWEST_PER_CYCLE)
     check_moves(found, displacement)
     rate, cycles, used = whole_cycles(found, frequency)
@@ -240,3 +237,10 @@ def identify_loop(
     step = float(np.median(np.diff(time)))
     left = 1.0 - moved.noise**2 / float(np.var(bent))
     return replace(loop, notes=loop_notes(loop, x, step, delay_std, left))
+
+
+def _check_settings(delay: float, delay_std: float, drift: int) -> None:
+    if not (np.isfinite(delay) and np.isfinite(delay_std) and delay_std >= 0.0):
+        raise IdentificationError(f"delay is {delay} s with a standard deviation of {delay_std} s; give finite numbers")
+    if not 0 <= drift <= 5:
+        raise IdentificationError(f"drift is {drift}; give a degree of 0 to 5, higher ones would take the loop away")

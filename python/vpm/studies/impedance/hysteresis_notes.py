@@ -5,15 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from vpm.experiment import quantisation_step
 from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from vpm.studies.impedance.hysteresis_loop import Loop
-
-Complex = NDArray[np.complex128]
 
 #: Share of the damping beyond which a possible error is worth a sentence.
 WORTH = 0.05
