@@ -119,3 +119,21 @@ class Driveline:
             two, first, second = two + change, first + w12 * change, second + w22 * change
         self.impulse = np.array([one, two])
         return np.array([first, second])
+
+
+class Driven(Driveline):
+    """The driveline with the gains of its drives."""
+
+    def __init__(
+        self, joints: Sequence[str], columns: Sequence[Column], links: Links, step: float, gain: Array
+    ) -> None:
+        super().__init__(joints, columns, links, step)
+        self.gain = gain
+
+    def outputs(self) -> Array:
+        """See `Plant`."""
+        return self.encoder
+
+    def advance(self, command: Array, time: float) -> None:
+        """See `Plant`."""
+        super().advance(self.gain * command, time)

@@ -6,7 +6,7 @@ the controllers compute from the readings; the drives work on the held commands 
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,6 +126,12 @@ class Cascade:
     limit: Array
     dt: float
     before: tuple[Array, Array] | None = None
+
+    @classmethod
+    def of(cls, columns: Sequence[Column], servos: Sequence[str], dt: float) -> Self:
+        """The cascades of these servos, by their values."""
+        outer, inner, limit = (stack(columns, servos, name) for name in ("position_gain", "velocity_gain", "limit"))
+        return cls(outer, inner, limit, dt)
 
     def __call__(self, reference: Array, reading: Array) -> Array:
         last, second = self.before or (reading, reading)

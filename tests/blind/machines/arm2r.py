@@ -10,7 +10,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from blind.driveline import Driveline
+from blind.driveline import Driven
 from blind.effects import Scale
 from blind.loads import Column, stack
 from blind.loop import Cascade
@@ -51,20 +51,6 @@ class TwoLinks:
         far = self.weight_2 * np.sin(q[0] + q[1] + self.tilt)
         near = self.weight_1 * np.sin(q[0] + self.tilt)
         return np.array([near + far - turning * (2.0 * v[0] + v[1]) * v[1], far + turning * v[0] ** 2])
-
-
-class _Plant(Driveline):
-    """The driveline with the gains of its drives."""
-
-    gain: Array
-
-    def outputs(self) -> Array:
-        """See `Plant`."""
-        return self.encoder
-
-    def advance(self, command: Array, time: float) -> None:
-        """See `Plant`."""
-        super().advance(self.gain * command, time)
 
 
 @dataclass(frozen=True)
@@ -172,16 +158,13 @@ velocity_gain = {show(f"{servo}.velocity_gain", "A s/rad")}
 limit = {show(f"{servo}.limit", "A")}""")
         return "\n\n".join([*parts, show.effects(base, dict.fromkeys(JOINTS, ("N m", "rad")))])
 
-    def plant(self, columns: Sequence[Column], step: float) -> _Plant:
+    def plant(self, columns: Sequence[Column], step: float) -> Driven:
         """See `Machine`."""
-        plant = _Plant(JOINTS, columns, TwoLinks(columns), step)
-        plant.gain = stack(columns, DRIVES, "gain")
-        return plant
+        return Driven(JOINTS, columns, TwoLinks(columns), step, stack(columns, DRIVES, "gain"))
 
     def controller(self, columns: Sequence[Column], dt: float) -> Cascade:
         """See `Machine`."""
-        outer, inner, limit = (stack(columns, SERVOS, name) for name in ("position_gain", "velocity_gain", "limit"))
-        return Cascade(outer, inner, limit, dt)
+        return Cascade.of(columns, SERVOS, dt)
 
     def mixed(self, values: Mapping[str, float]) -> Mapping[str, Mapping[str, float]]:
         """See `Machine`."""

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from blind.driveline import Driveline
+from blind.driveline import Driven
 from blind.effects import Scale
 from blind.loads import Column, stack
 from blind.loop import Cascade
@@ -50,20 +50,6 @@ class _Mass:
     def load(self, q: Array, v: Array) -> Array:
         """See `Links`."""
         return self.unbalance * np.sin(q + self.tilt) if self.swings else np.zeros_like(v)
-
-
-class _Plant(Driveline):
-    """The driveline with the gain of its drive."""
-
-    gain: Array
-
-    def outputs(self) -> Array:
-        """See `Plant`."""
-        return self.encoder
-
-    def advance(self, command: Array, time: float) -> None:
-        """See `Plant`."""
-        super().advance(self.gain * command, time)
 
 
 @dataclass(frozen=True)
@@ -190,17 +176,14 @@ limit = {show("servo.limit", command)}
 
 {show.effects(base, {"axis": (effort, coordinate)})}"""
 
-    def plant(self, columns: Sequence[Column], step: float) -> _Plant:
+    def plant(self, columns: Sequence[Column], step: float) -> Driven:
         """See `Machine`."""
-        plant = _Plant(["axis"], columns, _Mass(columns, rotary=self.rotary), step)
-        plant.gain = stack(columns, ["drive"], "gain")
-        return plant
+        mass, gain = _Mass(columns, rotary=self.rotary), stack(columns, ["drive"], "gain")
+        return Driven(["axis"], columns, mass, step, gain)
 
     def controller(self, columns: Sequence[Column], dt: float) -> Cascade:
         """See `Machine`."""
-        servo = ["servo"]
-        outer, inner, limit = (stack(columns, servo, name) for name in ("position_gain", "velocity_gain", "limit"))
-        return Cascade(outer, inner, limit, dt)
+        return Cascade.of(columns, ["servo"], dt)
 
     def mixed(self, values: Mapping[str, float]) -> Mapping[str, Mapping[str, float]]:
         """See `Machine`."""

@@ -201,8 +201,7 @@ limit = {show(f"{SERVOS[k]}.limit", "A")}""")
 
     def controller(self, columns: Sequence[Column], dt: float) -> Cascade:
         """See `Machine`."""
-        outer, inner, limit = (stack(columns, SERVOS, name) for name in ("position_gain", "velocity_gain", "limit"))
-        return Cascade(outer, inner, limit, dt)
+        return Cascade.of(columns, SERVOS, dt)
 
     def mixed(self, values: Mapping[str, float]) -> Mapping[str, Mapping[str, float]]:
         """See `Machine`."""
