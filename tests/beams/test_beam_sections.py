@@ -1,6 +1,5 @@
 """Links whose sections change, of layers, and curved at rest, from model files."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,11 +7,11 @@ import pytest
 from numpy.typing import NDArray
 
 import vpm
+from places import EXAMPLES
 from vpm.errors import ModelError
 from vpm.simplify.reductions import reductions
 
-ROOT = Path(__file__).resolve().parents[2]
-EXAMPLE = ROOT / "examples" / "curved_arm" / "model.toml"
+EXAMPLE = EXAMPLES / "curved_arm" / "model.toml"
 CURVED = ("strain(5)", "bezier(6)", "elements(16)", "lumped(40)")
 #: EJx = 2, mass 0.5 kg/m.
 NUMBERS = {"bending_x": 2.0, "bending_y": 8.0, "torsion": 3.0, "extension": 1e6, "mass": 0.5}

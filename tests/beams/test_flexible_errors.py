@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from model_texts import refused
 from test_flexible_python import ARM
 from vpm.cli import app
-from vpm.errors import DivergedError, ModelError, SimulationError, ValidityWarning
+from vpm.errors import DivergedError, SimulationError, ValidityWarning
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.simulate import Run, simulate
@@ -58,13 +59,7 @@ def push(current: float, dt: float = 1e-3) -> Experiment:
     ],
 )
 def test_files_are_refused_in_one_sentence(old: str, new: str, where: str, words: str) -> None:
-    text = ARM + FORE
-    assert old in text
-    with pytest.raises(ModelError) as caught:
-        Model.from_toml(text.replace(old, new, 1))
-    assert caught.value.where == where
-    assert words in str(caught.value)
-    assert "\n" not in str(caught.value)
+    refused(where, words, ARM + FORE, (old, new))
 
 
 @pytest.mark.parametrize(

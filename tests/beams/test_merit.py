@@ -11,12 +11,12 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from places import EXAMPLES, ROOT
 from vpm.experiment import Experiment
 from vpm.identify import identify
 from vpm.model import Model
 from vpm.simulate import Setup, simulate
 
-ROOT = Path(__file__).resolve().parents[2]
 RECORD = ROOT.parent / "shared" / "data" / "tudor_merit" / "exp1.csv"
 VALUES = {entry["id"]: entry for entry in json.loads((ROOT / "tests" / "values" / "tudor.json").read_text("utf-8"))}
 
@@ -28,7 +28,7 @@ needs_record = pytest.mark.skipif(
 @pytest.fixture(scope="module")
 def merit() -> ModuleType:
     """The example as a module."""
-    folder = ROOT / "examples" / "tudor"
+    folder = EXAMPLES / "tudor"
     sys.path.insert(0, str(folder))
     try:
         spec = importlib.util.spec_from_file_location("merit", folder / "merit.py")

@@ -11,12 +11,13 @@ import pytest
 
 from command_line import vpm
 from interrupting import running, spent, work
+from places import EXAMPLES
 from sledge import SLEDGE, pushed
 from vpm import __version__
 from vpm.demo import MODEL, TRAIN, VALIDATION
 from vpm.model import Model
 
-STEP = Path(__file__).resolve().parents[2] / "examples" / "emps" / "step.toml"
+STEP = EXAMPLES / "emps" / "step.toml"
 COMMANDS = (
     *("info", "simulate", "compare", "identify", "diagnose", "rank", "report"),
     *("climb", "simplify", "budget", "compile", "demo"),

@@ -17,6 +17,7 @@ import typer
 import vpm
 from brick import bar_archive
 from command_line import vpm as command
+from places import EXAMPLES, ROOT
 from vpm import info_command
 from vpm.cli import app
 from vpm.command_output import console
@@ -24,7 +25,6 @@ from vpm.demo import MODEL, TRAIN
 from vpm.errors import ValidityWarning
 from vpm.json_values import plain
 
-ROOT = Path(__file__).resolve().parents[2]
 BAND = ("--channel", "motor.command", "--unit", "A", "--band", "1", "20", "--period", "1", "--time-step", "0.01")
 LIMITS = "[shoulder]\nposition = [-1.5, 1.5]\nspeed = 3.0\nacceleration = 15.0\n"
 TURN = (
@@ -48,11 +48,11 @@ CASES: dict[str, tuple[str | Path, ...]] = {
     "budget": (MODEL, "--steps", "2000", "--latency", "0"),
     "compile": (MODEL, "--c", "c"),
     "optimise": (MODEL, "turn.toml"),
-    "linkage": (ROOT / "examples" / "karl" / "karl.toml",),
+    "linkage": (EXAMPLES / "karl" / "karl.toml",),
     "study": ("carton", "--mesh", "1"),
     "view": (MODEL, "--page", "arm.html"),
-    "import": (ROOT / "examples" / "robots" / "arm.urdf", "-o", "robot.toml"),
-    "export": ("robot.toml", "--urdf", ROOT / "examples" / "robots" / "arm.urdf", "-o", "back.urdf"),
+    "import": (EXAMPLES / "robots" / "arm.urdf", "-o", "robot.toml"),
+    "export": ("robot.toml", "--urdf", EXAMPLES / "robots" / "arm.urdf", "-o", "back.urdf"),
     "reduce": ("bar.npz", "--modes", "2", "--out", "link.npz"),
     "demo": ("--list",),
     "excite multisine": (*BAND, "--peak", "2"),

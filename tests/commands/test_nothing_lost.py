@@ -17,6 +17,7 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from interrupting import running, work
+from places import EXAMPLES
 from vpm import command, demo
 from vpm.cli import app
 from vpm.diagnosing import diagnose
@@ -27,7 +28,7 @@ from vpm.model import Model
 from vpm.report import print_story, write_report
 
 MODEL, LOG = str(demo.MODEL), str(demo.TRAIN)
-SCENARIO = Path(__file__).parents[2] / "examples" / "emps" / "step.toml"
+SCENARIO = EXAMPLES / "emps" / "step.toml"
 POSIX = pytest.mark.skipif(os.name != "posix", reason="needs limits and signals of POSIX")
 
 

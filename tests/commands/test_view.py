@@ -10,8 +10,9 @@ import pytest
 
 import vpm
 from command_line import vpm as command
+from places import ROOT
 from textbook_arm import FILE, LENGTHS
-from view_scenes import AHEAD, ROOT, arm_scene, hits, tubes
+from view_scenes import AHEAD, arm_scene, hits, tubes
 from vpm.errors import ExperimentError, SimulationError, VpmError
 from vpm.experiment import Experiment
 from vpm.numbers import Array

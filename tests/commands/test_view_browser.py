@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 import vpm
 from command_line import vpm as command
-from view_scenes import ROOT, arm_scene, hits, leg_scene, strip_scene
+from places import ROOT
+from view_scenes import arm_scene, hits, leg_scene, strip_scene
 from vpm.errors import VpmError
 from vpm.scenario import Scenario
 from vpm.view import Scene, course_of

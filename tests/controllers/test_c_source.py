@@ -16,6 +16,7 @@ from scipy.linalg import expm
 from typer.testing import CliRunner
 
 from nightly import at_night
+from places import EXAMPLES
 from test_ball_joints import FRICTION, OVER, start, top
 from test_frictions import geared
 from test_sides import rubbing_on_both_sides
@@ -26,8 +27,6 @@ from vpm.linear import LinearModel
 from vpm.numbers import Array
 from vpm.realtime import CSource, c_source
 
-ROOT = Path(__file__).parents[2]
-EXAMPLES = ROOT / "examples"
 #: Levels of flexible links whose derivatives take a compiler seconds; those of the files take it a minute, or ten.
 COARSE = {
     "curved_arm/model.toml": "strain(1)",
@@ -255,7 +254,7 @@ def test_examples_say_the_same_as_machine_code_and_recorded(name: str) -> None:
 
 @WITHOUT_COMPILER
 def test_free_parameters_are_prepared_and_differentiated(tmp_path: Path) -> None:
-    model = Model.load(ROOT / "examples" / "arm" / "arm.toml")
+    model = Model.load(EXAMPLES / "arm" / "arm.toml")
     written = c_source(model, name="m", parameters=["*.mass", "*viscous*"])
     assert len(written.parameters) > 1
     library = Library(written, tmp_path)
@@ -283,7 +282,7 @@ def test_free_parameters_are_prepared_and_differentiated(tmp_path: Path) -> None
 
 
 def test_the_command_writes_what_the_function_gives(emps: Model, tmp_path: Path) -> None:
-    words = ["compile", str(ROOT / "examples" / "emps" / "model.toml"), "--name", "axis", "--parameter", "*.mass"]
+    words = ["compile", str(EXAMPLES / "emps" / "model.toml"), "--name", "axis", "--parameter", "*.mass"]
     done = CliRunner().invoke(app, [*words, "--c", str(tmp_path / "axis")])
     assert done.exit_code == 0, done.output
     written = c_source(emps, name="axis", parameters=["*.mass"])
@@ -295,7 +294,7 @@ def test_the_command_writes_what_the_function_gives(emps: Model, tmp_path: Path)
 @WITHOUT_COMPILER
 def test_the_loop_of_the_examples_ends_where_a_simulation_does(emps: Model, tmp_path: Path) -> None:
     c_source(emps, name="axis").save(tmp_path)
-    cc(tmp_path, "-I.", str(ROOT / "examples" / "c" / "equations_loop.c"), "axis.c", "-o", "loop")
+    cc(tmp_path, "-I.", str(EXAMPLES / "c" / "equations_loop.c"), "axis.c", "-o", "loop")
     done = subprocess.run([tmp_path / "loop"], capture_output=True, text=True, check=True)
     name, position = done.stdout.split()
     sim = Simulation(emps, 1e-3, integrator="rosenbrock")
@@ -317,7 +316,7 @@ def casadi() -> ModuleType:
 def test_casadi_takes_functions_and_their_exact_jacobians(
     parameters: tuple[str, ...], tmp_path: Path, casadi: ModuleType
 ) -> None:
-    model = Model.load(ROOT / "examples" / "arm" / "arm.toml")
+    model = Model.load(EXAMPLES / "arm" / "arm.toml")
     written = c_source(model, name="m", parameters=parameters)
     library = Library(written, tmp_path)
     linear = places(model, 1)[0]
@@ -340,7 +339,7 @@ def test_casadi_takes_functions_and_their_exact_jacobians(
 @WITHOUT_COMPILER
 def test_casadi_moves_an_axis_by_its_equations(tmp_path: Path, casadi: ModuleType, emps: Model) -> None:
     assert casadi.__name__ == "casadi"
-    example = runpy.run_path(str(ROOT / "examples" / "c" / "casadi_motion.py"))
+    example = runpy.run_path(str(EXAMPLES / "c" / "casadi_motion.py"))
     f = example["rates"](tmp_path)
     # A step of the implicit midpoint rule: Newton's method on exact Jacobians ends in one step: this axis is linear.
     h = 0.05
@@ -416,7 +415,7 @@ int main(void)
 
 @WITHOUT_COMPILER
 def test_acados_finds_its_functions(tmp_path: Path) -> None:
-    model = Model.load(ROOT / "examples" / "arm" / "arm.toml")
+    model = Model.load(EXAMPLES / "arm" / "arm.toml")
     c_source(model, name="m").save(tmp_path)
     (tmp_path / "acados.c").write_text(ACADOS, encoding="utf-8")
     cc(tmp_path, "-Dcasadi_int=int", "acados.c", "m.c", "-o", "acados")
@@ -443,7 +442,7 @@ def test_acados_finds_its_functions(tmp_path: Path) -> None:
 def test_acados_steps_implicitly_with_exact_jacobians(tmp_path: Path, emps: Model) -> None:
     """By functions of (x, dx/dt, u, z, t, p): on a linear axis a Padé approximant of the exponential."""
     c_source(emps, name="axis").save(tmp_path)
-    sources = [str(ROOT / "examples" / "c" / name) for name in ("acados_step.c", "acados_functions.c")]
+    sources = [str(EXAMPLES / "c" / name) for name in ("acados_step.c", "acados_functions.c")]
     cc(tmp_path, "-I.", "-Dcasadi_int=int", *sources, "axis.c", "-o", "step")
     linear, h = emps.linearize(), 5e-3
     begin, command = np.array([0.01, 0.1]), np.array([0.5])

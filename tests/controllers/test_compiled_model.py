@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from places import EXAMPLES, ROOT
 from synthetic import nominal
 from vpm import Model, Simulation
 from vpm.errors import SimulationError
 from vpm.realtime import compile_model
 
-ROOT = Path(__file__).parents[2]
-AXIS = ROOT / "examples" / "emps" / "model.toml"
+AXIS = EXAMPLES / "emps" / "model.toml"
 COMPILED = ROOT / "crates" / "vpm-c" / "tests" / "data" / "axis.json"
 
 
@@ -33,7 +33,7 @@ def test_parameters_are_those_of_the_model_now(tmp_path: Path) -> None:
 
 
 def test_integrators_have_bounded_work_unless_another_is_asked_for() -> None:
-    rig = Model.load(ROOT / "examples" / "crane" / "crane.toml")
+    rig = Model.load(EXAMPLES / "crane" / "crane.toml")
     assert json.loads(compile_model(rig, 1000.0).text)["integrator"] == "guarded"
     assert json.loads(compile_model(rig, 1000.0, integrator="rosenbrock").text)["integrator"] == "rosenbrock"
 

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 import vpm
+from places import EXAMPLES
 from two_link_arm import MODEL
 from vpm.cli import app
 from vpm.demo import MODEL as DEMO
@@ -488,6 +489,6 @@ def test_what_cannot_be_is_one_sentence(arm: vpm.Model) -> None:
 
 
 def test_models_without_a_balance_of_efforts_are_refused() -> None:
-    beam = vpm.Model.load(Path(__file__).parents[2] / "examples" / "flexible_pendulum" / "flexible_pendulum.toml")
+    beam = vpm.Model.load(EXAMPLES / "flexible_pendulum" / "flexible_pendulum.toml")
     with pytest.raises(SimulationError):
         base_parameters(beam, [next(iter(beam.parameters))])

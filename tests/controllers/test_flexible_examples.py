@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-pytestmark = pytest.mark.nightly
+from places import EXAMPLES
 
-ROOT = Path(__file__).resolve().parents[2]
+pytestmark = pytest.mark.nightly
 
 
 def table(
@@ -17,7 +17,7 @@ def table(
 ) -> tuple[str, dict[str, list[float]]]:
     """What an example prints, and the numbers of each row of its table."""
     monkeypatch.setattr("sys.argv", ["control.py", str(tmp_path), "--seeds", "3"])
-    runpy.run_path(str(ROOT / "examples" / folder / "control.py"), run_name="__main__")
+    runpy.run_path(str(EXAMPLES / folder / "control.py"), run_name="__main__")
     assert (tmp_path / "control.png").stat().st_size > 5000
     printed = capsys.readouterr().out
     rows = re.findall(r"^(\S.*?)  +((?:\d+\.\d+ +)+\d+\.\d+)$", printed, re.MULTILINE)

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from nightly import at_night
+from places import EXAMPLES, ROOT
 from test_c_source import STRICT, places
 from vpm import Model, Simulation, write_fmu
 from vpm.linear import LinearModel
@@ -21,8 +22,6 @@ from vpm.realtime import Fmu
 fmpy = pytest.importorskip("fmpy", reason="FMPy is not installed (pip install fmpy)")
 validation = pytest.importorskip("fmpy.validation", reason="FMPy is not installed (pip install fmpy)")
 pytestmark = pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler `cc` here")
-
-ROOT = Path(__file__).parents[2]
 
 
 #: Rigid, with three joints, with coupled shafts, flexible, hydraulic, and a leg that lands; with levels of detail.
@@ -70,7 +69,7 @@ STATES: dict[str, dict[str, float]] = {
 
 
 def machine(name: str) -> Model:
-    model = Model.load(ROOT / "examples" / f"{name}.toml")
+    model = Model.load(EXAMPLES / f"{name}.toml")
     level = (SIX | MORE)[name]
     return model if level is None else model.at(level)
 

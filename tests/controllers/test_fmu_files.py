@@ -7,13 +7,12 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
+from places import EXAMPLES
 from vpm import Model, write_fmu
 from vpm.cli import app
 from vpm.errors import SimulationError
 from vpm.files import FileError
 from vpm.realtime import c_source
-
-ROOT = Path(__file__).parents[2]
 
 
 def test_the_same_model_gives_the_same_bytes_and_another_token_otherwise(emps: Model, tmp_path: Path) -> None:
@@ -33,7 +32,7 @@ def test_the_same_model_gives_the_same_bytes_and_another_token_otherwise(emps: M
 
 def test_the_command_writes_one_and_says_what_it_leaves_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", "no-such-compiler")
-    axis = str(ROOT / "examples" / "emps" / "model.toml")
+    axis = str(EXAMPLES / "emps" / "model.toml")
     done = CliRunner().invoke(app, ["compile", axis, "--fmu", str(tmp_path / "a.fmu"), "--parameter", "*.mass"])
     assert done.exit_code == 0, done.output
     assert (tmp_path / "a.fmu").is_file()

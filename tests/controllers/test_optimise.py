@@ -13,6 +13,7 @@ from scipy.optimize import fsolve
 import vpm
 from command_line import vpm as command
 from model_texts import effect_text, on_rail
+from places import EXAMPLES
 from vpm.errors import OptimisationError
 from vpm.numbers import Array
 
@@ -22,9 +23,6 @@ from vpm.optimise import OptimisationInterruptedError, Optimum, Task
 from vpm.optimise.channels import Channels
 from vpm.optimise.collocation import DERIVATIVE, NODES, POINTS, WEIGHTS
 from vpm.optimise.equations import casadi, equations
-
-ROOT = Path(__file__).resolve().parents[2]
-EXAMPLES = ROOT / "examples"
 
 #: A cart of 2 kg on a rail, pushed by a motor.
 CART = on_rail("cart", joint="rail", drive="motor") + 'command_unit = "N"\n[markers.nose]\nparent = "cart"\n'

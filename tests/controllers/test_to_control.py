@@ -1,18 +1,18 @@
 """State spaces for python-control: flexible and hydraulic machines with the names of all their states."""
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from places import EXAMPLES
 from test_batched import BEAM
 from vpm.errors import SimulationError
 from vpm.model import Model
 
 control = pytest.importorskip("control", reason="python-control is not installed (pip install 'vpm-dynamics[control]')")
 DRIVE = '\n[actuators.motor]\njoint = "shoulder"\ngain = 1.0\n'
-HYDRAULIC = Path(__file__).parents[2] / "examples" / "crane" / "crane.toml"
+HYDRAULIC = EXAMPLES / "crane" / "crane.toml"
 
 
 def machines() -> dict[str, Model]:

@@ -11,6 +11,7 @@ import pytest
 import two_link_arm
 import vpm
 from hopper import HOPPER
+from places import EXAMPLES
 from second_suite.cases import make_case
 from sledge import MASS, SLEDGE, swung
 from synthetic import Truth, nominal, simulate_axis
@@ -25,8 +26,6 @@ from vpm.model import Model
 from vpm.ranking import Judgement, Ranked, Ranking
 from vpm.ranking import Settings as Asked
 from vpm.ranking.result import Gap
-
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 COULOMB = {"axis.friction.coulomb": 8.8, "axis.friction.transition_velocity": 1e-3}
 BIAS = {"axis.bias.force": 4.5}

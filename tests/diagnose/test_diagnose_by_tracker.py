@@ -11,6 +11,7 @@ import pytest
 from typer.testing import CliRunner
 
 import vpm
+from places import EXAMPLES
 from sledge import MASS, POLE, SAMPLED, pushed
 from sledge import OIL as DRAG
 from slider_crank import OIL, SLIDER, SLIDER_CRANK, turned
@@ -26,7 +27,7 @@ from vpm.ranking.tracker_residual import TrackerResidual
 from vpm.report import write_report
 from vpm.report.messages import estimate
 
-LOOPS = Path(__file__).parents[2] / "examples" / "loops"
+LOOPS = EXAMPLES / "loops"
 CHANNEL = "crank.position (observed)"
 TRIED = ["coulomb_friction", "asymmetric_friction", "spring", "bias_force"]
 

@@ -1,19 +1,19 @@
 """A hydraulic leg on a guide that has no drive: no inverse-dynamics residual shows what acts there."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import vpm
+from places import EXAMPLES
 from vpm.discrepancy import ranked_effects
 from vpm.discrepancy.ranked_effects import free_joints, why_not_ranked
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.numbers import Array
 
-HYL = Path(__file__).resolve().parents[2] / "examples" / "hyl"
+HYL = EXAMPLES / "hyl"
 RECORDS = ("squat", "bounce", "sway")
 #: Noise of positions [m, rad], pressures [Pa] and of the force of the ground [N].
 NOISE = {"position": 1e-5, "pressure_a": 5e3, "pressure_b": 5e3, "normal_force": 1.0}

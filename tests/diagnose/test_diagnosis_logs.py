@@ -6,12 +6,12 @@ magneto-rheological damper have test files of their own: test_emps.py and tests/
 
 import importlib.util
 import sys
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
 import pytest
 
+from places import EXAMPLES, ROOT
 from vpm.diagnosing import diagnose
 from vpm.discrepancy import Diagnosis
 from vpm.discrepancy.screening.candidates import candidates, left_out
@@ -19,7 +19,6 @@ from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 
-ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT.parent / "shared" / "data"
 
 needs_logs = pytest.mark.skipif(not DATA.is_dir(), reason="the records are absent: ../shared/data")
@@ -53,7 +52,7 @@ def press(name: str, viscous: float, air: bool = False) -> Model:
 
 def script(folder: str) -> ModuleType:
     """The script of an example as a module."""
-    spec = importlib.util.spec_from_file_location(folder, ROOT / "examples" / folder / "run.py")
+    spec = importlib.util.spec_from_file_location(folder, EXAMPLES / folder / "run.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)

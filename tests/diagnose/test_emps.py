@@ -11,15 +11,15 @@ from pathlib import Path
 import pytest
 
 from command_line import vpm
+from places import EXAMPLES, ROOT
 from vpm.diagnosing import diagnose
 from vpm.discrepancy import Diagnosis
 from vpm.experiment import Experiment
 from vpm.identify import identify
 from vpm.model import Model
 
-ROOT = Path(__file__).parents[2]
 DATA = Path(os.environ.get("VPM_SHARED_DATA", ROOT.parent / "shared" / "data")) / "emps"
-MODEL = ROOT / "examples" / "emps" / "model.toml"
+MODEL = EXAMPLES / "emps" / "model.toml"
 
 pytestmark = pytest.mark.skipif(not DATA.is_dir(), reason=f"the measured EMPS logs are not at {DATA}")
 

@@ -3,17 +3,17 @@
 import sys
 from functools import lru_cache
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from model_texts import DAMPED_AXIS, changed
+from places import ROOT
 from vpm.experiment import Experiment
 from vpm.model import Model
 
-BENCH = Path(__file__).resolve().parents[2] / "benches" / "diagnosis"
+BENCH = ROOT / "benches" / "diagnosis"
 STEP = 2e-3
 
 

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hydraulic_reference import ROOT
+from places import ROOT
 
 bench = SimpleNamespace(**runpy.run_path(str(ROOT / "examples/servo_cylinder/greybox.py"), run_name="bench"))
 TWO = bench.FREE[:2]

@@ -10,13 +10,13 @@ import pytest
 
 from drive_texts import RIG
 from model_texts import changed
+from places import EXAMPLES, ROOT
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.initial import initial_state
 from vpm.model import Model
 from vpm.simulate import simulate
 
-ROOT = Path(__file__).resolve().parents[2]
 DATA = ROOT.parent / "shared" / "data"
 CRANE = DATA / "hydraulic_crane_actuator" / "actuator.csv"
 PRESS = DATA / "servo_hydraulic_actuator" / "chirp_mr0A.csv"
@@ -33,7 +33,7 @@ LOAD = 1500.0
 
 def example(name: str) -> ModuleType:
     """The script of an example as a module."""
-    spec = importlib.util.spec_from_file_location(name, ROOT / "examples" / name / "run.py")
+    spec = importlib.util.spec_from_file_location(name, EXAMPLES / name / "run.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)
@@ -122,7 +122,7 @@ def test_a_pressure_that_no_balance_can_have_ends_at_tank_or_supply() -> None:
 
 
 def test_a_spring_needs_no_controller_in_a_closed_loop_but_a_cylinder_does() -> None:
-    model = Model.load(ROOT / "examples" / "servo_actuator" / "servo.toml")
+    model = Model.load(EXAMPLES / "servo_actuator" / "servo.toml")
     clock = 1e-3 * np.arange(300)
     step = Experiment.from_arrays(clock, {"servo.reference": np.full(300, 1e-3)}, {"servo.reference": "m"}, name="step")
     run = simulate(model, step, "closed_loop", substeps=2)

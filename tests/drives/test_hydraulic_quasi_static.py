@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 import vpm
+from places import EXAMPLES
 from vpm.errors import ModelError
 from vpm.simplify.reductions import reductions
 from vpm.simplify.replacement import replaced
 from vpm.simplify.tables import force_map, tables
 from vpm.simulate import Setup, simulate_arrays
 
-RIG = vpm.Model.load(Path(__file__).parents[2] / "examples" / "servo_cylinder" / "rig.toml")
+RIG = vpm.Model.load(EXAMPLES / "servo_cylinder" / "rig.toml")
 CLOCK = 1e-3 * np.arange(400)
 
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import vpm
+from places import EXAMPLES
 from vpm.errors import ModelError
 
-RIG = vpm.Model.load(Path(__file__).parents[2] / "examples" / "servo_cylinder" / "rig.toml")
+RIG = vpm.Model.load(EXAMPLES / "servo_cylinder" / "rig.toml")
 
 
 def reduced(*, static: bool = False, load: bool = False) -> dict[str, Any]:

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 import vpm
-from hydraulic_reference import AREA, NO_LOAD_IN, NO_LOAD_OUT, RATIO, ROOT, SUPPLY, TANK, held
+from hydraulic_reference import AREA, NO_LOAD_IN, NO_LOAD_OUT, RATIO, SUPPLY, TANK, held
 from oil_witness import BETA, FREQUENCIES, GAIN, GEOMETRY, LEAKAGE, SPOOL, found, seen, solved, sum_rule_bias
+from places import ROOT
 from vpm.errors import IdentificationError
 from vpm.studies.oil import pressures_from_force
 from vpm.studies.oil.equations import balances, through_spool

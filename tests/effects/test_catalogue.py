@@ -3,17 +3,16 @@
 import json
 import math
 import re
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from places import ROOT
 from vpm.catalogue import EFFECTS, SITE_KINDS, EffectParameter, EffectType, effect_type, effects_for_site
 from vpm.errors import ModelError
 from vpm.model import Model
 from vpm.units import parse_unit
 
-ROOT = Path(__file__).resolve().parents[2]
 PARAMETERS = [(effect, parameter) for effect in EFFECTS.values() for parameter in effect.parameters]
 
 

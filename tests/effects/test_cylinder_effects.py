@@ -10,6 +10,7 @@ from scipy.integrate import solve_ivp
 import vpm
 from hydraulic_reference import AREA, RATIO, SUPPLY, TANK, VALUES
 from nightly import at_night
+from places import EXAMPLES
 from vpm.discrepancy.screening.candidates import Candidate
 from vpm.errors import IdentificationError, ModelError
 from vpm.identify import InverseDynamicsProblem, gaps
@@ -19,7 +20,6 @@ from vpm.model.drives.states import commanded_states
 from vpm.numbers import Array
 from vpm.ranking.parameter_priors import Sizes
 
-ROOT = Path(__file__).resolve().parents[2]
 DT = 1e-3
 BETA, GAIN, LEAKAGE = 1.2e9, float(VALUES["hyd.Kv"]["value"]), 1.7e-13
 SPOOL, DAMPING = 2.0 * np.pi * 250.0, 0.7
@@ -35,7 +35,7 @@ EFFECTS: dict[str, tuple[str, dict[str, float]]] = {
 
 @pytest.fixture(scope="module")
 def rig() -> vpm.Model:
-    return vpm.Model.load(ROOT / "examples" / "servo_cylinder" / "rig.toml")
+    return vpm.Model.load(EXAMPLES / "servo_cylinder" / "rig.toml")
 
 
 def command(time: Array) -> Array:
@@ -432,7 +432,7 @@ def test_friction_of_seals_is_sought_at_the_joint(rig: vpm.Model) -> None:
 
 def test_pistons_on_lines_are_followed_to_their_stops() -> None:
     """The leg HyL: a course of the knee that leaves the stroke of its cylinder, as lengths of a machine at rest say."""
-    model = vpm.Model.load(ROOT / "examples" / "hyl" / "hydraulic.toml")
+    model = vpm.Model.load(EXAMPLES / "hyl" / "hydraulic.toml")
     knee = next(name for name in model.joints if "knee" in name)
     (drive,) = (name for name in model.actuators if model.joints_of_actuator(name) == (knee,))
     home = model.state()

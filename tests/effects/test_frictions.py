@@ -1,18 +1,15 @@
 """Effects of joints that no search tries: in every mode of a simulation, along records, in fits and files."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
+from places import EXAMPLES
 from test_sides import TIMES, elastic, force
 from test_split_joints import commanded, slide
 from vpm import EFFECTS, Experiment, Model, simulate
 from vpm.discrepancy.screening.candidates import candidates
 from vpm.errors import ModelError, SimulationError
 from vpm.identify import InverseDynamicsProblem, identify
-
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 #: Values that matter beside forces of 20 N on 2 kg.
 VALUES: dict[str, dict[str, float]] = {

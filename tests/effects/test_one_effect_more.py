@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import vpm.model.model as module
+from places import EXAMPLES
 from vpm import demo
 from vpm.catalogue import EFFECTS
 from vpm.errors import ModelError, VpmError
 from vpm.model import Model
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 MACHINES = {
     "arm": Path(demo.MODEL),
     "rig": EXAMPLES / "servo_cylinder" / "rig.toml",

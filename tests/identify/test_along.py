@@ -1,19 +1,18 @@
 """Efforts balanced along a measured motion, of machines that hold more than their joints show."""
 
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import vpm
+from places import EXAMPLES
 from vpm.errors import DivergedError, SimulationError
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.simplify.hydraulics import NO_STATE, SIMPLER, simpler
 from vpm.simplify.replacement import replaced
 from vpm.simplify.tables import force_map
 
-ROOT = Path(__file__).resolve().parents[2]
 DT = 1e-3
 
 
@@ -32,7 +31,7 @@ def cylinder_record(
 
 @pytest.fixture(scope="module")
 def cylinder() -> vpm.Model:
-    return vpm.Model.load(ROOT / "examples" / "servo_cylinder" / "rig.toml")
+    return vpm.Model.load(EXAMPLES / "servo_cylinder" / "rig.toml")
 
 
 def arm(level: str = "strain(4)") -> vpm.Model:

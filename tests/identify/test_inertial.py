@@ -14,6 +14,7 @@ from scipy.optimize import check_grad, nnls
 from scipy.signal import lfilter
 
 import vpm
+from places import EXAMPLES
 from two_link_arm import GRAVITY, MODEL, Arm, record
 from vpm.errors import IdentificationError
 from vpm.identify.feasibility import WEIGHT, Distance, fault, pseudo_inertia
@@ -23,8 +24,6 @@ from vpm.identify.inertial_solve import score_covariance
 from vpm.linkages import INERTIAL_NAMES, Leg, inertial_values, with_inertial_values
 from vpm.model.standard import standard_parameters
 from vpm.numbers import Array
-
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 # D'Imperio (2016), Table 5.1, CAD column: seven masses, four inertias.
 TABLE = np.array([7.360, 0.885, 0.876, 1.216, 0.215, 1.214, 0.215, 2.750e-3, 0.325e-3, 0.338e-3, 0.769e-3])

@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from hydraulic_reference import ROOT
+from places import ROOT
 from synthetic import Truth, nominal, simulate_axis
 from test_fit_engine import FREE, MASS, STIFFNESS, TRUTH, VISCOUS, oscillator, recorded, wrong
 from vpm.errors import ExperimentError, IdentificationError, SimulationError

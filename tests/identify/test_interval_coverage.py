@@ -4,7 +4,6 @@ import importlib.util
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
 from nightly import at_night
+from places import ROOT
 from vpm.identify import Checks, Fit, InverseDynamicsProblem, identify
 from vpm.identify.closed_loop_prediction import own_residual
 from vpm.identify.problem import Block
@@ -20,7 +20,7 @@ from vpm.identify.settings import OwnSimulation
 from vpm.identify.statistics import freedom, white_sandwich
 from vpm.identify.whiteness import explained_by, heard, powers, shifted, waves
 
-BENCHES = Path(__file__).parents[2] / "benches"
+BENCHES = ROOT / "benches"
 MACHINES = ("axis", "flexible_arm", "leg", "cart")
 #: All but the quickest are left to the night.
 EACH = at_night(MACHINES, but=("axis",))

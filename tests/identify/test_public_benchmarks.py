@@ -12,7 +12,8 @@ import pytest
 from numpy.typing import NDArray
 from scipy.io import savemat
 
-ROOT = Path(__file__).resolve().parents[2]
+from places import ROOT
+
 sys.path[:0] = [str(ROOT / "benches" / "public"), str(ROOT / "benches" / "peers")]
 
 bouc_wen, public_scores, public_sets = (import_module(n) for n in ("bouc_wen", "public_scores", "public_sets"))

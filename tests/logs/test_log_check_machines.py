@@ -2,14 +2,15 @@
 
 import sys
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 import pytest
 
+from places import ROOT
+
 pytestmark = pytest.mark.nightly
 
-BENCHES = Path(__file__).resolve().parents[2] / "benches"
+BENCHES = ROOT / "benches"
 MACHINES = ("axis_linear", "axis_rotary", "arm2r", "servo_cylinder", "hydraulic_leg", "flexible_arm")
 
 

@@ -19,6 +19,7 @@ import pytest
 from numpy.typing import ArrayLike, NDArray
 
 import vpm
+from places import EXAMPLES
 from vpm import demo, results
 from vpm._core import System
 from vpm.errors import (
@@ -40,7 +41,6 @@ from vpm.scenario import Scenario
 from vpm.simulate import Setup
 from vpm.units import parse_unit
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 TIME: NDArray[np.float64] = np.arange(100, dtype=np.float64) * 0.01
 
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from places import EXAMPLES
 from vpm.batch import Trial, simulate_batch
 from vpm.errors import DivergedError, SimulationError
 from vpm.experiment import Experiment
@@ -15,7 +16,6 @@ from vpm.scenario import Scenario
 from vpm.simulate import Setup, simulate
 from vpm.stepping import Simulation
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 LIGHT = 299_792_458.0
 STEP = 1e-3
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
+from places import EXAMPLES
 from vpm import linkages
 from vpm.cli import app
 from vpm.errors import CoreError, ModelError, VpmError
@@ -22,7 +23,6 @@ from vpm.numbers import Array
 from vpm.scenario import Scenario
 from vpm.simulate import Setup
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 G = 9.81
 
 

@@ -12,12 +12,13 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from model_texts import refused
+from places import EXAMPLES
 from vpm.catalogue import EFFECTS, EffectType
 from vpm.errors import ModelError, UnitError
 from vpm.model import Model, Parameter, load_channel_table, parse_channel_table
 
-ROOT = Path(__file__).resolve().parents[2]
-EMPS = (ROOT / "examples" / "emps" / "model.toml").read_text(encoding="utf-8")
+EMPS = (EXAMPLES / "emps" / "model.toml").read_text(encoding="utf-8")
 
 moderate = st.floats(-100.0, 100.0)
 positive = st.floats(1e-3, 1e3)
@@ -525,14 +526,7 @@ REFUSALS = [
 
 @pytest.mark.parametrize(("old", "new", "where", "words"), REFUSALS, ids=[f"{r[2]}-{r[3]}" for r in REFUSALS])
 def test_what_cannot_be_right_is_refused(old: str, new: str, where: str, words: str) -> None:
-    assert old in EMPS
-    with pytest.raises(ModelError) as caught:
-        Model.from_toml(EMPS.replace(old, new, 1))
-    message = str(caught.value)
-    assert caught.value.where == where
-    assert message.startswith(where)
-    assert words in message
-    assert "\n" not in message
+    refused(where, words, EMPS, (old, new))
 
 
 def test_the_number_of_further_problems_is_said() -> None:

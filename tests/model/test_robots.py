@@ -15,6 +15,7 @@ from hypothesis import strategies as st
 import robot_texts as texts
 import vpm
 from command_line import vpm as run_command
+from places import EXAMPLES, ROOT
 from vpm.errors import MissingExtraError, ModelError
 from vpm.numbers import Array
 from vpm.robots import ImportedRobot
@@ -544,7 +545,6 @@ def test_commands(tmp_path: Path) -> None:
     assert (done.returncode, done.stderr) == (1, "error: none.urdf does not exist; check the path\n")
 
 
-ROOT = Path(__file__).resolve().parents[2]
 BLOCK = re.compile(r"^```(toml|text)\n(.*?)^```", re.MULTILINE | re.DOTALL)
 
 
@@ -554,7 +554,7 @@ def test_the_tutorial_leads_from_a_urdf_and_a_bag_to_a_named_effect_in_three_com
     """Dry friction of 1.5 N m is hidden in the elbow; only the channel table is written by hand."""
     page = (ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8")
     recording, table, commands, script = (found[2] for found in BLOCK.finditer(page))
-    shutil.copytree(ROOT / "examples" / "robots", tmp_path / "examples" / "robots")
+    shutil.copytree(EXAMPLES / "robots", tmp_path / "examples" / "robots")
     for line in recording.splitlines():
         words = [sys.executable if word == "python" else word for word in line.split()]
         subprocess.run(words, cwd=tmp_path, check=True)

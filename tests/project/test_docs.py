@@ -18,10 +18,10 @@ import pytest
 from typer.testing import CliRunner
 
 import vpm
+from places import ROOT
 from vpm.catalogue import EFFECTS, EffectType
 from vpm.cli import app
 
-ROOT = Path(__file__).resolve().parents[2]
 LANGUAGES = {"console", "python", "rust", "text", "toml"}
 FENCE = re.compile(r"^```(?P<language>\S*)[ \t]*\n(?P<code>.*?)^```[ \t]*$", re.MULTILINE | re.DOTALL)
 

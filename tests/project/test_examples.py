@@ -8,8 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import vpm
-
-ROOT = Path(__file__).resolve().parents[2]
+from places import EXAMPLES
 
 
 @pytest.mark.parametrize(
@@ -42,7 +41,7 @@ def test_examples_run_and_plot(
     capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr("sys.argv", ["run.py", str(tmp_path)])
-    runpy.run_path(str(ROOT / "examples" / script / "run.py"), run_name="__main__")
+    runpy.run_path(str(EXAMPLES / script / "run.py"), run_name="__main__")
     assert {path.name for path in tmp_path.iterdir()} == pictures
     assert all(path.stat().st_size > 5000 for path in tmp_path.iterdir())
     printed = capsys.readouterr().out
@@ -50,7 +49,7 @@ def test_examples_run_and_plot(
 
 
 def test_the_step_of_the_drive_arrives() -> None:
-    result = vpm.Scenario.load(ROOT / "examples" / "emps" / "step.toml").run()
+    result = vpm.Scenario.load(EXAMPLES / "emps" / "step.toml").run()
     assert not result.failures
     for name in result.runs:
         position = next(row for row in result.extremes(name) if row.channel == "axis.position")
@@ -60,7 +59,7 @@ def test_the_step_of_the_drive_arrives() -> None:
 
 
 def test_the_strip_that_is_let_go_falls_as_a_rod_if_it_is_stiff() -> None:
-    result = vpm.Scenario.load(ROOT / "examples" / "flexible_pendulum" / "release.toml").run()
+    result = vpm.Scenario.load(EXAMPLES / "flexible_pendulum" / "release.toml").run()
     assert list(result.runs) == ["bezier(7)", "bezier(3)", "rigid"]
     # A uniform rod of 1 m about its end: (l^2/3) d2q/dt2 = -g (l/2) cos q.
     fall = solve_ivp(lambda _, x: (x[1], -1.5 * 9.81 * np.cos(x[0])), (0.0, 1.0), (np.pi / 6, 0.0), rtol=1e-9)
@@ -74,7 +73,7 @@ def test_the_published_table_is_sought_by_a_command(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("sys.argv", ["table.py"])
-    runpy.run_path(str(ROOT / "examples" / "tudor" / "table.py"), run_name="__main__")
+    runpy.run_path(str(EXAMPLES / "tudor" / "table.py"), run_name="__main__")
     printed = capsys.readouterr().out
     # Two rows of docs/tudor.md: the published means, and what the arm reaches without a factor on its gauges.
     assert "1470.0" in printed

@@ -3,17 +3,16 @@
 import json
 import runpy
 from collections.abc import Callable
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from places import ROOT
 from vpm.catalogue import EFFECTS
 from vpm.catalogue.signature import ANYWHERE
 
-ROOT = Path(__file__).resolve().parents[2]
 FIGURES = ROOT / "docs" / "figures"
 
 

@@ -15,8 +15,8 @@ from typing import NamedTuple
 import pytest
 
 import vpm
+from places import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "python" / "vpm"
 
 OPTIONAL = {

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 import vpm
+from places import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "docs" / "site"))
 
 pages = import_module("pages")

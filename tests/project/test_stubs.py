@@ -1,8 +1,6 @@
 """The package is marked as typed; that its stub agrees with the compiled module is for `make lint` to say."""
 
-from pathlib import Path
-
-ROOT = Path(__file__).resolve().parents[2]
+from places import ROOT
 
 
 def test_package_is_marked_as_typed() -> None:

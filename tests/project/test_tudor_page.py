@@ -3,14 +3,13 @@
 import re
 import sys
 from importlib import import_module
-from pathlib import Path
 
 import numpy as np
 import pytest
 
+from places import EXAMPLES, ROOT
 from vpm.model import Model
 
-ROOT = Path(__file__).resolve().parents[2]
 PAGE = ROOT / "docs" / "tudor.md"
 NUMBER = re.compile(r"[+-]?\d+\.\d+")
 
@@ -19,10 +18,10 @@ NUMBER = re.compile(r"[+-]?\d+\.\d+")
 def test_the_page_quotes_the_search_for_table_3_2(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.syspath_prepend(str(ROOT / "examples" / "tudor"))
+    monkeypatch.syspath_prepend(str(EXAMPLES / "tudor"))
     table = import_module("table")
     try:
-        table.main(Model.load(ROOT / "examples" / "tudor" / "tudor.toml"))
+        table.main(Model.load(EXAMPLES / "tudor" / "tudor.toml"))
     finally:
         sys.modules.pop("table")
     printed = capsys.readouterr().out.splitlines()

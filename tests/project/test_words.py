@@ -5,10 +5,9 @@ from pathlib import Path
 
 import pytest
 
+from places import ROOT
 from public_api import LIST
 from vpm.catalogue import EFFECTS, EffectType
-
-ROOT = Path(__file__).resolve().parents[2]
 
 #: Phrases that no page uses, each with the field's term. Words that are ordinary English too stand in their phrases.
 PHRASES = {

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from places import EXAMPLES
 from synthetic import Truth, nominal, simulate_axis
 from vpm import Model
 from vpm.budget import BudgetReport, Stage, budget
@@ -20,7 +21,7 @@ from vpm.simulate import Setup
 needs_valgrind = pytest.mark.skipif(
     shutil.which("valgrind") is None, reason="counts instructions with valgrind, which is not here"
 )
-TUDOR = Path(__file__).parents[2] / "examples" / "tudor" / "tudor.toml"
+TUDOR = EXAMPLES / "tudor" / "tudor.toml"
 
 
 @pytest.fixture(scope="module")

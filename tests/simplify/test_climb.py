@@ -6,72 +6,31 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flexible_link import one_flexible_link
+from model_texts import effect_text
 from vpm import Climb, Experiment, Model, Setup, climb, simulate
 from vpm.climb.climbing import ACTUATORS, RIGID, families
 from vpm.errors import IdentificationError
 from vpm.identify import OutputErrorProblem
 from vpm.numbers import Array
 
-ARM = """
-name = "one flexible link"
-gravity = [0.0, 0.0, -9.81]
-
-[bodies.hub]
-mass = 0.5
-inertia = [0.01, {{ value = 0.01, uncertainty = 0.005 }}, 0.01, 0, 0, 0]
-
-[bodies.load]
-mass = 0.2
-inertia = [1e-4, 1e-4, 1e-4, 0, 0, 0]
-
-[joints.shoulder]
-type = "revolute"
-parent = "world"
-child = "hub"
-axis = [0.0, -1.0, 0.0]
-
-[joints.grip]
-type = "fixed"
-parent = "link"
-child = "load"
-
-[beams.link]
-parent = "hub"
-rotation = [0.0, 1.5707963267948966, 0.0]
-length = 0.5
-level = "{level}"
-deforms = ["bending_y"]
-material = {{ young = {{ value = {young}, unit = "GPa", uncertainty = 40.0 }}, density = 7850.0 }}
-section = {{ shape = "rectangle", width = 0.006, height = 0.02 }}
-damping = {{ stiffness = {{ value = 2.0, unit = "ms" }} }}
-
-[gauges.root]
-beam = "link"
-at = 0.05
-x = -0.002
-
-[actuators.motor]
-joint = "shoulder"
-command_unit = "N m"
-gain = 1.0
-
-[[effects]]
-type = "actuator_lag"
-at = "motor"
-time_constant = {lag}
-
-[controllers.servo]
-type = "pid"
-actuator = "motor"
-measures = "shoulder.position"
-proportional = 20.0
-derivative = 1.5
-"""
 SHOWN = ["shoulder.position", "root.strain"]
 
 
+def arm_text(level: str = "bezier(3)", young: float = 200.0, lag: str = "0.004") -> str:
+    text = one_flexible_link(
+        level,
+        young=f'{{ value = {young}, unit = "GPa", uncertainty = 40.0 }}',
+        section=(0.006, 0.02),
+        damping=2.0,
+        gains=(20.0, 1.5),
+    )
+    free = text.replace("[0.01, 0.01, 0.01", "[0.01, { value = 0.01, uncertainty = 0.005 }, 0.01")
+    return free + effect_text("actuator_lag", "motor", time_constant=lag)
+
+
 def arm(level: str = "bezier(3)", young: float = 200.0, lag: str = "0.004") -> Model:
-    return Model.from_toml(ARM.format(level=level, young=young, lag=lag))
+    return Model.from_toml(arm_text(level, young, lag))
 
 
 def swing(truth: Model, seed: int, frequency: float) -> Experiment:
@@ -181,9 +140,7 @@ def test_patience_and_parameters_are_checked() -> None:
     with pytest.raises(IdentificationError, match="at least 1"):
         climb(arm(), record, validate=record, patience=0)
     fixed = Model.from_toml(
-        ARM.format(level="rigid", young=200.0, lag="0.004")
-        .replace("uncertainty = 0.005", "min = 0.0")
-        .replace("uncertainty = 40.0", "min = 1.0")
+        arm_text("rigid").replace("uncertainty = 0.005", "min = 0.0").replace("uncertainty = 40.0", "min = 1.0")
     )
     with pytest.raises(IdentificationError, match="no parameter is adjustable"):
         climb(fixed, record, validate=record)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import vpm
+from places import EXAMPLES
 from vpm.errors import ModelError
 from vpm.numbers import Array
 from vpm.simplify import Ladder, reductions, simplify
@@ -16,7 +17,6 @@ from vpm.simplify.learnt import maxwell_entry, narx_entry, trained
 from vpm.simplify.replacement import commanded, replaced
 from vpm.simplify.surrogates import _learnt, _taught, surrogates
 
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 CHANNELS = ("slider.position", "hip_drive.force", "knee_drive.force")
 SPRING = json.dumps(
     {"type": "maxwell_narx", "sample_time": 1e-3, "k0": [2e4], "s0": [0.32], "k1": 1e5, "c1": 1e3, "command_unit": "1"}

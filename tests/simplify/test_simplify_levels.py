@@ -7,52 +7,18 @@ import numpy as np
 import pytest
 
 import vpm
+from flexible_link import one_flexible_link
 from vpm.errors import SimulationError
 from vpm.simplify import Ladder, Reduction, Rung, reduced, reductions, simplify
 from vpm.simplify.search import _simplest
 
-ARM = """
-name = "one flexible link"
-gravity = [0.0, 0.0, -9.81]
-[bodies.hub]
-mass = 0.5
-inertia = [0.01, 0.01, 0.01, 0, 0, 0]
-[bodies.load]
-mass = 0.2
-inertia = [1e-4, 1e-4, 1e-4, 0, 0, 0]
-[joints.shoulder]
-type = "revolute"
-parent = "world"
-child = "hub"
-axis = [0.0, -1.0, 0.0]
-[joints.grip]
-type = "fixed"
-parent = "link"
-child = "load"
-[beams.link]
-parent = "hub"
-rotation = [0.0, 1.5707963267948966, 0.0]
-length = 0.5
-level = "elements(5)"
-deforms = ["bending_y"]
-material = { young = { value = 200.0, unit = "GPa", uncertainty = 10.0 }, density = 7850.0 }
-section = { shape = "rectangle", width = 0.004, height = 0.015 }
-damping = { stiffness = { value = 1.0, unit = "ms" } }
-[gauges.root]
-beam = "link"
-at = 0.05
-x = -0.002
-[actuators.motor]
-joint = "shoulder"
-command_unit = "N m"
-gain = 1.0
-[controllers.servo]
-type = "pid"
-actuator = "motor"
-measures = "shoulder.position"
-proportional = 100.0
-derivative = 4.0
-"""
+ARM = one_flexible_link(
+    "elements(5)",
+    young='{ value = 200.0, unit = "GPa", uncertainty = 10.0 }',
+    section=(0.004, 0.015),
+    damping=1.0,
+    gains=(100.0, 4.0),
+)
 STEP, RATE = 4e-3, 500.0
 
 

@@ -1,15 +1,14 @@
 """Walking an arm with two flexible links down from elements: what is cut, what is chosen, and what Ctrl-C leaves."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 
 import vpm
+from places import EXAMPLES
 from vpm.simplify import Ladder, simplify
 from vpm.simulate import FIXED_STEP
 
-TUDOR = Path(__file__).resolve().parents[2] / "examples" / "tudor"
+TUDOR = EXAMPLES / "tudor"
 GAUGES = ("gauge_1.strain", "gauge_2.strain")
 RATE, TOLERANCE = 1000.0, 0.05
 

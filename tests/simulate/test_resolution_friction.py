@@ -1,19 +1,18 @@
 """Friction that steps do not bring to rest, of everything that rubs: told where a run shows it, and nowhere else."""
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from places import EXAMPLES
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.simulate import Run, simulate
 from vpm.stepping import Simulation
 
-EXAMPLES = Path(__file__).parents[2] / "examples"
 STEP, ROWS = 1e-3, 300
 #: Velocity over which friction turns around, m/s: of 1 N on 1 kg, 50 times in a step.
 NARROW = 2e-5

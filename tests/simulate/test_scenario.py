@@ -17,11 +17,10 @@ import vpm
 from command_line import vpm as command
 from interrupting import pressed
 from model_texts import on_rail
+from places import EXAMPLES, ROOT
 from vpm.errors import ModelError, ScenarioError
 from vpm.plot.scenarios import readable_unit
 from vpm.scenario import Scenario, ScenarioInterruptedError, ScenarioRun, signals
-
-ROOT = Path(__file__).resolve().parents[2]
 
 SLED = (
     on_rail("sled", gain='{ value = 3.0, unit = "N/V" }', gravity="[0.0, 0.0, -9.81]", along="[0.0, 0.0, 1.0]")
@@ -222,7 +221,7 @@ def test_lags_and_named_states_begin_as_told(folder: Path) -> None:
 
 
 def test_logged_supplies_have_the_pressure_that_is_given_or_that_of_the_model(folder: Path) -> None:
-    text = (ROOT / "examples" / "servo_cylinder" / "rig.toml").read_text(encoding="utf-8")
+    text = (EXAMPLES / "servo_cylinder" / "rig.toml").read_text(encoding="utf-8")
     text = text.replace("[supplies.pump]", '[supplies.pump]\nsource = "logged"', 1)
     (folder / "rig.toml").write_text(text, encoding="utf-8")
     runs = [{"name": "rig", "model": "rig.toml"}]
@@ -240,7 +239,7 @@ def test_logged_supplies_have_the_pressure_that_is_given_or_that_of_the_model(fo
 
 
 def test_flexible_links_begin_in_their_equilibrium() -> None:
-    made = Scenario.load(ROOT / "examples" / "flexible_pendulum" / "release.toml")
+    made = Scenario.load(EXAMPLES / "flexible_pendulum" / "release.toml")
     model = made.models["bezier(7)"]
     place = math.radians(30.0)
     assert made.initial_state("bezier(7)")[: len(model.coordinates)] == pytest.approx(model.equilibrium([place])[0])
@@ -512,5 +511,5 @@ def test_frequencies_in_radians_per_second_are_turned_into_hertz(folder: Path) -
 def test_the_page_shows_the_example_as_it_is() -> None:
     page = (ROOT / "docs" / "scenarios.md").read_text(encoding="utf-8")
     shown = page.partition("```toml\n")[2].partition("```")[0]
-    example = (ROOT / "examples" / "emps" / "step.toml").read_text(encoding="utf-8")
+    example = (EXAMPLES / "emps" / "step.toml").read_text(encoding="utf-8")
     assert tomllib.loads(shown) == tomllib.loads(example)

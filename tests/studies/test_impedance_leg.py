@@ -8,14 +8,13 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from places import EXAMPLES
 from vpm import impedance
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
 def example() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("hyl_impedance", ROOT / "examples" / "hyl" / "impedance.py")
+    spec = importlib.util.spec_from_file_location("hyl_impedance", EXAMPLES / "hyl" / "impedance.py")
     assert spec is not None
     assert spec.loader is not None
     module = importlib.util.module_from_spec(spec)

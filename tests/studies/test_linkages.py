@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
+from places import EXAMPLES
 from validation.linkages import disagreement
 from vpm import linkages
 from vpm.cli import app
@@ -16,9 +17,8 @@ from vpm.linkages import Karl, KarlGeometry, KarlPoses, Leg, LegParameters, Shar
 from vpm.studies.linkages.leg import ShareDefinition
 from vpm.studies.linkages.leg_parameters import HyqSet
 
-ROOT = Path(__file__).resolve().parents[2]
-KARL_FILE = ROOT / "examples" / "karl" / "karl.toml"
-LEG_FILE = ROOT / "examples" / "hyq_leg" / "leg.toml"
+KARL_FILE = EXAMPLES / "karl" / "karl.toml"
+LEG_FILE = EXAMPLES / "hyq_leg" / "leg.toml"
 
 
 def load_karl() -> Karl:
@@ -204,7 +204,7 @@ def test_examples_run_and_plot(
     script: str, pictures: set[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sys.argv", ["run.py", str(tmp_path)])
-    runpy.run_path(str(ROOT / "examples" / script / "run.py"), run_name="__main__")
+    runpy.run_path(str(EXAMPLES / script / "run.py"), run_name="__main__")
     assert {path.name for path in tmp_path.iterdir()} == pictures
     assert all(path.stat().st_size > 5000 for path in tmp_path.iterdir())
 

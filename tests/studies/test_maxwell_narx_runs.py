@@ -9,12 +9,13 @@ import numpy as np
 import pytest
 
 from maxwell_element import C1, SIGNALS, STEP, Record, element, made, motions, poses
+from places import EXAMPLES
 from vpm import narx
 from vpm.errors import DivergedError, IdentificationError, SimulationError
 from vpm.experiment import Experiment
 from vpm.narx import MaxwellSignals
 
-EXAMPLE = Path(__file__).resolve().parents[2] / "examples" / "maxwell_narx" / "run.py"
+EXAMPLE = EXAMPLES / "maxwell_narx" / "run.py"
 
 
 # ---- runs and errors -------------------------------------------------------------------------------------------------

@@ -10,12 +10,13 @@ import numpy as np
 import pytest
 
 import vpm
+from places import EXAMPLES
 from vpm import identify, narx, results
 from vpm.errors import VpmError
 from vpm.results import Result
 from vpm.studies import impedance, linkages, maxwell, oil
 
-KARL = Path(__file__).resolve().parents[2] / "examples" / "karl" / "karl.toml"
+KARL = EXAMPLES / "karl" / "karl.toml"
 
 #: Classes in files of older versions: the modules as they were then.
 OLDER = {

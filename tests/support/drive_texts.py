@@ -1,11 +1,9 @@
 """Model files with drives: a servo-cylinder on a bench, a motor with a gear, a leg with springs along a line."""
 
-from pathlib import Path
-
 from model_texts import TWO_LINKS
+from places import EXAMPLES
 
-ROOT = Path(__file__).resolve().parents[2]
-RIG = (ROOT / "examples" / "servo_cylinder" / "rig.toml").read_text(encoding="utf-8")
+RIG = (EXAMPLES / "servo_cylinder" / "rig.toml").read_text(encoding="utf-8")
 
 MOTOR = """
 name = "motor bench"

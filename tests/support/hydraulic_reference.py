@@ -5,17 +5,16 @@ Cylinder 16/10/80 mm, 160 bar, 7.5 l/min at 35 bar per edge and 10 mA, spool 250
 """
 
 import json
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from places import ROOT
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.numbers import Array
 
-ROOT = Path(__file__).resolve().parents[2]
 #: Reference values by their id: the file that the core's tests read.
 VALUES: dict[str, dict[str, Any]] = {
     entry["id"]: entry

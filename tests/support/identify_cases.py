@@ -7,13 +7,12 @@ from pathlib import Path
 
 import numpy as np
 
+from places import EXAMPLES
 from vpm.experiment import Experiment
 from vpm.identify import Fit, Fitting, identify
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.simulate import Setup, simulate
-
-EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 
 @dataclass(frozen=True)

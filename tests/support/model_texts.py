@@ -3,6 +3,9 @@
 import json
 from typing import Any
 
+import pytest
+
+from vpm.errors import ModelError
 from vpm.model import Model
 
 #: Thigh and shank of a leg that hangs from the world: bodies and joints of a model text.
@@ -38,6 +41,17 @@ def changed(text: str, *changes: tuple[str, str]) -> Model:
         assert old in text
         text = text.replace(old, new, 1)
     return Model.from_toml(text)
+
+
+def refused(where: str, words: str, text: str, *changes: tuple[str, str]) -> None:
+    """Assert that a file with changes is refused in one sentence, which names a place and holds some words."""
+    with pytest.raises(ModelError) as caught:
+        changed(text, *changes)
+    message = str(caught.value)
+    assert caught.value.where == where, message
+    assert words in message
+    assert message.startswith(where)
+    assert "\n" not in message
 
 
 def described(model: Model) -> Any:

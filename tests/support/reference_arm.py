@@ -5,16 +5,16 @@ The motions were computed with eight curvature coordinates per link and Richards
 
 import json
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 import vpm
+from places import ROOT
 
 Array = NDArray[np.float64]
 
-DATA = Path(__file__).resolve().parents[2] / "crates" / "vpm-core" / "tests" / "data" / "flexible_arm.json"
+DATA = ROOT / "crates" / "vpm-core" / "tests" / "data" / "flexible_arm.json"
 REFERENCE = json.loads(DATA.read_text(encoding="utf-8"))
 P = REFERENCE["params"]
 MOTIONS = ("slow", "fast")

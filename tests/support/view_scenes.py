@@ -1,18 +1,15 @@
 """Machines that the tests of the viewer look at, and where in a picture their parts have to be."""
 
-from pathlib import Path
-
 import numpy as np
 from numpy.typing import NDArray
 
 import vpm
+from places import ROOT
 from textbook_arm import FILE
 from vpm.numbers import Array
 from vpm.scenario import Scenario
 from vpm.view import Course, Scene, Tube, course_of, scene_of
 from vpm.view.looks import LOOKS, colour
-
-ROOT = Path(__file__).resolve().parents[2]
 
 #: How far the measured arm is ahead of the simulated one (rad).
 AHEAD = np.array([0.25, 0.1])

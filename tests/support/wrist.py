@@ -10,16 +10,16 @@ centre hangs below the roll axis, a how far out that begins, and I its moments o
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from places import EXAMPLES
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.numbers import Array
 
-FILE = Path(__file__).parents[2] / "examples" / "wrist" / "wrist.toml"
+FILE = EXAMPLES / "wrist" / "wrist.toml"
 GRAVITY = 9.81
 SHAFTS = ("left", "right")
 #: Turn of each motor per turn of each joint: rows are motors.

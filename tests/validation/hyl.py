@@ -2,16 +2,16 @@
 
 import tomllib
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 import vpm
+from places import EXAMPLES
 from validation.row import Array, Row, accepted, against, row, values
 
-HYL = Path(__file__).resolve().parent.parent.parent / "examples" / "hyl"
+HYL = EXAMPLES / "hyl"
 #: Height of the hip axis with the foot on the ground in the desired pose (m).
 STANDING = (0.350 + 0.341) * np.cos(np.radians(40.0))
 SMOOTH = {"foot.friction.static": 0.0, "foot.friction.dynamic": 0.0}

@@ -1,15 +1,12 @@
 """Masses and inertias by least squares: Table 5.1, its recovery, ranks, and the textbooks' base parameters."""
 
-from pathlib import Path
-
 import numpy as np
 
 import vpm
+from places import EXAMPLES
 from validation.row import Array, Row, accepted, against, row
 from vpm.identify.inertial_model import InertialModel
 from vpm.linkages import INERTIAL_NAMES, Leg, LegParameters, inertial_values
-
-EXAMPLES = Path(__file__).resolve().parent.parent.parent / "examples"
 
 
 def reference() -> list[Row]:

@@ -1,15 +1,12 @@
 """KARL and the HyQ leg, read from the example files, against published and recomputed values."""
 
-from pathlib import Path
-
 import numpy as np
 from numpy.typing import ArrayLike
 
+from places import EXAMPLES
 from validation.row import Array, Row, accepted, against
 from vpm import linkages
 from vpm.linkages import Karl, Leg
-
-EXAMPLES = Path(__file__).resolve().parent.parent.parent / "examples"
 
 Found = dict[str, ArrayLike]
 

@@ -1,15 +1,12 @@
 """Beams in large overall motion, against converged solutions of other codes."""
 
-from pathlib import Path
-
 import numpy as np
 
 import vpm
+from places import EXAMPLES
 from reference_arm import P, errors, log, samples, tip_and_strains
 from validation.machines import arm
 from validation.row import Array, Row, row, values
-
-EXAMPLES = Path(__file__).resolve().parent.parent.parent / "examples"
 
 
 def example(name: str) -> vpm.Model:

@@ -5,9 +5,9 @@ import io
 import json
 import subprocess
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import NamedTuple
 
+from places import ROOT
 from validation import (
     beams,
     hydraulics,
@@ -24,7 +24,6 @@ from validation import (
 )
 from validation.row import Row, row
 
-ROOT = Path(__file__).resolve().parent.parent.parent
 PAGE = ROOT / "docs" / "validation.md"
 TABLE = PAGE.with_suffix(".csv")
 

@@ -2,15 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 import vpm
+from places import EXAMPLES
 from validation.observe import at_rest
 from validation.row import Array, Row, accepted, against
 
-MODEL = Path(__file__).parent.parent.parent / "examples" / "tudor" / "tudor.toml"
+MODEL = EXAMPLES / "tudor" / "tudor.toml"
 GAUGES = ("gauge_1.strain", "gauge_2.strain")
 #: Mean and amplitude (rad) of a swing of each joint whose strains stand to one another as those of Table 3.2.
 SWING = ((0.0, 0.0), (0.325, 0.636), (0.599, -0.497))
