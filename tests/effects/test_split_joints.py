@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from model_texts import on_rail
+from model_texts import on_rail, two_links
 from vpm import Experiment, Model, simulate
 from vpm.diagnosing import diagnose
 from vpm.discrepancy.screening.compliance_and_stop_start import logged_swing
@@ -18,41 +18,17 @@ SLIDE = (
     on_rail("link", "{ value = 2.0, uncertainty = 0.2 }", gain='{ value = 1.0, unit = "N/A" }') + 'command_unit = "A"\n'
 )
 
-ARM = """
-name = "arm"
-gravity = [0.0, 0.0, -9.81]
-
-[bodies.upper]
-mass = 2.0
-center_of_mass = [0.0, 0.0, -0.3]
-inertia = [0.02, 0.02, 0.01, 0.0, 0.0, 0.0]
-
-[bodies.lower]
-mass = 1.0
-center_of_mass = [0.0, 0.0, -0.2]
-inertia = [0.01, 0.01, 0.005, 0.0, 0.0, 0.0]
-
-[joints.shoulder]
-type = "revolute"
-parent = "world"
-child = "upper"
-axis = [0.0, 1.0, 0.0]
-
-[joints.elbow]
-type = "revolute"
-parent = "upper"
-child = "lower"
-translation = [0.0, 0.0, -0.6]
-axis = [0.0, 1.0, 0.0]
-
+UPPER = "mass = 2.0\ncenter_of_mass = [0.0, 0.0, -0.3]\ninertia = [0.02, 0.02, 0.01, 0.0, 0.0, 0.0]"
+LOWER = "mass = 1.0\ncenter_of_mass = [0.0, 0.0, -0.2]\ninertia = [0.01, 0.01, 0.005, 0.0, 0.0, 0.0]"
+ARM = f"""{two_links(UPPER, LOWER, "[0.0, 0.0, -0.6]", axis="[0.0, 1.0, 0.0]", gravity="[0.0, 0.0, -9.81]")}
 [actuators.first]
 joint = "shoulder"
-gain = { value = 1.0, unit = "N m/A" }
+gain = {{ value = 1.0, unit = "N m/A" }}
 command_unit = "A"
 
 [actuators.second]
 joint = "elbow"
-gain = { value = 1.0, unit = "N m/A" }
+gain = {{ value = 1.0, unit = "N m/A" }}
 command_unit = "A"
 """
 

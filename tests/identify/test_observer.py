@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import vpm
-from model_texts import effect_text, on_rail
+from model_texts import effect_text, on_rail, two_links
 from vpm.errors import ExperimentError, ModelError, SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -18,41 +18,16 @@ CARRIAGE = (
 )
 
 #: Two links in a level plane, of which one encoder sees the first alone.
-TWO_LINKS = """
-name = "two links"
-gravity = [0, 0, 0]
-[bodies.upper]
-mass = 2.0
-center_of_mass = [0.25, 0, 0]
-inertia = [0.001, 0.04, 0.04, 0, 0, 0]
-[bodies.lower]
-mass = 1.0
-center_of_mass = [0.2, 0, 0]
-inertia = [0.001, 0.02, 0.02, 0, 0, 0]
-[joints.shoulder]
-type = "revolute"
-parent = "world"
-child = "upper"
-axis = [0, 0, 1]
-[joints.elbow]
-type = "revolute"
-parent = "upper"
-child = "lower"
-axis = [0, 0, 1]
-translation = [0.5, 0, 0]
-[actuators.motor]
-joint = "shoulder"
-gain = 1.0
-[[effects]]
-type = "viscous_friction"
-at = "elbow"
-viscous = 0.05
-[[effects]]
-type = "spring"
-at = "elbow"
-stiffness = 3.0
-rest = 0.0
-"""
+TWO_LINKS = (
+    two_links(
+        "mass = 2.0\ncenter_of_mass = [0.25, 0, 0]\ninertia = [0.001, 0.04, 0.04, 0, 0, 0]",
+        "mass = 1.0\ncenter_of_mass = [0.2, 0, 0]\ninertia = [0.001, 0.02, 0.02, 0, 0, 0]",
+        "[0.5, 0, 0]",
+    )
+    + '[actuators.motor]\njoint = "shoulder"\ngain = 1.0\n'
+    + effect_text("viscous_friction", "elbow", viscous=0.05)
+    + effect_text("spring", "elbow", stiffness=3.0, rest=0.0)
+)
 
 STEP, FORCE, READING = 2e-3, 0.8, 2e-5
 

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import vpm
+from model_texts import two_links
 from vpm.errors import ModelError
 from vpm.simplify import Ladder, reductions, simplify
 from vpm.simplify.reductions import VELOCITY_TERMS
@@ -11,28 +12,9 @@ from vpm.simplify.terms import parts
 
 #: Two rods in a horizontal plane: masses at 0.5 m and 0.4 m from their joints, the second joint at 0.8 m.
 FIRST, SECOND, LENGTH, CENTER = 3.0, 2.0, 0.8, 0.4
-ARM = f"""
-name = "two links"
-gravity = [0.0, 0.0, 0.0]
-[bodies.upper]
-mass = {FIRST}
-center_of_mass = [0.5, 0.0, 0.0]
-inertia = [0.1, 0.1, 0.1, 0, 0, 0]
-[bodies.lower]
-mass = {SECOND}
-center_of_mass = [{CENTER}, 0.0, 0.0]
-inertia = [0.05, 0.05, 0.05, 0, 0, 0]
-[joints.shoulder]
-type = "revolute"
-parent = "world"
-child = "upper"
-axis = [0.0, 0.0, 1.0]
-[joints.elbow]
-type = "revolute"
-parent = "upper"
-child = "lower"
-axis = [0.0, 0.0, 1.0]
-translation = [{LENGTH}, 0.0, 0.0]
+UPPER = f"mass = {FIRST}\ncenter_of_mass = [0.5, 0.0, 0.0]\ninertia = [0.1, 0.1, 0.1, 0, 0, 0]"
+LOWER = f"mass = {SECOND}\ncenter_of_mass = [{CENTER}, 0.0, 0.0]\ninertia = [0.05, 0.05, 0.05, 0, 0, 0]"
+ARM = f"""{two_links(UPPER, LOWER, f"[{LENGTH}, 0.0, 0.0]")}
 [actuators.one]
 joint = "shoulder"
 command_unit = "N m"

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
 from typer.testing import CliRunner
 
+from model_texts import two_links
 from places import EXAMPLES
 from vpm import linkages
 from vpm.cli import app
@@ -584,27 +585,11 @@ def test_a_fit_along_a_log_finds_a_parameter(parallelogram: Model) -> None:
         identify(wrong, log)
 
 
+LINK = "mass = 1.0\ninertia = [0.01, 0.01, 0.01, 0, 0, 0]"
 #: Two links whose end is pinned to a point that they reach with either elbow; `start` is filled in.
-ELBOW = """
-name = "elbow"
-gravity = [0, 0, 0]
-[bodies.upper]
-mass = 1.0
-inertia = [0.01, 0.01, 0.01, 0, 0, 0]
-[bodies.lower]
-mass = 1.0
-inertia = [0.01, 0.01, 0.01, 0, 0, 0]
-[joints.shoulder]
-type = "revolute"
-parent = "world"
-child = "upper"
-axis = [0, 0, 1]
-[joints.elbow]
-type = "revolute"
-parent = "upper"
-child = "lower"
-translation = [0.4, 0, 0]
-axis = [0, 0, 1]
+ELBOW = (
+    two_links(LINK, LINK, "[0.4, 0, 0]")
+    + """
 [loops.pin]
 type = "revolute"
 axis = [0, 0, 1]
@@ -612,6 +597,7 @@ a = { parent = "lower", point = [0.3, 0, 0] }
 b = { parent = "world", point = [0.5, 0, 0] }
 start = { START }
 """
+)
 
 
 #: Its angle, by the law of cosines.

@@ -86,6 +86,31 @@ gain = {gain}
 """
 
 
+def two_links(
+    upper: str, lower: str, elbow: str, *, axis: str = "[0.0, 0.0, 1.0]", gravity: str = "[0.0, 0.0, 0.0]"
+) -> str:
+    """Model file of two links on parallel hinges, by the lines of their bodies and the place of the elbow."""
+    return f"""
+name = "two links"
+gravity = {gravity}
+[bodies.upper]
+{upper}
+[bodies.lower]
+{lower}
+[joints.shoulder]
+type = "revolute"
+parent = "world"
+child = "upper"
+axis = {axis}
+[joints.elbow]
+type = "revolute"
+parent = "upper"
+child = "lower"
+axis = {axis}
+translation = {elbow}
+"""
+
+
 def effect_text(kind: str, at: str, **parameters: object) -> str:
     """Table of an effect."""
     lines = [f"{name} = {value}" for name, value in parameters.items()]

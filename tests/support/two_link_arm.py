@@ -9,6 +9,7 @@ from math import cos, sin, tanh
 
 import numpy as np
 
+from model_texts import two_links
 from vpm.experiment import Experiment
 from vpm.model import Model
 
@@ -18,33 +19,15 @@ DT, FINE, GRAVITY = 0.002, 10, 9.81
 GAINS = np.array([5.0, 3.0])
 PROPORTIONAL, DERIVATIVE = np.array([120.0, 60.0]), np.array([12.0, 5.0])
 
-MODEL = """
-name = "two-link arm"
-gravity = [0.0, 0.0, -9.81]
-
-[bodies.upper]
-mass = 3.0
+UPPER = """mass = 3.0
 center_of_mass = [{ value = 0.20, unit = "m", uncertainty = 0.03, min = 0.05, max = 0.5 }, 0.0, 0.0]
-inertia = [0.03, { value = 0.04, unit = "kg m^2", uncertainty = 0.02 }, 0.06, 0.0, 0.0, 0.0]
-
-[bodies.lower]
-mass = 2.0
+inertia = [0.03, { value = 0.04, unit = "kg m^2", uncertainty = 0.02 }, 0.06, 0.0, 0.0, 0.0]"""
+LOWER = """mass = 2.0
 center_of_mass = [{ value = 0.18, unit = "m", uncertainty = 0.03, min = 0.05, max = 0.5 }, 0.0, 0.0]
-inertia = [0.02, { value = 0.03, unit = "kg m^2", uncertainty = 0.02 }, 0.04, 0.0, 0.0, 0.0]
-
-[joints.shoulder]
-type = "revolute"
-parent = "world"
-child = "upper"
-axis = [0.0, 1.0, 0.0]
-
-[joints.elbow]
-type = "revolute"
-parent = "upper"
-child = "lower"
-axis = [0.0, 1.0, 0.0]
-translation = [0.4, 0.0, 0.0]
-
+inertia = [0.02, { value = 0.03, unit = "kg m^2", uncertainty = 0.02 }, 0.04, 0.0, 0.0, 0.0]"""
+MODEL = (
+    two_links(UPPER, LOWER, "[0.4, 0.0, 0.0]", axis="[0.0, 1.0, 0.0]", gravity="[0.0, 0.0, -9.81]")
+    + """
 [actuators.first]
 joint = "shoulder"
 gain = { value = 5.0, unit = "N m/A" }
@@ -65,6 +48,7 @@ type = "viscous_friction"
 at = "elbow"
 viscous = { value = 0.2, unit = "N m s/rad", uncertainty = 0.2 }
 """
+)
 
 
 @dataclass(frozen=True)
