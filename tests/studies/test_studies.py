@@ -47,6 +47,26 @@ def test_energy_has_its_own_derivatives() -> None:
         np.testing.assert_allclose(found.hessian[k], bend, rtol=1e-6, atol=1e-2)
 
 
+def slopes(first: float, second: float) -> tuple[float, float]:
+    """Slopes ``dW/dI1`` and ``dW/dI2`` of rubber at constant volume, Pa, by its energy."""
+    x, y = first - 3.0, second - 3.0
+    terms = RUBBER.constants.items()
+    w1 = sum(c * i * x ** max(i - 1, 0) * y**j for (i, j), c in terms)
+    return w1, sum(c * j * x**i * y ** max(j - 1, 0) for (i, j), c in terms)
+
+
+def uniaxial(stretch: float) -> float:
+    """Nominal stress of rubber along one axis, Pa: ``2 (l - 1/l^2) (W_1 + W_2/l)``, R. S. Rivlin 1948."""
+    w1, w2 = slopes(stretch**2 + 2.0 / stretch, 2.0 * stretch + stretch**-2)
+    return 2.0 * (stretch - stretch**-2) * (w1 + w2 / stretch)
+
+
+def equibiaxial(stretch: float) -> float:
+    """Nominal stress of rubber along two axes alike, Pa: ``2 (l - 1/l^5) (W_1 + l^2 W_2)``."""
+    w1, w2 = slopes(2.0 * stretch**2 + stretch**-4, stretch**4 + 2.0 * stretch**-2)
+    return 2.0 * (stretch - stretch**-5) * (w1 + stretch**2 * w2)
+
+
 @pytest.mark.parametrize("stretch", [0.6, 0.9, 1.4])
 def test_pressed_cylinder_is_uniaxial(stretch: float) -> None:
     """Between smooth plates a cylinder stays one: the patch test at large strain, against Rivlin's closed form."""
@@ -54,12 +74,12 @@ def test_pressed_cylinder_is_uniaxial(stretch: float) -> None:
     stress = RUBBER.isochoric(strain).gradient[:, 0]
     pressure = stress[0] * stretch**-0.5  # the side is free: P_rr + p dJ/da = 0
     nominal = stress[3] - pressure / stretch
-    assert nominal == pytest.approx(float(RUBBER.uniaxial(stretch)), rel=1e-9)
+    assert nominal == pytest.approx(uniaxial(stretch), rel=1e-9)
     inverse = stretch**-2.0
     strain = np.array([stretch, 0.0, 0.0, inverse, stretch])[:, None]
     stress = RUBBER.isochoric(strain).gradient[:, 0]
     # Radial and hoop stress alike, faces free.
-    assert stress[0] - stress[3] * inverse / stretch == pytest.approx(float(RUBBER.equibiaxial(stretch)), rel=1e-9)
+    assert stress[0] - stress[3] * inverse / stretch == pytest.approx(equibiaxial(stretch), rel=1e-9)
 
 
 def slipping_cylinder(way: float) -> tuple[Pressed, float, float, NDArray[np.float64]]:
@@ -71,7 +91,7 @@ def slipping_cylinder(way: float) -> tuple[Pressed, float, float, NDArray[np.flo
     seen = press(body, [0.5 * way, way], start=0.0)[-1]
     outer = 3.0 * height
     stretch = 1.0 - way / height
-    force = -float(RUBBER.uniaxial(stretch)) * np.pi * outer**2
+    force = -uniaxial(stretch) * np.pi * outer**2
     rest = np.sort(np.asarray(body.skin.global_coordinates()[0]).mean(axis=1))
     return seen, force, stretch, rest
 

@@ -71,27 +71,6 @@ class Material:
             total += x.power(i) * y.power(j) * constant
         return total
 
-    def uniaxial(self, stretch: float | Array) -> Array:
-        """Uniaxial stress of a material, Pa: ``2 (l - 1/l^2) (W_1 + W_2/l)``, R. S. Rivlin 1948."""
-        stretch = np.asarray(stretch, dtype=float)
-        w1, w2 = self.slopes(stretch**2 + 2.0 / stretch, 2.0 * stretch + stretch**-2)
-        return 2.0 * (stretch - stretch**-2) * (w1 + w2 / stretch)
-
-    def equibiaxial(self, stretch: float | Array) -> Array:
-        """Equibiaxial stress of a material, Pa: ``2 (l - 1/l^5) (W_1 + l^2 W_2)``."""
-        stretch = np.asarray(stretch, dtype=float)
-        w1, w2 = self.slopes(2.0 * stretch**2 + stretch**-4, stretch**4 + 2.0 * stretch**-2)
-        return 2.0 * (stretch - stretch**-5) * (w1 + stretch**2 * w2)
-
-    def slopes(self, first: Array, second: Array) -> tuple[Array, Array]:
-        """Slopes ``dW/dI1`` and ``dW/dI2`` of a material at constant volume, Pa."""
-        x, y = first - 3.0, second - 3.0
-        w1, w2 = np.zeros_like(x), np.zeros_like(x)
-        for (i, j), c in self.constants.items():
-            w1 += c * i * x ** max(i - 1, 0) * y**j
-            w2 += c * j * x**i * y ** max(j - 1, 0)
-        return w1, w2
-
 
 def invariants(strain: Array) -> tuple[Jet, Jet, Jet]:
     """Invariants ``I1``, ``I2`` and ``J`` of gradients for a material, with derivatives."""
