@@ -21,8 +21,7 @@ from vpm.studies.carton import LEVER, carton, crease_stiffness, fold
 from vpm.studies.crease import Damage, elastica
 from vpm.studies.finger_body import block, hertz, layer_factor
 from vpm.studies.fingertip import FINGER, classes, indent
-from vpm.studies.knee import LOADS, Load, Stressed, loaded
-from vpm.studies.knee_pictures import pictures
+from vpm.studies.knee import LOADS, Load, Stressed, loaded, pictures
 from vpm.studies.material import Material
 from vpm.studies.press import Pressed, press
 from vpm.studies.soft import SoftBody

@@ -11,9 +11,9 @@ import numpy as np
 
 from vpm.errors import VpmError
 from vpm.numbers import Array
-from vpm.studies.carton_pictures import pictures
 from vpm.studies.crease import Damage, damaged, elastica
-from vpm.studies.study import Compared, Study, Table
+from vpm.studies.pictures import curves
+from vpm.studies.study import Compared, Picture, Study, Table
 from vpm.units import convert
 
 if TYPE_CHECKING:
@@ -135,7 +135,7 @@ def fold_carton(fineness: int = 4) -> Study:
             _damages(rigid, {0.05: None, 0.2: (first, second)}),
         ),
         ASSUMED,
-        pictures(rigid, flexible, first, second, meshes),
+        _pictures(rigid, flexible, first, second, meshes),
     )
 
 
@@ -222,4 +222,34 @@ def _damages(rigid: Fold, folds: Mapping[float, Sequence[Fold] | None]) -> Table
         tuple(rows),
         f"Torque K q (1 - D(q)), D = share (1 - exp(-q/{np.degrees(DAMAGE.scale):.0f} degrees)) on the first fold; "
         "what is damaged stays so, and later folds follow the straight line of what is left.",
+    )
+
+
+def _pictures(
+    rigid: Fold, flexible: Fold, first: Fold, second: Fold, meshes: Mapping[int, float]
+) -> tuple[Picture, ...]:
+    """All pictures of the study."""
+    angle, force = ("angle of the finger", "degrees"), ("contact force", "N")
+    folds = [(name, np.degrees(one.angle), one.force, "-") for name, one in (("rigid", rigid), ("flexible", flexible))]
+    torques = [
+        (name, np.degrees(one.crease), 1e3 * LEVER * one.force, "-")
+        for name, one in (("undamaged", rigid), ("first fold", first), ("second fold", second))
+    ]
+    counts = list(meshes)
+    return (
+        Picture(
+            "force",
+            "Contact force over the angle, with a rigid and with a flexible panel.",
+            lambda: curves("Force", angle, force, [*folds, ("read off Fig. B.10", [90.0], [PRINTED_FORCE], "s")]),
+        ),
+        Picture(
+            "torque",
+            "Torque over the angle of the crease, undamaged, damaged by a first fold, and on the second one.",
+            lambda: curves("Crease", ("angle of the crease", "degrees"), ("torque", "N mm"), torques),
+        ),
+        Picture(
+            "mesh",
+            "Force at 90 degrees over the number of elements of the flexible panel.",
+            lambda: curves("Convergence", ("elements", ""), force, [("flexible", counts, list(meshes.values()), "o-")]),
+        ),
     )

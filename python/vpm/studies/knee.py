@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import VpmError
 from vpm.numbers import Array
-from vpm.studies.knee_pictures import pictures
+from vpm.studies.pictures import curves, field
 from vpm.studies.solid import Solid, von_mises
-from vpm.studies.study import Cell, Compared, Study, Table
+from vpm.studies.study import Cell, Compared, Picture, Study, Table
 from vpm.studies.yoke import Yoke, frame
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
 
 #: Table B.1: Young's modulus (GPa) as printed and as it has to be, yield stress (MPa) likewise.
 MATERIALS = {
@@ -199,3 +205,48 @@ def _offsets(yoke: Yoke, young: float) -> Table:
     seen = loaded(yoke, 1, lines, young)
     rows = tuple((name, 1e-6 * each.peak) for name, each in seen.items())
     return Table(f"What the line of 1250 N does ({mesh_words(1)})", ("line", "largest MPa"), rows)
+
+
+def pictures(yoke: Yoke, levels: Sequence[dict[str, Stressed]]) -> tuple[Picture, ...]:
+    """All pictures of the study."""
+    finest, stress = levels[-1], ("von Mises stress", "MPa")
+    fineness = np.arange(1, len(levels) + 1)
+    meshes = [(name, fineness, [1e-6 * level[name].peak for level in levels], "o-") for name in finest]
+    across = [
+        (name, 1e3 * depth, 1e-6 * value, "o-")
+        for name, (depth, value) in ((name, each.line(yoke)) for name, each in finest.items())
+    ]
+    fields = [
+        Picture(
+            f"stress_{number}",
+            f"Stress of von Mises on the front of the frame: {name}.",
+            lambda name=name, each=each: _front(yoke, name, each),  # type: ignore[misc]
+        )
+        for number, (name, each) in enumerate(finest.items(), 1)
+    ]
+    return (
+        *fields,
+        Picture(
+            "mesh",
+            "Largest stress over the fineness of the mesh.",
+            lambda: curves("Convergence", ("bricks through the thickness", ""), stress, meshes),
+        ),
+        Picture(
+            "section",
+            "Stress of von Mises across the middle of a corner, from inside.",
+            lambda: curves("Across a corner", ("depth from inside", "mm"), stress, across),
+        ),
+    )
+
+
+def _front(yoke: Yoke, name: str, seen: Stressed) -> Figure:
+    """Front face: a quadrilateral for each brick that has one."""
+    mesh, corners = seen.solid.mesh, seen.solid.corners
+    facets = mesh.facets[:, mesh.boundary_facets()]
+    on = np.all(np.abs(corners[1, facets[:4]] - 0.5 * yoke.width) < 1e-9, axis=0)
+    faces = facets[:4, on]
+    places = corners[[0, 2]][:, faces]
+    turn = np.arctan2(*(places - places.mean(axis=1, keepdims=True))[::-1])
+    faces = np.take_along_axis(faces, np.argsort(turn, axis=0), axis=0)
+    values = 1e-6 * seen.equivalent[faces].mean(axis=0)
+    return field(f"Stress of von Mises, {name}", "MPa", 1e3 * corners[[0, 2]], faces, values, ("x", "z"))
