@@ -8,6 +8,7 @@ import pytest
 from scipy.linalg import cho_factor, cho_solve, solve_continuous_are
 
 import vpm
+from model_texts import effect_text, on_rail, sliding
 from vpm.control.splitting import solve, split
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
@@ -60,42 +61,12 @@ stiffness = {STIFFNESS}
 rest = 0.0
 """
 #: A mass that is driven, and one behind a spring.
-CARTS = """
-name = "two carts"
-gravity = [0.0, 0.0, 0.0]
-
-[bodies.first]
-mass = 2.0
-
-[bodies.second]
-mass = 0.5
-
-[joints.way]
-type = "prismatic"
-parent = "world"
-child = "first"
-axis = [1.0, 0.0, 0.0]
-
-[joints.stretch]
-type = "prismatic"
-parent = "first"
-child = "second"
-axis = [1.0, 0.0, 0.0]
-
-[markers.load]
-parent = "second"
-
-[actuators.motor]
-joint = "way"
-gain = { value = 1.0, unit = "N/N" }
-command_unit = "N"
-
-[[effects]]
-type = "spring"
-at = "stretch"
-stiffness = 50.0
-rest = 0.0
-"""
+CARTS = (
+    on_rail("first", joint="way", drive="motor", gain='{ value = 1.0, unit = "N/N" }')
+    + 'command_unit = "N"\n[markers.load]\nparent = "second"\n'
+    + sliding("second", "0.5", "stretch", "first")
+    + effect_text("spring", "stretch", stiffness=50.0, rest=0.0)
+)
 SMALL = 1e-4
 
 

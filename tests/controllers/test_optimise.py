@@ -12,7 +12,7 @@ from scipy.optimize import fsolve
 
 import vpm
 from command_line import vpm as command
-from model_texts import effect_text, on_rail
+from model_texts import effect_text, on_rail, sliding
 from places import EXAMPLES
 from vpm.errors import OptimisationError
 from vpm.numbers import Array
@@ -31,58 +31,16 @@ SPRUNG = CART + effect_text("spring", "rail", stiffness=50.0)
 #: A cart of 1 kg that pulls a load of 1 kg by a spring of 1 N/m.
 PAIR = (
     CART.replace("mass = 2.0", "mass = 1.0")
-    + """
-[bodies.load]
-mass = 1.0
-
-[joints.spring]
-type = "prismatic"
-parent = "cart"
-child = "load"
-axis = [1.0, 0.0, 0.0]
-
-[[effects]]
-type = "spring"
-at = "spring"
-stiffness = 1.0
-"""
+    + sliding("load", "1.0", "spring", "cart")
+    + effect_text("spring", "spring", stiffness=1.0)
 )
 #: A hand of 1 kg on two crossed rails.
-GANTRY = """
-name = "gantry"
-gravity = [0.0, 0.0, 0.0]
-
-[bodies.bridge]
-mass = 1.0
-
-[bodies.hand]
-mass = 1.0
-
-[joints.along]
-type = "prismatic"
-parent = "world"
-child = "bridge"
-axis = [1.0, 0.0, 0.0]
-
-[joints.across]
-type = "prismatic"
-parent = "bridge"
-child = "hand"
-axis = [0.0, 1.0, 0.0]
-
-[markers.finger]
-parent = "hand"
-
-[actuators.first]
-joint = "along"
-gain = 1.0
-command_unit = "N"
-
-[actuators.second]
-joint = "across"
-gain = 1.0
-command_unit = "N"
-"""
+GANTRY = (
+    on_rail("bridge", "1.0", joint="along", drive="first")
+    + 'command_unit = "N"\n'
+    + sliding("hand", "1.0", "across", "bridge", "[0.0, 1.0, 0.0]")
+    + '[markers.finger]\nparent = "hand"\n[actuators.second]\njoint = "across"\ngain = 1.0\ncommand_unit = "N"\n'
+)
 PENDULUM = """
 name = "pendulum"
 gravity = [0.0, 0.0, -9.81]

@@ -7,43 +7,25 @@ import numpy as np
 import pytest
 
 import vpm
-from model_texts import changed
+from model_texts import changed, sliding
 from vpm.errors import ModelError, SimulationError
 from vpm.model import Model
 
 G = 9.81
 
-BLOCK = """
+BLOCK = f"""
 name = "block"
 gravity = [0.0, 0.0, -9.81]
-
-[bodies.carriage]
-mass = 0.5
-
-[bodies.block]
-mass = 2.0
-
-[joints.x]
-type = "prismatic"
-parent = "world"
-child = "carriage"
-axis = [1.0, 0.0, 0.0]
-
-[joints.z]
-type = "prismatic"
-parent = "carriage"
-child = "block"
-axis = [0.0, 0.0, 1.0]
-
+{sliding("carriage", "0.5", "x", "world")}{sliding("block", "2.0", "z", "carriage", "[0.0, 0.0, 1.0]")}
 [contacts.foot]
 parent = "block"
 point = [0.0, 0.0, -0.1]
-plane = { point = [0.0, 0.0, -0.1], normal = [0.0, 0.0, 2.0] }
-stiffness = { value = 2855, unit = "N/mm^1.1" }
+plane = {{ point = [0.0, 0.0, -0.1], normal = [0.0, 0.0, 2.0] }}
+stiffness = {{ value = 2855, unit = "N/mm^1.1" }}
 exponent = 1.1
-damping = { value = 1, unit = "N s/mm" }
-damping_depth = { value = 0.1, unit = "mm" }
-friction = { static = 0.7, static_velocity = 0.1, dynamic = 0.55, dynamic_velocity = { value = 1, unit = "m/s" } }
+damping = {{ value = 1, unit = "N s/mm" }}
+damping_depth = {{ value = 0.1, unit = "mm" }}
+friction = {{ static = 0.7, static_velocity = 0.1, dynamic = 0.55, dynamic_velocity = {{ value = 1, unit = "m/s" }} }}
 
 [load_cells.cell]
 joint = "z"

@@ -73,16 +73,21 @@ def on_rail(
     return f"""
 name = "{body}"
 gravity = {gravity}
-[bodies.{body}]
+{sliding(body, mass, joint, "world", along)}[actuators.{drive}]
+joint = "{joint}"
+gain = {gain}
+"""
+
+
+def sliding(body: str, mass: str, joint: str, parent: str, along: str = "[1.0, 0.0, 0.0]") -> str:
+    """Tables of a body that slides on another one."""
+    return f"""[bodies.{body}]
 mass = {mass}
 [joints.{joint}]
 type = "prismatic"
-parent = "world"
+parent = "{parent}"
 child = "{body}"
 axis = {along}
-[actuators.{drive}]
-joint = "{joint}"
-gain = {gain}
 """
 
 
