@@ -1,7 +1,6 @@
 """Logs as they come: every format gives the numbers that were written, and what cannot be read is one sentence."""
 
 import re
-import sys
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,7 @@ from typer.testing import CliRunner
 
 from vpm.cli import app
 from vpm.demo import MODEL, TRAIN
-from vpm.errors import ExperimentError, MissingExtraError
+from vpm.errors import ExperimentError
 from vpm.experiment import Experiment
 from vpm.experiment.readers import open_log
 from vpm.model import ChannelEntry, Model
@@ -367,21 +366,6 @@ def test_a_file_that_is_not_what_its_ending_says(tmp_path: Path, name: str, pack
         Experiment.load(path)
     assert caught.value.path == str(path)
     assert "\n" not in str(caught.value)
-
-
-@pytest.mark.parametrize(
-    ("name", "package", "extra"),
-    [("x.parquet", "pyarrow", "parquet"), ("x.h5", "h5py", "hdf5"), ("x.mcap", "rosbags", "ros")],
-)
-def test_a_missing_library_is_named_with_its_extra(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, package: str, extra: str
-) -> None:
-    for module in [m for m in sys.modules if m.partition(".")[0] == package]:
-        monkeypatch.delitem(sys.modules, module)
-    monkeypatch.setitem(sys.modules, package, None)
-    (tmp_path / name).touch()
-    with pytest.raises(MissingExtraError, match=rf'{package}, .* pip install "vpm-dynamics\[{extra}\]"'):
-        Experiment.load(tmp_path / name)
 
 
 # ---- on the command line ---------------------------------------------------------------------------------------------

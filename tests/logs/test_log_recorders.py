@@ -222,7 +222,10 @@ def test_a_file_that_is_not_what_its_ending_says(
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize(("name", "package", "extra"), FILES)
+OTHERS = [("x.parquet", "pyarrow", "parquet"), ("x.h5", "h5py", "hdf5"), ("x.mcap", "rosbags", "ros")]
+
+
+@pytest.mark.parametrize(("name", "package", "extra"), [*FILES, *OTHERS])
 def test_a_missing_library_is_named_with_its_extra(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, package: str, extra: str
 ) -> None:
