@@ -29,6 +29,7 @@ __all__ = [
     "soft_flights",
     "step_all",
     "stop_when",
+    "zero_phase",
 ]
 
 class Diverged(CoreError):
@@ -60,6 +61,13 @@ def soft_flights(
     """Acceleration (N, k) of a link against the motor in k plays, ``pull`` (N,) moving it within them.
 
     Beyond a gap (m or rad) a spring and a damper hold it: it would swing at ``rates`` (rad/s) with these ``dampings``.
+    """
+
+def zero_phase(sections: ArrayLike, values: ArrayLike, padding: int, every: int) -> NDArray[np.float64]:
+    """Columns of ``values`` (N, k) filtered forward and backward; every ``every``-th sample (ceil(N / every), k).
+
+    Each row of ``sections`` (s, 6) is ``b0 b1 b2 a0 a1 a2`` with ``a0 = 1``. Both ends are continued by ``padding``
+    samples, reflected at the end point.
     """
 
 def check_integrator(name: str) -> None:

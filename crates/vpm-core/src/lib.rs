@@ -22,6 +22,7 @@ pub mod dynamics;
 pub mod effect;
 pub mod error;
 pub mod evaluate;
+pub mod filter;
 pub mod flight;
 pub mod graph;
 pub mod integrator;

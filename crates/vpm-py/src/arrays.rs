@@ -57,6 +57,11 @@ impl Numbers {
     pub(crate) fn rows(&self) -> usize {
         self.rows
     }
+
+    /// Number of an array's columns.
+    pub(crate) fn columns(&self) -> usize {
+        self.columns
+    }
 }
 
 /// One dimension, for calls so short that a copy counts: read where it is if it is double precision and without gaps.

@@ -7,6 +7,7 @@ use pyo3::prelude::*;
 mod arrays;
 mod dynamics;
 mod errors;
+mod filter;
 mod flight;
 mod interrupt;
 mod linkage;
@@ -23,6 +24,8 @@ mod _core {
     use crate::dynamics::Dynamics;
     #[pymodule_export]
     use crate::errors::Diverged;
+    #[pymodule_export]
+    use crate::filter::zero_phase;
     #[pymodule_export]
     use crate::flight::soft_flights;
     #[pymodule_export]

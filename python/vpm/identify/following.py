@@ -120,10 +120,9 @@ class Following:
 
     def filtered(self, values: Array, slopes: Array) -> Pair:
         """Values (N, k) of a following machine and derivatives (N, k, columns), filtered at compared samples."""
-        (rows, *shape), width = slopes.shape, values.shape[1]
-        # All side by side: each pass of the filter begins with the same solution of its equations at rest.
-        both = self.keep(np.hstack([values, slopes.reshape(rows, math.prod(shape))]))
-        return np.ascontiguousarray(both[:, :width]), both[:, width:].reshape(len(both), *shape)
+        rows, *shape = slopes.shape
+        kept = self.keep(values)
+        return kept, self.keep(slopes.reshape(rows, math.prod(shape))).reshape(len(kept), *shape)
 
     def answer(
         self,

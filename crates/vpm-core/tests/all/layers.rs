@@ -23,10 +23,11 @@ const TREE: [&str; 15] = [
     "dynamics",
 ];
 /// Parts that stand alone, each a rig of its own, and all that they may import besides themselves.
-const ALONE: [(&str, &[&str]); 17] = [
+const ALONE: [(&str, &[&str]); 18] = [
     ("error", &[]),
     ("scalar", &[]),
     ("table", &["error"]),
+    ("filter", &["error"]),
     ("narx", &["error", "scalar"]),
     ("realtime", &["error"]),
     ("graph", &["error", "scalar"]),
