@@ -11,7 +11,7 @@ from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import is_clear
 from vpm.discrepancy.screening.candidates import Candidate
 from vpm.discrepancy.screening.linear_step import softened
-from vpm.discrepancy.screening.probe import Probe, _stepped
+from vpm.discrepancy.screening.probe import Baseline, Probe, _stepped
 from vpm.discrepancy.screening.short_list import same_models
 from vpm.discrepancy.search.search_round import Round
 from vpm.identify import Estimate, InverseDynamicsProblem, Worth, estimate
@@ -68,7 +68,7 @@ def test_a_loss_that_one_step_has_negative_stays_at_its_start(loss: float, stays
     noise = 0.1 * np.random.default_rng(0).standard_normal(phase.size)
     residual = -columns @ np.array([-4.0, loss]) + noise
     data: Any = SimpleNamespace(blocks=[SimpleNamespace(samples=slice(0, phase.size))])
-    base: Any = SimpleNamespace(free=(), pushed={})
+    base = Baseline(vpm.Model.from_toml(AXIS), (), residual, np.zeros((phase.size, 0)))
     values, std, left = _stepped(base, data, columns, residual, np.array([10.0, 1.0]), [1])
     assert values[0] == pytest.approx(-4.0, abs=0.02)
     assert (values[1] == 0.0) == np.isinf(std[1]) == stays

@@ -20,7 +20,7 @@ from vpm.identify import (
     robust_covariance,
     unseen_combinations,
 )
-from vpm.identify.identifiability import explained_share
+from vpm.identify.identifiability import Span
 from vpm.identify.statistics import correlation_length
 from vpm.simulate import Setup
 
@@ -228,10 +228,25 @@ def test_unseen_combinations_do_not_depend_on_units(scale: float) -> None:
     assert weights["a"] + scale * weights["b"] == pytest.approx(0.0, abs=1e-9 * abs(weights["a"]))
 
 
-def test_explained_share_is_the_squared_cosine() -> None:
+def test_share_of_a_span_is_the_squared_cosine() -> None:
     x = np.array([1.0, 0.0, 0.0])
     y = np.array([[1.0], [1.0], [0.0]])
-    assert explained_share(x, y) == pytest.approx(0.5)
+    assert Span.of(y).share(x) == pytest.approx(0.5)
+
+
+@given(st.integers(0, 6), st.integers(1, 4), st.integers(0, 2**32 - 1))
+def test_a_step_beside_a_span_is_the_step_in_all_columns(known: int, new: int, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    columns = rng.standard_normal((60, known + new)) * 10.0 ** rng.uniform(-6.0, 6.0, known + new)
+    columns[:, : known // 2] = columns[:, known - known // 2 : known] * 3.0  # copies of others
+    residual = rng.standard_normal(60)
+    lengths = np.linalg.norm(columns, axis=0)
+    whole = np.linalg.lstsq(columns / lengths, residual, rcond=1e-10)[0] / lengths
+    span = Span.of(columns[:, :known])
+    alone = np.linalg.lstsq(span.rest(columns[:, known:] / lengths[known:]), span.rest(residual), rcond=None)[0]
+    np.testing.assert_allclose(alone, (whole * lengths)[known:], atol=1e-9 * float(np.linalg.norm(residual)))
+    assert span.basis.shape[1] == known - known // 2
+    assert span.beside(columns).basis.shape[1] == known - known // 2 + new
 
 
 def test_gain_of_a_smaller_residual_is_significant_and_of_noise_is_not() -> None:

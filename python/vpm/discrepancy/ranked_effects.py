@@ -27,6 +27,7 @@ from vpm.discrepancy.search.search import Search
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import gain, segments
+from vpm.identify.identifiability import Span
 from vpm.identify.response_along_motion import bends
 from vpm.model import Effect, Model
 from vpm.numbers import Array
@@ -215,7 +216,9 @@ def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
     known = tuple(compress(known, visible))
     split = len(known)
     sizes = np.array([abs(model.parameters[name].value) or 1.0 for name in (*known, *own)])
-    keep, held, blind = sort_columns(own, fresh, beside, known, residual, (sizes[:split], sizes[split:]))
+    keep, held, blind = sort_columns(
+        own, fresh, Span.of(beside), (known, beside), residual, (sizes[:split], sizes[split:])
+    )
     moving = tuple(own[place] for place in keep)
     values = {name: model.parameters[name].value for name in own}
     probe = Probe(candidate, model, moving, held, blind, values, dict.fromkeys(own, np.nan), np.nan)

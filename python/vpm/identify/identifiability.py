@@ -29,6 +29,8 @@ COPY_SHARE = 0.9999
 SMALLEST_WEIGHT = 1e-6
 #: Length of a column, relative to the longest, that is nothing but rounding of terms that cancel.
 NOTHING = 1e-13
+#: Length of what is new in columns of unit length, below which it is rounding.
+NEW_DIRECTION = 1e-10
 #: Share of a column that those before it must leave, so that it is kept by preference.
 LEAST_REST = 1e-4
 
@@ -90,19 +92,43 @@ def unseen_combinations(
     )
 
 
-def explained_share(column: Array, others: Array) -> float:
-    """Share of ``column``'s squared length in the span of ``others``, 0 to 1, for identifiability."""
-    power = float(column @ column)
-    if power == 0.0:
-        return 1.0
-    if others.shape[1] == 0:
-        return 0.0
-    scaled = others / column_lengths(others)
-    rest = column - scaled @ np.linalg.lstsq(scaled, column, rcond=1e-10)[0]
-    return 1.0 - float(rest @ rest) / power
+@dataclass(frozen=True, eq=False)
+class Span:
+    """Span of some columns, for identifiability: others are split into what lies in it and what is left.
+
+    Known columns are taken out of new ones once, and steps in these alone give the same estimates as steps in all
+    (R. Frisch and F. Waugh, *Econometrica* 1, 1933; M. Lovell, *J. American Statistical Association* 58, 1963).
+
+    Attributes
+    ----------
+    basis : ndarray, shape (n, r)
+        Orthonormal.
+    """
+
+    basis: Array
+
+    @classmethod
+    def of(cls, columns: Array) -> Span:
+        """Span of columns (n, k), those of zeros and copies among them."""
+        return cls(np.zeros((len(columns), 0))).beside(columns)
+
+    def beside(self, columns: Array) -> Span:
+        """Span of more columns (n, k) together with these."""
+        rest = self.rest(self.rest(columns / column_lengths(columns)))  # twice, for what rounding leaves
+        vectors, values, _ = np.linalg.svd(rest, full_matrices=False)
+        return Span(np.column_stack([self.basis, vectors[:, values > NEW_DIRECTION]]))
+
+    def rest(self, columns: Array) -> Array:
+        """Part of columns (n,) or (n, k) outside of a span, for identifiability."""
+        return np.asarray(columns - self.basis @ (self.basis.T @ columns))
+
+    def share(self, column: Array) -> float:
+        """Share of a column's squared length within a span, 0 to 1, for identifiability."""
+        power, rest = float(column @ column), self.rest(column)
+        return 1.0 - float(rest @ rest) / power if power > 0.0 else 1.0
 
 
-def is_alias(column: Array, others: Array, residual: Array) -> bool:
+def is_alias(column: Array, others: Span, residual: Array) -> bool:
     """Whether ``column`` is identifiable only together with ``others``.
 
     A constant load and a weight that hardly turns are nearly the same column; what differs may still be just what the
@@ -111,19 +137,16 @@ def is_alias(column: Array, others: Array, residual: Array) -> bool:
     Parameters
     ----------
     column : ndarray, shape (n,)
-    others : ndarray, shape (n, k)
+    others : Span
     residual : ndarray, shape (n,)
         What is left to explain.
     """
-    share = explained_share(column, others)
-    if share <= ALIAS_SHARE or others.shape[1] == 0:
+    share = others.share(column)
+    if share <= ALIAS_SHARE or others.basis.shape[1] == 0:
         return False
     if share > COPY_SHARE:
         return True
-    scaled = others / column_lengths(others)
-    left = residual - scaled @ np.linalg.lstsq(scaled, residual, rcond=1e-10)[0]
-    rest = column - scaled @ np.linalg.lstsq(scaled, column, rcond=1e-10)[0]
-    return explained_share(left, rest[:, None]) < ALIAS_REST
+    return Span.of(others.rest(column)[:, None]).share(others.rest(residual)) < ALIAS_REST
 
 
 def closest_column(column: Array, others: Array) -> int:

@@ -29,7 +29,7 @@ from vpm.identify import (
     segments,
 )
 from vpm.identify.estimation import MOST_EVALUATIONS, standing
-from vpm.identify.identifiability import COPY_SHARE, closest_column, explained_share, is_alias
+from vpm.identify.identifiability import COPY_SHARE, Span, closest_column, is_alias
 from vpm.identify.response_along_motion import bends
 from vpm.identify.tangent import Tangent, drives_on_tangent, estimate_on_tangent, has_tangent
 from vpm.model import Model
@@ -150,11 +150,14 @@ def judge(
     bounds: dict[str, tuple[float, float]],
     origin: Array | None = None,
     worth: Worth | None = None,
+    *,
+    linear_only: bool = False,
 ) -> Judged:
     """Confirmation's judgement: fit ``free`` on training records, predict validation records.
 
     For ``origin`` see `vpm.identify.tangent`. Where links bend and nothing else is worked out, the tangent at the start
-    is taken if none is given. A fit that is not on a tangent of links ends early if it is not ``worth`` its time.
+    is taken if none is given. A fit that is not on a tangent of links ends early if it is not ``worth`` its time, or
+    after its first step if that is ``linear_only``.
 
     Raises
     ------
@@ -169,7 +172,14 @@ def judge(
     if origin is None:
         most = FEW_EVALUATIONS if bends(model) and model.added_joints else MOST_EVALUATIONS
         fit = estimate(
-            model, data.training, free, bounds=bounds, tolerance=TOLERANCE, most_evaluations=most, worth=worth
+            model,
+            data.training,
+            free,
+            bounds=bounds,
+            tolerance=TOLERANCE,
+            linear_only=linear_only,
+            most_evaluations=most,
+            worth=worth,
         )
     else:
         fit = estimate_on_tangent(model, data.training, free, origin, bounds=bounds, tolerance=TOLERANCE, worth=worth)
@@ -296,15 +306,15 @@ def _visible_now(judged: Judged, data: Data, probe: Probe) -> tuple[str, ...]:
         return ()
     model = judged.model
     _, columns = data.training.evaluate(model, model.theta, [model.index(name) for name in names])
-    known, seen = judged.fit.jacobian, []
+    known, seen = Span.of(judged.fit.jacobian), []
     for name, column in zip(names, columns.T, strict=True):
         if probe.candidate.neutral:
             alike = is_alias(column, known, judged.fit.residual)
         else:
-            alike = explained_share(column, known) > COPY_SHARE
+            alike = known.share(column) > COPY_SHARE
         if np.any(column) and not alike:
             seen.append(name)
-            known = np.column_stack([known, column])
+            known = known.beside(column[:, None])
     return tuple(seen)
 
 
@@ -454,15 +464,15 @@ def _release(
     _, fresh = data.evaluate(model, theta, [model.index(name) for name in asleep])
     released: list[str] = []
     held: list[Alias] = []
-    known, names = fit.jacobian, list(free)
+    known, span, names = fit.jacobian, Span.of(fit.jacobian), list(free)
     for name, column in zip(asleep, fresh.T, strict=True):
         if not np.any(column):
             continue
-        if is_alias(column, known, fit.residual):
+        if is_alias(column, span, fit.residual):
             held.append(Alias(name, names[closest_column(column, known)]))
             continue
         released.append(name)
-        known, names = np.column_stack([known, column]), [*names, name]
+        known, span, names = np.column_stack([known, column]), span.beside(column[:, None]), [*names, name]
     return tuple(released), tuple(held)
 
 

@@ -17,7 +17,7 @@ from vpm.discrepancy.screening.probe import Probe
 from vpm.discrepancy.search.candidate_choice import Accepted, alike
 from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem
-from vpm.identify.identifiability import COPY_SHARE, explained_share
+from vpm.identify.identifiability import COPY_SHARE, Span
 from vpm.numbers import NORMAL_95
 
 
@@ -93,7 +93,8 @@ def contains(rival: Judged, parameters: tuple[str, ...], final: Judged, own: tup
         return False
     columns = rival.fit.jacobian[:, [rival.fit.names.index(name) for name in parameters]]
     plain = (final.fit.jacobian[:, final.fit.names.index(name)] for name in own)
-    return all(explained_share(column, columns) > COPY_SHARE for column in plain)
+    within = Span.of(columns)
+    return all(within.share(column) > COPY_SHARE for column in plain)
 
 
 def _held_at_start(probe: Probe) -> list[str]:

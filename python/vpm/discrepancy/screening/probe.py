@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.special import chdtri
@@ -19,7 +20,7 @@ from vpm.discrepancy.screening.joint_compliance_start import best_start, is_sear
 from vpm.discrepancy.screening.linear_step import is_outside, linear_step, softened, step_without
 from vpm.discrepancy.screening.location_parameter import free_location
 from vpm.identify import InverseDynamicsProblem
-from vpm.identify.identifiability import closest_column, is_alias
+from vpm.identify.identifiability import Span, closest_column, column_lengths, is_alias
 from vpm.identify.response_along_motion import bends
 from vpm.identify.tangent import has_tangent
 from vpm.model import Model
@@ -69,6 +70,27 @@ class Baseline:
     residual: Array
     jacobian: Array
     pushed: Mapping[str, int] = field(default_factory=dict)
+
+    @cached_property
+    def span(self) -> Span:
+        """Span of the columns of known parameters."""
+        return Span.of(self.jacobian)
+
+    @cached_property
+    def _inverse(self) -> Array:
+        lengths = column_lengths(self.jacobian)
+        return np.asarray(np.linalg.pinv(self.jacobian / lengths, rcond=1e-10) / lengths[:, None])
+
+    def without_pushed(self, residual: Array) -> Span:
+        """Span of known columns without those that a step against a probe's residual would push beyond a bound.
+
+        What a bound holds stays there: beyond it, it would seem to explain what no fit can.
+        """
+        if not self.pushed:
+            return self.span
+        steps = -(self._inverse @ residual)
+        pushed = [self.pushed.get(name, 0) * step > 0.0 for name, step in zip(self.free, steps, strict=True)]
+        return Span.of(self.jacobian[:, np.logical_not(pushed)]) if any(pushed) else self.span
 
 
 def prepare(base: Baseline, data: InverseDynamicsProblem, listed: Sequence[Candidate]) -> Baseline:
@@ -178,33 +200,26 @@ def _probe_start(
     if not candidate.neutral:
         added = tuple(name for name in added if _short(model, candidate, name) not in candidate.fixed)
     columns = [model.index(name) for name in added]
-    if candidate.neutral or has_tangent(base.model, data):
-        # Where links bend or drives answer, each known column costs a simulation: they are taken as before it.
-        residual, fresh = data.evaluate(model, model.theta, columns)
-        known = base.jacobian
-    else:
-        all_columns = [model.index(name) for name in base.free] + columns
-        residual, jacobian = data.evaluate(model, model.theta, all_columns)
-        known, fresh = jacobian[:, : len(base.free)], jacobian[:, len(base.free) :]
+    # Known columns are taken as before it: few effects change them, and where links bend each costs a simulation.
+    residual, fresh = data.evaluate(model, model.theta, columns)
     place = free_location(data, model, candidate, added, fresh)
     if place is not None:
         fresh[:, place.where] = place.column
     keep, held, invisible = sort_columns(
-        added, fresh, known, base.free, residual, _sizes(model, candidate, base.free, added)
+        added, fresh, base.span, (base.free, base.jacobian), residual, _sizes(model, candidate, base.free, added)
     )
     if place is not None and place.where in keep and place.size not in keep:
         keep.remove(place.where)
         invisible = (*invisible, added[place.where])
-    chosen = np.column_stack([known, fresh[:, keep]])
-    names = (*base.free, *(added[i] for i in keep))
-    start_values = np.concatenate([np.zeros(len(base.free)), model.theta[[columns[i] for i in keep]]])
-    values, std, left = _stepped(base, data, chosen, residual, start_values, _losses(model, candidate, names))
+    free = tuple(added[i] for i in keep)
+    start_values = model.theta[[columns[i] for i in keep]]
+    values, std, left = _stepped(base, data, fresh[:, keep], residual, start_values, _losses(model, candidate, free))
     if still:
-        values, (_, _, left) = np.zeros_like(values), linear_step(data, known, residual)
+        rest = base.span.rest(residual)
+        values, left = np.zeros_like(values), float(rest @ rest)
     power = float(base.residual @ base.residual)
-    free = names[len(base.free) :]
-    estimates = dict(zip(free, (values + start_values)[len(base.free) :].tolist(), strict=True))
-    deviations = dict(zip(free, std[len(base.free) :].tolist(), strict=True))
+    estimates = dict(zip(free, (values + start_values).tolist(), strict=True))
+    deviations = dict(zip(free, std.tolist(), strict=True))
     drop = 1.0 - left / power if power > 0.0 and free else 0.0
     if place is not None and place.where in keep:
         size, where = added[place.size], added[place.where]
@@ -223,30 +238,30 @@ def _probe_start(
 
 
 def _stepped(
-    base: Baseline, data: InverseDynamicsProblem, jacobian: Array, residual: Array, start: Array, losses: Sequence[int]
+    base: Baseline, data: InverseDynamicsProblem, fresh: Array, residual: Array, start: Array, losses: Sequence[int]
 ) -> tuple[Array, Array, float]:
-    """Linear step of a probe in known and new parameters, see `linear_step`; some of them stay.
+    """Linear step of a probe in new parameters beside the known ones, see `linear_step`; some of them stay.
 
-    What a bound holds stays there: beyond it, it would seem to explain what no fit can. A negative loss of a spring in
-    series stays at its ``start``. It depends on the square of the compliance, so a step from a clearly stiffer or
-    softer start gives a wrong value, even a wrong sign. A refit finds it; whether there is a spring at all, its
-    stiffness tells.
+    A negative loss of a spring in series stays at its ``start``. It depends on the square of the compliance, so a step
+    from a clearly stiffer or softer start gives a wrong value, even a wrong sign. A refit finds it; whether there is a
+    spring at all, its stiffness tells.
     """
-    values, std, left = linear_step(data, jacobian, residual)
-    held = [i for i, name in enumerate(base.free) if base.pushed.get(name, 0) * values[i] > 0.0]
-    if held:
-        values, std, left = step_without(data, jacobian, residual, held)
+    values, std, left = linear_step(data, base.span.rest(fresh), base.span.rest(residual))
+    known = base.without_pushed(residual + fresh @ values)
+    if known is not base.span:
+        values, std, left = linear_step(data, known.rest(fresh), known.rest(residual))
     negative = [i for i in losses if start[i] + values[i] + std[i] < 0.0]
     if negative:
-        values, std, left = step_without(data, jacobian, residual, (*held, *negative))
+        values, std, left = step_without(data, known.rest(fresh), known.rest(residual), negative)
         std[negative] = np.inf
     return values, std, left
 
 
-def _losses(model: Model, candidate: Candidate, names: Sequence[str]) -> list[int]:
-    """Indices of the loss parameters of a spring in series in a probe."""
-    own = set(_added(model, candidate)) if in_series(candidate.effect) else set()
-    return [i for i, name in enumerate(names) if name in own and _short(model, candidate, name) in LOSSES]
+def _losses(model: Model, candidate: Candidate, free: Sequence[str]) -> list[int]:
+    """Indices of the loss parameters of a spring in series among those of a probe."""
+    if not in_series(candidate.effect):
+        return []
+    return [i for i, name in enumerate(free) if _short(model, candidate, name) in LOSSES]
 
 
 def _sizes(model: Model, candidate: Candidate, known: Sequence[str], added: Sequence[str]) -> tuple[Array, Array]:
@@ -266,25 +281,26 @@ def _added(model: Model, candidate: Candidate) -> tuple[str, ...]:
 def sort_columns(
     added: Sequence[str],
     fresh: Array,
-    known: Array,
-    known_names: Sequence[str],
+    span: Span,
+    known: tuple[Sequence[str], Array],
     residual: Array,
     sizes: tuple[Array, Array],
 ) -> tuple[list[int], tuple[Alias, ...], tuple[str, ...]]:
     """Sort the new columns of a probe: identifiable, confused with others, and without influence.
 
-    The first come by their places, the others by name. ``sizes`` are those of known and fresh parameters, without which
-    SI units would decide what is small.
+    The first come by their places, the others by name. ``known`` are names and columns of what has the ``span``.
+    ``sizes`` are those of known and fresh parameters, without which SI units would decide what is small.
     """
+    names, columns = known
     lengths = np.linalg.norm(fresh, axis=0) * sizes[1]
-    largest = float(np.max([*(np.linalg.norm(known, axis=0) * sizes[0]), *lengths], initial=0.0))
+    largest = float(np.max([*(np.linalg.norm(columns, axis=0) * sizes[0]), *lengths], initial=0.0))
     visible = [i for i in range(len(added)) if lengths[i] > 1e-12 * largest]
     invisible = tuple(added[i] for i in range(len(added)) if i not in visible)
     keep, held = list(visible), []
     for i in visible:
-        others = np.column_stack([known, fresh[:, [j for j in keep if j != i]]])
-        names = [*known_names, *(added[j] for j in keep if j != i)]
-        if is_alias(fresh[:, i], others, residual):
-            held.append(Alias(added[i], names[closest_column(fresh[:, i], others)]))
+        others = [j for j in keep if j != i]
+        if is_alias(fresh[:, i], span.beside(fresh[:, others]), residual):
+            closest = closest_column(fresh[:, i], np.column_stack([columns, fresh[:, others]]))
+            held.append(Alias(added[i], [*names, *(added[j] for j in others)][closest]))
             keep.remove(i)
     return keep, tuple(held), invisible
