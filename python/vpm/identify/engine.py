@@ -18,7 +18,7 @@ from vpm.identify.objective import Objective, noise_levels
 from vpm.identify.parallel import worker_count
 from vpm.identify.problem import Problem
 from vpm.identify.settings import Fitting
-from vpm.identify.solver import Box, Descent, Point, descend
+from vpm.identify.solver import Box, Descent, Point, descend, sizes
 from vpm.identify.statistics import record_groups, sandwich
 from vpm.model import Model
 from vpm.numbers import Array
@@ -33,8 +33,6 @@ AGREEING, ROUNDING = 0.01, 1e-12
 ROUNDS, SETTLED = 5, 0.02
 #: Bounds further apart than this factor say nothing about where to start.
 WIDE = 1e4
-#: Least size of a parameter that a change is compared with, in parts of what moves the residual by as much as it is.
-LEAST_SCALE = 1e-3
 #: Largest change of a logarithm in one step.
 FARTHEST = float(np.log(30.0))
 
@@ -205,9 +203,7 @@ def onward(
     """
     p = len(objective.columns)
     lengths = column_lengths(first.jacobian)
-    size = np.where(
-        objective.log, 1.0, np.maximum(np.abs(first.x[:p]), LEAST_SCALE * np.sqrt(first.cost) / lengths[:p])
-    )
+    size = np.where(objective.log, 1.0, sizes(first.x[:p], first.cost, lengths[:p]))
     scale = np.concatenate([size, np.ones(first.x.size - p)])
     reach = np.concatenate([np.where(objective.log, FARTHEST, np.inf), np.full(first.x.size - p, np.inf)])
     box = Box(low, high, scale, reach)

@@ -11,6 +11,7 @@ from scipy.optimize import least_squares, lsq_linear
 from vpm.identify.identifiability import RANK_TOLERANCE, Combination, column_lengths, unseen_combinations
 from vpm.identify.moments import AXES, PAIRS, Coordinates, real_bodies
 from vpm.identify.problem import Problem, segments
+from vpm.identify.solver import DAMPING, Box, Point, descend, sizes
 from vpm.identify.statistics import robust_covariance
 from vpm.model import Model
 from vpm.numbers import Array
@@ -23,6 +24,8 @@ MOST_EVALUATIONS = 40
 PROGRESS = 0.05
 #: The same for a fit that has shown its worth: towards a bound, steps shrink with the distance and never end.
 CREEPING = 0.002
+#: Share of the sum of squares by which a step of a descent falls that decides nothing any more.
+FLAT = 1e-4
 #: Share by which the sum of squares may grow along a direction that the data cannot see.
 UNCHANGED = 1e-9
 
@@ -116,7 +119,11 @@ def estimate(
     try:
         if columns:
             start = _linear_step(counter, start, low, high)
-            start = start if linear_only else _refine(counter, start, low, high, tolerance, most_evaluations)
+            start = (
+                start
+                if linear_only
+                else _refine(counter, start, low, high, tolerance, most_evaluations, descends=not feasible)
+            )
         start = _nearest(counter, start, first, low, high) if feasible else start
         residual, jacobian = counter(start)
         # Derivatives may leave all bounds where the motion itself does not; the best with derivatives stands then.
@@ -228,6 +235,15 @@ class _Counter:
     def jacobian(self, x: Array) -> Array:
         return self(x)[1]
 
+    def cost(self, x: Array) -> float:
+        residual = self.residual(x)
+        return float(residual @ residual) if np.all(np.isfinite(residual)) else np.inf
+
+    def point(self, x: Array) -> Point:
+        residual, slopes = self(x)
+        usable = np.all(np.isfinite(residual)) and np.all(np.isfinite(slopes))
+        return Point(x, float(residual @ residual) if usable else np.inf, residual, slopes, (residual, slopes))
+
     def _count(self, residual: Array) -> None:
         self.count += 1
         self._reached.append(min([float(residual @ residual), *self._reached[-1:]]))
@@ -294,7 +310,9 @@ def _nearest(counter: _Counter, found: Array, start: Array, low: Array, high: Ar
     return found
 
 
-def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance: float, most: int) -> Array:
+def _refine(
+    counter: _Counter, start: Array, low: Array, high: Array, tolerance: float, most: int, *, descends: bool = False
+) -> Array:
     residual, jacobian = counter(start)
     if not np.all(np.isfinite(residual)):
         return start
@@ -306,6 +324,8 @@ def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance:
     # Nothing left to gain along any free direction: the problem was linear and the first step ended it.
     if np.all(np.abs(gradient[interior]) <= 1e-9 * np.sqrt(residual @ residual)):
         return start
+    if descends and _has_blind(jacobian / lengths):
+        return _descended(counter, start, low, high, most)
     inside = _strictly_inside(start, low, high)
     if not np.all(
         np.isfinite(counter.residual(inside))
@@ -325,6 +345,30 @@ def _refine(counter: _Counter, start: Array, low: Array, high: Array, tolerance:
     )
     solution: Array = result.x
     return solution if np.sum(counter.residual(solution) ** 2) <= np.sum(residual**2) else start
+
+
+def _has_blind(scaled: Array) -> bool:
+    """Whether there are directions that an estimation's records do not show, from columns of equal length."""
+    values = np.linalg.svd(np.linalg.qr(scaled, mode="r"), compute_uv=False)
+    return bool(values[-1] < RANK_TOLERANCE * values[0])
+
+
+def _descended(counter: _Counter, start: Array, low: Array, high: Array, most: int) -> Array:
+    """Refine an estimate by a damped descent: what nothing shows stays, where a trust region wanders along it.
+
+    Steps begin as those of most probable values, for noise as large as the residual and parameters as uncertain as
+    they are stated. What the residual hardly shows may else leave what makes a machine, and no step comes back.
+    """
+    first = counter.point(start)
+    lengths = column_lengths(first.jacobian)
+    stated = (counter.model.parameters[counter.model.parameter_names[column]].uncertainty for column in counter.columns)
+    spread = np.array([np.inf if one is None or not one > 0.0 else one for one in stated])
+    prior = first.cost / len(first.residual) / (spread * lengths) ** 2
+    box = Box(low, high, sizes(start, first.cost, lengths), damping=np.where(np.isfinite(spread), prior / DAMPING, 1.0))
+    found = descend(counter.point, first, box, tolerance=FLAT, most_evaluations=most, cost=counter.cost)
+    if found.interrupted:
+        raise KeyboardInterrupt
+    return found.point.x
 
 
 def _strictly_inside(x: Array, low: Array, high: Array) -> Array:

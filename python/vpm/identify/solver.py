@@ -8,14 +8,17 @@ Control and Optimization* 20, 1982).
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.optimize import lsq_linear
 
 from vpm.numbers import Array
 
 #: Damping at the start, and beyond which no step is left to try.
 DAMPING, MOST_DAMPING = 1e-3, 1e12
+#: Least size of a coordinate, as a share of the move that would explain the whole residual.
+LEAST_SIZE = 1e-3
 #: Columns from which on normal equations take the place of orthogonal triangles.
 MANY = 24
 
@@ -56,6 +59,7 @@ class Box:
     high: Array
     scale: Array  #: Shape (n,); size of each coordinate, that a change is compared with.
     reach: Array | float = np.inf  #: Shape (n,), or float; largest change of each in one step.
+    damping: Array | float = 1.0  #: Shape (n,), or float; damping of each beside others, of columns of length one.
 
 
 def descend(
@@ -65,6 +69,7 @@ def descend(
     *,
     tolerance: float,
     most_evaluations: int,
+    cost: Callable[[Array], float] | None = None,
 ) -> Descent:
     """Solver: least sum of losses inside a box.
 
@@ -78,6 +83,8 @@ def descend(
     tolerance : float
         Relative change of the coordinates or of the cost at which to stop.
     most_evaluations : int
+    cost : callable, optional
+        The cost alone, where that takes less time than a point: points are then evaluated where it falls.
     """
     at, count, damping, ended = start, 0, DAMPING, "evaluations"
     try:
@@ -87,7 +94,7 @@ def descend(
                 ended = "converged"
                 break
             step, predicted = found
-            trial = evaluate(at.x + step)
+            trial = _tried(evaluate, at, at.x + step, cost)
             count += 1
             actual = at.cost - trial.cost
             small = bool(np.all(np.abs(step) <= tolerance * box.scale)) or predicted <= tolerance**1.5 * at.cost
@@ -107,6 +114,18 @@ def descend(
     return Descent(at, start.cost, count, ended)
 
 
+def sizes(x: Array, cost: float, lengths: Array) -> Array:
+    """Sizes of a descent's coordinates (n,), that changes are compared with, from values and lengths of columns."""
+    return np.asarray(np.maximum(np.abs(x), LEAST_SIZE * np.sqrt(cost) / lengths))
+
+
+def _tried(evaluate: Callable[[Array], Point], at: Point, x: Array, cost: Callable[[Array], float] | None) -> Point:
+    """Point of the solver at a step from ``at``; without derivatives where the cost does not fall."""
+    if cost is None or (reached := cost(x)) < at.cost:
+        return evaluate(x)
+    return replace(at, x=x, cost=reached)
+
+
 def _step(at: Point, box: Box, damping: float) -> tuple[Array, float] | None:
     """Damped step of the solver inside the box and its predicted fall of cost; None at a minimum."""
     low, high, reach = box.low, box.high, np.broadcast_to(box.reach, at.x.shape)
@@ -117,7 +136,8 @@ def _step(at: Point, box: Box, damping: float) -> tuple[Array, float] | None:
     if free.size == 0:
         return None
     square, image = _root(at.jacobian[:, free] / lengths[free], at.residual)
-    damped = np.vstack([square, np.sqrt(damping) * np.eye(free.size)])
+    own = np.broadcast_to(box.damping, at.x.shape)[free]
+    damped = np.vstack([square, np.diag(np.sqrt(damping * own))])
     target = np.concatenate([-image, np.zeros(free.size)])
     below, above = ((edge - at.x)[free] * lengths[free] for edge in (low, high))
     change = _boxed(damped, target, below, above)
@@ -131,18 +151,11 @@ def _step(at: Point, box: Box, damping: float) -> tuple[Array, float] | None:
 
 
 def _boxed(matrix: Array, target: Array, low: Array, high: Array) -> Array:
-    """Least-squares solution of the solver in a box: coordinates beyond it go to its edge."""
-    solution = np.zeros(matrix.shape[1])
-    inside = np.ones(solution.size, dtype=np.bool_)
-    while np.any(inside):
-        rest = target - matrix[:, ~inside] @ solution[~inside]
-        solution[inside] = np.linalg.lstsq(matrix[:, inside], rest, rcond=None)[0]
-        outside = inside & ((solution < low) | (solution > high))
-        if not np.any(outside):
-            break
-        solution[outside] = np.clip(solution, low, high)[outside]
-        inside &= ~outside
-    return solution
+    """Least-squares solution of the solver in a box (P. Stark and R. Parker, *Computational Statistics* 10, 1995)."""
+    solution = np.linalg.lstsq(matrix, target, rcond=None)[0]
+    if np.all((low <= solution) & (solution <= high)):
+        return np.asarray(solution)
+    return np.asarray(lsq_linear(matrix, target, (low, high), method="bvls").x)
 
 
 def _root(jacobian: Array, residual: Array) -> tuple[Array, Array]:
