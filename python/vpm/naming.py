@@ -17,7 +17,8 @@ from vpm.discrepancy.rivals.rival_discrimination import discriminated
 from vpm.discrepancy.rivals.rival_exchange import in_order, replaced, timed_again
 from vpm.discrepancy.search.backlash_contacts import with_predicted_contacts
 from vpm.discrepancy.search.forward_step import forward_step
-from vpm.discrepancy.search.search import Search, further, search
+from vpm.discrepancy.search.search import Search, begin, further
+from vpm.discrepancy.search.usual_friction import with_usual_friction
 from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -117,7 +118,8 @@ def named(
         found, ambiguous = searched(ranking, recalibrated, data, Settings(effects=limit), effects)
         notes.extend([*notes_of(found.accepted), *ranked_notes(ranking, found.refused, found.interrupted)])
         return found, ambiguous, False
-    found = search(recalibrated, data, screened, limit, tell, each)
+    begun = with_usual_friction(begin(recalibrated), data, screened, limit, tell, each)
+    found = further(begun, data, screened, limit, tell, each)
     if found.interrupted:
         notes.append(STOPPED)
     nothing: tuple[Rivals, ...] = ()

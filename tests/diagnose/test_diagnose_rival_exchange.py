@@ -21,7 +21,7 @@ from vpm.discrepancy.rivals.rival_exchange import earned, in_order
 from vpm.discrepancy.screening.candidates import candidates
 from vpm.discrepancy.screening.probe import Baseline, probe
 from vpm.discrepancy.search.backward_elimination import Stage
-from vpm.discrepancy.search.search import Search, search
+from vpm.discrepancy.search.search import Search, begin, further
 from vpm.identify import Gain, InverseDynamicsProblem, estimate
 
 
@@ -94,7 +94,7 @@ def test_a_search_goes_on_beside_what_took_the_place_of_an_effect(monkeypatch: p
     naming = import_module("vpm.naming")
     model, free, data = inverse_dynamics_data(shared_case("axis_linear", ("spring", "viscous_friction"), 3))
     start, each = judge(model, free, data, {}), ParallelCandidates(1)
-    spring = search(start, data, ["spring"], 6, print, each)
+    spring = further(begin(start), data, ["spring"], 6, print, each)
     gone = (Stage("added", "bias_force", "axis", start), Stage("removed", "bias_force", "axis", start))
     exchanged = replace(
         spring,

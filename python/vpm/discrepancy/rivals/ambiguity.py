@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from functools import partial
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confirm, judge
-from vpm.discrepancy.confirmation.refusal import LEAST_GAIN
+from vpm.discrepancy.confirmation.refusal import CLEAR_GAIN, LEAST_GAIN
 from vpm.discrepancy.diagnosis import Ambiguity
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.discrepancy.rivals.nested_model import probe_beside
-from vpm.discrepancy.screening.candidates import Candidate, Key, candidates
+from vpm.discrepancy.screening.candidates import Candidate, Key, candidates, joint_at
 from vpm.discrepancy.screening.probe import Probe, impossible_values, probe, refit_effort, screening_effort
 from vpm.discrepancy.search.candidate_choice import Accepted, alike
 from vpm.discrepancy.search.search import Tried
@@ -154,9 +154,13 @@ def _others(without: Judged, data: Data, entry: Accepted, effects: Sequence[str]
 
 
 def _could_do(model: Model, entry: Accepted, candidate: Candidate) -> bool:
-    """Whether a candidate acts near enough to an accepted effect to make it ambiguous."""
+    """Whether a candidate acts near enough to an accepted effect to make it ambiguous.
+
+    A motion of its own is no rival of friction that does most of the work at its joint: no swing takes energy alike.
+    """
     heavier = bool(candidate.effect.motion) and not entry.effect.motion
-    return _near(candidate, entry) and not (heavier and bends(model))
+    rubs = entry.effect.usual == "friction" and entry.trial.there.relative >= CLEAR_GAIN
+    return _near(model, candidate, entry) and not (heavier and (rubs or bends(model)))
 
 
 def _short_list(final: Judged, without: Judged | None, entry: Accepted, probes: Sequence[Probe]) -> list[Probe]:
@@ -173,10 +177,16 @@ def _short_list(final: Judged, without: Judged | None, entry: Accepted, probes: 
     return good[:SHORT_LIST] + sorted(nested, key=lambda p: -p.drop)[:NESTED]
 
 
-def _near(candidate: Candidate, entry: Accepted) -> bool:
-    """Whether a rival acts on the joint of an effect, or is confusable with it, so that it is ambiguous."""
+def _near(model: Model, candidate: Candidate, entry: Accepted) -> bool:
+    """Whether a rival acts on the joint of an effect, or is confusable with it, so that it is ambiguous.
+
+    What has no motion of its own and acts at another joint alone changes no effort at this one.
+    """
     name, site = entry.key
     if candidate.key == (name, site):
+        return False
+    here, there = joint_at(model, site), joint_at(model, candidate.site)
+    if here and there and here != there and not (candidate.effect.motion or entry.effect.motion):
         return False
     own = entry.trial.probe.candidate.effect
     return candidate.site == site or candidate.effect.name in own.confused_with or candidate.effect.site == "actuator"

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
-from vpm.discrepancy.screening.candidates import Key
+from vpm.discrepancy.screening.candidates import Key, joint_at
 from vpm.discrepancy.screening.probe import Probe
 
-#: Candidates refitted in one round: those that have the largest predicted gain for their numbers, and those that have
-#: the largest predicted gain of all. Without the latter, several names of one regressor, as a constant force and a
-#: tilted world, crowd out a law of two numbers that takes more than any of them.
-SHORT_LIST, RICHEST = 7, 2
+#: Candidates refitted in one round: those that have the largest predicted gain for their numbers, of the machine and of
+#: each joint, and those that have the largest predicted gain of all. Without the last, several names of one regressor,
+#: as a constant force and a tilted world, crowd out a law of two numbers that takes more than any of them.
+SHORT_LIST, OF_JOINT, RICHEST = 7, 3, 2
 #: Share by which the gain that screening predicts of two candidates may differ by rounding alone.
 TWIN = 1e-6
 
@@ -33,6 +34,16 @@ def same_models(short_list: Sequence[Probe]) -> dict[Key, Key]:
 
 
 def most_promising(promising: Sequence[Probe]) -> list[Probe]:
-    """Short list of probes to refit, by falling score."""
+    """Short list of probes to refit, by falling score.
+
+    Efforts of each joint are balanced by themselves, so that what one joint lacks says nothing of another one.
+    """
     richest = {p.candidate.key for p in sorted(promising, key=lambda p: -p.drop)[:RICHEST]}
-    return [p for rank, p in enumerate(promising) if rank < SHORT_LIST or p.candidate.key in richest]
+    seats: Counter[str] = Counter()
+    chosen = []
+    for rank, one in enumerate(promising):
+        joint = joint_at(one.model, one.candidate.site)
+        if rank < SHORT_LIST or one.candidate.key in richest or (joint and seats[joint] < OF_JOINT):
+            chosen.append(one)
+            seats[joint] += 1
+    return chosen

@@ -74,18 +74,17 @@ class Search:
         return self.stages[-1].judged
 
 
-def search(
-    start: Judged, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: ParallelCandidates
-) -> Search:
-    """Search: add effects one at a time and drop replaced ones, until none is accepted any more."""
-    return further(Search((Stage("recalibrated", "", "", start),), (), (), ()), data, effects, limit, tell, each)
+def begin(start: Judged) -> Search:
+    """Search that has found nothing yet."""
+    return Search((Stage("recalibrated", "", "", start),), (), (), ())
 
 
 def further(
     found: Search, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: ParallelCandidates
 ) -> Search:
-    """Continue a search from the end of another one; removed effects do not come back.
+    """Continue a search: add effects one at a time and drop replaced ones, until none is accepted any more.
 
+    Removed effects do not come back.
     A new effect in the place of another one leaves what the other one had covered. A second effect that was refused
     before may be clear in that.
     """
@@ -96,19 +95,19 @@ def further(
     over = Over()
     interrupted = False
     first = 1 + max((candidate.round for candidate in ranking), default=0)
-    waiting, tried = set[Key](), 0  # what was accepted at other joints, too, when the last effect came in, of how many
+    waiting, tried = list[Key](), 0  # what a round would have accepted at other joints, too, and of how many
     for number in range(first, 2 * limit + 2):
         outcome = Round(stages[-1].judged, data, number, tell, each, tried)
         best, pair, again = None, None, False
         try:
             if len(accepted) < limit and not (accepted and outcome.done()):
-                best = outcome.again(waiting - set(dropped)) if waiting else None
+                best = _next(outcome, waiting, dropped)
                 again = best is not None
                 if not again:
                     outcome = Round(stages[-1].judged, data, number, tell, each)
                     best, pair = _whole(outcome, effects, set(dropped), several=len(accepted) + 1 < limit)
-                waiting = outcome.elsewhere(best) if best is not None and pair is None else set()
-                tried = outcome.tried
+                    waiting = outcome.elsewhere(best) if best is not None and pair is None else []
+                    tried = outcome.tried
         except KeyboardInterrupt:
             interrupted = True
         ranking += outcome.ranked()
@@ -143,6 +142,15 @@ def further(
     return Search(
         tuple(stages), tuple(accepted), _listed({**dropped, **refused}), tuple(ranking), interrupted, last, over
     )
+
+
+def _next(outcome: Round, waiting: list[Key], dropped: Mapping[Key, str]) -> Accepted | None:
+    """First candidate that still waits for the search and is accepted beside what came in meanwhile."""
+    while waiting:
+        key = waiting.pop(0)
+        if key not in dropped and (best := outcome.again(key)) is not None:
+            return best
+    return None
 
 
 def _reconsidered(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:

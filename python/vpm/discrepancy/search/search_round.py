@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property, partial
@@ -121,9 +122,9 @@ class Round:
         self.mark(best.key)
         return best
 
-    def again(self, several: set[Key]) -> Accepted | None:
-        """Best of the round's earlier accepted candidates, judged again after another effect came in."""
-        self.screen([name for name, _ in several], set(), heavy=False, only=several)
+    def again(self, key: Key) -> Accepted | None:
+        """Candidate that an earlier round would have accepted too, if the round accepts it beside what came in."""
+        self.screen([key[0]], set(), heavy=False, only={key})
         self.confirm()
         return self.best()
 
@@ -132,13 +133,18 @@ class Round:
         """Candidates of the round from which those to refit were chosen."""
         return max(len(self._ranking), self._chosen_from)
 
-    def elsewhere(self, best: Accepted) -> set[Key]:
-        """Candidates of the round that are accepted at other joints too and have no motion of their own."""
+    def elsewhere(self, best: Accepted) -> list[Key]:
+        """Best candidate of the round at each other joint, by falling gain, of those without a motion of their own."""
         model = self.current.model
         here = joint_at(model, best.key[1])
-        supported = [trial.probe.candidate for trial in self._supported]
-        light = [one for one in supported if not self._is_heavy(one) and joint_at(model, one.site)]
-        return {one.key for one in light if here and joint_at(model, one.site) != here}
+        by_joint: dict[str, list[Trial]] = defaultdict(list)
+        for trial in self._supported:
+            candidate = trial.probe.candidate
+            joint = joint_at(model, candidate.site)
+            if here and joint and joint != here and not self._is_heavy(candidate):
+                by_joint[joint].append(trial)
+        chosen = [choose(trials, self.data) for trials in by_joint.values()]
+        return [one.key for one in sorted(chosen, key=lambda one: -one.trial.validation.score)]
 
     def weak(self, best: Accepted) -> bool:
         """Whether the best candidate of the round leaves most of the error, so that a hidden motion is tried too.

@@ -1,0 +1,186 @@
+"""Usual friction at several joints together, where a search on inverse-dynamics residuals begins.
+
+Nobody knows the friction of a robot beforehand, so that its description seldom has any, at no joint. One effect after
+the other, parameters that are uncertain take what friction at the other joints would explain, and so do other effects.
+All of it together is one regression.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from vpm.catalogue import EFFECTS
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, is_clear, judge, measured
+from vpm.discrepancy.confirmation.refusal import CLEAR_GAIN, Thresholds, refuse_trial
+from vpm.discrepancy.parallel_candidates import ParallelCandidates
+from vpm.discrepancy.screening.candidates import TRANSITION, Candidate, candidates, joint_at
+from vpm.discrepancy.screening.probe import Probe
+from vpm.discrepancy.search.backward_elimination import Stage
+from vpm.discrepancy.search.candidate_choice import Accepted
+from vpm.discrepancy.search.search import Search
+from vpm.discrepancy.search.search_round import Tell
+from vpm.errors import VpmError
+from vpm.identify.identifiability import RANK_TOLERANCE, column_lengths
+from vpm.identify.response_along_motion import bends, has_own_drives
+from vpm.model import Model
+from vpm.numbers import Array
+
+
+def with_usual_friction(
+    found: Search, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: ParallelCandidates
+) -> Search:
+    """Search that begins with the usual friction that several joints lack; unchanged where that is not what they lack.
+
+    Each size has to be clear on training records. Without each effect, all else fitted again, validation records have
+    to be predicted clearly worse where it acts. What does not do that leaves, of each joint the least first.
+    """
+    start = found.final
+    if bends(start.model) or has_own_drives(start.model):
+        return found
+    usual = [name for name, one in EFFECTS.items() if one.usual == "friction" and (effects is None or name in effects)]
+    listed = [c for c in candidates(start.model, data.training, start.fit.residual, usual) if c.neutral]
+    if len(_joints(start, listed)) < 2:
+        return found
+    tell(f"fitting the friction of {len(_joints(start, listed))} joints together")
+    try:
+        judged = _fitted(start, data, listed)
+        while len(_joints(start, listed)) > 1 and len(listed) <= limit:
+            unclear = [c for c in listed if not is_clear(judged, _own(judged, c))]
+            trials = [] if unclear else list(map(_Beside(judged, data), listed))
+            tried = len(usual) * len(start.model.joints)
+            leaving = unclear or _leaving(trials, Thresholds(tried, min(m.dt for m in data.training.motions)))
+            if not leaving:
+                return _begun(found, judged, data, trials, each)
+            listed = [c for c in listed if c not in leaving]
+            judged = _fitted(start, data, listed)
+    except VpmError:
+        pass  # a search one effect after the other says what it is that fails
+    return found
+
+
+def _joints(start: Judged, listed: Sequence[Candidate]) -> set[str]:
+    return {joint_at(start.model, candidate.site) for candidate in listed}
+
+
+def _own(judged: Judged, candidate: Candidate) -> tuple[str, ...]:
+    """Fitted parameters of a candidate's friction."""
+    names = judged.model.effect(*candidate.key).parameter_names.values()
+    return tuple(name for name in names if name in judged.free)
+
+
+def _fitted(start: Judged, data: Data, listed: Sequence[Candidate]) -> Judged:
+    """Model with all listed friction, fitted: first its sizes, then the speeds at which it turns round, too.
+
+    Parameters begin where they were stated: a fit without friction may have led them far away.
+    """
+    stated = {name: data.training.nominal.parameters[name].value for name in start.free}
+    model, sizes, turning = start.model.with_parameters(stated), list[str](), dict[str, tuple[float, float]]()
+    for candidate in listed:
+        model = model.with_effect(candidate.effect.name, at=candidate.site, **_middle(candidate))
+        names = model.effect(*candidate.key).parameter_names
+        sizes += _sizes(model, candidate)
+        turning |= {names[short]: ends for short, ends in candidate.bounds.items() if short == TRANSITION}
+    bounds, free = dict(start.bounds), (*start.free, *sizes)
+    rough = judge(model, free, replace(data, simulation=None), bounds)
+    return judge(rough.model, (*free, *turning), data, bounds | turning)
+
+
+def _middle(candidate: Candidate) -> dict[str, float]:
+    return dict(candidate.starts[len(candidate.starts) // 2])
+
+
+class _Beside:
+    """Trials of each friction beside all others, by the regression at the values of the joint fit.
+
+    Efforts are linear in sizes, and nearly so in all else. A regression without one of them knows no bounds, and may
+    let commands hold up to one sample later or earlier. So it leaves less than a fit would, and what is lost by it is
+    no less than it says.
+    """
+
+    def __init__(self, judged: Judged, data: Data) -> None:
+        model, columns = judged.model, [judged.model.index(name) for name in judged.free]
+        self.judged, self.data = judged, data
+        self.fitted, self.slopes = judged.fit.residual, judged.fit.jacobian
+        self.later = data.training.later().evaluate(model, model.theta)[0] - self.fitted
+        self.unseen, self.unseen_slopes = data.validation.evaluate(model, model.theta, columns)
+        self.unseen_later = data.validation.later().evaluate(model, model.theta)[0] - self.unseen
+
+    def __call__(self, candidate: Candidate) -> Trial:
+        """Trial of one friction beside all others."""
+        judged, own = self.judged, _own(self.judged, candidate)
+        values = {name: judged.model.parameters[name].value for name in own}
+        gone = _sizes(judged.model, candidate)
+        move = np.array([-values[name] if name in gone else 0.0 for name in judged.free])
+        others = np.array([name not in own for name in judged.free])
+        left, slopes = self.fitted + self.slopes @ move, self.slopes[:, others]
+        shift = float(np.clip(_made_up(left, np.column_stack([slopes, self.later]))[-1], -1.0, 1.0))
+        move[others] = _made_up(left + shift * self.later, slopes)
+        left = self.fitted + self.slopes @ move + shift * self.later
+        unseen = self.unseen + self.unseen_slopes @ move + shift * self.unseen_later
+        less = replace(
+            judged,
+            model=judged.model.without_effect(*candidate.key),
+            fit=replace(judged.fit, residual=left),
+            validation=unseen,
+            simulated=None,
+        )
+        spread = dict(zip(own, (float(judged.fit.std[judged.free.index(name)]) for name in own), strict=True))
+        drop = 1.0 - float(self.fitted @ self.fitted) / float(left @ left)
+        probe = Probe(candidate, judged.model, own, (), (), values, spread, drop)
+        return measured(less, self.data, probe, judged, own, (), None, "")
+
+
+def _made_up(residual: Array, slopes: Array) -> Array:
+    """What parameters make up for without some friction, as far as the records show them."""
+    lengths = column_lengths(slopes)
+    return np.asarray(np.linalg.lstsq(slopes / lengths, -residual, rcond=RANK_TOLERANCE)[0] / lengths)
+
+
+def _sizes(model: Model, candidate: Candidate) -> list[str]:
+    """Parameters of a friction that are sizes, in which efforts are linear."""
+    names = model.effect(*candidate.key).parameter_names
+    return [name for short, name in names.items() if not candidate.effect.parameter(short).shape]
+
+
+def _reduced(judged: Judged, gone: Sequence[Candidate], data: Data) -> Judged:
+    """Model without some of its friction, all else fitted again by one step."""
+    model = judged.model
+    for candidate in reversed(gone):
+        model = model.without_effect(*candidate.key)
+    free = tuple(name for name in judged.free if name in model.parameters)
+    bounds = {name: ends for name, ends in judged.bounds.items() if name in free}
+    return judge(model, free, data, bounds, linear_only=True)
+
+
+def _leaving(trials: Sequence[Trial], thresholds: Thresholds) -> list[Candidate]:
+    """Friction that validation records do not ask for, or that does not do most of the work where it acts.
+
+    Of each joint that which does least: what it did, the other friction there may do.
+    """
+    least: dict[str, Trial] = {}
+    for trial in trials:
+        if trial.there.relative < CLEAR_GAIN or refuse_trial(trial, thresholds):
+            joint = joint_at(trial.judged.model, trial.probe.candidate.site)
+            least[joint] = min(trial, least.get(joint, trial), key=lambda one: one.there.relative)
+    return [trial.probe.candidate for trial in least.values()]
+
+
+def _begun(found: Search, judged: Judged, data: Data, trials: Sequence[Trial], each: ParallelCandidates) -> Search:
+    """Search with friction that was judged, the clearest first."""
+    ordered = sorted(trials, key=lambda trial: -trial.there.relative)
+    listed = [trial.probe.candidate for trial in ordered]
+    alone = replace(data, simulation=None)
+    places = range(1, len(listed))
+    fits = each(
+        "friction: refitting one after the other",
+        lambda place: _reduced(judged, listed[place:], alone),
+        places,
+        lambda place: listed[place - 1].label,
+    )
+    reached = [one if isinstance(one, Judged) else judged for one in fits] + [judged]
+    stages = [Stage("added", *one.key, fit) for one, fit in zip(listed, reached, strict=True)]
+    accepted = [Accepted(trial, ()) for trial in ordered]
+    return replace(found, stages=(*found.stages, *stages), accepted=(*found.accepted, *accepted))
