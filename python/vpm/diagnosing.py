@@ -38,6 +38,7 @@ from vpm.identify.parallel import worker_count
 from vpm.log_check import refuse_mistakes
 from vpm.model import Model
 from vpm.naming import BROKEN, FAILED, RANKING, STOPPED, Names, Tell, named, ranked_notes, ranking_of, until_stopped
+from vpm.observer import measured_outputs
 from vpm.one_thread import in_one_thread
 from vpm.ranking import Ranking, Settings
 from vpm.ranking.by_tracker import diagnosed_by_tracker
@@ -56,6 +57,8 @@ STOPPED_BARE = "stopped by Ctrl-C before all pictures were drawn, and experiment
 STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, was examined"
 #: Said where a cut-off frequency was asked for and no motion is filtered.
 UNFILTERED = "the cut-off frequency is not used, for an observer filters nothing"
+#: Said where something stays unexplained, of readings whose errors no candidate describes.
+NO_SENSOR = "no offset, gain or delay of {channels} was tried: describe a sensor of them in the model file to try these"
 #: What is odd in a channel and may pass for an effect.
 NOTED = ("delay", "frozen", "clipped", "spikes")
 
@@ -233,7 +236,14 @@ def diagnosed(
     most = max(LEAST_LIMIT, 2 * len(model.joints)) if limit is None else limit
     names = asked.get("names", RANKING)
     diagnosis = _diagnosis(model, records, effects, cutoff, setup, most, names, each, tell)
-    return replace(diagnosis, notes=(*odd, *diagnosis.notes))
+    blind = [] if diagnosis.verdict != "unexplained" else _without_sensor(model, records[0])
+    return replace(diagnosis, notes=(*odd, *diagnosis.notes, *blind))
+
+
+def _without_sensor(model: Model, records: Sequence[Experiment]) -> list[str]:
+    """Note on logged outputs without a described sensor, whose errors a diagnosis does not try."""
+    bare = {name for record in records for name in measured_outputs(model, record) if model.sensor_of(name) is None}
+    return [NO_SENSOR.format(channels=", ".join(sorted(bare)))] if bare else []
 
 
 def _diagnosis(
@@ -281,7 +291,7 @@ def _measured(
     if ranking is not None and ranking.hold != setup.course:
         notes.append(FOUND_HOLD.format(hold=ranking.hold))
         setup = replace(setup, hold=ranking.hold)
-    if ranking is not None and (reason := why_unbalanced(model)):
+    if ranking is not None and (reason := why_unbalanced(model, training)):
         say("measuring what was named on validation records")
         notes.extend([] if cutoff is None else [UNFILTERED])
         told = diagnosed_by_tracker(ranking, model, records, (effects, limit), setup, reason)

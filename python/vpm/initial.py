@@ -76,9 +76,9 @@ def _bent(model: Model, theta: Array, motion: tuple[Array, Array, Array], dt: fl
 def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
     """Initial state at the first sample: lags settled, flexible links deflected as in equilibrium.
 
-    The machine is at rest at zero where the log holds no position, and shafts tell none. Drives have stood without
-    commands, but for what the log holds of them: pressures of chambers, current, place of the spool. One pressure and
-    the load tell the other.
+    A joint is at zero where the log holds no position, and shafts tell none, with its logged velocity or at rest.
+    Drives have stood without commands, but for what the log holds of them: pressures of chambers, current, place of the
+    spool. One pressure and the load tell the other.
     """
     joints, coordinates = len(model.joints), len(model.coordinates)
     with suppress(ExperimentError):  # shafts that do not tell the joints leave them at rest
@@ -90,6 +90,9 @@ def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
             position, velocity = _fit_start(experiment, f"{name}.position")
             state[joint] = (position - offset[joint]) / gain[joint]
             state[coordinates + joint] = velocity / gain[joint]
+    for name in joints_by_velocity(model, experiment.channels):
+        velocity, _ = _fit_start(experiment, f"{name}.velocity")
+        state[coordinates + model.joints.index(name)] = _true(model, theta, f"{name}.velocity", velocity)
     if model.loops:
         seen = [name for name in model.joints if f"{name}.position" in experiment]
         moving = slice(coordinates, 2 * coordinates)
@@ -109,6 +112,15 @@ def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
             internal[place] = experiment[command][0]
     state[2 * coordinates :] = _seen(model, experiment, theta, state[:coordinates], internal, 0)
     return state
+
+
+def joints_by_velocity(model: Model, channels: Sequence[str]) -> tuple[str, ...]:
+    """Joints whose initial state a log tells by the velocity alone, as of a tachometer.
+
+    Of closed loops, or of joints that effects split off, none: other joints place these.
+    """
+    own = () if model.loops else (name for name in model.joints if name not in model.added_joints)
+    return tuple(name for name in own if f"{name}.velocity" in channels and f"{name}.position" not in channels)
 
 
 def whole_motion(model: Model, experiment: Experiment, theta: Array, cutoff: float | None) -> Motion:
@@ -253,6 +265,11 @@ def _chambers(
 
 
 def _reading(model: Model, experiment: Experiment, theta: Array, channel: str, row: int) -> float:
+    """True initial value of a logged channel."""
+    return _true(model, theta, channel, float(experiment[channel][row]))
+
+
+def _true(model: Model, theta: Array, channel: str, reading: float) -> float:
     """True initial value behind a reading, without its sensor's offset and gain."""
     sensor = model.sensor_of(channel)
 
@@ -260,7 +277,7 @@ def _reading(model: Model, experiment: Experiment, theta: Array, channel: str, r
         name = f"{sensor}.{suffix}"
         return float(theta[model.index(name)]) if name in model.parameters else none
 
-    return (float(experiment[channel][row]) - error("offset.value", 0.0)) / error("gain.value", 1.0)
+    return (reading - error("offset.value", 0.0)) / error("gain.value", 1.0)
 
 
 def _areas(model: Model, theta: Array, name: str) -> tuple[float, float]:

@@ -68,7 +68,7 @@ def ranking_of(
     """
     names, effects, limit = by
     training, validation = records
-    unbalanced = why_unbalanced(model)
+    unbalanced = why_unbalanced(model, training)
     if names != "ranking":
         if unbalanced:
             raise DiagnosisError(NO_SEARCH.format(model=model.name, reason=unbalanced))

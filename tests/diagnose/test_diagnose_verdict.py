@@ -32,6 +32,21 @@ def test_a_trifle_above_its_noise_says_nothing_of_another_channel(elbow: float, 
     assert told(elbow) == word
 
 
+@pytest.mark.parametrize(("after", "word"), [(0.1, "effect_found"), (0.9, "unexplained")])
+def test_without_efforts_an_effect_that_leaves_the_error_explains_nothing(after: float, word: str) -> None:
+    """An observer alone tells what is left: a share of 0.81 of the error power is no explanation."""
+    effect: Any = SimpleNamespace(key=("lugre_friction", "shaft"), trial=SimpleNamespace())
+    effect.trial.probe = SimpleNamespace(candidate=SimpleNamespace(label="lugre_friction at shaft"))
+    model: Any = SimpleNamespace(effects=(), bodies=(), joints=("shaft",), parameters={})
+    final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=()))
+    found: Any = SimpleNamespace(
+        accepted=(effect,), left={"shaft": after**2}, within_laws=False, interrupted=False, final=final, ranked=None
+    )
+    judged: Any = SimpleNamespace(model=model)
+    gap = {"shaft.velocity": ChannelGap(1.0, 1.0, after, NOISE, "rad/s", SIGNAL, "observed")}
+    assert verdict(None, judged, judged, found, gap, None, None)[0] == word
+
+
 def test_an_error_that_grew_is_not_told_as_a_gap_that_closed() -> None:
     """Of two channels the one farthest above its noise became worse: the other one is told, and that this one grew."""
     noise = np.random.default_rng(0).standard_normal(2000)

@@ -17,12 +17,12 @@ FAR = 3.0
 
 
 def moved_far(model: Model, recalibrated: Judged) -> list[str]:
-    """Notes on parameters that a recalibration moved far from their prior in the model file."""
+    """Notes on parameters that a recalibration clearly moved far from their prior in the model file."""
     notes = []
-    for name in recalibrated.free:
+    for name, std in zip(recalibrated.free, recalibrated.fit.std, strict=True):
         before, after = model.parameters[name], recalibrated.model.parameters[name]
         spread = _stated(before)
-        if abs(after.value - before.value) > FAR * spread:
+        if abs(after.value - before.value) - NORMAL_95 * float(std) > FAR * spread:
             notes.append(
                 f"recalibration moved {name} from {short(before.value)} to {short(after.value)} {before.unit}, "
                 f"{abs(after.value - before.value) / spread:.1f} times its stated uncertainty"

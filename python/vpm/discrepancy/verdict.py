@@ -89,7 +89,8 @@ def verdict(
             True,
         )
     tracked = min(found.left.values(), default=np.nan)
-    mostly_open = (structured and share_left > MOSTLY_OPEN) or _is_described_better(rest)
+    open_anywhere = structured or (data is None and bool(still))  # without efforts an observer alone can tell
+    mostly_open = (open_anywhere and share_left > MOSTLY_OPEN) or _is_described_better(rest)
     joints = Joints.of(gap, left, found.left)
     apart = joints.differ and not any(joints.has(entry, found.final.model) for entry in found.accepted)
     if found.accepted and (

@@ -289,10 +289,13 @@ def _channels(
     """Columns of a log for its motion; zeros for optional ones that it does not hold."""
     for channel in channels:
         if channel not in experiment and channel not in optional:
+            owner, _, quantity = channel.rpartition(".")
+            by_speed = quantity == "position" and f"{owner}.velocity" in experiment
             near = near_match(channel, experiment.channels, what="the log holds")
+            rest = "a velocity alone is enough for a diagnosis, and for fits by free_run or prediction_error"
             raise ExperimentError(
                 f'{experiment.name}: the motion of "{model.name}" needs the channel "{channel}", which the log does '
-                f"not hold; map a column to it in the channel table ({near})",
+                f"not hold; map a column to it in the channel table ({rest if by_speed else near})",
                 channel=channel,
             )
     known = {channel: experiment[channel] for channel in channels if channel in experiment}

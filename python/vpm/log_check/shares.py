@@ -167,7 +167,7 @@ class Judge:
         None where the model as it is follows the record, by its ``plain`` shares, and where no efforts follow from the
         motion. Nor where the model file rules such values out: commands that are far too small ask for masses that are.
         """
-        if not plain.above(self.settings.doubtful) or why_unbalanced(self.model):
+        if not plain.above(self.settings.doubtful) or why_unbalanced(self.model, [record]):
             return None
         try:
             found = regressed(structure, InverseDynamicsProblem(self.model, [record]))

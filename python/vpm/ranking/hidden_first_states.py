@@ -16,7 +16,7 @@ STEP = 1e-3
 
 
 def hidden_states(model: Model, channels: Sequence[str]) -> tuple[str, ...]:
-    """Hidden states of a model: positions and velocities of joints without a position channel.
+    """Hidden states of a model: positions of joints without a position channel, and velocities that none shows.
 
     Of machines with closed loops none: first states next to one another would leave their loops open.
     """
@@ -24,7 +24,7 @@ def hidden_states(model: Model, channels: Sequence[str]) -> tuple[str, ...]:
         return ()
     hidden = [name for name in model.joints if name not in model.added_joints and f"{name}.position" not in channels]
     names = [f"{name}.{what}" for what in ("position", "velocity") for name in hidden]
-    return tuple(name for name in names if name in model.state_names)
+    return tuple(name for name in names if name in model.state_names and name not in channels)
 
 
 @dataclass(frozen=True)

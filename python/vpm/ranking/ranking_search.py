@@ -238,7 +238,7 @@ class Search:
 
     def _brought_back(self, looks: list[Look]) -> tuple[list[Look], list[tuple[Ranked, ...]]]:
         """Search begun with the usual friction that counts, of a model that is lost at several joints without it."""
-        if why_unbalanced(self.start.model) or not all(look.is_lost for look in looks):
+        if why_unbalanced(self.start.model, self.fitter.tracked.experiments) or not all(look.is_lost for look in looks):
             return looks, []
         with contextlib.suppress(*ASTRAY):
             most = self.settings.effects

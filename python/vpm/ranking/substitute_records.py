@@ -1,4 +1,4 @@
-"""Substitute records for machines without inverse dynamics: closed loops opened, sampled drives idle."""
+"""Substitute records for machines without inverse dynamics: loops opened, sampled drives idle, joints placed."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.following import Following
 from vpm.identify.response_along_motion import SAMPLED_TYPES, Response
+from vpm.initial import joints_by_velocity
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.ranking.tracked_records import TrackedRecords, Tracker
@@ -18,13 +19,16 @@ from vpm.ranking.tracked_records import TrackedRecords, Tracker
 PLACES = ("joint", "line", "transmission")
 
 
-def why_unbalanced(model: Model) -> str:
+def why_unbalanced(model: Model, experiments: Sequence[Experiment] = ()) -> str:
     """Why a machine needs substitute records, because no efforts follow from its motion, or ""."""
     if model.loops:
         return f"the closed loops ({', '.join(model.loops)}) share efforts among them"
     for name in model.actuators:
         if (kind := model.actuator_type(name)) in SAMPLED_TYPES:
             return f"the actuator {name} (type {kind}) goes by samples of its own"
+    for experiment in experiments:
+        if joints := joints_by_velocity(model, experiment.channels):
+            return f"the log holds no position of {' and '.join(joints)}, only its velocity"
     return ""
 
 
@@ -32,7 +36,7 @@ def shown(model: Model, tracked: TrackedRecords) -> InverseDynamicsProblem:
     """Motion and efforts of the records, or those of substitute records that are as large."""
     return (
         SubstituteProblem(model, tracked)
-        if why_unbalanced(model)
+        if why_unbalanced(model, tracked.experiments)
         else InverseDynamicsProblem(model, tracked.experiments)
     )
 
@@ -93,7 +97,10 @@ def _idle(joint: str) -> str:
 
 def _completed(model: Model, tracked: TrackedRecords) -> list[Experiment]:
     """Substitute records with positions of all joints; a tracker estimates unmeasured ones."""
-    if not model.loops:
+    lacking = {joint for one in tracked.experiments for joint in joints_by_velocity(model, one.channels)}
+    if model.loops:
+        lacking = set(model.joints) - set(model.added_joints)
+    if not lacking:
         return list(tracked.experiments)
     fast = Tracker(max(tracked.settings.bands), fine=False)
     motions = tracked.states(model, fast)
@@ -103,7 +110,7 @@ def _completed(model: Model, tracked: TrackedRecords) -> list[Experiment]:
         whole = record
         for place, joint in enumerate(model.joints):
             channel = f"{joint}.position"
-            if channel not in record and joint not in model.added_joints:
+            if channel not in record and joint in lacking:
                 whole = whole.with_channel(channel, motion[:, place], model.channel_unit(channel))
         for name in added:
             whole = whole.with_channel(f"{name}.command", np.zeros(len(record.time)), "1")

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import VpmError
 from vpm.experiment import Experiment, read_noise
-from vpm.initial import initial_state
+from vpm.initial import initial_state, joints_by_velocity
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.observer import Record
@@ -65,9 +65,10 @@ class TrackedRecords:
     The tracker knows no noise. It draws each measured joint to its encoder with the bandwidth, as by a soft spring with
     a damper between the machine and its log. All structures are compared under the same one. Where a joint is split,
     the load behind its spring or backlash is drawn along with the motor. Else both would answer to noise, and to
-    missing effects elsewhere, otherwise than a rigid joint does. A deflection that the logs hold is compared and not
-    drawn: a structure without the joint behind predicts zero. Of joints in closed loops, as many are drawn as there are
-    degrees of freedom. More of them would have to be weighed against each other.
+    missing effects elsewhere, otherwise than a rigid joint does. A joint of which the logs hold the velocity alone is
+    drawn to that. A deflection that the logs hold is compared and not drawn: a structure without the joint behind
+    predicts zero. Of joints in closed loops, as many are drawn as there are degrees of freedom. More of them would have
+    to be weighed against each other.
 
     Parameters
     ----------
@@ -135,7 +136,7 @@ class TrackedRecords:
         return np.concatenate([record.readings - np.mean(record.readings, axis=0) for record in self.records])
 
     def drawn(self, band: float) -> Array:
-        """Residual of tracked records under free masses (N, m); zero for channels without position.
+        """Residual of tracked records under free masses (N, m); zero for channels that are not drawn.
 
         Of a machine that is far too heavy it leaves the same, for no force of its model does anything any more.
         """
@@ -143,9 +144,9 @@ class TrackedRecords:
 
         left = np.zeros_like(self.motion)
         for end, record in zip(np.cumsum([len(one.time) for one in self.records]), self.records, strict=True):
-            zeros, poles = _free_mass(band, record.dt)
             for column, channel in enumerate(record.channels):
                 if channel in self.drawn_to:
+                    zeros, poles = _free_mass(channel, band, record.dt)
                     reading = record.readings[:, column] - record.readings[0, column]
                     left[end - len(reading) : end, column] = lfilter(zeros, poles, reading)
         return left
@@ -170,7 +171,7 @@ class TrackedRecords:
             passed = read_noise(self.experiments[place], channel, lines)
             if channel in self.drawn_to:
                 turns = np.exp(2j * np.pi * lines)
-                zeros, poles = (np.polyval(one, turns) for one in _free_mass(band, self.records[place].dt))
+                zeros, poles = (np.polyval(one, turns) for one in _free_mass(channel, band, self.records[place].dt))
                 passed = passed * np.abs(zeros / poles) ** 2
             found.append(passed)
         return found
@@ -319,10 +320,10 @@ def _records(model: Model, experiments: Sequence[Experiment]) -> Iterator[Record
 
 
 def _drawn(model: Model, channels: Sequence[str]) -> tuple[str, ...]:
-    """Position channels that a tracker draws independently, those of driven joints first."""
+    """Channels that a tracker draws independently: positions, those of driven joints first, or else velocities."""
     positions = [name for name in channels if is_position(model, name)]
     if not model.loops:
-        return tuple(positions)
+        return (*positions, *(f"{joint}.velocity" for joint in joints_by_velocity(model, channels)))
     joints = {name.rpartition(".")[0]: name for name in positions}
     start, driven = model.loops.assembled(), [joint for joint in joints if joint in model.driven_joints]
     ways = [set(joints) & set(model.loops.independent(start, preferred)) for preferred in (driven, list(joints))]
@@ -354,10 +355,11 @@ def tracker_gain(model: Model, channels: Sequence[str], band: float, dt: float, 
     gain = np.zeros((len(model.state_names), len(channels)))
     coordinates = model.coordinates
     for column, channel in enumerate(channels):
-        if not is_position(model, channel):
+        joint, _, quantity = channel.rpartition(".")
+        if joint not in coordinates or quantity not in {"position", "velocity"}:
             continue
-        place = coordinates.index(channel.rpartition(".")[0])
-        moved = np.array(_gains(band, dt)) / _factor(model, channel, theta)
+        place = coordinates.index(joint)
+        moved = np.array(_gains(channel, band, dt)) / _factor(model, channel, theta)
         gain[[place, len(coordinates) + place], column] = moved
     return gain
 
@@ -371,15 +373,19 @@ def is_position(model: Model, channel: str) -> bool:
     return quantity == "position" and joint in model.coordinates and joint not in model.added_joints
 
 
-def _gains(band: float, dt: float) -> tuple[float, float]:
-    """Gains of a tracker from a position error to the position and its rate."""
+def _gains(channel: str, band: float, dt: float) -> tuple[float, float]:
+    """Gains of a tracker from an error of a position, or of a velocity, to the position and its rate."""
     turn = 2.0 * np.pi * band * dt
+    if channel.endswith(".velocity"):
+        return 0.0, float(-np.expm1(-turn))
     return float(-np.expm1(-2.0 * DAMPING * turn)), turn**2 / dt
 
 
-def _free_mass(band: float, dt: float) -> tuple[list[float], list[float]]:
+def _free_mass(channel: str, band: float, dt: float) -> tuple[list[float], list[float]]:
     """Error of a tracked free mass: numerator and denominator polynomials of the transfer function."""
-    place, rate = _gains(band, dt)
+    place, rate = _gains(channel, band, dt)
+    if channel.endswith(".velocity"):
+        return [1.0, -1.0], [1.0, rate - 1.0]
     return [1.0, -2.0, 1.0], [1.0, place + dt * rate - 2.0, 1.0 - place]
 
 
