@@ -455,6 +455,12 @@ REFUSALS = [
     ("viscous =", "viscus =", "effects[0].viscus", 'did you mean "viscous"?'),
     ('"q_m", unit', '"q_m", scal = 1, unit', 'channels."axis.position".scal', 'did you mean "scale"?'),
     ("value = 80.0, ", "", "bodies.carriage.mass.value", "is missing; add it, for example value = 1.0"),
+    (
+        'time = { column = "time_s", unit = "s"',
+        'time = { column = "time_s"',
+        "channels.time.unit",
+        'for example unit = "s"',
+    ),
     ('type = "prismatic"\n', "", "joints.axis.type", 'for example type = "prismatic"'),
     ('at = "axis"\n', "", "effects[0].at", "is missing"),
     ('type = "cascade"\n', "", "controllers.servo", "has no type"),

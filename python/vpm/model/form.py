@@ -35,6 +35,7 @@ _EXAMPLES: Mapping[str, str] = {
     "value": "value = 1.0",
     "column": 'column = "q_m"',
     "unit": 'unit = "m"',
+    "channels.time.unit": 'unit = "s"',
     "length": "length = 0.5",
     "level": 'level = "bezier(4)"',
     "material": "material = { young = 206e9, poisson = 0.3, density = 7850 }",
@@ -105,7 +106,7 @@ def _sentence(
             return f'belongs to type = "{" or ".join(other)}", but this is {own}; change the type or remove the key'
         return f"is not a known key; {near_match(str(keys[-1]), keys_of(*tables))}"
     if kind == "missing":
-        example = _example(str(keys[0]), str(keys[-1]))
+        example = _EXAMPLES.get(".".join(map(str, keys))) or _example(str(keys[0]), str(keys[-1]))
         return "is missing; add it" + (f", for example {example}" if example else "")
     if kind in _KINDS:
         return f"is {shown(found)}, but has to be {_KINDS[kind]}; correct it"
