@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -90,19 +90,33 @@ def remarks(
         moved = abs(value - first)
         if name not in limits and name not in blind and moved <= min(STILL * abs(first), STILL_STD * deviation):
             told.append(f"{name} is still at its start {first:.6g}: begin elsewhere and see whether it comes back")
-    told += [
-        f"{names[i]} and {names[j]} are collinear, correlation {correlation[i, j]:+.4f}: these data know one "
-        "combination of them much better than each"
-        for i in range(len(names))
-        for j in range(i)
-        if abs(correlation[i, j]) > COLLINEAR and not {names[i], names[j]} & blind
-    ]
+    told += _collinear(names, correlation, blind)
     count, unknowns = int(sum(block.moving.sum() for block in blocks)), len(names) + others
     if count < SAMPLES_EACH * unknowns:
         told.append(
             f"{count} samples are too few for {unknowns} unknowns, {', '.join(names)} among them: record longer or "
             "free less"
         )
+    return told
+
+
+def _collinear(names: Sequence[str], correlation: Array, blind: Collection[str]) -> list[str]:
+    """Diagnostic sentence on each group of parameters that the data know only together."""
+    from scipy.sparse.csgraph import connected_components  # slow to import, and seldom needed
+
+    seen = [place for place, name in enumerate(names) if name not in blind]
+    size = np.abs(correlation[np.ix_(seen, seen)])
+    count, groups = connected_components(size > COLLINEAR, directed=False)
+    told = []
+    for group in range(count):
+        mine = np.flatnonzero(groups == group)
+        if len(mine) > 1:
+            *most, last = (names[seen[place]] for place in mine)
+            least = float(np.min(size[np.ix_(mine, mine)]))
+            told.append(
+                f"{', '.join(most)} and {last} are collinear, correlation {'at least ' * (len(mine) > 2)}{least:.4f} "
+                "in size: these data know a combination of them much better than each"
+            )
     return told
 
 
