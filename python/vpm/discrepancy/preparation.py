@@ -12,7 +12,7 @@ from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge, judge
 from vpm.discrepancy.motion_filters import filters
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.prior_departure import moved_far
-from vpm.discrepancy.screening.candidates import slow_speeds
+from vpm.discrepancy.screening.candidates import shares_at, slow_speeds
 from vpm.discrepancy.stuck_channels import check_moving, check_stuck
 from vpm.errors import DiagnosisError, DivergedError
 from vpm.experiment import Experiment, joints_from_sensors
@@ -106,9 +106,9 @@ def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[
     for effect in model.effects:
         name = effect.parameter_names.get("transition_velocity")
         dry = effect.type.sticks and not effect.type.close_to_rest
-        if dry and name is not None and effect.at in data.joints:
-            joint = data.joints.index(effect.at)
-            speeds = np.concatenate([np.abs(data.state(record)[1][:, joint]) for record in range(len(data.motions))])
+        if dry and name is not None and effect.at in (*data.joints, *model.transmissions):
+            shares = shares_at(model, effect.at, data.joints)
+            speeds = np.concatenate([np.abs(data.state(record)[1] @ shares) for record in range(len(data.motions))])
             found[name] = slow_speeds(float(np.quantile(speeds, 0.999)))
     return found
 
