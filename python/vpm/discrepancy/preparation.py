@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
@@ -17,6 +16,7 @@ from vpm.discrepancy.stuck_channels import check_moving, check_stuck
 from vpm.errors import DiagnosisError, DivergedError
 from vpm.experiment import Experiment, joints_from_sensors
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
+from vpm.identify.comparison import relative_to_drives
 from vpm.identify.parallel import worker_count
 from vpm.model import Model
 from vpm.simulate import Setup
@@ -55,13 +55,20 @@ def data_of(
     notes: list[str],
 ) -> Data:
     """Prepare residual problems of the records with common filters and sample masks, with a note on each."""
-    balance = partial(InverseDynamicsProblem, model, hold=setup.course)
-    fitted = balance(training, cutoff=cutoff)
+    constants = [name for name in model.adjustable if _is_proportional(model, name.partition(".")[0])]
+
+    def balance(
+        several: Sequence[Experiment], cut: float | Sequence[float] | None, band: Sequence[float] | float | None = None
+    ) -> InverseDynamicsProblem:
+        problem = InverseDynamicsProblem(model, several, cutoff=cut, band=band, hold=setup.course)
+        return relative_to_drives(model, problem, constants, {})
+
+    fitted = balance(training, cutoff)
     states, bands = filters(model, fitted, cutoff)
     if states != tuple(m.cutoff for m in fitted.motions):
-        fitted = balance(training, cutoff=states, band=bands)
+        fitted = balance(training, states, bands)
     # One filter for all validation records: a gap that is measured in another band is another gap.
-    predicted = balance(validation, cutoff=min(states), band=min(bands))
+    predicted = balance(validation, min(states), min(bands))
     for problem in (fitted, predicted):
         problem.take_long_steps()
         for number, (record, m) in enumerate(zip(problem.experiments, problem.motions, strict=True)):
@@ -70,6 +77,11 @@ def data_of(
             notes.append(f"{record.name}: motion filtered at {m.cutoff:.4g} Hz, compared up to {m.band:.3g} Hz{rest}")
     notes.append(f"validation records simulated in mode {mode}")
     return Data(fitted, predicted, OutputErrorProblem(model, validation, mode, setup=setup))
+
+
+def _is_proportional(model: Model, name: str) -> bool:
+    """Whether a prepared drive gives an effort in proportion to a constant, which may grow with all masses."""
+    return name in model.actuators and model.actuator_type(name) in {"ideal", "dc_motor"}
 
 
 def nominal_of(model: Model, data: Data, notes: list[str]) -> Judged:

@@ -125,7 +125,7 @@ class RelativeProblem(InverseDynamicsProblem):
     ----------
     data : InverseDynamicsProblem
     drives : sequence of str
-        Parameters that change what drives deliver.
+        Drives whose parameters change what they deliver.
     """
 
     def __init__(self, data: InverseDynamicsProblem, drives: Sequence[str]) -> None:
@@ -146,7 +146,7 @@ class RelativeProblem(InverseDynamicsProblem):
         slopes = {
             place: self._slope(model, theta, column) / strengths
             for place, column in enumerate(columns)
-            if model.parameter_names[column] in self._drives
+            if model.parameter_names[column].partition(".")[0] in self._drives
         }
         for record in range(len(self.motions)):
             for joint, block in enumerate(self.efforts(record)):
@@ -163,8 +163,11 @@ class RelativeProblem(InverseDynamicsProblem):
         return np.where(strengths > 0.0, strengths, 1.0)
 
     def _slope(self, model: Model, theta: Array, column: int) -> Array:
-        """Derivative by one parameter of the efforts to which a comparison is relative."""
-        return difference(partial(self._strengths, model), theta, column, OF_PARAMETER * (abs(theta[column]) or 1.0))
+        """Derivative by one parameter, within its bounds, of the efforts to which a comparison is relative."""
+        parameter, step = model.parameters[model.parameter_names[column]], OF_PARAMETER * (abs(theta[column]) or 1.0)
+        middle = theta.copy()
+        middle[column] = np.clip(theta[column], parameter.minimum + step, parameter.maximum - step)
+        return difference(partial(self._strengths, model), middle, column, step)
 
 
 def relative_to_drives(
@@ -177,5 +180,4 @@ def relative_to_drives(
     moved = {*free, *(follower for follower, leader in ties.items() if leader in free)}
     held = {channel.partition(".pressure")[0] for channel in data.shown if ".pressure" in channel}
     drives = [name for name in model.actuators if name not in held]
-    mine = [name for name in sorted(moved) if name.partition(".")[0] in drives]
-    return RelativeProblem(data, mine) if mine else data
+    return RelativeProblem(data, drives) if any(name.partition(".")[0] in drives for name in moved) else data

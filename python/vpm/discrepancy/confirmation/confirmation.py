@@ -14,7 +14,7 @@ from vpm.discrepancy.confirmation.refit_start import nearer_start
 from vpm.discrepancy.confirmation.whittle_likelihood import ClosedLoopPrediction
 from vpm.discrepancy.screening.candidates import joint_at
 from vpm.discrepancy.screening.compliance_and_stop_start import ends_apart
-from vpm.discrepancy.screening.probe import Alias, Baseline, Probe, size_is_clear
+from vpm.discrepancy.screening.probe import ROUNDED, Alias, Baseline, Probe, size_is_clear
 from vpm.errors import DivergedError
 from vpm.identify import (
     Estimate,
@@ -465,8 +465,10 @@ def _release(
     released: list[str] = []
     held: list[Alias] = []
     known, span, names = fit.jacobian, Span.of(fit.jacobian), list(free)
+    least = ROUNDED * float(np.max(np.linalg.norm(known, axis=0) * np.abs(fit.values), initial=0.0))
+    typical = {name: probe.candidate.effect.parameter(short).typical for short, name in _short_names(probe).items()}
     for name, column in zip(asleep, fresh.T, strict=True):
-        if not np.any(column):
+        if np.linalg.norm(column) * typical[name] <= least:
             continue
         if is_alias(column, span, fit.residual):
             held.append(Alias(name, names[closest_column(column, known)]))
@@ -476,19 +478,35 @@ def _release(
     return tuple(released), tuple(held)
 
 
+def _as_stated(judged: Judged) -> Array:
+    """Covariance of a confirmed estimate beside stated uncertainties, which are measurements of their own.
+
+    The update of a Kalman filter (G. Welch and G. Bishop, *An Introduction to the Kalman Filter*, 1995, equation 1.11).
+    """
+    full = judged.fit.covariance.copy()
+    spread = np.array([judged.model.parameters[name].uncertainty or np.inf for name in judged.free])
+    seen = np.isfinite(np.diag(full))
+    stated = seen & np.isfinite(spread)
+    across = full[np.ix_(seen, stated)]
+    both = full[np.ix_(stated, stated)] + np.diag(spread[stated] ** 2)
+    full[np.ix_(seen, seen)] -= across @ np.linalg.solve(both, across.T)
+    return full
+
+
 def is_clear(judged: Judged, own: tuple[str, ...]) -> bool:
     """Whether the size of a confirmed effect differs from zero: a Wald test of its linear parameters together.
 
     Size and shape of a law often compensate each other, such as a higher friction close to rest that fades sooner. A
     law without size has no uncertain shape. The size of a backlash is its width, however hard its contacts are. Of
-    nearly rigid contacts no data bound the stiffness from above.
+    nearly rigid contacts no data bound the stiffness from above. Parameters are no less certain than the file states:
+    where a drive's constant and all masses may grow together, a payload's mass is known as well as that constant.
     """
     widths = {effect.parameter_names["gap"] for effect in judged.model.effects if effect.type.has_play}
     size = [n for n in own if n in widths]
     size = size or [n for n in own if judged.model.parameters[n].kind == "linear"] or list(own)
     shape = [judged.free.index(name) for name in own if name not in size]
     index = [judged.free.index(name) for name in size]
-    full = judged.fit.covariance
+    full = _as_stated(judged)
     covariance = full[np.ix_(index, index)]
     if shape and np.all(np.isfinite(full[np.ix_(index + shape, index + shape)])):
         across = full[np.ix_(index, shape)]

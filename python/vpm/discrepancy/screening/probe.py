@@ -26,6 +26,9 @@ from vpm.identify.tangent import has_tangent
 from vpm.model import Model
 from vpm.numbers import Array
 
+#: Share of the largest influence on a residual below which that of a parameter is rounding.
+ROUNDED = 1e-12
+
 #: Significance asked of an effect's size on the training data.
 SIZE_LEVEL = 0.05
 
@@ -294,7 +297,7 @@ def sort_columns(
     names, columns = known
     lengths = np.linalg.norm(fresh, axis=0) * sizes[1]
     largest = float(np.max([*(np.linalg.norm(columns, axis=0) * sizes[0]), *lengths], initial=0.0))
-    visible = [i for i in range(len(added)) if lengths[i] > 1e-12 * largest]
+    visible = [i for i in range(len(added)) if lengths[i] > ROUNDED * largest]
     invisible = tuple(added[i] for i in range(len(added)) if i not in visible)
     keep, held = list(visible), []
     for i in visible:
