@@ -75,6 +75,15 @@ def test_of_white_noise_hardly_anything_stands_out() -> None:
     assert np.std(Structured.of([values]).part_of(values)) < 0.15
 
 
+@pytest.mark.parametrize("count", [300, 2000])
+def test_noise_of_a_few_lines_is_not_taken_for_less_than_it_is(count: int) -> None:
+    """Of 300 pieces of white noise none passes for what stands 1.3 times above the level that is told of it."""
+    random = np.random.default_rng(1)
+    told = [Structured.of([random.standard_normal(count) for _ in range(3)]).noise for _ in range(300)]
+    assert min(told) > 1.0 / 1.3
+    assert np.mean(told) < 1.2
+
+
 @pytest.mark.parametrize("band", [1.0, 10.0])
 def test_noise_is_told_where_a_tracker_follows_what_is_slow_of_it(band: float) -> None:
     """It draws the model to slow noise, too, and leaves less of that."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.fft import dct, idct
 from scipy.linalg import solve_toeplitz
-from scipy.special import gammaln
+from scipy.special import chdtri, gammaln, ndtr
 
 from vpm.numbers import Array
 from vpm.ranking.settings import LINES, PER_OCTAVE, SURE, TAILS
@@ -74,6 +74,8 @@ class Structured:
 
     Law: N. Wiener, *Extrapolation, Interpolation, and Smoothing of Stationary Time Series*, MIT Press 1949, the filter
     that leaves least of noise and takes least of a signal. The quietest band of the spectrum says how strong that is.
+    Its level is known up to the chi-squared law of its lines (R. Blackman and J. Tukey, *Bell System Technical Journal*
+    37, 1958): as much is taken as chance makes of it.
     Of a band with few lines little is known, so that it is kept: nothing may grow there unseen. The lines are those of
     a cosine transform, which mirrors a piece at its ends: no jump there leaks into others.
     """
@@ -97,7 +99,8 @@ class Structured:
         shares = np.ones(len(powers)) if passed is None else np.concatenate(list(passed))
         edges, bands = _banded(places, powers)
         white = np.maximum([np.mean(band) for band in _banded(places, shares)[1]], 1e-300)
-        most = np.array([np.mean(band) * (1.0 + SURE * np.sqrt(2.0 / len(band))) for band in bands])
+        counts = np.array([len(band) for band in bands])
+        most = np.array([np.sum(band) for band in bands]) / chdtri(counts, ndtr(SURE))
         level = max(float(np.min(most / white)), 1e-300)
         most = np.maximum(most, level * white)
         return cls(edges, 1.0 - level * white / most, float(np.sqrt(level * np.mean(shares))))

@@ -33,7 +33,8 @@ MOVE = 1e-5
 TAILS = (3.0, 4.0, 6.0, 10.0, 20.0, np.inf)
 #: Bands in an octave of the spectrum, as of acoustics, and fewest lines of a band: their mean is off by 0.4 of itself.
 PER_OCTAVE, LINES = 3, 12
-#: Standard errors by which the level of a band may be higher than its lines say: chance does more once in 700 bands.
+#: The level of a band may be higher than its lines say, as sure as a normal variable is below so many deviations: by
+#: chance it is higher still once in 700 bands.
 SURE = 3.0
 
 # ---- where fits begin and how they go on -------------------------------------------------------------------------
