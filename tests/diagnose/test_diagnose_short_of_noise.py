@@ -5,11 +5,9 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-import pytest
 
 import vpm
 from vpm.experiment import Experiment
-from vpm.identify import InverseDynamicsProblem
 
 STEP, SLOW, COUNT = 0.01, 5, 2997  # s; samples between two readings of the angle; samples
 TROLLEY, LOAD, ROPE, INERTIA, GRAVITY = 180.0, 60.0, 2.5, 3.0, 9.81

@@ -8,8 +8,9 @@ import pytest
 
 from vpm import Experiment
 from vpm.errors import ExperimentError
-from vpm.experiment import choose_cutoff, instrument_noise, lowpass, read_noise
+from vpm.experiment import choose_cutoff, drawn_noise, instrument_noise, lowpass, read_noise
 from vpm.experiment.dates import seconds_of_dates
+from vpm.identify.closed_loop_prediction import Noise
 from vpm.model import ChannelEntry
 
 STEP, SLOW = 0.01, 5  # s; samples between two readings of the slow sensor
@@ -159,13 +160,26 @@ def test_noise_between_two_readings_is_not_taken_for_none(tmp_path: Path) -> Non
     log = Experiment.load(path, entries, irregular="interpolate")
     assert log.read_rate("travel.position") == pytest.approx(1.0 / STEP)
     assert log.read_rate("swing.position") == pytest.approx(1.0 / (SLOW * STEP))
-    assert instrument_noise(log, "swing.position") == pytest.approx(noise * np.sqrt(SLOW), rel=0.15)
+    assert instrument_noise(log, "swing.position") == pytest.approx(noise, rel=0.15)
+
+    for first in range(1, SLOW):  # a cut record does not begin with a reading
+        cut = log.trim(log.time[first], log.time[-1])
+        assert instrument_noise(cut, "swing.position") == pytest.approx(noise, rel=0.15)
 
     lines = np.linspace(0.0, 0.5, 2001)
     share = np.trapezoid(read_noise(log, "swing.position", lines), lines) / 0.5
     error = log["swing.position"] - 0.4 * np.sin(1.9 * log.time) - 0.1 * np.sin(4.4 * log.time)
     assert np.std(error) == pytest.approx(noise * np.sqrt(SLOW * share), rel=0.1)
     assert np.all(read_noise(log, "travel.position", lines) == 1.0)
+
+    # Noise that is drawn once more is no larger and no smaller than that of the log, and as slow.
+    again = drawn_noise(log, "swing.position", np.random.default_rng(5))
+    assert np.std(again) == pytest.approx(np.std(error), rel=0.1)
+    assert np.std(np.diff(again)) == pytest.approx(np.std(np.diff(error)), rel=0.1)
+    simulated = Noise(np.array([[0.0, noise]]), np.zeros((1, 2)))
+    ((drawn, _),) = simulated.drawn([log], np.random.default_rng(6))
+    assert np.std(drawn[:, 1]) == pytest.approx(np.std(error), rel=0.1)
+    assert np.std(np.diff(drawn[:, 1])) == pytest.approx(np.std(np.diff(error)), rel=0.1)
 
     swing_alone = log["swing.position"][:, None]
     chosen = choose_cutoff(swing_alone, log.rate, [log.read_rate("swing.position")])

@@ -5,7 +5,7 @@ from vpm.experiment.cutoff import CutoffChoice, choose_cutoff
 from vpm.experiment.draft import plain_table
 from vpm.experiment.lengths import joints_from_lengths, joints_from_sensors
 from vpm.experiment.motion import Motion, common_cutoff, motion
-from vpm.experiment.noise import instrument_noise, noise_std, quantisation_step, read_noise
+from vpm.experiment.noise import as_read, drawn_noise, instrument_noise, noise_std, quantisation_step, read_noise
 from vpm.experiment.record import Experiment
 from vpm.experiment.shafts import joints_from_shafts
 from vpm.experiment.signal import decimation_for, differentiate, lowpass, parallel_filter
@@ -15,11 +15,13 @@ __all__ = [
     "CutoffChoice",
     "Experiment",
     "Motion",
+    "as_read",
     "as_records",
     "choose_cutoff",
     "common_cutoff",
     "decimation_for",
     "differentiate",
+    "drawn_noise",
     "instrument_noise",
     "joints_from_lengths",
     "joints_from_sensors",

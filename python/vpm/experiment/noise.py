@@ -9,7 +9,7 @@ import numpy as np
 
 from vpm.errors import ExperimentError
 from vpm.experiment.grid import is_smooth
-from vpm.experiment.signal import interpolation_gain
+from vpm.experiment.signal import interpolate, interpolation_gain
 from vpm.numbers import Array
 
 if TYPE_CHECKING:
@@ -61,10 +61,10 @@ def noise_std(values: Array) -> float:
 
 
 def instrument_noise(record: Experiment, channel: str) -> float:
-    """Noise of a channel as the white noise of all samples of its record that has the same density.
+    """Standard deviation of a channel's noise in its readings, of which a record may hold fewer than samples.
 
-    Of a channel that was read at a lower rate ``r`` only the readings show it. The density of noise with deviation
-    ``s`` is ``2 s^2 / r``, so in all samples the deviation is larger by the root of the ratio of both rates.
+    A record that was cut does not say which of its samples these were. Between them there is less noise: interpolation
+    takes means of them.
 
     Parameters
     ----------
@@ -76,8 +76,27 @@ def instrument_noise(record: Experiment, channel: str) -> float:
     float
         Unit of the channel.
     """
-    every = max(1, round(record.rate / record.read_rate(channel)))
-    return noise_std(record[channel][::every]) * sqrt(every)
+    every = _samples_a_reading(record, channel)
+    return max(noise_std(record[channel][first::every]) for first in range(every))
+
+
+def drawn_noise(record: Experiment, channel: str, random: np.random.Generator) -> Array:
+    """Noise of a channel (N,), drawn once more: that of its instrument, interpolated between readings as its values."""
+    white = random.standard_normal(len(record.time))
+    return instrument_noise(record, channel) * as_read(record, channel, white)
+
+
+def as_read(record: Experiment, channel: str, values: Array) -> Array:
+    """Noise (N,) of a channel from one number a sample: only those of its readings count, interpolated in between."""
+    every, last = _samples_a_reading(record, channel), len(values) - 1
+    if every == 1:
+        return values
+    read = np.append(np.arange(0, last, every), last)
+    return interpolate(read.astype(float), values[read], np.arange(last + 1.0), smooth=is_smooth(channel))
+
+
+def _samples_a_reading(record: Experiment, channel: str) -> int:
+    return max(1, round(record.rate / record.read_rate(channel)))
 
 
 def read_noise(record: Experiment, channel: str, frequency: Array) -> Array:

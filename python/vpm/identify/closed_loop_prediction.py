@@ -22,7 +22,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from vpm.errors import VpmError
-from vpm.experiment import Experiment, Motion, noise_std
+from vpm.experiment import Experiment, Motion, as_read, instrument_noise
 from vpm.identify.first_states import begun_again
 from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.identify.response_along_motion import bends, has_hidden, has_own_drives
@@ -252,9 +252,14 @@ class Noise:
     def drawn(self, records: Sequence[Experiment], random: np.random.Generator) -> list[tuple[Array, Array]]:
         """Noise draw of a closed-loop prediction for each record: of readings and drives, in the data's shape."""
         return [
-            (seen * random.standard_normal(e.data.shape), told * random.standard_normal(e.data.shape))
+            (seen * _as_read(e, random.standard_normal(e.data.shape)), told * random.standard_normal(e.data.shape))
             for e, seen, told in zip(records, self.instruments, self.drives, strict=True)
         ]
+
+
+def _as_read(record: Experiment, white: Array) -> Array:
+    """White noise (N, channels) of a closed-loop prediction as each channel of its record holds it."""
+    return np.column_stack([as_read(record, name, one) for name, one in zip(record.channels, white.T, strict=True)])
 
 
 def mirrored(draw: Sequence[tuple[Array, Array]]) -> tuple[Sequence[tuple[Array, Array]], ...]:
@@ -277,7 +282,9 @@ def noise_of(
     random : Generator
     """
     same, names = data.on(data.experiments), compared(data)
-    instruments = np.array([[noise_std(e[c]) if c in names else 0.0 for c in e.channels] for e in data.experiments])
+    instruments = np.array(
+        [[instrument_noise(e, c) if c in names else 0.0 for c in e.channels] for e in data.experiments]
+    )
     silent = np.zeros_like(instruments)
     told = [Noise(silent, moved) for moved in _commands_moved(data)]
     if not told:

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable
-from functools import partial
 
 import numpy as np
 
-from vpm.discrepancy.noise.noise_spectrum import noise_shapes, noise_spectrum, with_noise
+from vpm.discrepancy.noise.noise_spectrum import TIMES, noise_shapes, noise_spectrum, with_noise
 from vpm.errors import VpmError
-from vpm.experiment import Experiment, instrument_noise
+from vpm.experiment import Experiment
 from vpm.experiment.signal import RETAINED_BAND
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.model import Model
@@ -26,13 +24,15 @@ QUIET_SHARE = 0.4
 def noise_floor(
     model: Model, validation: InverseDynamicsProblem, residual: Array, mode: str, setup: Setup | None = None
 ) -> dict[str, float]:
-    """Noise floor by channel: root mean square residual that the right model would leave.
+    """Noise floor by channel: root mean square residual that the right model may leave.
 
     The larger of two. The first is known beforehand. The model predicts the records, in closed loop where that is
     possible, and noise of the measured size is added. The residual of that log is noise and the error of filters and
     steps. Where the model cannot run them so, noise is added to the measured motion once more, and what that changes is
-    taken. The second comes from the residual: its white part, such as the ripple of a drive that no channel shows (see
-    `white_level`). Noise that a drive with states integrated counts too (see `noise_shapes`).
+    taken. The largest of several draws counts: a short record in a narrow band holds few numbers, and chance makes
+    their mean square large or small. The second comes from the residual: its white part, such as the ripple of a drive
+    that no channel shows (see `white_level`). Noise that a drive with states integrated counts too (see
+    `noise_shapes`).
 
     Parameters
     ----------
@@ -47,21 +47,24 @@ def noise_floor(
     setup : Setup, optional
     """
     generator = np.random.default_rng(SEED)
-    expected: dict[str, list[tuple[float, int]]] = {}
-    for experiment, m, steps in zip(validation.experiments, validation.motions, validation.integrators, strict=True):
-        balance = partial(InverseDynamicsProblem, model, cutoff=m.cutoff, band=m.band, integrator=steps)
-        own = own_log(model, experiment, setup, generator) if mode == "closed_loop" else None
-        change = _balance(model, balance, own) if own is not None else None
-        if change is None:
-            clean, noisy = balance([experiment]), balance([with_noise(model, experiment, generator)])
-            change = clean, noisy.evaluate(model, model.theta)[0] - clean.evaluate(model, model.theta)[0]
-        for channel, (rms, _, _) in gaps(*change).items():
-            expected.setdefault(channel, []).append((rms**2, change[1].size))
+    logs = validation.experiments
+    own = [own_log(model, log, setup) if mode == "closed_loop" else None for log in logs]
+    try:
+        quiet = validation.on([one or log for one, log in zip(own, logs, strict=True)])
+        left = quiet.evaluate(model, model.theta)[0]
+    except VpmError:
+        own, quiet, left = [None] * len(logs), validation, validation.evaluate(model, model.theta)[0]
+    for record, one in enumerate(own):
+        if one is not None:  # what the model leaves of its own log without noise is the error of filters and steps
+            left[_rows(quiet, record)] = 0.0
+    found: dict[str, list[float]] = {}
+    for _ in range(TIMES):
+        pairs = zip(quiet.experiments, logs, strict=True)
+        noisy = quiet.on([with_noise(model, one, log, generator) for one, log in pairs])
+        for channel, (rms, _, _) in gaps(quiet, noisy.evaluate(model, model.theta)[0] - left).items():
+            found.setdefault(channel, []).append(rms)
     white = _white(validation, residual, noise_shapes(model, validation))
-    return {
-        channel: max(float(np.sqrt(np.average([p for p, _ in v], weights=[n for _, n in v]))), white.get(channel, 0.0))
-        for channel, v in expected.items()
-    }
+    return {channel: max(*several, white.get(channel, 0.0)) for channel, several in found.items()}
 
 
 def white_level(residual: Array, moving: Array, shape: Array | None = None) -> float:
@@ -104,10 +107,8 @@ def _white(problem: InverseDynamicsProblem, residual: Array, shapes: tuple[Array
     }
 
 
-def own_log(
-    model: Model, experiment: Experiment, setup: Setup | None, generator: np.random.Generator | None = None
-) -> Experiment | None:
-    """Simulated log of the model itself with generated noise, for its noise floor; None where it cannot follow."""
+def own_log(model: Model, experiment: Experiment, setup: Setup | None) -> Experiment | None:
+    """Simulated log of the model itself, for its noise floor; None where it cannot follow."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -119,21 +120,15 @@ def own_log(
     own = experiment
     for column, channel in enumerate(model.output_channels):
         if channel in experiment:
-            values = run.outputs[:, column]
-            if generator is not None and not channel.endswith(".command"):  # the controller wrote it: exact
-                values = values + instrument_noise(experiment, channel) * generator.standard_normal(values.size)
-            own = own.with_channel(channel, values, _unit(experiment, channel))
+            own = own.with_channel(channel, run.outputs[:, column], _unit(experiment, channel))
     return own
 
 
-def _balance(
-    model: Model, balance: Callable[[list[Experiment]], InverseDynamicsProblem], own: Experiment
-) -> tuple[InverseDynamicsProblem, Array] | None:
-    try:
-        problem = balance([own])
-        return problem, problem.evaluate(model, model.theta)[0]
-    except VpmError:
-        return None
+def _rows(problem: InverseDynamicsProblem, record: int) -> slice:
+    """Rows of one record in a residual."""
+    count = len(problem.blocks) // len(problem.motions)
+    mine = problem.blocks[record * count :][:count]
+    return slice(mine[0].samples.start, mine[-1].samples.stop)
 
 
 def _unit(experiment: Experiment, channel: str) -> str:

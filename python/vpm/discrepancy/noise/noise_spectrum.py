@@ -13,7 +13,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
-from vpm.experiment import Experiment, Motion, instrument_noise
+from vpm.experiment import Experiment, Motion, drawn_noise
 from vpm.experiment.signal import RETAINED_BAND as _BAND
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.following import Following
@@ -137,7 +137,7 @@ def _of_instruments(
     m, steps = problem.motions[record], problem.integrators[record]
     clean, noisy = (
         InverseDynamicsProblem(model, [log], cutoff=m.cutoff, band=m.band, integrator=steps)
-        for log in (one, with_noise(model, one, generator))
+        for log in (one, with_noise(model, one, one, generator))
     )
     change = noisy.evaluate(model, model.theta)[0] / _weights(noisy) - clean.evaluate(model, model.theta)[0] / (
         _weights(clean)
@@ -153,15 +153,14 @@ def _weights(problem: InverseDynamicsProblem) -> Array:
     return np.concatenate([np.full(block.time.size, block.weight) for block in problem.blocks])
 
 
-def with_noise(model: Model, experiment: Experiment, generator: np.random.Generator) -> Experiment:
-    """Record with noise added to every logged output again, for its spectrum; commands are exact."""
+def with_noise(model: Model, log: Experiment, read: Experiment, generator: np.random.Generator) -> Experiment:
+    """Log with noise on every output as in the record ``read``, for its spectrum; a controller's commands are exact."""
+    noisy = log
     for channel in model.output_channels:
-        if channel in experiment and not channel.endswith(".command"):
-            values = experiment[channel]
-            noise = instrument_noise(experiment, channel) * generator.standard_normal(values.size)
-            unit = experiment.units[experiment.channels.index(channel)]
-            experiment = experiment.with_channel(channel, values + noise, unit)
-    return experiment
+        if channel in read and not channel.endswith(".command"):
+            values = log[channel] + drawn_noise(read, channel, generator)
+            noisy = noisy.with_channel(channel, values, read.units[read.channels.index(channel)])
+    return noisy
 
 
 def _shown(model: Model, problem: InverseDynamicsProblem, record: int, whole: Motion) -> Array:
