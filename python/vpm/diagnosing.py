@@ -313,7 +313,8 @@ def _measured(
     except KeyboardInterrupt:
         notes.append(STOPPED_UNJUDGED)
         gap = gaps_of(data, nominal, recalibrated, found.final, {})
-        return replace(plain(time.perf_counter() - began), gap=gap, interrupted=True)
+        known = plain(time.perf_counter() - began)
+        return replace(known, verdict="effect_found" if found.accepted else "interrupted", gap=gap, interrupted=True)
 
 
 @dataclass(frozen=True)

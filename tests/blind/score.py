@@ -168,7 +168,7 @@ def alarmed(answer: Answer) -> bool:
 
 def unexplained(answer: Answer) -> bool:
     """Whether it says that it has no name."""
-    return answer.verdict == "unexplained"
+    return answer.verdict in {"unexplained", "interrupted"}
 
 
 def single(answers: Iterable[Answer]) -> list[Answer]:

@@ -240,7 +240,7 @@ def test_ctrl_c_in_the_ranking_gives_what_is_known(monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(naming, "rank", stopped)
     why = vpm.diagnose(Model.from_toml(SLIDER_CRANK), *swings(2.0), check=False)
     assert why.interrupted
-    assert (why.verdict, why.effects, why.gap) == ("unexplained", (), {})
+    assert (why.verdict, why.effects, why.gap) == ("interrupted", (), {})
 
 
 @pytest.mark.parametrize("lacking", [0, 1])

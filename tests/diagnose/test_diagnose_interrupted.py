@@ -64,7 +64,9 @@ def named(why: vpm.Diagnosis) -> list[str]:
 def test_before_anything_is_named_nothing_is_said(kind: str) -> None:
     sentences = {"search": "recalibrating the nominal", "ranking": "ranking what", "observer": "fitting what"}
     why = stopped(kind, sentences[kind])
-    assert (why.verdict, why.effects) == ("unexplained", ())
+    assert (why.verdict, why.effects) == ("interrupted", ())
+    assert "Stopped" in why.summary
+    assert "no effect of the catalogue" not in why.summary
     assert why.model.theta.tolist() == pytest.approx(why.fit.model.theta.tolist())
 
 

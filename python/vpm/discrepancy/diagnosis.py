@@ -325,7 +325,7 @@ class Diagnosis(Result):
 
     Attributes
     ----------
-    verdict : {"effect_found", "parameters_only", "no_disagreement", "unexplained"}
+    verdict : {"effect_found", "parameters_only", "no_disagreement", "unexplained", "interrupted"}
     summary : str
         The verdict in a sentence or two.
     effects : tuple of AcceptedEffect

@@ -50,9 +50,10 @@ def of_search(
     """
     training, validation, notes = records
     names = ", ".join(entry.label for entry in found.accepted) or "no effect"
+    stopped = "Stopped before every candidate was tried. " if found.interrupted else ""
     return Diagnosis(
-        "effect_found" if found.accepted else "unexplained",
-        f"The search accepts {names} in {model.name}; what is left on validation records is not judged.",
+        "effect_found" if found.accepted else "interrupted" if found.interrupted else "unexplained",
+        f"{stopped}The search accepts {names} in {model.name}; what is left on validation records is not judged.",
         tuple(accepted_effect(entry, found.final) for entry in found.accepted),
         {},
         found.refused,

@@ -42,7 +42,7 @@ def unmeasured(
     names = ", ".join(f"{one.effect} at {one.site}" for one in effects)
     known = f"a ranking names {names}, on validation records not measured yet" if effects else "nothing is named yet"
     return Diagnosis(
-        "effect_found" if effects else "unexplained",
+        "effect_found" if effects else "interrupted",
         f"Stopped by Ctrl-C, {model.name}: {known}.",
         tuple(_effect(one, ranking.model) for one in effects),
         tracker_gaps(ranking, None),

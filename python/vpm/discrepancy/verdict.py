@@ -111,6 +111,13 @@ def verdict(
             + (_OPEN.format(joints=", ".join(joints.open)) if apart else _REST if remaining else ""),
             remaining,
         )
+    if remaining and found.interrupted:
+        return (
+            "interrupted",
+            f"The residual is structured and {above:.2g} times the noise floor, and no effect was accepted until then. "
+            f"Error on validation data: {numbers}.",
+            False,
+        )
     if remaining:
         return (
             "unexplained",

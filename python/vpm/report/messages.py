@@ -12,6 +12,7 @@ VERDICT_WORDS = {
     "parameters_only": "Nothing is missing: the known parameters only had other values.",
     "no_disagreement": "Model and data agree.",
     "unexplained": "Something is missing, and no effect of the catalogue explains it.",
+    "interrupted": "Stopped before there was an answer.",
 }
 
 
