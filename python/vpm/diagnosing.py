@@ -313,8 +313,10 @@ def _measured(
     except KeyboardInterrupt:
         notes.append(STOPPED_UNJUDGED)
         gap = gaps_of(data, nominal, recalibrated, found.final, {})
-        known = plain(time.perf_counter() - began)
-        return replace(known, verdict="effect_found" if found.accepted else "interrupted", gap=gap, interrupted=True)
+        found_so_far = plain(time.perf_counter() - began)
+        return replace(
+            found_so_far, verdict="effect_found" if found.accepted else "interrupted", gap=gap, interrupted=True
+        )
 
 
 @dataclass(frozen=True)
