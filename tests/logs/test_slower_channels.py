@@ -107,6 +107,27 @@ def test_a_slow_sensor_counts_where_it_was_read(tmp_path: Path, slow: list[str])
     assert np.median(np.abs(error)) < 0.005  # the step of the sensor
 
 
+@pytest.mark.parametrize("times", [1.0, 5.0])
+def test_values_held_for_two_samples_are_refused_where_that_costs_more_than_noise(times: float) -> None:
+    """Half of the samples are one step late, so the error is the step times the speed, by the root of two."""
+    noise, time = 1e-3, STEP * np.arange(4 * COUNT)
+    read = times * 0.2 * np.sin(0.7 * time) + noise * np.random.default_rng(2).normal(size=time.size)
+    held = read[np.arange(time.size) // 2 * 2]
+    cost = times * 0.2 * 0.7 / np.sqrt(2.0) * STEP / np.sqrt(2.0)
+    if cost > noise:
+        with pytest.raises(
+            ExperimentError, match=r"off by 0\.003\d+ rad.* more than its noise of 0\.00(09|1).*interpolate"
+        ):
+            Experiment.from_arrays(time, {"boom.position": held}, {"boom.position": "rad"})
+        return
+    log = Experiment.from_arrays(time, {"boom.position": held}, {"boom.position": "rad"})
+    np.testing.assert_array_equal(log["boom.position"], held)
+    (told,) = [sentence for sentence in log.history if "repeated" in sentence]
+    assert "no more than its noise" in told
+    assert log.read_rate("boom.position") == pytest.approx(0.5 / STEP)
+    assert instrument_noise(log, "boom.position") == pytest.approx(noise, rel=0.15)
+
+
 def test_each_message_of_a_bus_has_its_own_rows(tmp_path: Path) -> None:
     """The record has the clock of the message that came most often."""
     time = STEP * np.arange(COUNT)

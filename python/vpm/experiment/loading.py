@@ -22,8 +22,9 @@ from vpm.experiment.grid import (
     make_uniform,
 )
 from vpm.experiment.merge import merge_clocks
+from vpm.experiment.noise import noise_std
 from vpm.experiment.record import Experiment
-from vpm.experiment.repeated import fresh_samples
+from vpm.experiment.repeated import fresh_samples, held_error
 from vpm.numbers import Array, array_of
 
 if TYPE_CHECKING:
@@ -123,10 +124,9 @@ def _finish(draft: Draft, name: str, irregular: str, resample: float | None) -> 
         raise ExperimentError(f'irregular="{irregular}" is not known; choose "error" or "interpolate"')
     check_finite(draft.time, draft.time, "the time", draft.source, channel="time")
     check_increasing(draft.time, draft.source)
-    _take_fresh(draft, irregular)
-    slower: dict[str, float] = {}
+    slower = _take_fresh(draft, irregular)
     if draft.clocks:
-        slower = {channel: 1.0 / float(np.median(np.diff(own))) for channel, own in draft.clocks.items()}
+        slower |= {channel: 1.0 / float(np.median(np.diff(own))) for channel, own in draft.clocks.items()}
         draft.time, draft.columns, merged = merge_clocks(
             draft.time, draft.columns, draft.clocks, draft.source, irregular=irregular
         )
@@ -162,8 +162,18 @@ def _finish(draft: Draft, name: str, irregular: str, resample: float | None) -> 
     )
 
 
-def _take_fresh(draft: Draft, irregular: str) -> None:
-    """Take of motions in a loaded file what was read, where slower sensors had their values repeated."""
+def _take_fresh(draft: Draft, irregular: str) -> dict[str, float]:
+    """Take of motions in a loaded file what was read, where slower sensors had their values repeated.
+
+    Without interpolation they stay as they are if that costs no more than the noise of the sensor. The rates of their
+    readings come back, Hz.
+
+    Raises
+    ------
+    ExperimentError
+        Repeated values cost more.
+    """
+    slower: dict[str, float] = {}
     for channel, column in draft.columns.items():
         own = draft.clocks.get(channel, draft.time)
         # An acceleration may jump, as the force that a slower controller holds.
@@ -174,10 +184,17 @@ def _take_fresh(draft: Draft, irregular: str) -> None:
         usual, step = (float(np.median(np.diff(time))) for time in (own[fresh], own))
         told = f"{channel} was read every {usual:.6g} s and repeated every {step:.6g} s in between"
         if irregular != "interpolate":
-            raise draft.source.error(
-                f"{draft.source.name}: {told}, which makes its motion late and jerky; {INTERPOLATE}, which takes what "
-                "was read, or map a channel that was read in every sample",
-                channel=channel,
-            )
+            cost, noise, unit = held_error(own, column, fresh), noise_std(column[fresh]), draft.units[channel]
+            costs = f"held so long it is off by {cost:.3g} {unit} in the mean of squares"
+            if cost > noise:
+                raise draft.source.error(
+                    f"{draft.source.name}: {told}; {costs}, more than its noise of {noise:.3g} {unit}; {INTERPOLATE}, "
+                    "which takes what was read, or map a channel that was read in every sample",
+                    channel=channel,
+                )
+            slower[channel] = 1.0 / usual
+            draft.history.append(f"{told}; {costs}, no more than its noise of {noise:.3g} {unit}.")
+            continue
         draft.columns[channel], draft.clocks[channel] = column[fresh], own[fresh]
         draft.history.append(f"{told}; the {fresh.size} values that were read count.")
+    return slower

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.experiment.noise import FEWEST_SAMPLES, quantisation_step
+from vpm.experiment.noise import FEWEST_SAMPLES, noise_std, quantisation_step
 from vpm.numbers import Array
 
 
@@ -47,3 +47,27 @@ def fresh_samples(time: Array, values: Array) -> NDArray[np.int64] | None:
     ]
     fresh = np.concatenate([np.arange(changes[0] - period, -1, -period)[::-1], *stretches])
     return fresh[~np.isin(fresh, lost)]  # behind a lost row nobody knows when it was read
+
+
+def held_error(time: Array, values: Array, fresh: NDArray[np.int64]) -> float:
+    """Error of a motion whose readings are repeated: speed times the time for which each is held, root mean square.
+
+    Noise of two readings is in the way between them, too, and no part of the error.
+
+    Parameters
+    ----------
+    time : ndarray, shape (N,)
+        s.
+    values : ndarray, shape (N,)
+    fresh : ndarray of int
+        Samples at which the motion was read, see `fresh_samples`.
+
+    Returns
+    -------
+    float
+        Unit of the values.
+    """
+    held = time - time[np.maximum.accumulate(np.where(np.isin(np.arange(time.size), fresh), np.arange(time.size), 0))]
+    speeds = np.diff(values[fresh]) / np.diff(time[fresh])
+    noise = np.sqrt(2.0) * noise_std(values[fresh]) / np.median(np.diff(time[fresh]))
+    return float(np.sqrt(max(np.mean(speeds**2) - noise**2, 0.0) * np.mean(held**2)))
