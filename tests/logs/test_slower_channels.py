@@ -147,6 +147,30 @@ def test_each_message_of_a_bus_has_its_own_rows(tmp_path: Path) -> None:
     np.testing.assert_allclose(log["boom.pressure_a"], 1e5 * np.cos(log.time), atol=10.0)  # straight lines: h^2/8
 
 
+def test_a_message_between_those_of_the_record_leaves_these_as_they_were_read(tmp_path: Path) -> None:
+    """Half a step beside its readings a position would lose noise, and a held command its jumps."""
+    random, time, noise = np.random.default_rng(4), STEP * np.arange(COUNT), 2e-3
+    read = np.sin(time) + noise * random.normal(size=COUNT)
+    held = np.repeat(random.normal(size=COUNT // 4), 4)
+    rows = ["t,q,u,p"]
+    for k, now in enumerate(time):
+        rows += [f"{now:.4f},{read[k]:.9f},{held[k]:.9f},", f"{now + 0.5 * STEP:.4f},,,{np.cos(now):.9f}"][: 1 + k % 2]
+    path = tmp_path / "bus.csv"
+    path.write_text("\n".join(rows) + "\n")
+    entries = {
+        "time": ChannelEntry(column="t", unit="s"),
+        "boom.position": ChannelEntry(column="q", unit="rad"),
+        "drive.command": ChannelEntry(column="u", unit="1"),
+        "boom.pressure_a": ChannelEntry(column="p", unit="bar"),
+    }
+    log = Experiment.load(path, entries, irregular="interpolate")
+    places = np.round(log.time / STEP).astype(int)
+    np.testing.assert_allclose(log.time, time[places], atol=1e-9)
+    np.testing.assert_allclose(log["boom.position"], read[places], atol=1e-6)
+    np.testing.assert_allclose(log["drive.command"], held[places], atol=1e-6)
+    assert instrument_noise(log, "boom.position") == pytest.approx(noise, rel=0.15)
+
+
 @pytest.mark.parametrize(
     "values",
     [
