@@ -33,6 +33,9 @@ Key = tuple[str, str]
 TRANSITION = "transition_velocity"
 #: Number of ripple periods proposed by the periodogram.
 PERIODS = 3
+#: Cells of the way in the shortest wave of an octave, waves in one more on the whole way, share of a wave that a slow
+#: sample may pass until the next one, and fewest of them: a wave has two sizes and is told from a mean.
+CELLS, FINER, PASSED, SLOWEST = 8, 4, 0.4, 16
 
 
 @dataclass(frozen=True)
@@ -280,19 +283,27 @@ def _excitation(data: InverseDynamicsProblem, model: Model, site: str, actuator:
 def _ripple_periods(position: Array, values: Array, fewest: float) -> list[float]:
     """Start periods of candidates in position: peaks of the residual's least-squares periodogram.
 
-    Evenly spaced frequencies up to what the decimated samples resolve, from ``fewest`` periods per travel; friction
-    changes its sign with the motion, and half a period suffices for it; N. Lomb, *Astrophysics and Space Science* 39,
-    1976.
+    From ``fewest`` waves on the whole way; friction changes its sign with the motion, and half a wave suffices for it.
+    Of short waves only slow samples show anything, those that pass less than one in the time between them. Each octave
+    takes those, and what a wave explains of their sum of squares counts (N. Lomb, *Astrophysics and Space Science* 39,
+    1976). Sums of values over the way give all waves of an octave at once. There are no more waves than samples.
     """
-    thin = max(1, len(values) // 4000)
-    position, values = position[::thin], values[::thin]
     travel = max(float(np.ptp(position)), 1e-12)
-    step = float(np.median(np.abs(np.diff(position)))) or travel / 1e3
-    highest = min(1.0 / (2.5 * step), 400.0 / travel)
-    frequencies = np.arange(fewest, max(highest * travel, 4.0), 0.25) / travel
-    phase = 2.0 * np.pi * np.outer(frequencies, position - position.mean())
-    centred = values - values.mean()
-    power = (np.cos(phase) @ centred) ** 2 + (np.sin(phase) @ centred) ** 2
+    place = (position - position.min()) / travel
+    steps = np.abs(np.gradient(place))
+    waves, explained = [np.zeros(0)], [np.zeros(0)]
+    slow, shortest = np.full(place.shape, fill_value=True), fewest
+    while shortest == fewest or (np.count_nonzero(slow) >= SLOWEST and shortest <= len(values)):
+        first, shortest = shortest, 2.0 * shortest
+        cells = int(CELLS * shortest)
+        centred = values[slow] - np.mean(values[slow])
+        sums = np.bincount((place[slow] * cells).astype(np.int64), centred, cells + 1)
+        spectrum = np.abs(np.fft.rfft(sums, FINER * cells)) ** 2
+        inside = slice(int(FINER * first), int(FINER * shortest))
+        waves.append(np.arange(spectrum.size)[inside] / FINER)
+        explained.append(spectrum[inside] * 2.0 / np.count_nonzero(slow))
+        slow = steps * 2.0 * shortest < PASSED
+    frequencies, power = np.concatenate(waves) / travel, np.concatenate(explained)
     peaks = [i for i in range(1, len(power) - 1) if power[i] >= power[i - 1] and power[i] > power[i + 1]]
     best = sorted(peaks or [int(np.argmax(power))], key=lambda i: -power[i])[:PERIODS]
     return [float(1.0 / frequencies[i]) for i in best]
