@@ -18,7 +18,7 @@ def told(elbow: float) -> str:
     data: Any = SimpleNamespace(validation=SimpleNamespace(blocks=(SimpleNamespace(samples=slice(0, 400)),)))
     nominal: Any = SimpleNamespace(validation=3.0 * noise)
     recalibrated: Any = SimpleNamespace(validation=noise)
-    found: Any = SimpleNamespace(accepted=(), left={}, within_laws=False)
+    found: Any = SimpleNamespace(accepted=(), left={}, within_laws=False, interrupted=False)
     left: Any = SimpleNamespace(present=True)
     gap = {
         "strain": ChannelGap(3e-3, 2e-3, 2e-3, NOISE, "1", SIGNAL, "inverse_dynamics"),

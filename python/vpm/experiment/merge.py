@@ -90,7 +90,7 @@ def merge_clocks(
         )
     check_grid(time, step, MOST_GROWTH, Source(source.name, None, source.path))
     # What has the record's clock stays as it was read: between readings there is less noise, and no command holds.
-    start = float(time[np.searchsorted(time, start)])
+    start = np.float64(time[np.searchsorted(time, start)])
     grid = start + step * np.arange(int((stop - start) / step + 1e-6) + 1)
     merged, sentences = {}, []
     for channel, own in every.items():
