@@ -358,16 +358,18 @@ def shrinkage(problem: InverseDynamicsProblem, current: Judged, judged: Judged) 
 
 
 def _where_it_acts(current: Judged, validation: Array, problem: InverseDynamicsProblem, site: str) -> Gain | None:
-    """Confirmed gain in the effort at the joint where the effect acts; None without one."""
-    joint, lost = (
-        joint_at(current.model, site),
-        float(validation @ validation) > float(current.validation @ current.validation),
-    )
-    if len(problem.joints) == 1 or joint not in problem.joints or lost:
+    """Confirmed gain in the effort at the joint where the effect acts, or of all joints for a body; None without one.
+
+    Where nothing but one effort is compared, it is the whole gain.
+    """
+    joint = joint_at(current.model, site)
+    lost = float(validation @ validation) > float(current.validation @ current.validation)
+    if len(problem.blocks) == len(problem.motions) or joint not in {"", *problem.joints} or lost:
         return None
     here = np.zeros(len(validation))
     for record in range(len(problem.motions)):
-        here[problem.efforts(record)[problem.joints.index(joint)].samples] = 1.0
+        for name, block in zip(problem.joints, problem.efforts(record), strict=True):
+            here[block.samples] = float(joint in {"", name})
     return gain(here * current.validation, here * validation, segments(problem))
 
 

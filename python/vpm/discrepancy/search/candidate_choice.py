@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from vpm.discrepancy.confirmation.sensor_prediction import preferred_sensor
 from vpm.discrepancy.screening.candidates import Candidate, Key
 from vpm.discrepancy.screening.compliance_and_stop_start import coupled
 from vpm.identify import Gain
+from vpm.model import Model
 
 #: Kinds of delay: pure delays, lags of drives, slow spools.
 KINDS: tuple[Late, ...] = ("delay", "lag", "spool")
@@ -70,9 +72,10 @@ def choose(supported: Sequence[Trial], data: Data) -> Accepted:
 
     One that refines another only takes its place if it leaves less than ``REFINED`` of what that leaves.
     """
-    first = min(supported, key=cost)
+    least = partial(cost, stated=data.training.nominal)
+    first = min(supported, key=least)
     plain = [t for t in supported if _plainer(t, first)]
-    first = min(plain, key=cost) if plain else first
+    first = min(plain, key=least) if plain else first
     equals = [t for t in supported if _as_good(t, first)]
     chosen = _delay_or_lag(preferred_sensor(_first_named(equals), equals, data), supported, data)
     return Accepted(chosen, tuple(t.probe.candidate.label for t in equals if t is not chosen))
@@ -122,9 +125,17 @@ def _share(gained: Gain) -> float:
     return max(1.0 - gained.relative, 1e-12)
 
 
-def cost(trial: Trial) -> float:
-    """Cost of a candidate in the choice: information criterion of the validation data, see `schwarz`."""
-    return schwarz(trial.validation, len(trial.parameters))
+def cost(trial: Trial, stated: Model) -> float:
+    """Cost of a candidate in the choice: information criterion of the validation data, see `schwarz`.
+
+    With what the model file states of known parameters, a measurement of them: each normal deviation counts squared.
+    """
+    prior = sum(
+        ((trial.judged.model.parameters[name].value - known.value) / known.uncertainty) ** 2
+        for name in trial.judged.free
+        if (known := stated.parameters.get(name)) is not None and known.uncertainty
+    )
+    return schwarz(trial.validation, len(trial.parameters)) + prior / max(trial.validation.pieces, 3)
 
 
 def schwarz(gained: Gain, numbers: int) -> float:

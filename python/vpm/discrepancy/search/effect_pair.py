@@ -99,7 +99,7 @@ def _do_more(outcome: Round, best: Accepted | None, first: Trial, second: Trial,
     )
     if both.validation.relative < CLEAR_GAIN or refuse_trial(both, outcome.thresholds()):
         return False
-    return best is None or cost(both) < cost(best.trial)
+    return best is None or cost(both, data.training.nominal) < cost(best.trial, data.training.nominal)
 
 
 def _without(judged: Judged, key: Key, data: Data) -> Judged:
