@@ -89,6 +89,7 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
     """Reason of refusal of a refitted candidate, or ""."""
     reasons = (
         _too_short(trial, thresholds.interval),
+        _no_place(trial),
         _no_way(trial),
         _creeps(trial),
         _trifling_gain(trial),
@@ -190,6 +191,20 @@ def has_peers(model: Model, site: str) -> bool:
     """Whether several drives, or several position sensors, share one clock, so that a delay of one is no refusal."""
     encoders = {model.sensor_of(f"{joint}.position") for joint in model.joints} - {None}
     return any(site in group and len(group) > 1 for group in (set(model.actuators), encoders))
+
+
+def _no_place(trial: Trial) -> str:
+    """Refusal of a payload whose place does not show, on a body of which nobody knows the mass.
+
+    A heavier body is a payload on the ray through its centre of mass. What is beside the ray shows as mass times
+    distance, and has to be more than an error of the model.
+    """
+    site, effect = trial.probe.candidate.site, trial.probe.candidate.effect
+    mass = f"{site}.mass"
+    shown = len(trial.parameters) > 1 or trial.error > NEGLIGIBLE
+    if effect.site != "body" or mass not in trial.judged.free or shown:
+        return ""
+    return f"these data do not discriminate it from {mass}"
 
 
 def _no_way(trial: Trial) -> str:

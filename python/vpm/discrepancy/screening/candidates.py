@@ -218,12 +218,22 @@ def _periodic(effect: EffectType, site: str, data: InverseDynamicsProblem, model
 
 
 def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
-    """Start positions of a candidate payload: origin of the body, its centre of mass, and twice as far out."""
+    """Start positions of a candidate payload: origin of the body, its centre of mass, and twice as far out.
+
+    Beside an unknown mass of the body only what is off the ray from the origin through its centre of mass shows. So the
+    other two are to all sides of the centre of mass there, as far as that is from the origin.
+    """
     if body in model.beams:  # in the frame of its tip
         return ({},)
-    centre = {axis: model.parameters[f"{body}.center_of_mass.{axis}"].value for axis in "xyz"}
-    factors = (0.0, 1.0, 2.0) if any(centre.values()) else (0.0,)
-    return tuple({axis: factor * value for axis, value in centre.items()} for factor in factors)
+    centre = np.array([model.parameters[f"{body}.center_of_mass.{axis}"].value for axis in "xyz"])
+    if not centre.any():
+        places = [centre]
+    elif f"{body}.mass" in model.adjustable:
+        sides = np.linalg.norm(centre) * np.vstack([np.eye(3), -np.eye(3)])
+        places = [np.zeros(3), *(centre + sides)]
+    else:
+        places = [factor * centre for factor in (0.0, 1.0, 2.0)]
+    return tuple(dict(zip("xyz", place.tolist(), strict=True)) for place in places)
 
 
 def slow_speeds(fastest: float) -> tuple[float, float]:

@@ -15,6 +15,7 @@ from vpm.discrepancy.search.backward_elimination import (
     drop_replaced,
     drop_springs,
     refitted,
+    release_shown,
     without_tight_bounds,
 )
 from vpm.discrepancy.search.candidate_choice import Accepted
@@ -160,6 +161,7 @@ def _reconsidered(stages: list[Stage], accepted: list[Accepted], data: Data, dro
         stages[-1] = replace(stages[-1], judged=accepted[-1].trial.judged)
     drop_replaced(stages, accepted, data, dropped)
     drop_springs(stages, accepted, data, dropped)
+    release_shown(stages, accepted, data)
 
 
 def _whole(
