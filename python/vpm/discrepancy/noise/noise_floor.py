@@ -17,6 +17,8 @@ from vpm.simulate import Setup, simulate_arrays
 
 #: Seed of the noise that is carried through; any would do.
 SEED = 20160331
+#: So many numbers of noise tell its root mean square to a twentieth: of fewer there are more draws.
+ENOUGH = 200
 #: Share of the frequencies of a residual that hold no more than noise, for the estimate of what is white in it.
 QUIET_SHARE = 0.4
 
@@ -51,14 +53,15 @@ def noise_floor(
     own = [own_log(model, log, setup) if mode == "closed_loop" else None for log in logs]
     try:
         quiet = validation.on([one or log for one, log in zip(own, logs, strict=True)])
-        left = quiet.evaluate(model, model.theta)[0]
+        left = np.array(quiet.evaluate(model, model.theta)[0])
     except VpmError:
-        own, quiet, left = [None] * len(logs), validation, validation.evaluate(model, model.theta)[0]
+        own, quiet, left = [None] * len(logs), validation, np.array(validation.evaluate(model, model.theta)[0])
     for record, one in enumerate(own):
         if one is not None:  # what the model leaves of its own log without noise is the error of filters and steps
             left[_rows(quiet, record)] = 0.0
     found: dict[str, list[float]] = {}
-    for _ in range(TIMES):
+    counted = max(1.0, min(float(block.moving.sum()) for block in quiet.blocks))
+    for _ in range(int(np.clip(ENOUGH / counted, 1, TIMES))):
         pairs = zip(quiet.experiments, logs, strict=True)
         noisy = quiet.on([with_noise(model, one, log, generator) for one, log in pairs])
         for channel, (rms, _, _) in gaps(quiet, noisy.evaluate(model, model.theta)[0] - left).items():
