@@ -362,15 +362,20 @@ def _where_it_acts(current: Judged, validation: Array, problem: InverseDynamicsP
 
     Where nothing but one effort is compared, it is the whole gain.
     """
-    joint = joint_at(current.model, site)
     lost = float(validation @ validation) > float(current.validation @ current.validation)
-    if len(problem.blocks) == len(problem.motions) or joint not in {"", *problem.joints} or lost:
+    if len(problem.blocks) == len(problem.motions) or lost:
         return None
-    here = np.zeros(len(validation))
+    here = acts_on(current.model, problem, site)
+    return gain(here * current.validation, here * validation, segments(problem)) if np.any(here) else None
+
+
+def acts_on(model: Model, problem: InverseDynamicsProblem, site: str) -> Array:
+    """Samples of a residual (n,) to confirm an effect by: 1 in efforts of its joint, of all joints for a body."""
+    joint, samples = joint_at(model, site), np.zeros(max(block.samples.stop for block in problem.blocks))
     for record in range(len(problem.motions)):
         for name, block in zip(problem.joints, problem.efforts(record), strict=True):
-            here[block.samples] = float(joint in {"", name})
-    return gain(here * current.validation, here * validation, segments(problem))
+            samples[block.samples] = float(joint in {"", name})
+    return samples
 
 
 def _simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:

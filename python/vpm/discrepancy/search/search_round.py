@@ -10,7 +10,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confirm, finished
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, acts_on, confirm, finished
 from vpm.discrepancy.confirmation.delay_in_motion import in_motion, is_late
 from vpm.discrepancy.confirmation.friction_near_rest import (
     is_supported,
@@ -326,6 +326,9 @@ class Round:
             # Stiction looks like a delay, with a shift as without, so delays are judged in motion only.
             before, validation = (in_motion(self.data.validation) * each for each in (before, validation))
         timed = gain(before, validation, segments(self.data.validation))
+        if trial.there is trial.here and timed.relative > 0.0:
+            here = acts_on(self.current.model, self.data.validation, trial.probe.candidate.site)
+            timed = gain(here * before, here * validation, segments(self.data.validation))
         return refuse_timing(timed, self.timed.shift, thresholds, beside=shifted.shift)
 
     def best(self) -> Accepted | None:
