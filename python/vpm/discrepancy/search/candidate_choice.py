@@ -70,15 +70,12 @@ class Accepted:
 def choose(supported: Sequence[Trial], data: Data) -> Accepted:
     """Choose the candidate with the least criterion; of equally good ones the one whose simulation is best.
 
-    One that refines another takes its place if it leaves less than ``REFINED`` of what that leaves, of validation
-    records or, where these do not tell, of training records.
+    One that refines another only takes its place if it leaves less than ``REFINED`` of what that leaves.
     """
     least = partial(cost, stated=data.training.nominal)
     first = min(supported, key=least)
     plain = [t for t in supported if _plainer(t, first)]
     first = min(plain, key=least) if plain else first
-    finer = [t for t in supported if _is_refinement(t, first) and _left(t) <= SAME * _left(first)]
-    first = min(finer, key=least) if finer else first
     equals = [t for t in supported if _as_good(t, first)]
     chosen = _delay_or_lag(preferred_sensor(_first_named(equals), equals, data), supported, data)
     return Accepted(chosen, tuple(t.probe.candidate.label for t in equals if t is not chosen))
@@ -160,15 +157,7 @@ def schwarz(gained: Gain, numbers: int) -> float:
 def _plainer(trial: Trial, first: Trial) -> bool:
     """Whether a candidate explains nearly as much as ``first`` with fewer numbers, at the same site and confusable."""
     fewer = len(trial.parameters) < len(first.parameters)
-    return alike(trial.probe.candidate, first.probe.candidate) and fewer and not _is_refinement(first, trial)
-
-
-def _is_refinement(trial: Trial, plain: Trial) -> bool:
-    """Whether a candidate leaves clearly less than a ``plain`` one of fewer numbers, confusable at the same site."""
-    more = len(trial.parameters) > len(plain.parameters)
-    pairs = ((trial.validation, plain.validation), (trial.training, plain.training))
-    less = any(_share(own) < REFINED * _share(other) for own, other in pairs)
-    return alike(trial.probe.candidate, plain.probe.candidate) and more and less
+    return alike(trial.probe.candidate, first.probe.candidate) and fewer and REFINED * _left(trial) <= _left(first)
 
 
 def alike(one: Candidate, other: Candidate) -> bool:
@@ -180,7 +169,7 @@ def alike(one: Candidate, other: Candidate) -> bool:
 def _as_good(trial: Trial, first: Trial) -> bool:
     """Whether a candidate explains the validation data as well as the first one, with no more numbers."""
     close = trial.validation.relative >= first.validation.relative - LEAST_GAIN and _left(trial) <= SAME * _left(first)
-    return close and len(trial.parameters) <= len(first.parameters) and not _is_refinement(first, trial)
+    return close and len(trial.parameters) <= len(first.parameters)
 
 
 def _evidence(trial: Trial) -> float:
