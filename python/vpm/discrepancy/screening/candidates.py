@@ -31,11 +31,11 @@ Key = tuple[str, str]
 
 #: Short name of the speed at which a friction law bends; where it is fixed, it is that of the dry friction beside.
 TRANSITION = "transition_velocity"
-#: Number of ripple periods proposed by the periodogram.
+#: Number of ripple periods proposed by the periodogram, of waves that most samples show and of shorter ones.
 PERIODS = 3
 #: Cells of the way in the shortest wave of an octave, waves in one more on the whole way, share of a wave that a slow
 #: sample may pass until the next one, and fewest of them: a wave has two sizes and is told from a mean.
-CELLS, FINER, PASSED, SLOWEST = 8, 4, 0.4, 16
+CELLS, FINER, PASSED, SLOWEST = 32, 4, 0.4, 16
 
 
 @dataclass(frozen=True)
@@ -294,29 +294,34 @@ def _ripple_periods(position: Array, values: Array, fewest: float) -> list[float
     """Start periods of candidates in position: peaks of the residual's least-squares periodogram.
 
     From ``fewest`` waves on the whole way; friction changes its sign with the motion, and half a wave suffices for it.
-    Of short waves only slow samples show anything, those that pass less than one in the time between them. Each octave
-    takes those, and what a wave explains of their sum of squares counts (N. Lomb, *Astrophysics and Space Science* 39,
-    1976). Sums of values over the way give all waves of an octave at once. There are no more waves than samples.
+    What a wave explains of the sum of squares counts (N. Lomb, *Astrophysics and Space Science* 39, 1976). Of waves so
+    short that half of the samples pass one until the next, only slow samples show anything: each octave takes those.
+    Dry friction is there, too, so that these have places of their own. Sums of values over the way give all waves of an
+    octave at once. There are no more waves than samples.
     """
     travel = max(float(np.ptp(position)), 1e-12)
     place = (position - position.min()) / travel
     steps = np.abs(np.gradient(place))
-    waves, explained = [np.zeros(0)], [np.zeros(0)]
-    slow, shortest = np.full(place.shape, fill_value=True), fewest
-    while shortest == fewest or (np.count_nonzero(slow) >= SLOWEST and shortest <= len(values)):
+    usual, shortest, best = float(np.median(steps)), fewest, list[float]()
+    seen: dict[bool, list[Array]] = {True: [], False: []}
+    while True:
         first, shortest = shortest, 2.0 * shortest
+        whole = not seen[True] or shortest * usual < PASSED
+        slow = np.full(place.shape, fill_value=True) if whole else steps * shortest < PASSED
+        if (np.count_nonzero(slow) < SLOWEST and not whole) or shortest > 2.0 * max(len(values), fewest):
+            break
         cells = int(CELLS * shortest)
         centred = values[slow] - np.mean(values[slow])
         sums = np.bincount((place[slow] * cells).astype(np.int64), centred, cells + 1)
-        spectrum = np.abs(np.fft.rfft(sums, FINER * cells)) ** 2
+        spectrum = np.abs(np.fft.rfft(sums, FINER * cells)) ** 2 * 2.0 / np.count_nonzero(slow)
+        waves = np.arange(spectrum.size) / FINER
         inside = slice(int(FINER * first), int(FINER * shortest))
-        waves.append(np.arange(spectrum.size)[inside] / FINER)
-        explained.append(spectrum[inside] * 2.0 / np.count_nonzero(slow))
-        slow = steps * 2.0 * shortest < PASSED
-    frequencies, power = np.concatenate(waves) / travel, np.concatenate(explained)
-    peaks = [i for i in range(1, len(power) - 1) if power[i] >= power[i - 1] and power[i] > power[i + 1]]
-    best = sorted(peaks or [int(np.argmax(power))], key=lambda i: -power[i])[:PERIODS]
-    return [float(1.0 / frequencies[i]) for i in best]
+        seen[whole].append(np.array([waves[inside], spectrum[inside]]))
+    for octaves in filter(None, seen.values()):
+        waves, power = np.concatenate(octaves, axis=1)
+        peaks = [i for i in range(1, len(power) - 1) if power[i] >= power[i - 1] and power[i] > power[i + 1]]
+        best += [float(waves[i]) for i in sorted(peaks or [int(np.argmax(power))], key=lambda i: -power[i])[:PERIODS]]
+    return [travel / each for each in best]
 
 
 def _over_way(data: InverseDynamicsProblem, model: Model, site: str, residual: Array) -> tuple[Array, Array, Array]:
