@@ -293,35 +293,49 @@ def _excitation(data: InverseDynamicsProblem, model: Model, site: str, actuator:
 def _ripple_periods(position: Array, values: Array, fewest: float) -> list[float]:
     """Start periods of candidates in position: peaks of the residual's least-squares periodogram.
 
-    From ``fewest`` waves on the whole way; friction changes its sign with the motion, and half a wave suffices for it.
-    What a wave explains of the sum of squares counts (N. Lomb, *Astrophysics and Space Science* 39, 1976). Of waves so
-    short that half of the samples pass one until the next, only slow samples show anything: each octave takes those.
-    Dry friction is there, too, so that these have places of their own. Sums of values over the way give all waves of an
-    octave at once. There are no more waves than samples.
+    Evenly spaced frequencies up to what the decimated samples resolve, from ``fewest`` periods per travel; friction
+    changes its sign with the motion, and half a period suffices for it; N. Lomb, *Astrophysics and Space Science* 39,
+    1976. Shorter waves than these come from slow samples, see `_short_waves`.
+    """
+    short = _short_waves(position, values)
+    thin = max(1, len(values) // 4000)
+    position, values = position[::thin], values[::thin]
+    travel = max(float(np.ptp(position)), 1e-12)
+    step = float(np.median(np.abs(np.diff(position)))) or travel / 1e3
+    highest = min(1.0 / (2.5 * step), 400.0 / travel)
+    frequencies = np.arange(fewest, max(highest * travel, 4.0), 0.25) / travel
+    phase = 2.0 * np.pi * np.outer(frequencies, position - position.mean())
+    centred = values - values.mean()
+    power = (np.cos(phase) @ centred) ** 2 + (np.sin(phase) @ centred) ** 2
+    peaks = [i for i in range(1, len(power) - 1) if power[i] >= power[i - 1] and power[i] > power[i + 1]]
+    best = sorted(peaks or [int(np.argmax(power))], key=lambda i: -power[i])[:PERIODS]
+    return [float(1.0 / frequencies[i]) for i in best] + [one for one in short if one * frequencies[-1] < 1.0]
+
+
+def _short_waves(position: Array, values: Array) -> list[float]:
+    """Start periods of candidates whose waves most samples pass at once: only slow samples show them.
+
+    Each octave takes those that pass less than ``PASSED`` of a wave until the next sample. What a wave explains of
+    their sum of squares counts. Sums of values over the way give all waves of an octave at once.
     """
     travel = max(float(np.ptp(position)), 1e-12)
     place = (position - position.min()) / travel
     steps = np.abs(np.gradient(place))
-    usual, shortest, best = float(np.median(steps)), fewest, list[float]()
-    seen: dict[bool, list[Array]] = {True: [], False: []}
-    while True:
+    found, shortest = [np.zeros((2, 0))], PASSED / max(float(np.median(steps)), 1.0 / len(values))
+    while shortest <= len(values):
         first, shortest = shortest, 2.0 * shortest
-        whole = not seen[True] or shortest * usual < PASSED
-        slow = np.full(place.shape, fill_value=True) if whole else steps * shortest < PASSED
-        if (np.count_nonzero(slow) < SLOWEST and not whole) or shortest > 2.0 * max(len(values), fewest):
+        slow = steps * shortest < PASSED
+        if np.count_nonzero(slow) < SLOWEST:
             break
         cells = int(CELLS * shortest)
         centred = values[slow] - np.mean(values[slow])
         sums = np.bincount((place[slow] * cells).astype(np.int64), centred, cells + 1)
         spectrum = np.abs(np.fft.rfft(sums, FINER * cells)) ** 2 * 2.0 / np.count_nonzero(slow)
-        waves = np.arange(spectrum.size) / FINER
         inside = slice(int(FINER * first), int(FINER * shortest))
-        seen[whole].append(np.array([waves[inside], spectrum[inside]]))
-    for octaves in filter(None, seen.values()):
-        waves, power = np.concatenate(octaves, axis=1)
-        peaks = [i for i in range(1, len(power) - 1) if power[i] >= power[i - 1] and power[i] > power[i + 1]]
-        best += [float(waves[i]) for i in sorted(peaks or [int(np.argmax(power))], key=lambda i: -power[i])[:PERIODS]]
-    return [travel / each for each in best]
+        found.append(np.array([np.arange(spectrum.size)[inside] / FINER, spectrum[inside]]))
+    waves, power = np.concatenate(found, axis=1)
+    peaks = [i for i in range(1, len(power) - 1) if power[i] >= power[i - 1] and power[i] > power[i + 1]]
+    return [travel / float(waves[i]) for i in sorted(peaks, key=lambda i: -power[i])[:PERIODS]]
 
 
 def _over_way(data: InverseDynamicsProblem, model: Model, site: str, residual: Array) -> tuple[Array, Array, Array]:
