@@ -12,6 +12,7 @@ from vpm.identify.estimation import touching
 from vpm.identify.problem import Block
 from vpm.identify.settings import Checks
 from vpm.model import Model
+from vpm.numbers import Array
 
 if TYPE_CHECKING:
     from vpm.identify.fit_result import Fit
