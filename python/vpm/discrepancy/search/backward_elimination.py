@@ -13,7 +13,7 @@ from vpm.discrepancy.screening.candidates import Key
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.errors import DivergedError, ModelError
 from vpm.identify import gain, segments
-from vpm.identify.identifiability import is_alias
+from vpm.identify.identifiability import Span, is_alias
 from vpm.model import Model
 
 #: Factor by which the last fit may exceed the bound of a transition velocity.
@@ -111,11 +111,11 @@ def release_shown(stages: list[Stage], accepted: list[Accepted], data: Data) -> 
         return
     model = current.model
     _, columns = data.training.evaluate(model, model.theta, [model.index(name) for name in names])
-    known, shown = current.fit.jacobian, list[str]()
+    known, shown = Span.of(current.fit.jacobian), list[str]()
     for name, column in zip(names, columns.T, strict=True):
         if np.any(column) and not is_alias(column, known, current.fit.residual):
             shown.append(name)
-            known = np.column_stack([known, column])
+            known = known.beside(column[:, None])
     if not shown:
         return
     try:
