@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from vpm.log_check.shares import Judge, Shares
 from vpm.log_check.stretches import odd_stretches
 from vpm.log_check.table import line_of
 from vpm.model import ChannelEntry, Model
+from vpm.numbers import Array
 from vpm.observer import measured_outputs
 from vpm.one_thread import in_one_thread
 from vpm.simulate import Setup
@@ -82,9 +83,14 @@ def check_log(
     checked = "the first record"
     try:
         check = _Check(Judge(model, settings, setup or Setup()), ParallelCandidates(workers, progress))
+        begun: list[_Begun] = []
         for record in as_records(experiments):
             checked = record.name
-            odd, left = check.of(record, model.channel_table if table is None else table)
+            begun.append(check.begun(record))
+        known = check.known(begun)
+        for one in begun:
+            checked = one.record.name
+            odd, left = check.of(one, known, model.channel_table if table is None else table)
             findings += odd
             for name, share in left.by_channel.items():
                 shares[name] = max(share, shares.get(name, 0.0))
@@ -122,20 +128,45 @@ def refuse_mistakes(
     return found.findings
 
 
+@dataclass(frozen=True)
+class _Begun:
+    """A record to check, the beginning of its motion, and what is left of that as it is."""
+
+    record: Experiment
+    part: Experiment
+    left: Shares
+
+
 class _Check:
     """Looks at one record after the other."""
 
     def __init__(self, judge: Judge, each: ParallelCandidates) -> None:
         self.judge, self.each, self.settings = judge, each, judge.settings
 
-    def of(self, record: Experiment, table: Mapping[str, ChannelEntry]) -> tuple[list[Finding], Shares]:
-        """Checked findings of a record, and the record when they are corrected."""
-        record, model = joints_from_shafts(record, self.judge.model), self.judge.model
+    def begun(self, record: Experiment) -> _Begun:
+        """Beginning of a check: what is left of a record as it is."""
+        record = joints_from_shafts(record, self.judge.model)
+        part = _beginning(record, measured_outputs(self.judge.model, record), self.settings)
+        return _Begun(record, part, self.judge.fitted(part))
+
+    def known(self, begun: Sequence[_Begun]) -> Array | None:
+        """Values by which the model explains the record of which a check leaves least; None if it explains none."""
+        explained = [one.left for one in begun if not one.left.above(self.settings.doubtful)]
+        return min(explained, key=lambda left: left.order).values if explained else None
+
+    def of(self, begun: _Begun, known: Array | None, table: Mapping[str, ChannelEntry]) -> tuple[list[Finding], Shares]:
+        """Checked findings of a record, and the record when they are corrected.
+
+        A record of which the model explains little is tried with values that are ``known`` from another one: it is the
+        same machine, and a mistake of this record would still show.
+        """
+        record, part, left, model = begun.record, begun.part, begun.left, self.judge.model
+        if known is not None and left.above(self.settings.doubtful):
+            left = min(left, self.judge.fitted_from(part, known), key=lambda one: one.order)
         outputs = measured_outputs(model, record)
         inputs = tuple(name for name in model.input_channels if name in record)
         stretches = list(odd_stretches(record, outputs, inputs, self.settings))
-        part = _beginning(record, outputs, self.settings)
-        left, found, whole = self.judge.fitted(part), list[Finding](), record
+        found, whole = list[Finding](), record
         for _ in range(self.settings.rounds if len(part) >= self.settings.judged else 0):
             units = _units(model, record, table)
             explanations = Explainer(self.judge, units, self.each).explained(part, (*outputs, *inputs), left)

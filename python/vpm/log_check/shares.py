@@ -147,6 +147,14 @@ class Judge:
         found = [self._fitted(record, *start) or plain for start in starts]
         return min(found, key=lambda shares: shares.order)
 
+    def fitted_from(self, record: Experiment, known: Array) -> Shares:
+        """Shares at values that are ``known`` from another record, or when a fit from there has ended."""
+        structure, own = self._structure(record), len(self.model.theta)
+        values = np.append(known[:own], structure.theta[own:])
+        start = self.measured(record, values)
+        found = self._fitted(record, replace(structure, theta=values), start)
+        return start if found is None else min(start, found, key=lambda shares: shares.order)
+
     def _fitted(self, record: Experiment, structure: Structure, start: Shares) -> Shares | None:
         """Shares where a fit ends that begins at the values of a structure and its shares; None if it runs away."""
         if start.residual is None:
