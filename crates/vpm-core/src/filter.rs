@@ -61,6 +61,9 @@ impl ZeroPhase {
     pub fn apply(&self, record: &[f64], columns: usize, every: NonZeroUsize) -> Vec<f64> {
         let rows = record.len() / columns.max(1);
         let mut kept = vec![0.0; rows.div_ceil(every.get()) * columns];
+        if kept.is_empty() {
+            return kept;
+        }
         // What is zero all the time stays so: most parameters leave some efforts of a machine alone.
         let moving: Vec<usize> = (0..columns)
             .filter(|&column| record[column..].iter().step_by(columns).any(|&number| number != 0.0))

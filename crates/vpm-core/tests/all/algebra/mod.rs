@@ -1,3 +1,4 @@
 //! Linear algebra.
 
 mod dense;
+mod filter;
