@@ -14,6 +14,7 @@ from nightly import at_night
 from vpm import demo
 from vpm.errors import ExperimentError, ModelError
 from vpm.log_check import Finding, Settings
+from vpm.log_check.checking import doubted
 from vpm.log_check.correction import Correction
 from vpm.log_check.stretches import odd_stretches
 from vpm.log_check.table import corrected_text, line_of
@@ -258,6 +259,14 @@ def test_two_mistakes_are_found_one_after_the_other(logs: dict[str, Columns]) ->
     log = record(both(scaled("q1", 180.0 / np.pi), scaled("i2", 1e3))(logs["none"]))
     found = vpm.check_log(MODEL, log, workers=1).mistakes
     assert {one.channels for one in found} == {("one.position",), ("m2.command",)}
+
+
+def test_what_leaves_another_joint_unexplained_is_told_and_not_believed() -> None:
+    found = Finding("scale", ("m2.command",), ("log",), "m2.command is ten times too large", "correct it", mistake=True)
+    told = doubted(found, {"one.position"})
+    assert not told.mistake
+    assert "one.position stays unexplained with that, so that it may come from what the model lacks" in str(told)
+    assert doubted(told, {"one.position"}) is told
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -166,7 +166,7 @@ class _Check:
         outputs = measured_outputs(model, record)
         inputs = tuple(name for name in model.input_channels if name in record)
         stretches = list(odd_stretches(record, outputs, inputs, self.settings))
-        found, whole = list[Finding](), record
+        found, affected, whole = list[Finding](), set[str](), record
         for _ in range(self.settings.rounds if len(part) >= self.settings.judged else 0):
             units = _units(model, record, table)
             explanations = Explainer(self.judge, units, self.each).explained(part, (*outputs, *inputs), left)
@@ -174,9 +174,12 @@ class _Check:
                 changed = one.correction.entries(table)
                 table = {**table, **changed}
                 found.append(_finding(one, units, changed, record.name, self.settings))
+                affected |= set(one.affected)
                 part, whole, left = one.correction.applied(part), one.correction.applied(whole), one.after
             if not explanations:
                 break
+        if others := left.above(self.settings.doubtful) - affected:
+            found = [doubted(one, others) for one in found]
         units = _units(model, record, table)
         for correction, related in wrong_scales(model, whole, units, self.settings):
             found.append(_of_related(correction, related, units, correction.entries(table), record.name))
@@ -184,6 +187,15 @@ class _Check:
         if tangent is not None and (undetermined := self.judge.undetermined(tangent)):
             stretches.append(_of_parameters(undetermined, record.name))
         return [*found, *stretches], left
+
+
+def doubted(found: Finding, others: Collection[str]) -> Finding:
+    """Finding of a check that is no mistake for sure, for the corrected record leaves other channels unexplained.
+
+    What the model lacks there moves the rest of the machine too, and may look like a mistake.
+    """
+    more = f"{', '.join(sorted(others))} stays unexplained with that, so that it may come from what the model lacks"
+    return replace(found, mistake=False, sentence=f"{found.sentence}; {more}") if found.mistake else found
 
 
 def _beginning(record: Experiment, outputs: Sequence[str], settings: Settings) -> Experiment:
