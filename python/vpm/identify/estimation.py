@@ -119,11 +119,8 @@ def estimate(
     try:
         if columns:
             start = _linear_step(counter, start, low, high)
-            start = (
-                start
-                if linear_only
-                else _refine(counter, start, low, high, tolerance, most_evaluations, descends=not feasible)
-            )
+            if not linear_only:
+                start = _refine(counter, start, low, high, tolerance, most_evaluations, descends=not feasible)
         start = _nearest(counter, start, first, low, high) if feasible else start
         residual, jacobian = counter(start)
         # Derivatives may leave all bounds where the motion itself does not; the best with derivatives stands then.

@@ -1,8 +1,8 @@
 """Usual friction at several joints together, where a search on inverse-dynamics residuals begins.
 
-Nobody knows the friction of a robot beforehand, so that its description seldom has any, at no joint. One effect after
-the other, parameters that are uncertain take what friction at the other joints would explain, and so do other effects.
-All of it together is one regression.
+Nobody knows the friction of a robot beforehand, so that its description often has none. Added one effect at a time,
+uncertain parameters and other effects take what friction at the other joints would explain. All of it together is one
+regression.
 """
 
 from __future__ import annotations
@@ -32,7 +32,7 @@ from vpm.numbers import Array
 def with_usual_friction(
     found: Search, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: ParallelCandidates
 ) -> Search:
-    """Search that begins with the usual friction that several joints lack; unchanged where that is not what they lack.
+    """Search that begins with the usual friction of several joints; as it was where that does not do most of the work.
 
     Each size has to be clear on training records. Without each effect, all else fitted again, validation records have
     to be predicted clearly worse where it acts. What does not do that leaves, of each joint the least first.
