@@ -18,7 +18,7 @@ from vpm.discrepancy.screening.candidates import Candidate
 from vpm.discrepancy.screening.compliance_and_stop_start import LOSSES, in_series
 from vpm.discrepancy.screening.joint_compliance_start import best_start, is_searched
 from vpm.discrepancy.screening.linear_step import is_outside, linear_step, softened, step_without
-from vpm.discrepancy.screening.location_parameter import ANYWHERE, EVEN, free_location
+from vpm.discrepancy.screening.location_parameter import free_location
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.identifiability import Span, closest_column, column_lengths, is_alias
 from vpm.identify.response_along_motion import bends
@@ -143,45 +143,12 @@ def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *,
         (_probe_start(base, data, candidate, start) for start in candidate.starts), key=lambda p: -len(p.held)
     )
     best = max(probes, key=lambda p: p.drop)
-    if best.held and not best.free and candidate.neutral:
-        # In the origin of a body a payload is that body's mass; beside it, it need not be. Nor may it be anywhere.
-        aside = [_probe_start(base, data, candidate, start) for start in _aside(data, best)]
-        if all(each.free for each in aside):
-            probes = [best, *aside]
-            best = max(probes, key=lambda p: p.drop)
     possible = [p for p in probes if not impossible_values(p)]
     if possible:
         runner_up = max(possible, key=lambda p: p.drop)
         if runner_up.drop >= 0.5 * best.drop:
             return runner_up
     return best
-
-
-def _aside(data: InverseDynamicsProblem, known: Probe) -> list[dict[str, float]]:
-    """Starts of a probe on either side of a known one, along each coordinate of its place that changes what it does.
-
-    They are off by the radius of gyration of the body there, which is about where its own masses are.
-    """
-    model, (name, site), effect = known.model, known.candidate.key, known.candidate.effect
-    inertia = [f"{site}.inertia.{axis}" for axis in ("xx", "yy", "zz")]
-    moments = [model.parameters[one].value for one in inertia if one in model.parameters]
-    places = [p for p in effect.parameters if p.scale == "coordinate" and tuple(p.physical) == ANYWHERE]
-    if not any(moments) or not places:
-        return []
-    radius = float(np.sqrt(0.5 * sum(moments) / model.parameters[f"{site}.mass"].value))
-    dotted = model.effect(name, site).parameter_names
-    size = [model.index(dotted[p.name]) for p in effect.parameters if not p.shape]
-    _, before = data.evaluate(model, model.theta, size)
-    first = {p.name: model.parameters[dotted[p.name]].value for p in places}
-    found = []
-    for place in places:
-        for side in (1.0, -1.0):
-            start = {**first, place.name: first[place.name] + side * radius}
-            moved = model.with_parameters({dotted[short]: value for short, value in start.items()})
-            _, after = data.evaluate(moved, moved.theta, size)
-            if np.linalg.norm(after - before) > EVEN * np.linalg.norm(before):
-                found.append(start)
-    return found
 
 
 def _searched(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe | None:
