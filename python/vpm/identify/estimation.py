@@ -220,6 +220,10 @@ class _Counter:
             self._least, self.best = cost, (self._whole.x, (residual, slopes))
         return residual, slopes
 
+    @property
+    def names(self) -> list[str]:
+        return [self.model.parameter_names[column] for column in self.columns]
+
     def residual(self, x: Array) -> Array:
         for known in (self._tried, self._whole):
             if known is not None and np.array_equal(x, known.x):
@@ -321,7 +325,7 @@ def _refine(
     # Nothing left to gain along any free direction: the problem was linear and the first step ended it.
     if np.all(np.abs(gradient[interior]) <= 1e-9 * np.sqrt(residual @ residual)):
         return start
-    if descends and _has_blind(jacobian / lengths):
+    if descends and unseen_combinations(jacobian, counter.names):
         return _descended(counter, start, low, high, most)
     inside = _strictly_inside(start, low, high)
     if not np.all(
@@ -344,12 +348,6 @@ def _refine(
     return solution if np.sum(counter.residual(solution) ** 2) <= np.sum(residual**2) else start
 
 
-def _has_blind(scaled: Array) -> bool:
-    """Whether there are directions that an estimation's records do not show, from columns of equal length."""
-    values = np.linalg.svd(np.linalg.qr(scaled, mode="r"), compute_uv=False)
-    return bool(values[-1] < RANK_TOLERANCE * values[0])
-
-
 def _descended(counter: _Counter, start: Array, low: Array, high: Array, most: int) -> Array:
     """Refine an estimate by a damped descent: what nothing shows stays, where a trust region wanders along it.
 
@@ -358,7 +356,7 @@ def _descended(counter: _Counter, start: Array, low: Array, high: Array, most: i
     """
     first = counter.point(start)
     lengths = column_lengths(first.jacobian)
-    stated = (counter.model.parameters[counter.model.parameter_names[column]].uncertainty for column in counter.columns)
+    stated = (counter.model.parameters[name].uncertainty for name in counter.names)
     spread = np.array([np.inf if one is None or not one > 0.0 else one for one in stated])
     prior = first.cost / len(first.residual) / (spread * lengths) ** 2
     box = Box(low, high, sizes(start, first.cost, lengths), damping=np.where(np.isfinite(spread), prior / DAMPING, 1.0))

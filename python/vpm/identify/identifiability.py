@@ -67,6 +67,21 @@ def column_lengths(jacobian: Array) -> Array:
     return np.where(lengths > 0.0, lengths, 1.0)
 
 
+def least_step(jacobian: Array, residual: Array, tolerance: float = 1e-10) -> Array:
+    """Step of least squares (p,) along what is identifiable: relative singular values above ``tolerance``.
+
+    Parameters
+    ----------
+    jacobian : ndarray, shape (n, p)
+    residual : ndarray, shape (n,)
+    tolerance : float
+    """
+    if not jacobian.shape[1]:
+        return np.zeros(0)
+    lengths = column_lengths(jacobian)
+    return np.asarray(np.linalg.lstsq(jacobian / lengths, -residual, rcond=tolerance)[0] / lengths)
+
+
 def unseen_combinations(
     jacobian: Array, names: Sequence[str], tolerance: float = RANK_TOLERANCE
 ) -> tuple[Combination, ...]:

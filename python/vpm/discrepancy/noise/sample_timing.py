@@ -12,7 +12,7 @@ import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.identify import gain, segments
-from vpm.identify.identifiability import column_lengths
+from vpm.identify.identifiability import least_step
 from vpm.numbers import Array
 
 #: A shift matters if it takes so much of the mean square of the residual, on training and on validation records.
@@ -37,7 +37,7 @@ def in_time(judged: Judged, data: Data) -> InTime:
     own = judged.fit.residual
     change, known = later - own, judged.fit.jacobian
     # Free parameters give way to the shift and do nothing else: one that its bounds hold has to stay where it is.
-    step = _step(known, change)
+    step = least_step(known, change)
     rest = change + known @ step
     power = float(rest @ rest)
     if power <= 1e-20 * float(change @ change):
@@ -53,10 +53,3 @@ def in_time(judged: Judged, data: Data) -> InTime:
     if gain(own_validation, validation, segments(data.validation)).relative < MATTERS:
         return predict
     return InTime(fitted, validation, shift)
-
-
-def _step(jacobian: Array, residual: Array) -> Array:
-    if not jacobian.shape[1]:
-        return np.zeros(0)
-    lengths = column_lengths(jacobian)
-    return np.asarray(np.linalg.lstsq(jacobian / lengths, -residual, rcond=1e-10)[0] / lengths)

@@ -23,10 +23,9 @@ from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search import Search
 from vpm.discrepancy.search.search_round import Tell
 from vpm.errors import VpmError
-from vpm.identify.identifiability import RANK_TOLERANCE, column_lengths
+from vpm.identify.identifiability import RANK_TOLERANCE, least_step
 from vpm.identify.response_along_motion import bends, has_own_drives
 from vpm.model import Model
-from vpm.numbers import Array
 
 
 def with_usual_friction(
@@ -116,8 +115,8 @@ class _Beside:
         move = np.array([-values[name] if name in gone else 0.0 for name in judged.free])
         others = np.array([name not in own for name in judged.free])
         left, slopes = self.fitted + self.slopes @ move, self.slopes[:, others]
-        shift = float(np.clip(_made_up(left, np.column_stack([slopes, self.later]))[-1], -1.0, 1.0))
-        move[others] = _made_up(left + shift * self.later, slopes)
+        shift = float(np.clip(least_step(np.column_stack([slopes, self.later]), left, RANK_TOLERANCE)[-1], -1.0, 1.0))
+        move[others] = least_step(slopes, left + shift * self.later, RANK_TOLERANCE)
         left = self.fitted + self.slopes @ move + shift * self.later
         unseen = self.unseen + self.unseen_slopes @ move + shift * self.unseen_later
         less = replace(
@@ -131,12 +130,6 @@ class _Beside:
         drop = 1.0 - float(self.fitted @ self.fitted) / float(left @ left)
         probe = Probe(candidate, judged.model, own, (), (), values, spread, drop)
         return measured(less, self.data, probe, judged, own, (), None, "")
-
-
-def _made_up(residual: Array, slopes: Array) -> Array:
-    """What parameters make up for without some friction, as far as the records show them."""
-    lengths = column_lengths(slopes)
-    return np.asarray(np.linalg.lstsq(slopes / lengths, -residual, rcond=RANK_TOLERANCE)[0] / lengths)
 
 
 def _sizes(model: Model, candidate: Candidate) -> list[str]:
