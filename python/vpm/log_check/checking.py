@@ -162,7 +162,7 @@ class _Check:
         """
         record, part, left, model = begun.record, begun.part, begun.left, self.judge.model
         if known is not None and left.above(self.settings.doubtful):
-            left = min(left, self.judge.fitted_from(part, known), key=lambda one: one.order)
+            left = min(left, self.judge.fitted_from(part, known, left.efforts), key=lambda one: one.order)
         outputs = measured_outputs(model, record)
         inputs = tuple(name for name in model.input_channels if name in record)
         stretches = list(odd_stretches(record, outputs, inputs, self.settings))

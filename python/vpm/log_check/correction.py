@@ -84,6 +84,11 @@ class Correction:
         return f"{names} {are} {by}{turned}"
 
     @property
+    def each(self) -> tuple[Correction, ...]:
+        """The correction as one of several, see `Pair.each`."""
+        return (self,)
+
+    @property
     def kind(self) -> str:
         """Kind of mistake that a correction undoes; see `Finding.kind`."""
         if self.swap:
@@ -132,6 +137,11 @@ class Pair(NamedTuple):
 
     first: Correction
     second: Correction
+
+    @property
+    def each(self) -> tuple[Correction, ...]:
+        """Corrections of a pair."""
+        return (self.first, self.second)
 
     def applied(self, record: Experiment) -> Experiment:
         """The record with both corrections done."""

@@ -13,7 +13,7 @@ import numpy as np
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.experiment import Experiment
 from vpm.log_check.correction import Correction, Pair
-from vpm.log_check.shares import FORCES, Judge, Shares, Tangent
+from vpm.log_check.shares import FORCES, Judge, Shares, Tangent, mean_logarithm
 from vpm.log_check.tried_corrections import delays, of_two, scales
 
 Change = TypeVar("Change", Correction, Pair)
@@ -90,6 +90,7 @@ class Explainer:
             if any(doubtful & set(self._affected(one, left)) for one in pair)
         ]
         before = self.judge.guessed(part)
+        pairs = self._balancing(pairs, part, left)
         tried = self._ordered("trying", self.judge.guessed, pairs, part)
         few = [pair for pair, shares in tried if shares.cost < before.cost][: self.settings.fitted]
         for pair, after in self._ordered("fitting", self.judge.fitted, few, part)[:1]:
@@ -145,12 +146,16 @@ class Explainer:
         return min(known, default=math.inf)
 
     def _best(self, ended: Sequence[_Trial], used: Sequence[str]) -> Explanation | None:
-        """The first of several corrections, if it explains what was left, with those that do as well."""
+        """The first of several corrections, if it explains what was left, with those that do as well.
+
+        One with values that the model file rules out does not do as well as one without.
+        """
         if not ended:
             return None
-        (correction, before, after), *others = ended
-        close = after.cost - math.log(self.settings.alike)
-        rivals = tuple(other.correction for other in others if other.after.cost <= close)
+        close = ended[0].after.cost - math.log(self.settings.alike)
+        alike = [one for one in ended if one.after.cost <= close]
+        (correction, before, after), *others = [one for one in alike if one.after.far <= self.settings.far] or alike
+        rivals = tuple(other.correction for other in others)
         if not self._explains(correction, before, after) or any(_is_no_scale(correction, other) for other in rivals):
             return None
         affected, of_values = self._affected(correction, after), self._is_of_values(correction, before, after)
@@ -176,11 +181,36 @@ class Explainer:
             tried = [one for one in tried if not one.is_clock]
         # The mirror image of a machine explains most of a log as well as the machine does.
         tried += self._about((one for one in everything if one.is_mirror), some, left)
-        return self._hopeful(list(dict.fromkeys(tried)), part, self.judge.guessed(part)) if tried else []
+        tried = self._balancing(list(dict.fromkeys(tried)), part, left)
+        return self._hopeful(tried, part, self.judge.guessed(part)) if tried else []
+
+    def _balancing(self, corrections: Sequence[Change], part: Experiment, left: Shares) -> list[Change]:
+        """Corrections with which less is left of the efforts that they affect, and of all; all where none follow.
+
+        That takes no run of the model, and what a slow tracker makes of a force that is missing does not enter.
+        """
+
+        def better(correction: Change) -> bool:
+            affected = {name for one in correction.each for name in self._affected(one, left)} & set(left.efforts)
+            if not affected:
+                return True
+            efforts = self.judge.balanced(correction.applied(part))
+            return bool(efforts) and all(
+                mean_logarithm(efforts, names) <= mean_logarithm(left.efforts, names) for names in (affected, efforts)
+            )
+
+        told = self.each("balancing", better, corrections, self._words)
+        return [one for one, kept in zip(corrections, told, strict=True) if kept is True]
 
     def _doubtful(self, left: Shares) -> set[str]:
-        """Channels that the model does not explain; all where its file rules out the values by which it does."""
-        return set(left.by_channel) if left.far > self.settings.far else left.above(self.settings.doubtful)
+        """Channels that the model does not explain; all where its file rules out the values by which it does.
+
+        But for those at which efforts balance: a wrong unit or sign shows there. What shows in the motion alone is a
+        small force of which a slow tracker makes a large error, such as one at which a joint sticks.
+        """
+        share = self.settings.doubtful
+        found = set(left.by_channel) if left.far > self.settings.far else left.above(share)
+        return {name for name in found if left.efforts.get(name, 1.0) > share}
 
     def _about(self, corrections: Iterable[Correction], channels: set[str], left: Shares) -> list[Correction]:
         """Explanations that may have affected one of these channels."""
@@ -282,10 +312,13 @@ class Explainer:
         if count == 1 and self._is_of_values(correction, before, after):
             return True
         affected = self._affected(correction, after)
-        gain = after.logarithm(affected) - before.logarithm(affected)
-        if after.cost > before.cost or gain > count * math.log(self.settings.better):
+        enough = count * math.log(self.settings.better)
+        if after.cost > before.cost or after.logarithm(affected) - before.logarithm(affected) > enough:
             return False
-        return not correction.delay or self._is_throughout(affected, before, after)
+        if correction.delay:
+            return self._is_throughout(affected, before, after)
+        told = set(affected) & set(before.efforts) & set(after.efforts)
+        return not told or mean_logarithm(after.efforts, told) - mean_logarithm(before.efforts, told) <= enough
 
     def _is_of_values(self, correction: Correction, before: Shares, after: Shares) -> bool:
         """Whether the model explains the record anyway, but with values that its file rules out, now needless.

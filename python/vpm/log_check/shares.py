@@ -6,6 +6,7 @@ import math
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from vpm.catalogue import EFFECTS
 from vpm.catalogue.effects import BUILT_IN
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
+from vpm.identify.response_along_motion import bends, has_own_drives
 from vpm.initial import initial_state
 from vpm.log_check.correction import Correction
 from vpm.log_check.delay import Delayed, with_delay, without_delay
@@ -64,6 +66,8 @@ class Shares:
     unlikely: float = 0.0
     chance: float = 1.0  #: Of deviations as large as these.
     floor: float = 0.0  #: Shares below this are as good as nothing.
+    #: What a balance of efforts leaves of that at each position, by channel; none where it takes a run of the model.
+    efforts: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def cost(self) -> float:
@@ -72,8 +76,7 @@ class Shares:
 
     def logarithm(self, channels: Iterable[str]) -> float:
         """Mean of the logarithms of the shares of some channels."""
-        shares = [self.by_channel[name] for name in channels]
-        return sum(math.log(max(share, 1e-300)) for share in shares) / len(shares)
+        return mean_logarithm(self.by_channel, channels)
 
     def above(self, share: float) -> set[str]:
         """Channels of which more than a share is left."""
@@ -83,6 +86,13 @@ class Shares:
     def order(self) -> tuple[float, float]:
         """Sort key of several shares: what leaves least comes first."""
         return self.cost, self.logarithm(self.by_channel)
+
+
+class _Balance(NamedTuple):
+    """Values by which a balance of efforts leaves least, and what it leaves of them."""
+
+    values: Array
+    efforts: dict[str, float]
 
 
 class Judge:
@@ -116,6 +126,18 @@ class Judge:
             return self._lost(record, values)
         return self._shares(tracked, residual, tracker, values)
 
+    def balanced(self, record: Experiment) -> Mapping[str, float]:
+        """What a balance of efforts leaves at each position as a share; see `Shares.efforts`."""
+        if not self._at_once:
+            return {}
+        balance = self._balance(record, self._structure(record))
+        return {} if balance is None else balance.efforts
+
+    @cached_property
+    def _at_once(self) -> bool:
+        """Whether efforts follow from each sample of an error share alone, without states of links and drives."""
+        return not bends(self.model) and not has_own_drives(self.model)
+
     def guessed(self, record: Experiment) -> Shares:
         """Shares where a fit would begin, whichever leaves least: at the values of the model, with friction or without.
 
@@ -130,8 +152,8 @@ class Judge:
             parameter = self.model.effect(*key).parameter_names["coulomb"]
             values[self.model.index(parameter)] = structure.priors[parameter].spread
         tried = [plain, self.measured(record, values)]
-        if (near := self._regressed(record, structure, plain)) is not None:
-            tried.append(self.measured(record, near))
+        if (balance := self._balanced(record, structure, plain)) is not None:
+            tried.append(self.measured(record, balance.values))
         return min(tried, key=lambda shares: shares.order)
 
     def fitted(self, record: Experiment) -> Shares:
@@ -142,18 +164,23 @@ class Judge:
         """
         structure, plain = self._structure(record), self.measured(record)
         starts = [(structure, plain)]
-        if (near := self._regressed(record, structure, plain)) is not None:
-            starts.append((replace(structure, theta=near), self.measured(record, near)))
+        if (balance := self._balanced(record, structure, plain)) is not None:
+            starts.append((replace(structure, theta=balance.values), self.measured(record, balance.values)))
         found = [self._fitted(record, *start) or plain for start in starts]
-        return min(found, key=lambda shares: shares.order)
+        best = min(found, key=lambda shares: shares.order)
+        return best if balance is None else replace(best, efforts=balance.efforts)
 
-    def fitted_from(self, record: Experiment, known: Array) -> Shares:
-        """Shares at values that are ``known`` from another record, or when a fit from there has ended."""
+    def fitted_from(self, record: Experiment, known: Array, efforts: Mapping[str, float]) -> Shares:
+        """Shares at values that are ``known`` from another record, or when a fit from there has ended.
+
+        What is left of the ``efforts`` goes by the record alone.
+        """
         structure, own = self._structure(record), len(self.model.theta)
         values = np.append(known[:own], structure.theta[own:])
         start = self.measured(record, values)
         found = self._fitted(record, replace(structure, theta=values), start)
-        return start if found is None else min(start, found, key=lambda shares: shares.order)
+        best = start if found is None else min(start, found, key=lambda shares: shares.order)
+        return replace(best, efforts=efforts)
 
     def _fitted(self, record: Experiment, structure: Structure, start: Shares) -> Shares | None:
         """Shares where a fit ends that begins at the values of a structure and its shares; None if it runs away."""
@@ -169,20 +196,33 @@ class Judge:
         shares = self._shares(tracked, found.residual, tracker, found.structure.theta)
         return self._with_departure(shares, found.structure)
 
-    def _regressed(self, record: Experiment, structure: Structure, plain: Shares) -> Array | None:
+    def _balanced(self, record: Experiment, structure: Structure, plain: Shares) -> _Balance | None:
+        """Balance of efforts of a record; None where the model as it is follows the record, by its ``plain`` shares."""
+        return self._balance(record, structure) if plain.above(self.settings.doubtful) else None
+
+    def _balance(self, record: Experiment, structure: Structure) -> _Balance | None:
         """Values that leave least of the inverse-dynamics residual of a record, see `vpm.ranking.regression`.
 
-        None where the model as it is follows the record, by its ``plain`` shares, and where no efforts follow from the
-        motion. Nor where the model file rules such values out: commands that are far too small ask for masses that are.
+        None where no efforts follow from the motion. Values that the model file rules out are none: commands that are
+        far too small ask for masses that are.
         """
-        if not plain.above(self.settings.doubtful) or why_unbalanced(self.model, [record]):
+        if why_unbalanced(self.model, [record]):
             return None
+        priors = {name: self._within(name, prior) for name, prior in structure.priors.items()}
         try:
-            found = regressed(structure, InverseDynamicsProblem(self.model, [record]))
+            problem = InverseDynamicsProblem(self.model, [record])
+            found = regressed(replace(structure, priors=priors), problem)
+            left = _left_of_efforts(problem, self.model, found.theta) if self._at_once else {}
+            return _Balance(found.theta, left)
         except ASTRAY:
             return None
-        farthest = max(self._departures(found).values(), default=0.0)
-        return None if farthest > self.settings.far else found.theta
+
+    def _within(self, name: str, prior: Prior) -> Prior:
+        """Prior of a parameter with bounds beyond which the model file rules values out."""
+        if name in self._of_added:
+            return prior
+        ends = prior.value(-self.settings.far), prior.value(self.settings.far)
+        return replace(prior, low=min(ends), high=max(ends))
 
     def tangent(self, record: Experiment, at: Shares, forces: Collection[str] = FRICTION) -> Tangent | None:
         """Tangent of the error share by the parameters; None where that cannot be computed."""
@@ -223,7 +263,8 @@ class Judge:
         seen = _seen(tracked)
         kept[seen] = (slopes.reshape(len(sizes), -1, slopes.shape[1]) * sizes).transpose(1, 0, 2)
         shares = self._shares(tracked, fitted.residual, tracker, fitted.structure.theta)
-        return Tangent(fitted.structure, fitted.residual, kept, self._with_departure(shares, fitted.structure))
+        shares = replace(self._with_departure(shares, fitted.structure), efforts=start.shares.efforts)
+        return Tangent(fitted.structure, fitted.residual, kept, shares)
 
     def fit_delay(self, record: Experiment, correction: Correction, tangent: Tangent) -> tuple[Correction, Shares]:
         """Error share of a delay that is fitted with the parameters and all forces."""
@@ -242,7 +283,8 @@ class Judge:
         *values, delay = found.structure.theta.tolist()
         refined = replace(correction, delay=delay)
         shares = self.measured(refined.applied(record), np.array(values))
-        return refined, self._with_departure(shares, without_delay(found.structure))
+        shares = self._with_departure(shares, without_delay(found.structure))
+        return refined, replace(shares, efforts=self.balanced(refined.applied(record)))
 
     def _with_departure(self, shares: Shares, structure: Structure) -> Shares:
         """Shares with how far the parameters of the model are from what its file states."""
@@ -257,12 +299,12 @@ class Judge:
     def _departures(self, structure: Structure) -> dict[str, float]:
         """By how many of its stated deviations each parameter of the model was moved."""
         moved = zip(structure.priors, np.abs(structure.standard).tolist(), strict=True)
-        return {name: far for name, far in moved if not self._is_added(name)}
+        return {name: far for name, far in moved if name not in self._of_added}
 
     def undetermined(self, tangent: Tangent) -> list[str]:
         """Uncertain parameters of the model on which a record's error share hardly depends."""
         deviations = zip(tangent.structure.priors, tangent.deviations.tolist(), strict=True)
-        return [name for name, left in deviations if left > self.settings.undetermined and not self._is_added(name)]
+        return [name for name, left in deviations if left > self.settings.undetermined and name not in self._of_added]
 
     def of_sensor(self, correction: Correction, record: Experiment, before: Shares) -> Shares | None:
         """Error share of a corrected sensor that does not draw the model; None where it takes another run."""
@@ -321,8 +363,10 @@ class Judge:
         rest = np.zeros(len(self.model.coordinates))
         return np.abs(self.model.inverse_dynamics(rest, rest, rest))
 
-    def _is_added(self, parameter: str) -> bool:
-        return any(parameter in self.model.effect(*key).parameter_names.values() for key in self.added)
+    @cached_property
+    def _of_added(self) -> frozenset[str]:
+        """Parameters of forces that were added for error shares."""
+        return frozenset(name for key in self.added for name in self.model.effect(*key).parameter_names.values())
 
     def _tracker(self, record: Experiment) -> Tracker:
         return Tracker(min(self.settings.band, self.settings.turn / record.dt), fine=False)
@@ -398,9 +442,32 @@ class Tangent:
         return slopes.reshape(-1, slopes.shape[2]), sizes
 
 
+def mean_logarithm(shares: Mapping[str, float], channels: Iterable[str]) -> float:
+    """Mean of the logarithms of some shares."""
+    own = [math.log(max(shares[name], 1e-300)) for name in channels]
+    return sum(own) / len(own)
+
+
 def rows_of(part: Experiment, record: Experiment) -> NDArray[np.intp]:
     """Rows of a record that are the samples of a part of it, for error shares."""
     return np.asarray(np.round((part.time - record.time[0]) / record.dt), dtype=np.intp)
+
+
+def _left_of_efforts(problem: InverseDynamicsProblem, model: Model, values: Array) -> dict[str, float]:
+    """What a balance leaves of the effort at each position, as a share of its variance, by channel.
+
+    Of the variance, for what holds a weight says nothing of the scale of a motion.
+    """
+    _, applied, required = problem.effort(model, values, 0)
+    found = {}
+    for place, block in enumerate(problem.efforts(0)):
+        counts = block.moving > 0.0
+        moved = applied[counts, place]
+        left = float(np.sum((moved - required[counts, place]) ** 2))
+        found[f"{problem.joints[place]}.position"] = (
+            _share(left, float(np.sum((moved - moved.mean()) ** 2))) if moved.size else 1.0
+        )
+    return found
 
 
 def _seen(tracked: TrackedRecords) -> NDArray[np.intp]:
