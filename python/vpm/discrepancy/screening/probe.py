@@ -92,8 +92,15 @@ class Baseline:
         if not self.pushed:
             return self.span
         steps = -(self._inverse @ residual)
-        pushed = [self.pushed.get(name, 0) * step > 0.0 for name, step in zip(self.free, steps, strict=True)]
-        return Span.of(self.jacobian[:, np.logical_not(pushed)]) if any(pushed) else self.span
+        kept = tuple(self.pushed.get(name, 0) * step <= 0.0 for name, step in zip(self.free, steps, strict=True))
+        if kept not in self._spans:
+            self._spans[kept] = Span.of(self.jacobian[:, kept])
+        return self._spans[kept]
+
+    @cached_property
+    def _spans(self) -> dict[tuple[bool, ...], Span]:
+        """Spans of some known columns, by which of them these are; most probes ask for the same ones."""
+        return {(True,) * len(self.free): self.span}
 
 
 def prepare(base: Baseline, data: InverseDynamicsProblem, listed: Sequence[Candidate]) -> Baseline:
