@@ -9,8 +9,6 @@
 Libraries and single studies are imported where they are used.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 from vpm.errors import VpmError, near_match

@@ -1,7 +1,5 @@
 """A fingertip pressed onto a plate: force and area of contact (D'Imperio 2016, section B.2)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Newton's method with line search, rounds of augmented Lagrange and load steps for a soft body on an obstacle."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Records as this package reads them: a clock and some channels, checked once."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias

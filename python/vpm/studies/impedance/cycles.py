@@ -1,7 +1,5 @@
 """Whole cycles of a record, and the sums over their harmonics."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

@@ -1,7 +1,5 @@
 """Fourier series of periodic channels by least squares: any start, any drift, no window."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -9,8 +9,6 @@ D'Imperio (2016), eq 5.27, prints the factor of the full cycle and ``m v^2`` for
 5.28 is no energy but an impulse, ``int F dt = m g dt + m dv``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

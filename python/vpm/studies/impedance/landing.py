@@ -7,8 +7,6 @@ least squares, less the known share of the displacement's white noise in their n
 estimates too small.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ Damping, Control, and Design*, CRC Press 2007, chapter 1). Each law has one coef
 of ``E / measure`` scatter no more than the tests themselves do.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

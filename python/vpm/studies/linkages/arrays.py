@@ -1,7 +1,5 @@
 """One configuration or many: the core takes tables, people also give single rows."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

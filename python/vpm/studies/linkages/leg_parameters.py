@@ -1,7 +1,5 @@
 """Dimensions and masses of a leg, and the published sets of HyQ."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Literal, Self
 

@@ -1,7 +1,5 @@
 """Bulk modulus of the oil and gain of the valve, by linear least squares from a record of one cylinder."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise

@@ -1,7 +1,5 @@
 """Least squares over the balances of oil: rows as rates or as integrals, instruments, weights, covariance."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
