@@ -1,7 +1,5 @@
 """Models: what a machine is made of, read from a TOML file and checked before anything moves."""
 
-from __future__ import annotations
-
 from vpm.model.channel_table import load_channel_table, parse_channel_table
 from vpm.model.channels import ChannelEntry
 from vpm.model.compile import Shape

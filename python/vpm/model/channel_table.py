@@ -1,7 +1,5 @@
 """Channel tables as files of their own: the same as ``[channels]`` of a model file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from os import PathLike
 from types import MappingProxyType

@@ -3,8 +3,6 @@
 What is checked stands with the components; here is the order.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from functools import partial
 from pathlib import Path

@@ -1,7 +1,5 @@
 """What a model is made of, by name: components, coordinates, states, channels."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cached_property
 from types import MappingProxyType

@@ -1,7 +1,5 @@
 """What a model answers about a single state: rest, vibrations, linear behaviour."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np

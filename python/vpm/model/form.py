@@ -1,7 +1,5 @@
 """What the schema finds in a model file, rewritten as sentences with the repair."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import Any

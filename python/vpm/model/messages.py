@@ -1,7 +1,5 @@
 """Problems of a model file, each as one sentence: where, the failing condition, the numbers, the repair."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Terms of the equations of motion that a model leaves out part by part: by name in the file, by number in the core."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 from vpm.model.messages import Problem, place

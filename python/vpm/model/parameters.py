@@ -1,7 +1,5 @@
 """Parameters of a model, and their places in its file: values in SI, bounds, and what is physically possible."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

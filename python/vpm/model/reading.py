@@ -1,7 +1,5 @@
 """Content of a model file: TOML, or what an importer makes of another format."""
 
-from __future__ import annotations
-
 import math
 import re
 import tomllib

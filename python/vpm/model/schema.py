@@ -3,8 +3,6 @@
 Only form is checked by it. What needs more than one key to judge (references, units, ranges, inertia) comes after.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from types import NoneType, UnionType
 from typing import Annotated, Literal, Union, get_args, get_origin

@@ -1,7 +1,5 @@
 """Standard inertial parameters of bodies: those in which efforts are linear."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from vpm.numbers import Array

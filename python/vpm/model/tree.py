@@ -1,7 +1,5 @@
 """What hangs on what: names, parents, places along beams, and ways that never reach the world."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 

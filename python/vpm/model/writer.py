@@ -1,7 +1,5 @@
 """From a checked document back to the content and the text of a model file."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from types import MappingProxyType
 from typing import Any

@@ -3,8 +3,6 @@
 Written ``"rigid"`` or with a number, ``"strain(3)"``. What each means and costs is in docs/beams.md.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

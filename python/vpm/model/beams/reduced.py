@@ -4,8 +4,6 @@ A model holds the whole file as text, so that it is complete in itself: it can b
 process, and does not need the file again.
 """
 
-from __future__ import annotations
-
 import base64
 import binascii
 import io

@@ -1,7 +1,5 @@
 """Cross-sections of flexible links: shapes of one material, layers, or stiffness that was given."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 

@@ -1,7 +1,5 @@
 """What a model answers about its drives and supplies, by name: types, what they move, inputs, states."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from functools import cached_property
 
