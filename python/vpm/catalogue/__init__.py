@@ -9,8 +9,6 @@ rad), ``{E}`` the unit of its effort (N or N m), ``{U}`` the unit of the actuato
 sensor reads.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 
 from vpm.catalogue.entries import OWN, Catalogue

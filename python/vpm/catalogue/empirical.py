@@ -1,7 +1,5 @@
 """Basis functions of a force without a law: the terms of which a formula for a residual is made."""
 
-from __future__ import annotations
-
 from types import MappingProxyType
 
 #: Terms by name as text, in x (position), y (velocity), s (direction), phi (phase along the way) and u (load).

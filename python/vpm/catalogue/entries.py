@@ -1,7 +1,5 @@
 """All effects by name: those of vpm, those that a program registered, and those of other packages."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any
 

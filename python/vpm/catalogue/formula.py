@@ -1,7 +1,5 @@
 """Laws that users write: expressions in q, v and parameters, compiled to a program that the core runs."""
 
-from __future__ import annotations
-
 import ast
 import math
 import operator

@@ -1,7 +1,5 @@
 """What the catalogue says about an effect and about each of its parameters."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

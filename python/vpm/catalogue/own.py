@@ -1,7 +1,5 @@
 """Entries that users add to the catalogue: laws of joints, written as expressions."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Collection, Mapping

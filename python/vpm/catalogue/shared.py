@@ -6,8 +6,6 @@ and C. Canudas de Wit, "A survey of models, analysis tools and compensation meth
 friction", Automatica 30 (1994).
 """
 
-from __future__ import annotations
-
 from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectParameter, Range, Scale, nonlinear, shape, size
 
 #: Transition velocity where none is given: prismatic (m/s), revolute (rad/s).

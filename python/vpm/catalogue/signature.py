@@ -3,8 +3,6 @@
 A report draws its evidence over this state, and the page of the catalogue says it in words.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

@@ -1,7 +1,5 @@
 """What an effect does, by its physics: what the rest of the package asks of an effect instead of its name."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

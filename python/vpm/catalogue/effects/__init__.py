@@ -7,8 +7,6 @@ The command passes the effects of an actuator in the order delay, dead zone, sat
 described of leakage, air and frequency stays, and an effect comes on top of it.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 
 from vpm.catalogue.kinds import EffectType
