@@ -6,8 +6,6 @@ elsewhere for noise, and the cut-off frequency is the highest one whose expected
 least of all: what follows averages over noise, but nothing brings back motion that was cut off.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Dates and times of day of a text log, as its clock."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from datetime import date

@@ -1,7 +1,5 @@
 """How a text file writes a table: letters, remarks above the names, separators, decimal commas, a row of units."""
 
-from __future__ import annotations
-
 import csv
 import re
 from collections.abc import Iterator, Sequence

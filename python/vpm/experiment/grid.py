@@ -1,7 +1,5 @@
 """The time grid of a log: what is refused, and what is interpolated when the user asks for it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Positions of joints that follow from lengths of lines, where a log holds the strokes of cylinders alone."""
 
-from __future__ import annotations
-
 from collections.abc import Collection
 from dataclasses import replace
 from functools import lru_cache

@@ -1,7 +1,5 @@
 """Which files make a campaign, what their records are called, and whether they belong together."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Sequence
 from glob import glob, has_magic

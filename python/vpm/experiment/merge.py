@@ -1,7 +1,5 @@
 """Columns of different clocks on one grid."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

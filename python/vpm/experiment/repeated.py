@@ -1,7 +1,5 @@
 """Motions that were read more slowly than they were logged, so that each value is repeated until the next one."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

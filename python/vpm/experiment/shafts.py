@@ -1,7 +1,5 @@
 """Positions of joints that follow from those of shafts, where a log holds motor encoders alone."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Filters, differences and resampling: all of them linear, none of them shifts a signal in time."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 from math import ceil
 

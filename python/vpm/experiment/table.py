@@ -1,7 +1,5 @@
 """A text table of numbers: read fast, and when that fails, read again to say where it is wrong."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Files of logs: which reader takes which, told by the ending of the name."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from importlib import import_module
 from os import PathLike

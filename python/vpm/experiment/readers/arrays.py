@@ -1,7 +1,5 @@
 """Files of named arrays, vectors and matrices of two dimensions: how a column of one is written and read."""
 
-from __future__ import annotations
-
 import re
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """What every reader of logs offers: names of columns, and their numbers."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager

@@ -3,8 +3,6 @@
 Its words are ``MODULE CLASS FILE SECONDS BYTES``: the class that reads, the file, and its limits.
 """
 
-from __future__ import annotations
-
 import importlib
 import json
 import os

@@ -1,7 +1,5 @@
 """Files of channels in groups, each group with a clock of its own."""
 
-from __future__ import annotations
-
 import logging
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Data frames that a program holds already: of pandas, polars, or anything with columns that NumPy takes."""
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from typing import Any, Protocol

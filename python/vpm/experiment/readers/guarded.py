@@ -4,8 +4,6 @@ A library with compiled parts may end its process or go round in a loop where a 
 sentence about the file.
 """
 
-from __future__ import annotations
-
 import importlib.util
 import json
 import os

@@ -1,7 +1,5 @@
 """Data sets of LeRobot, versions 2 and 3: each episode is a log."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """MATLAB files: variables and fields of structures, by SciPy up to version 7.2 and by h5py for version 7.3."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from os import PathLike
 

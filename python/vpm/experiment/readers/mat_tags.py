@@ -4,8 +4,6 @@ Source: MathWorks, *MAT-File Format*, 2024: a header of 128 bytes, then elements
 type miMATRIX hold flags, dimensions, a name and the content of their class.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 import zlib

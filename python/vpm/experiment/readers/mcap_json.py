@@ -1,7 +1,5 @@
 """MCAP files of JSON messages: numbers of topics, each topic with a clock of its own."""
 
-from __future__ import annotations
-
 import json
 from os import PathLike
 from pathlib import Path

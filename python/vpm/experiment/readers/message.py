@@ -1,7 +1,5 @@
 """Numbers inside a ROS message: fields, elements of arrays by index or by the name beside them, and the stamp."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator
 from typing import Any, NamedTuple

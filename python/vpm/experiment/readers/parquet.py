@@ -1,7 +1,5 @@
 """Parquet files: columns of numbers, of times, and fields of structures."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from os import PathLike
 

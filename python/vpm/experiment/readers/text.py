@@ -1,7 +1,5 @@
 """Text tables: CSV and its relatives."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from os import PathLike
 
