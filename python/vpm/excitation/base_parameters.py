@@ -1,7 +1,5 @@
 """What can be identified at all: the parameters that a regressor determines, and which others hang on them."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

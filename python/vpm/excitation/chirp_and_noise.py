@@ -1,7 +1,5 @@
 """A chirp and band-limited noise as excitations."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from vpm.errors import ExcitationError

@@ -1,7 +1,5 @@
 """Finite Fourier series as motions of joints: exact derivatives, and bounds that hold between samples."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

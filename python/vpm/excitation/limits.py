@@ -1,7 +1,5 @@
 """What a joint may do."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Multisines: sums of sines of one period with chosen amplitudes, and phases that keep the peaks low."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from typing import Literal

@@ -1,7 +1,5 @@
 """Point-to-point motions with trapezoidal velocity profiles, several joints in step."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 

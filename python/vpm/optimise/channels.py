@@ -1,7 +1,5 @@
 """Channels of a model as expressions of a point: state, commands and their slopes, duration of the phase."""
 
-from __future__ import annotations
-
 from functools import cached_property
 
 import numpy as np

@@ -4,8 +4,6 @@ Source: E. Hairer, G. Wanner, "Solving Ordinary Differential Equations II", 2nd 
 three stages has order five, and its last point is the end of the interval, so it is stiffly accurate.
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.polynomial import legendre
 

@@ -4,8 +4,6 @@ The C of a model is a list of assignments, one operation each. Read into CasADi'
 derivatives that are exact and sparse, and need no C compiler.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import dataclass

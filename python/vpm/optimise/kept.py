@@ -1,7 +1,5 @@
 """Which limits hold a motion back, and which it passes between the points where they are asked for."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 

@@ -4,8 +4,6 @@ Source: J. T. Betts, "Practical Methods for Optimal Control and Estimation Using
 2010, section 4.7: the error of an interval is the integral of what the polynomials' rates miss of the equations.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

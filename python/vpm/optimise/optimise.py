@@ -1,7 +1,5 @@
 """Motions that make a goal least: `vpm.optimise`."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

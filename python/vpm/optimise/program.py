@@ -5,8 +5,6 @@ command and duration). First and second derivatives are those of ``G``, evaluate
 their places by constant sparse matrices.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Form of a task file: which keys there are and what kind of value each takes."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Any
 

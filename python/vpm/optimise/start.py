@@ -1,7 +1,5 @@
 """Where the search begins: rest at both ends, a smooth way between, the sizes of all variables."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from contextlib import suppress

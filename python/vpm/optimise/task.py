@@ -1,7 +1,5 @@
 """Tasks: what a motion shall do and what limits it, read from TOML and fitted to a model."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from copy import deepcopy

@@ -5,8 +5,6 @@ Source: J. T. Betts, "Practical Methods for Optimal Control and Estimation Using
 Radau's points; commands run straight between the nodes, so that their limits and those of their rates hold everywhere.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any
