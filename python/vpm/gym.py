@@ -1,7 +1,5 @@
 """Environments for gymnasium: one machine, or many copies that the core steps in one call."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """State feedback from exact linear models: linear quadratic gains, scheduled along a motion or over the workspace."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

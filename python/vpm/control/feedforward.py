@@ -1,7 +1,5 @@
 """Commands by which chosen outputs of a flexible machine follow a target, with all that the machine does meanwhile."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Poses in which a machine's outputs are where they should be, with the loads that a motion makes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

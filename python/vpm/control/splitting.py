@@ -1,7 +1,5 @@
 """Boundary value problems whose solutions die out forward or backward in time: stable inversion."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

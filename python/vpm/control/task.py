@@ -1,7 +1,5 @@
 """The equations of an inversion: a machine, inputs that move it, and as many outputs that follow a target."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property

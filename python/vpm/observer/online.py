@@ -1,7 +1,5 @@
 """An observer that is fed sample by sample: state, covariance and innovations for a controller at work."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Compiled models: one file with all that a step needs, for the C library and for Rust."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """A loop at a fixed rate, for hardware in the loop."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from types import TracebackType

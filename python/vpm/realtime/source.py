@@ -1,7 +1,5 @@
 """Models as C99: rates, outputs, exact derivatives and steps, for controllers, CasADi and acados."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The shared library of an FMU, by the C compiler of this machine."""
 
-from __future__ import annotations
-
 import os
 import platform
 import shutil

@@ -1,7 +1,5 @@
 """The XML files of an FMU: what it is, and how its sources are built."""
 
-from __future__ import annotations
-
 import re
 import xml.etree.ElementTree as ET
 from collections.abc import Iterable

@@ -1,7 +1,5 @@
 """Variables of an FMU: their names, references, units, and what depends on what."""
 
-from __future__ import annotations
-
 import re
 import sys
 from collections import Counter

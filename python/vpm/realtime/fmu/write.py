@@ -1,7 +1,5 @@
 """One file that other simulators load: description, sources and, where a compiler is at hand, a library."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Mapping, Sequence
