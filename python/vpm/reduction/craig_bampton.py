@@ -6,8 +6,6 @@ Idelsohn, A. Cardona, "A reduction method for nonlinear structural dynamic analy
 codes", Mech. Struct. Mach. 22(3), 1994.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

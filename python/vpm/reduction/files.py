@@ -1,7 +1,5 @@
 """What `vpm reduce` reads: the description of a solid, or matrices with their nodes."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Mapping
 from os import PathLike

@@ -5,8 +5,6 @@ component, node, component, entry`` (``*MATRIX OUTPUT, FORMAT=MATRIX INPUT``). C
 6 rotations.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

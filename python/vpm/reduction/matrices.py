@@ -1,7 +1,5 @@
 """Stiffness and mass matrices from files of finite element programs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Solids of one isotropic material by quadratic finite elements of scikit-fem."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A solid of finite elements as matrices, and what has to hold for them before they are reduced."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property

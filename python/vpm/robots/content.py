@@ -1,7 +1,5 @@
 """From the parts of a robot to the content of a model file, with the remarks that make it readable."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Numbers of attributes written into a file of XML, with every other byte as it was."""
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, field
 

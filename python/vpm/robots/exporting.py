@@ -1,7 +1,5 @@
 """What a model knows, back in the URDF that it came from: ``export_robot``."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from os import PathLike

@@ -1,7 +1,5 @@
 """Robots of other programs as models: ``import_robot``."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from os import PathLike

@@ -1,7 +1,5 @@
 """Fixed joints taken away: what hangs on them is a part of the link that moves."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 

@@ -4,8 +4,6 @@ A body of MuJoCo turns about anchors of its joints, one after the other (``mj_ki
 link whose frame is at its anchor. A joint counts from its ``ref``, at which the body is where the file says.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from pathlib import Path

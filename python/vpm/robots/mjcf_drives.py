@@ -1,7 +1,5 @@
 """Actuators, tendons and equalities of MJCF as drives, shafts and joints that follow others."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What a file of a robot says, whichever format it has: links, joints, shafts and drives."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 

@@ -4,8 +4,6 @@ Laws: the documentation of ``transmission_interface`` of ros2_control, of its cl
 ``FourBarLinkageTransmission``, there "joint to actuator", position.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 

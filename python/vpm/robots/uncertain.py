@@ -1,7 +1,5 @@
 """How uncertain parameters of an imported robot are: a share of each, with bounds that a fit keeps to."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -4,8 +4,6 @@ Frames: wiki.ros.org/urdf/XML. The frame of a link is that of the joint that car
 the centre of mass, in axes of the frame that ``origin`` of ``inertial`` gives; ``ixy`` is an entry of the matrix.
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Xacro files, expanded by the program of their own in a process that can do nothing but that."""
 
-from __future__ import annotations
-
 import importlib.util
 import subprocess
 import sys

@@ -4,8 +4,6 @@ Xacro evaluates expressions of Python. Those of a robot are arithmetic on its pr
 inside of the interpreter is refused, and time and memory have an end.
 """
 
-from __future__ import annotations
-
 import ast
 import sys
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Sizes of bodies from what a model knows of them: boxes of the same inertia, spheres of the same mass."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

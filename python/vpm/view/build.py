@@ -1,7 +1,5 @@
 """From a model and a motion to a scene."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Colours and words of what is drawn, on light and on dark ground."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Shapes as triangles, for drawers that know nothing else."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np

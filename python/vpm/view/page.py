@@ -1,7 +1,5 @@
 """A scene as one static page: it holds all it needs and opens from a file, without a server and without a network."""
 
-from __future__ import annotations
-
 import base64
 import html
 import json

@@ -3,8 +3,6 @@
 Every shape has its places at every sample: of N samples, or of one where it never moves. All lengths are in m.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass

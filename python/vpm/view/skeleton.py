@@ -1,7 +1,5 @@
 """What of a machine is drawn, from what its model knows, and where all of it is along a motion."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
