@@ -1,7 +1,5 @@
 """The residual of a fit by its mode: with first states, pieces and equality constraints where they are asked for."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Drives with states of their own on a measured motion: where they begin, what shows of them, and their efforts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial

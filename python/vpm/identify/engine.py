@@ -1,7 +1,5 @@
 """The fit itself: starts, weights found on the way, descent, covariance; whatever is asked of it by `Fitting`."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor

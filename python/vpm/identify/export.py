@@ -1,7 +1,5 @@
 """What was found, for people: a fit as lines, and as files: the fitted model, a table, a report, a picture."""
 
-from __future__ import annotations
-
 import csv
 import math
 from collections.abc import Sequence

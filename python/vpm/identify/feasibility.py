@@ -12,8 +12,6 @@ approach", *IEEE Trans. Robotics* 36, 2020). Least squares with a small share of
 finds the one answer, inside the border (S. Boyd, L. Vandenberghe, *Convex Optimization*, 2004, section 11.3).
 """
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular

@@ -11,8 +11,6 @@ Parameters move first states too: equilibria of flexible links, chambers at rest
 differentiates the steps that it takes; what the first state adds comes from differences here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from copy import copy
 from typing import Self, TypeVar

@@ -1,7 +1,5 @@
 """Parameters from data: bounded least squares on any problem, with honest uncertainty."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace

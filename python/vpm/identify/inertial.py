@@ -5,8 +5,6 @@ that what the data cannot tell is named; equations are weighted by the noise of 
 correlated noise; and a fit can be confined to parameters that a body can have.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

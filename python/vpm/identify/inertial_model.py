@@ -1,7 +1,5 @@
 """The regression of a model file's machine: standard inertial parameters of its bodies, and what else is linear."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

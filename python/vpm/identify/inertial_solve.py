@@ -1,7 +1,5 @@
 """Three ways from a weighted regression to parameters and their covariance, and how far these may be trusted."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -10,8 +10,6 @@ is corrected with it: what is wrong with one sample would else pass for a comman
 As the logged command has a size of its own, the trivial solution of a balance (no force and no inertia) is none here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """What a fit leaves beside the motion of its records: signs that an effect is missing, channel by channel."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from itertools import product
 from typing import NamedTuple

@@ -6,8 +6,6 @@ moments of mass along the axes, ``xx = Y + Z``, are positive and nothing else (P
 Robotics and Automation Letters* 3, 2018); beside one known moment, sum and difference of the others have bounds.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

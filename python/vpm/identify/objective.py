@@ -1,7 +1,5 @@
 """What a fit makes small: residuals in units of their noise, through a loss, with what is known of the parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from threading import Lock
 

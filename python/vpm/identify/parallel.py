@@ -1,7 +1,5 @@
 """Jobs on threads, in order: the core computes without the interpreter's lock, so records and starts share cores."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Sequence
 from typing import TypeVar

@@ -5,8 +5,6 @@ and neither laws nor faults of drives how links bend: the balance is a sum. A ca
 changes, and the others answer from memory.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter

@@ -4,8 +4,6 @@ A problem fixes the data and how they are compared; the model may change under i
 the nominal model, the recalibrated one and every candidate effect on the same samples.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol

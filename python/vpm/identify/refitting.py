@@ -1,7 +1,5 @@
 """Fits that begin from one another: beside first states, less the model's own residual, on other records."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import TypeVar

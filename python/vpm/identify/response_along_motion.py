@@ -5,8 +5,6 @@ what nobody measures and what therefore has to be worked out along the motion, e
 without a sensor, and the states inside of drives.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

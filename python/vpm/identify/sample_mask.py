@@ -4,8 +4,6 @@ An end stop of 5e8 N/m makes 500 N out of a micrometre that an encoder is off: n
 a piston is from its ends is read from the measured motion, with the noise that the filter took from it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 

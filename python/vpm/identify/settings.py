@@ -1,7 +1,5 @@
 """How a fit is done: weights, losses, starts, unknown first states."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

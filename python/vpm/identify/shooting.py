@@ -6,8 +6,6 @@ Systems*, Springer 1981; A. Ribeiro et al., *Automatica* 121, 2020, for what it 
 no fitted states the pieces are restarts.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -5,8 +5,6 @@ clipped to the box, and a coordinate on a bound takes no part while the descent 
 Control and Optimization* 20, 1982).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

@@ -7,8 +7,6 @@ Two covariances stand here: `robust_covariance`, quick, for the many fits of a s
 samples, for final estimates.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Fits in which what links and drives do is taken from its tangent, so that few of their steps ask for a simulation."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

@@ -14,8 +14,6 @@ lacks differs from these in that it repeats with the motion. So two tests answer
   both have to say it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
