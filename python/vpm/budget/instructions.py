@@ -3,8 +3,6 @@
 A process of its own makes a few steps and a process more makes many; the difference is that of the steps alone.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

@@ -1,7 +1,5 @@
 """Times single steps of a model along a command, and says what they are made of."""
 
-from __future__ import annotations
-
 import os
 import platform
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Steps of a model, timed one by one along commands."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext

@@ -1,7 +1,5 @@
 """Model refinement: at each level of detail the new parameters first, then all; validation decides if it pays."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Correlation of a residual with its own past and with inputs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Compare a simulated run with the log of the machine."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import pairwise
 

@@ -1,7 +1,5 @@
 """Residual by region: by time, by frequency, and by state of the machine."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 

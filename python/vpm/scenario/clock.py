@@ -1,7 +1,5 @@
 """The time base of a scenario: one for all runs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """What the schema finds in a scenario file, rewritten as sentences with the repair."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """What drives the machine of a run: references, commands and pressures as samples, in the channels of its model."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The machine of a run: its model file, with level of detail, effects and parameter values changed."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Problems of a scenario file, each as one sentence: where, the failing condition, the numbers, the repair."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import NoReturn

@@ -1,7 +1,5 @@
 """What the picture of a scenario shows: channels, a list for each panel."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from vpm.errors import near_match

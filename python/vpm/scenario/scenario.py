@@ -1,7 +1,5 @@
 """A test without a log: which machines, from which state, driven by what, for how long."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cached_property, partial

@@ -3,8 +3,6 @@
 Only form is checked here. What needs the models of the runs to judge (channels, units, actuators) comes after.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Annotated, Literal
 

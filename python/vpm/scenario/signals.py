@@ -5,8 +5,6 @@ Identification: A Frequency Domain Approach", 2012, chapter 5). Checked against 
 and by properties that hold for all numbers: bounds, ends, jumps.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from vpm.numbers import Array

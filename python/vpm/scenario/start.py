@@ -1,7 +1,5 @@
 """The state in which the machine of a run begins."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping
 
 import numpy as np

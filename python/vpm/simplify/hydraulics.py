@@ -1,7 +1,5 @@
 """Simpler hydraulic drives: valves that follow at once, one load pressure or none (docs/hydraulics.md)."""
 
-from __future__ import annotations
-
 from vpm.model import Model
 
 #: Changes of a servo-cylinder, the one that changes least first.

@@ -1,7 +1,5 @@
 """How far a reduced model is off: its parameters are fitted on some records, and it is judged on others."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

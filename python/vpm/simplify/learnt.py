@@ -6,8 +6,6 @@ element is told where the machine is. In the machine its error moves the joints,
 least error of a prediction is not that of a simulation.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace

@@ -4,8 +4,6 @@ Each place of a model where something can be simpler is a *site* with a list of 
 reduced model takes one change, or none, at each site.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any

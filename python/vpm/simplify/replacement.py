@@ -3,8 +3,6 @@
 The laws of these drives are in docs/maxwell_narx.md, docs/narx.md and docs/hydraulics.md.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -7,8 +7,6 @@ foresee those of all combinations, and the combinations that should be best are 
 best one each further change is tried while one pays.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from itertools import islice, product

@@ -5,8 +5,6 @@ Its input is the reference of the controller, or the command of a drive without 
 does on the records to learn from.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Sequence
 

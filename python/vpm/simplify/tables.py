@@ -4,8 +4,6 @@ The force of a servo-cylinder whose spool follows at once and whose pressures ar
 and the velocity alone, so that it can be looked up (docs/hydraulics.md). The ends of the stroke are not in a table.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterator, Mapping, Sequence
 

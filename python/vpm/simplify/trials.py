@@ -1,7 +1,5 @@
 """Reduced models that were tried: coarsely timed, fitted, simulated in every way of stepping that may pay and timed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import replace

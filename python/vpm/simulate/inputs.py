@@ -1,7 +1,5 @@
 """What the log holds for a simulation: commands, references, disturbances, pieces of a horizon."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -13,8 +13,6 @@ prescribed_motion    Given the measured motion of the joints, how do the flexibl
 ===================  =====================================================================================
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

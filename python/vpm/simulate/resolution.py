@@ -1,7 +1,5 @@
 """What steps do not resolve, and what they make of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from functools import cached_property
 from typing import Any, NamedTuple, Self

@@ -1,7 +1,5 @@
 """How a simulation steps."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 
