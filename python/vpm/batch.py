@@ -1,7 +1,5 @@
 """Many simulations of one machine, side by side on all cores."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor

@@ -1,7 +1,5 @@
 """Output of commands: consoles, and what ``--json``, ``--quiet`` and ``--verbose`` make of it."""
 
-from __future__ import annotations
-
 import json
 import platform
 import re

@@ -1,7 +1,5 @@
 """Command line of the diagnosis: ``vpm diagnose``."""
 
-from __future__ import annotations
-
 import shlex
 import sys
 from dataclasses import replace

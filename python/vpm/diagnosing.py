@@ -1,7 +1,5 @@
 """Diagnosing what a model is missing: recalibrate it, name effects, judge them, and describe the rest."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor

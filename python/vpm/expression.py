@@ -1,7 +1,5 @@
 """Expressions over columns of numbers, such as ``left - right``: read without running anything, units checked."""
 
-from __future__ import annotations
-
 import ast
 import math
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Whether a value is what the annotation of a field says: for objects that are built from files."""
 
-from __future__ import annotations
-
 import types
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass

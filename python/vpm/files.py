@@ -3,8 +3,6 @@
 A file is written beside its place and then moved into it: whatever happens, there is the old file or the new one.
 """
 
-from __future__ import annotations
-
 import os
 import shutil
 from collections.abc import Iterator

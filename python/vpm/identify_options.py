@@ -1,7 +1,5 @@
 """Options of ``vpm identify``: what they are called, what their help says, and how their words are read."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

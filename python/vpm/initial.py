@@ -1,7 +1,5 @@
 """The state from which a simulation of a log starts, from what was measured."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace

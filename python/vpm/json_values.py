@@ -1,7 +1,5 @@
 """JSON values of whatever a result holds."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass

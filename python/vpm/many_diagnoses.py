@@ -1,7 +1,5 @@
 """Many diagnoses, here or on other machines: one task each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass

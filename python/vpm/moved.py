@@ -1,7 +1,5 @@
 """Names that modules of `vpm.studies` give now, where older scripts and files have them."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from importlib import import_module

@@ -1,7 +1,5 @@
 """Naming of missing effects: by a ranking of the training records, or by a search on inverse-dynamics residuals."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Literal, TypeVar

@@ -1,7 +1,5 @@
 """Numbers at both doors: what users give becomes arrays or an error; what they read is rounded alike everywhere."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 

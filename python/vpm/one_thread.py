@@ -1,7 +1,5 @@
 """Linear algebra of small matrices, which threads of its own would only slow down."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import wraps
 from threading import Event, Lock, Thread

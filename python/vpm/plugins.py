@@ -3,8 +3,6 @@
 Nothing of such a package is imported before it is needed; see ``docs/plugins.md``.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass

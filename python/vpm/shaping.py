@@ -1,7 +1,5 @@
 """Input shapers: commands that leave a flexible machine at rest."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

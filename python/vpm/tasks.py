@@ -4,8 +4,6 @@ The core computes without the interpreter's lock, so threads share the cores of 
 machines a task goes as bytes, see `vpm.sending`. A task that dies there, not by an error of its own, is tried again.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

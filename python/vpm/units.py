@@ -12,8 +12,6 @@ Angles have no dimension, and ``rad`` is 1 (SI brochure, 9th edition, section 2.
 one kind; so are ``Hz`` and ``rad/s``, and no factor of 2 pi stands between these two. Write ``rev/s`` for turns.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Mapping

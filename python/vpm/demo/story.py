@@ -1,7 +1,5 @@
 """The whole way through the program on the log that ships with it."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """A diagnosis as one HTML page that needs nothing else: plots are SVG inside it."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass

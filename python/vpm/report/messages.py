@@ -1,7 +1,5 @@
 """What the page and the terminal say alike: how sure a value is, what an effect took, where the steps stand."""
 
-from __future__ import annotations
-
 from math import isfinite, isnan
 
 from vpm.discrepancy import AcceptedEffect, Diagnosis, Step
