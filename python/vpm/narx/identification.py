@@ -75,10 +75,6 @@ def identify(
     max_terms : int
         Most terms that a criterion may choose.
 
-    Returns
-    -------
-    Narx
-
     Raises
     ------
     IdentificationError

@@ -46,7 +46,6 @@ class OutputErrors:
 
     Parameters
     ----------
-    records : sequence of Samples
     scheme : {"trapezoidal", "printed", "central_mean"}
     k0, s0 : Basis
         Of the maps.

@@ -54,15 +54,10 @@ def element_samples(
     Parameters
     ----------
     records : Experiment, or mapping of str to array-like, shape (N,), or a sequence of them
-    signals : MaxwellSignals
     step : float, optional
         Time between samples of mappings, which have no clock, s.
     least : int
         Fewest samples of a record.
-
-    Returns
-    -------
-    list of Samples
 
     Raises
     ------

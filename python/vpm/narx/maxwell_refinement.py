@@ -74,12 +74,10 @@ def refined(
 
     Parameters
     ----------
-    begun : MaxwellFit
     samples : list of Samples
         Training records.
     bases : tuple of two Basis
         Of k0 and s0, with the terms to fit.
-    signals : MaxwellSignals
     degree : int, optional
         Of both maps; by default the terms of the bases.
 

@@ -69,15 +69,8 @@ class Narx(Result):
 
         Parameters
         ----------
-        output : str
-        inputs : sequence of str
         terms : sequence of sequence of (int, int)
             Factors of each term: signal (0 is the output, then the inputs) and lag.
-        coefficients : sequence of float
-
-        Returns
-        -------
-        Narx
 
         Raises
         ------
@@ -119,10 +112,6 @@ class Narx(Result):
         ----------
         record : Experiment or mapping of str to array-like, shape (N,)
 
-        Returns
-        -------
-        NarxRun
-
         Raises
         ------
         SimulationError
@@ -143,10 +132,6 @@ class Narx(Result):
         record : Experiment or mapping of str to array-like, shape (N,)
         limit : float, optional
             Magnitude that counts as diverged; by default that of the model.
-
-        Returns
-        -------
-        NarxRun
 
         Raises
         ------
@@ -169,21 +154,11 @@ class Narx(Result):
         return self._run("free run", given, values, record)
 
     def stepper(self) -> NarxStepper:
-        """Stepper of the NARX model: ``start(output, inputs)``, then ``step(inputs)``.
-
-        Returns
-        -------
-        NarxStepper
-        """
+        """Stepper of the NARX model: ``start(output, inputs)``, then ``step(inputs)``."""
         return self._compiled.stepper()
 
     def plot(self) -> Figure:
-        """Draw what each term of the NARX model explains.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-        """
+        """Draw what each term of the NARX model explains."""
         from vpm.plot.narx import plot_narx_terms
 
         return plot_narx_terms(self.term_names, self.error_reduction)

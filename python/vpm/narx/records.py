@@ -34,14 +34,8 @@ def series(record: RecordLike, output: str, inputs: Sequence[str], name: str = "
     Parameters
     ----------
     record : Experiment or mapping of str to array-like, shape (N,)
-    output : str
-    inputs : sequence of str
     name : str
         Of a record without a name.
-
-    Returns
-    -------
-    Series
 
     Raises
     ------

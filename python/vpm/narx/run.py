@@ -23,9 +23,6 @@ def inside(correlation: Correlation) -> bool:
     At most one lag in ten lies outside the band, where one in twenty is expected; and no single lag is larger than the
     largest of all lags would be in 19 of 20 independent signals (Bonferroni's inequality).
 
-    Parameters
-    ----------
-    correlation : Correlation
     """
     values = np.abs(correlation.values[correlation.lags != 0.0]) if correlation.lags[0] >= 0.0 else correlation.values
     if values.size == 0:
@@ -79,12 +76,7 @@ class ResidualTests(Result):
         }
 
     def plot(self) -> Figure:
-        """Draw the autocorrelation of a run's residual with its band.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-        """
+        """Draw the autocorrelation of a run's residual with its band."""
         from vpm.plot.signals import plot_correlation
 
         return plot_correlation(self.own.lags, self.own.values, self.own.band, f"residual of {self.own.of}")
@@ -148,12 +140,7 @@ class NarxRun(Result):
         return 100.0 * (1.0 - off / spread) if spread > 0.0 else (100.0 if off == 0.0 else float("-inf"))
 
     def residual_tests(self) -> ResidualTests:
-        """Correlations of a run's residual with its own past and with each input.
-
-        Returns
-        -------
-        ResidualTests
-        """
+        """Correlations of a run's residual with its own past and with each input."""
         pieces, residual = [slice(0, self.residual.size)], self.residual
         columns = zip(self.inputs, self.input_values[self.start :].T, strict=True)
         return ResidualTests(
@@ -162,12 +149,7 @@ class NarxRun(Result):
         )
 
     def plot(self) -> Figure:
-        """Draw the computed over the measured output of a run.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-        """
+        """Draw the computed over the measured output of a run."""
         from vpm.plot.narx import plot_narx_run
 
         return plot_narx_run(self)

@@ -66,10 +66,6 @@ def validate(model: Narx, records: RecordLike | Sequence[RecordLike]) -> NarxVal
     records : Experiment, or mapping of str to array-like, or a sequence of them
         Records, or last parts of records (`split_in_time`), that were not used for the fit.
 
-    Returns
-    -------
-    NarxValidation
-
     Raises
     ------
     IdentificationError

@@ -101,7 +101,6 @@ def block(height: float, contact: float, material: Material, fineness: int) -> S
         m; three times as wide.
     contact : float
         Radius in which elements are smallest, m.
-    material : Material
     fineness : int
         Quarter of the elements within `contact`.
     """

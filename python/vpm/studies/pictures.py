@@ -26,10 +26,8 @@ def curves(
 
     Parameters
     ----------
-    title : str
     x, y : (str, str)
         Quantity and unit.
-    lines : sequence of Curve
     logarithmic : bool
         Both axes.
     """
@@ -51,7 +49,6 @@ def field(
 
     Parameters
     ----------
-    title, unit : str
     corners : ndarray, shape (2, N)
         mm.
     faces : ndarray of int, shape (4, M)

@@ -56,7 +56,6 @@ def press(
 
     Parameters
     ----------
-    body : SoftBody
     ways : iterable of float
         Indentations in growing order, m.
     start : float

@@ -39,10 +39,6 @@ def columns(record: RecordLike, names: tuple[str, ...], fewest: int) -> Columns:
     fewest : int
         Samples that the question needs at least.
 
-    Returns
-    -------
-    Columns
-
     Raises
     ------
     IdentificationError

@@ -78,10 +78,6 @@ def identify_decay(record: RecordLike, displacement: str, mass: float) -> Decay:
     mass : float
         kg.
 
-    Returns
-    -------
-    Decay
-
     Raises
     ------
     IdentificationError
@@ -194,10 +190,6 @@ def logarithmic_decrement(record: RecordLike, displacement: str) -> LogarithmicD
     ----------
     record : Experiment or mapping of str to array-like, shape (N,)
     displacement : str
-
-    Returns
-    -------
-    LogarithmicDecrement
 
     Raises
     ------

@@ -177,10 +177,6 @@ def identify_loop(
     drift : int
         Degree of the polynomial that is taken out of both channels; 0 keeps the mean alone, as a single cycle does.
 
-    Returns
-    -------
-    Loop
-
     Raises
     ------
     IdentificationError

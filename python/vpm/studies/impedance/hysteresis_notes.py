@@ -21,7 +21,6 @@ def loop_notes(loop: Loop, displacement: Array, step: float, delay_std: float, e
 
     Parameters
     ----------
-    loop : Loop
     displacement : ndarray, shape (N,)
         As recorded, m.
     step : float

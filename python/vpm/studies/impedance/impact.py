@@ -99,10 +99,6 @@ def stop_damping(
     gravity : float
         Acceleration along the stroke, m/s^2.
 
-    Returns
-    -------
-    Stop
-
     Raises
     ------
     IdentificationError
@@ -192,10 +188,6 @@ def impulse_balance(
         At the first and the last sample, m/s, positive away from the ground: a falling mass has a negative one.
     gravity : float
         m/s^2.
-
-    Returns
-    -------
-    ImpulseBalance
 
     Raises
     ------

@@ -72,10 +72,6 @@ def identify_landing(
     terms : int
         J; the highest frequency that is looked at is ``J / (2 T)`` in a record of T seconds.
 
-    Returns
-    -------
-    Landing
-
     Raises
     ------
     IdentificationError

@@ -79,10 +79,6 @@ def identify_loss_law(loops: Sequence[Loop]) -> LossLaw:
     loops : sequence of Loop
         At amplitudes and frequencies that differ, better by a factor of two and more.
 
-    Returns
-    -------
-    LossLaw
-
     Raises
     ------
     IdentificationError

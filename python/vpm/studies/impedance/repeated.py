@@ -90,10 +90,6 @@ def repeat(values: ArrayLike, name: str = "value", unit: str = "1", *, confidenc
     confidence : float
         Between 0 and 1.
 
-    Returns
-    -------
-    Repeated
-
     Raises
     ------
     IdentificationError
@@ -148,10 +144,6 @@ def repeat_tests(
     joint, impedance, test : str
     estimates : iterable of Loop, Landing or Decay
     confidence : float
-
-    Returns
-    -------
-    RepeatedTests
 
     Raises
     ------

@@ -113,10 +113,6 @@ def drop_limit(
     first, second : array_like, optional
         Joint angles (rad); by default those of `Leg.shares`.
 
-    Returns
-    -------
-    DropLimit
-
     Raises
     ------
     ModelError

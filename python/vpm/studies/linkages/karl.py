@@ -214,9 +214,6 @@ class Karl:
         The second derivative by the same variable never vanishes there, so the other variable turns back: a boundary,
         unless both first derivatives vanish.
 
-        Returns
-        -------
-        KarlSingularities
         """
         rows: list[tuple[int, str, str, float, float]] = []
         for actuator in (0, 1):
@@ -265,9 +262,6 @@ class Karl:
         mode : {0, 1, 2, 3}
             Row of `direct`. The prototype is built in mode 0, |q1| < 90 deg and q2 > 0.
 
-        Returns
-        -------
-        KarlWorkspace
         """
         one, two = self._strokes(0, first), self._strokes(1, second)
         if mode not in range(4):
@@ -303,12 +297,7 @@ class Karl:
         return (*apart, *singular)
 
     def plot(self) -> Figure:
-        """Plot KARL's reach, joint angles and transmission; see `KarlWorkspace.plot`.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-        """
+        """Plot KARL's reach, joint angles and transmission; see `KarlWorkspace.plot`."""
         return self.workspace().plot()
 
     def _strokes(self, actuator: int, given: ArrayLike | None) -> Array:

@@ -52,12 +52,7 @@ class KarlPoses(Result):
         return {"configurations": len(self), "angles": self.angles}
 
     def plot(self) -> Figure:
-        """Plot both bodies of KARL in every configuration.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-        """
+        """Plot both bodies of KARL in every configuration."""
         from vpm.studies.linkages.pictures import plot_limbs
 
         return plot_limbs(self.elbows, self.end_points, [f"{q1:.0f}°, {q2:.0f}°" for q1, q2 in np.degrees(self.angles)])
@@ -155,12 +150,7 @@ class KarlWorkspace(Result):
         return {"mode": self.mode, "grid": f"{self.first.size} x {self.second.size}", "assembled": self.share}
 
     def plot(self) -> Figure:
-        """Plot KARL's workspace: reach, joint angles and transmission up to the singular strokes.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-        """
+        """Plot KARL's workspace: reach, joint angles and transmission up to the singular strokes."""
         from vpm.studies.linkages.pictures import plot_stroke_workspace
 
         singular = [self.singularities.of(actuator) for actuator in (0, 1)]

@@ -103,9 +103,6 @@ class Leg:
         count : int
             Number of angles in each range.
 
-        Returns
-        -------
-        LegStrokes
         """
         ranges = [np.radians((-50.0, 70.0)) if first is None else first]
         ranges.append(np.radians((-140.0, -20.0)) if second is None else second)
@@ -244,10 +241,6 @@ class Leg:
         progress : callable, optional
             Called with the number of rows of angles done and their total.
 
-        Returns
-        -------
-        ShareMap
-
         Raises
         ------
         ModelError
@@ -280,12 +273,7 @@ class Leg:
         return (*ranges, *shares)
 
     def plot(self) -> Figure:
-        """Plot strokes and lever arms of the leg's cylinders over the angles; see `LegStrokes.plot`.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-        """
+        """Plot strokes and lever arms of the leg's cylinders over the angles; see `LegStrokes.plot`."""
         return self.stroke_table().plot()
 
     def _rows(self, question: Callable[..., Array], *tables: ArrayLike) -> Array:

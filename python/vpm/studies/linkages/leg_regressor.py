@@ -75,7 +75,6 @@ def leg_regressor(leg: Leg, angles: ArrayLike, rates: ArrayLike, accelerations: 
 
     Parameters
     ----------
-    leg : Leg
     angles, rates, accelerations : array_like, shape (2,) or (N, 2)
 
     Returns

@@ -126,12 +126,7 @@ class LegStrokes(Result):
         return {"hip_m": tuple(map(float, hip)), "knee_m": tuple(map(float, knee))}
 
     def plot(self) -> Figure:
-        """Plot a leg's strokes above, lever arms below, over the angles.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-        """
+        """Plot a leg's strokes above, lever arms below, over the angles."""
         from vpm.studies.linkages.pictures import plot_strokes
 
         return plot_strokes(self.angles, self.strokes, self.levers, ("hip", "knee"))
@@ -187,12 +182,7 @@ class ShareMap(Result):
         return {"rate": self.rate, "acceleration": self.acceleration, **shares}
 
     def plot(self) -> Figure:
-        """Plot three maps of a leg's shares over the joint angles, each with its average.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-        """
+        """Plot three maps of a leg's shares over the joint angles, each with its average."""
         from vpm.studies.linkages.pictures import plot_shares
 
         maps = {"μ_M, inertia": self.inertia, "μ_V, velocity": self.velocity, "μ_G, weight": self.gravity}

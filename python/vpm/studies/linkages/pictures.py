@@ -22,7 +22,6 @@ def plot_limbs(elbows: Array, tips: Array, names: Sequence[str]) -> Figure:
     ----------
     elbows, tips : ndarray, shape (N, 2)
         In m.
-    names : sequence of str
     """
     figure, [[axes]] = panels(1, height=4.5, width=6.0)
     for elbow, tip, name in zip(elbows, tips, names, strict=True):
@@ -91,7 +90,6 @@ def plot_strokes(angles: Array, strokes: Array, levers: Array, names: Sequence[s
     ----------
     angles, strokes, levers : ndarray, shape (N, K)
         In rad, m and m/rad.
-    names : sequence of str
     """
     figure, rows = panels(2, len(names), width=9.0, share_x=True)
     for k, name in enumerate(names):
@@ -115,7 +113,6 @@ def plot_shares(first: Array, second: Array, maps: Mapping[str, Array], title: s
         Joint angles (rad).
     maps : mapping of str to ndarray, shape (R, C)
         Fractions.
-    title : str
     """
     figure, rows = panels(1, len(maps), height=3.4, width=12.0)
     for axes, (name, table) in zip(rows[0], maps.items(), strict=True):

@@ -59,10 +59,6 @@ def identify_maxwell(
         Time between samples of records without a clock, s.
     refine : bool
 
-    Returns
-    -------
-    MaxwellFit
-
     Raises
     ------
     IdentificationError

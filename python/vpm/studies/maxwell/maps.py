@@ -88,10 +88,6 @@ def fit_maxwell_map(windows: MaxwellWindows, of: str, degree: int | None = None)
         well as the best (L. Breiman et al., *Classification and Regression Trees*, 1984, section 3.4.3), where errors
         below a window's own are no merit.
 
-    Returns
-    -------
-    MaxwellMap
-
     Raises
     ------
     IdentificationError

@@ -28,10 +28,6 @@ def maxwell_one_step(element: MaxwellNarx, record: RecordLike, signals: MaxwellS
     record : Experiment or mapping of str to array-like, shape (N,)
     signals : MaxwellSignals, optional
 
-    Returns
-    -------
-    NarxRun
-
     Raises
     ------
     IdentificationError
@@ -55,10 +51,6 @@ def maxwell_free_run(
     signals : MaxwellSignals, optional
     limit : float, optional
         Force that counts as diverged, N; by default a thousand times the largest measured one.
-
-    Returns
-    -------
-    NarxRun
 
     Raises
     ------
@@ -210,10 +202,6 @@ def maxwell_errors(
     signals : MaxwellSignals, optional
     cutoff : float, optional
         Of a low-pass filter for the length, Hz; by default none.
-
-    Returns
-    -------
-    MaxwellErrors
 
     Raises
     ------

@@ -18,7 +18,6 @@ def smoothed(one: Samples, cutoff: float | None) -> Samples:
 
     Parameters
     ----------
-    one : Samples
     cutoff : float, optional
         Hz, well above the motion.
 

@@ -110,10 +110,6 @@ def static_windows(
     drive_tolerance : float
         Drive signals that differ by less than this share of their range are one.
 
-    Returns
-    -------
-    MaxwellWindows
-
     Raises
     ------
     IdentificationError

@@ -68,7 +68,6 @@ def check_record(time: ArrayLike, geometry: CylinderGeometry, channels: Mapping[
     ----------
     time : array-like, shape (N,)
         s.
-    geometry : CylinderGeometry
     channels : mapping of str to array-like
         Numbers stand for constant channels; SI.
 

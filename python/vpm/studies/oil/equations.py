@@ -115,7 +115,6 @@ def pressures_from_force(
         N; opening of the valve in any unit, of which the sign counts.
     supply, tank : ndarray, shape (N,)
         Pa.
-    geometry : CylinderGeometry
     rule : {"steady", "symmetric"}
         ``"steady"``: the flow into one side drives the flow out of the other, in the ratio of the areas, so that
         ``pa + pb/alpha^2 = ps + pt/alpha^2`` outwards and ``pa alpha^2 + pb = ps + pt alpha^2`` inwards.
@@ -173,7 +172,6 @@ def balances(
 
     Parameters
     ----------
-    geometry : CylinderGeometry
     position, opening : ndarray, shape (N,)
         m from mid-stroke; unit of the command.
     pressures, ports : tuple of two ndarray, shape (N,)

@@ -183,10 +183,6 @@ def identify_oil(
     strict : bool
         Refuse an answer that is negative or that cannot be told from zero; otherwise it comes with warnings.
 
-    Returns
-    -------
-    OilFit
-
     Raises
     ------
     IdentificationError
