@@ -59,8 +59,6 @@ def own_residual(
     ----------
     model : Model
         At the values of a fit.
-    data : InverseDynamicsProblem
-    settings : OwnSimulation, optional
     seed : int
         Of the noise.
 
@@ -276,10 +274,8 @@ def noise_of(
     ----------
     model : Model
         As fitted.
-    data : InverseDynamicsProblem
     quiet : sequence of Experiment
         The records as the model would have written them without noise: what these leave no drive is to blame for.
-    random : Generator
     """
     same, names = data.on(data.experiments), compared(data)
     instruments = np.array(

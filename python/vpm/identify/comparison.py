@@ -121,7 +121,6 @@ class RelativeProblem(InverseDynamicsProblem):
 
     Parameters
     ----------
-    data : InverseDynamicsProblem
     drives : sequence of str
         Drives whose parameters change what they deliver.
     """

@@ -66,13 +66,8 @@ def fit_problem(
 
     Parameters
     ----------
-    model : Model
-    data : problem
-    free : sequence of str
-    fitting : Fitting
     tolerance : float
         Relative change of parameters or cost at which to stop.
-    progress : callable, optional
     begin : ndarray, shape (p,), optional
         Parameters to begin with, in place of the starts of ``fitting``.
     executor : Executor or callable, optional
@@ -190,12 +185,8 @@ def onward(
 
     Parameters
     ----------
-    objective : Objective
-    first : Point
     low, high : ndarray
         Box of the coordinates.
-    most_evaluations : int
-    tolerance : float
     evaluate : callable, optional
         Gives the points in place of the objective.
     """

@@ -83,7 +83,6 @@ def write_fit(fit: Fit, folder: Path, lines: Sequence[str] = ()) -> list[Path]:
 
     Parameters
     ----------
-    fit : Fit
     folder : Path
         Made if it is not there.
     lines : sequence of str

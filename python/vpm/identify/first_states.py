@@ -105,7 +105,6 @@ def first_state_derivative(model: Model, data: BegunAnywhere) -> Array:
     ----------
     model : Model
         At which values.
-    data : problem
     """
     sizes, records = data.open_states(model)
     places = np.flatnonzero(sizes)
@@ -193,7 +192,6 @@ def matters(model: Model, data: BegunAnywhere, residual: Array, jacobian: Array,
     ----------
     model : Model
         As fitted.
-    data : problem
     residual : ndarray, shape (n,)
     jacobian : ndarray, shape (n, p)
         By the parameters.
@@ -221,7 +219,6 @@ def first_state_slopes(
     ----------
     begin : callable
         First state (nx,) at parameters.
-    theta : ndarray
     columns : sequence of int
         Parameters in question.
     fixed : sequence of int
@@ -251,7 +248,6 @@ def add_first_state(
 
     Parameters
     ----------
-    jacobian : ndarray
     outputs : callable
         Outputs of a simulation from a first state.
     state : ndarray, shape (nx,)

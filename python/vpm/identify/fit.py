@@ -97,10 +97,6 @@ def identify(
         Does the fits from several starts of ``fitting``, one task each, see `vpm.tasks.Tasks`; the fit is the same.
         ``progress`` is then called after each of them.
 
-    Returns
-    -------
-    Fit
-
     Raises
     ------
     ExecutorError

@@ -174,7 +174,6 @@ def fit_of(
         The model at the start values.
     data : problem
         What was fitted.
-    result : Estimate
     before : ndarray
         Residual of the model that the fit is to be compared with.
     experiments : sequence of str

@@ -137,12 +137,10 @@ class Following:
 
         Parameters
         ----------
-        part : Part
         theta : ndarray, shape (P,)
             Of the whole machine.
         columns : sequence of int
             Its parameters to differentiate by.
-        work : callable
         more : hashable, optional
             All else that the answer depends on.
         origin : ndarray, shape (P,), optional
@@ -214,8 +212,6 @@ def gauge_gains(model: Model, experiments: Sequence[Experiment], position: Array
 
     Parameters
     ----------
-    model : Model
-    experiments : sequence of Experiment
     position : ndarray, shape (joints,)
         Of all joints, m or rad.
 

@@ -74,7 +74,6 @@ def least_step(jacobian: Array, residual: Array, tolerance: float = 1e-10) -> Ar
     ----------
     jacobian : ndarray, shape (n, p)
     residual : ndarray, shape (n,)
-    tolerance : float
     """
     if not jacobian.shape[1]:
         return np.zeros(0)
@@ -92,7 +91,6 @@ def unseen_combinations(
     jacobian : ndarray, shape (n, p)
     names : sequence of str
         One for each column.
-    tolerance : float
     """
     if jacobian.shape[1] == 0:
         return ()
@@ -152,7 +150,6 @@ def is_alias(column: Array, others: Span, residual: Array) -> bool:
     Parameters
     ----------
     column : ndarray, shape (n,)
-    others : Span
     residual : ndarray, shape (n,)
         What is left to explain.
     """

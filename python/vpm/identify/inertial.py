@@ -74,10 +74,6 @@ def identify_inertial(
     tolerance : float
         Relative singular value below which a direction counts as none, columns of equal length.
 
-    Returns
-    -------
-    InertialFit
-
     Raises
     ------
     IdentificationError

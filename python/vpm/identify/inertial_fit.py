@@ -246,12 +246,7 @@ class InertialFit(Result):
         }
 
     def plot(self) -> Figure:
-        """Plot of an inertial fit: estimates with intervals over the CAD values, base parameters below.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-        """
+        """Plot of an inertial fit: estimates with intervals over the CAD values, base parameters below."""
         from vpm.plot.inertial import plot_inertial
 
         return plot_inertial(self)

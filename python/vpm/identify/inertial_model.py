@@ -60,7 +60,6 @@ class InertialModel:
 
     Parameters
     ----------
-    model : Model
     others : sequence of str
         Further parameters that are sought.
     """
@@ -143,10 +142,6 @@ def inertial_regression(
         Parameters beside those of bodies, such as ``shoulder.friction.viscous``; by default all with an uncertainty.
     cutoff : float, optional
         Hz, of the motion filter.
-
-    Returns
-    -------
-    InertialRegression
 
     Raises
     ------

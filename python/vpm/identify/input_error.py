@@ -62,7 +62,6 @@ class InputErrorProblem:
 
     Parameters
     ----------
-    model : Model
     experiments : sequence of Experiment
         Each with the position of every joint, the command of every actuator, and both pressures of hydraulic drives.
     channels : sequence of str, optional

@@ -126,7 +126,6 @@ def profile_intervals(
     ----------
     fit : Fit
         From the same experiments.
-    experiments : Experiment or sequence of Experiment
     names : sequence of str, optional
         By default all that were free.
     cutoff : float, optional
@@ -220,9 +219,6 @@ def bootstrap(
     ----------
     fit : Fit
         From the same experiments.
-    experiments : Experiment or sequence of Experiment
-    replicates : int
-    seed : int
     piece : int, optional
         Samples of a piece; by default three correlation lengths of the residual.
     refit : bool

@@ -50,8 +50,6 @@ def real_bodies(model: Model, free: Sequence[str], low: Array, high: Array) -> t
 
     Parameters
     ----------
-    model : Model
-    free : sequence of str
     low, high : ndarray, shape (p,)
         Bounds of the parameters.
 
@@ -88,7 +86,6 @@ def on_the_border(model: Model, free: Sequence[str]) -> list[tuple[list[str], st
     ----------
     model : Model
         As fitted.
-    free : sequence of str
     """
     told = []
     for body in dict.fromkeys(name.rpartition(".inertia.")[0] for name in free if ".inertia." in name):

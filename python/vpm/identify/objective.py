@@ -27,11 +27,8 @@ class Objective:
     ----------
     model : Model
         Values at which parameters that are not free stay, and what is known of the others.
-    data : problem
-    free : sequence of str
     bounds : tuple of ndarray
         Least and largest parameters.
-    fitting : Fitting
     progress : callable, optional
         Told the number of evaluations and the root mean square of the weighted residual; from any thread.
     """

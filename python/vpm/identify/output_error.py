@@ -39,8 +39,6 @@ class OutputErrorProblem(BegunAnywhere):
 
     Parameters
     ----------
-    model : Model
-    experiments : sequence of Experiment
     mode : {"free_run", "restarts", "closed_loop", "prescribed_motion"}
     channels : sequence of str, optional
         Compared outputs; by default all measured ones that the simulation does not prescribe.
@@ -249,8 +247,6 @@ def with_offsets(fit: Fit, data: Problem, weights: Array) -> Fit:
 
     Parameters
     ----------
-    fit : Fit
-    data : problem
     weights : ndarray, shape (n,)
         With which rows went into the fit.
     """

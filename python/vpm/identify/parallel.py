@@ -29,10 +29,6 @@ def in_order(jobs: Sequence[Callable[[], T]], workers: int) -> list[T]:
 
     The first job that fails raises its error. Ctrl-C stops all of them.
 
-    Parameters
-    ----------
-    jobs : sequence of callable
-    workers : int
     """
     if workers == 1 or len(jobs) < 2:
         return [job() for job in jobs]

@@ -27,8 +27,6 @@ class PredictionErrorProblem:
 
     Parameters
     ----------
-    model : Model
-    experiments : sequence of Experiment
     channels : sequence of str, optional
         Outputs that are compared; by default all that each log holds.
     setup : Setup, optional

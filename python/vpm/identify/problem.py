@@ -138,7 +138,6 @@ def check_ties(model: Model, ties: Mapping[str, str], free: Sequence[str]) -> No
 
     Parameters
     ----------
-    model : Model
     ties : mapping of str to str
         Following parameter to the one whose value it takes.
     free : sequence of str

@@ -37,7 +37,6 @@ def beside_first_states(model: Model, data: Problem, ties: Mapping[str, str]) ->
     ----------
     model : Model
         At whose values these are the likeliest.
-    data : problem
     ties : mapping of str to str
     """
     plain = untied(data)

@@ -133,7 +133,6 @@ def respond(
     model : Model
         May have joints that ``m`` does not hold: nobody measured them, and they move freely.
     theta : ndarray, shape (P,)
-    m : Motion
     experiment : Experiment
         Tells what drives held at the beginning.
     columns : sequence of int

@@ -131,7 +131,6 @@ def at_stops(model: Model, experiment: Experiment, m: Motion) -> Mapping[str, ND
 
     Parameters
     ----------
-    model : Model
     experiment : Experiment
         Holds the position of every joint as it was read.
     m : Motion

@@ -45,8 +45,6 @@ class ShootingProblem(OutputErrorProblem):
 
     Parameters
     ----------
-    model : Model
-    experiments : sequence of Experiment
     mode : {"free_run", "closed_loop"}
         Pieces need a free run.
     fitting : Fitting

@@ -77,10 +77,8 @@ def descend(
         The point at coordinates (n,); its cost is infinite where there is none.
     start : Point
         Inside the box.
-    box : Box
     tolerance : float
         Relative change of the coordinates or of the cost at which to stop.
-    most_evaluations : int
     cost : callable, optional
         The cost alone, where that takes less time than a point: points are then evaluated where it falls.
     """

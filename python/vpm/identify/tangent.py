@@ -63,12 +63,9 @@ def estimate_on_tangent(
     ----------
     model : Model
         With the start values.
-    data : InverseDynamicsProblem
-    free : tuple of str
     origin : ndarray, shape (P,)
         Where the tangent touches.
     bounds : mapping
-    tolerance : float
     worth : Worth, optional
         A fit of drives that has not reached it after a whole step, nor was to by the tangent, ends there.
     """
