@@ -18,12 +18,7 @@ if TYPE_CHECKING:
 
 
 def as_records(experiments: Experiment | Sequence[Experiment]) -> list[Experiment]:
-    """Records of a campaign in a list, where one alone may be given.
-
-    Parameters
-    ----------
-    experiments : Experiment or sequence of Experiment
-    """
+    """Records of a campaign in a list, where one alone may be given."""
     return [experiments] if isinstance(experiments, Experiment) else list(experiments)
 
 
@@ -82,10 +77,6 @@ class Campaign(Result, Sequence[Experiment]):
             As in `Experiment.load`.
         common : bool
             Keep only the channels that every file has; otherwise files that differ are refused.
-
-        Returns
-        -------
-        Campaign
 
         Raises
         ------

@@ -163,7 +163,6 @@ def make_uniform(
         Positions, velocities and accelerations are interpolated by cubic splines, all others by straight lines.
     rate : float or None
         Hz; None takes the median step.
-    source : Source
 
     Returns
     -------

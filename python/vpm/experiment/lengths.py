@@ -38,8 +38,6 @@ def joints_from_lengths(
 
     Parameters
     ----------
-    experiment : Experiment
-    model : Model
     theta : ndarray, shape (P,), optional
         Values of the parameters, errors of sensors among them; by default those of the model.
     free : collection of str

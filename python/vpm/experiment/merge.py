@@ -33,7 +33,6 @@ def merge_clocks(
         Each as long as its clock.
     clocks : mapping of str to ndarray
         Own clocks of some channels, s, counted from the same instant; equal ones change nothing.
-    source : Source
     irregular : {"error", "interpolate"}
         Whether interpolation is allowed.
 

@@ -196,10 +196,6 @@ def motion(
     band : float, optional
         Highest frequency that `Motion.parallel` keeps, Hz; without it what the filter leaves alone.
 
-    Returns
-    -------
-    Motion
-
     Raises
     ------
     ExperimentError
@@ -254,7 +250,6 @@ def common_cutoff(experiments: Iterable[Experiment], model: Machine) -> float:
     ----------
     experiments : iterable of Experiment
         At least one, each with the position of every joint.
-    model : Model
 
     Returns
     -------

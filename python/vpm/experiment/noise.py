@@ -66,11 +66,6 @@ def instrument_noise(record: Experiment, channel: str) -> float:
     A record that was cut does not say which of its samples these were. Between them there is less noise: interpolation
     takes means of them.
 
-    Parameters
-    ----------
-    record : Experiment
-    channel : str
-
     Returns
     -------
     float

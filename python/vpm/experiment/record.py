@@ -149,10 +149,6 @@ class Experiment(Result):
         name : str, optional
             By default the file's name without its ending.
 
-        Returns
-        -------
-        Experiment
-
         Raises
         ------
         ExperimentError
@@ -207,10 +203,6 @@ class Experiment(Result):
         channels, model, irregular, resample
             As in `load`.
 
-        Returns
-        -------
-        Experiment
-
         Raises
         ------
         ExperimentError, UnitError
@@ -246,10 +238,6 @@ class Experiment(Result):
         name : str
         model, irregular, resample
             As in `load`.
-
-        Returns
-        -------
-        Experiment
 
         Raises
         ------

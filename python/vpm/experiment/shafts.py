@@ -23,8 +23,6 @@ def joints_from_shafts(
 
     Parameters
     ----------
-    experiment : Experiment
-    model : Model
     theta : ndarray, shape (P,), optional
         Values of the parameters, the ratios among them; by default those of the model.
     free : collection of str

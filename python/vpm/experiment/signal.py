@@ -69,7 +69,6 @@ def check_cutoff(cutoff: float, rate: float, samples: int) -> None:
     ----------
     cutoff, rate : float
         Hz, and samples per second.
-    samples : int
 
     Raises
     ------

@@ -65,10 +65,6 @@ def read_table(path: str | PathLike[str], dialect: Dialect, wanted: Sequence[str
     clock : str
         Column of the time among them: numbers, or dates.
 
-    Returns
-    -------
-    Table
-
     Raises
     ------
     ExperimentError

@@ -78,7 +78,6 @@ def check_effect(checked: Checked, content: Mapping[str, object]) -> Checked | N
 
     Parameters
     ----------
-    checked : Checked
     content : mapping
         Of the effect, as `tomllib` gives it.
 

@@ -25,8 +25,6 @@ def starting_values(
 
     Parameters
     ----------
-    model : Model
-    effect : EffectType
     at : str
         Component that it sits at.
     joint : str

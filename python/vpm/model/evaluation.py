@@ -213,10 +213,6 @@ class Evaluations(Motions):
         inputs : mapping of str to float, or array_like of shape (nu,), optional
             As in `command`; the commands that stand.
 
-        Returns
-        -------
-        LinearModel
-
         Raises
         ------
         ModelError

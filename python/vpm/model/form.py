@@ -63,7 +63,6 @@ def schema_problems(error: ValidationError, *, within: tuple[str, ...] = ()) -> 
 
     Parameters
     ----------
-    error : pydantic.ValidationError
     within : tuple of str
         Place of the validated part in the file.
     """

@@ -148,10 +148,6 @@ class Motions(Components):
         parameters : sequence of str
             Dotted names, as in ``model.parameters``.
 
-        Returns
-        -------
-        EffortDerivatives
-
         Raises
         ------
         ModelError

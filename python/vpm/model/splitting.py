@@ -70,7 +70,6 @@ def splitting_problems(document: Document, names: Mapping[str, str]) -> Iterator
 
     Parameters
     ----------
-    document : Document
     names : mapping of str to str
         Last coordinate of the joint of each body that its joint turns.
     """

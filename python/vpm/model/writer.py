@@ -17,7 +17,6 @@ def content_of(document: Document, *, complete: bool = False) -> dict[str, Any]:
 
     Parameters
     ----------
-    document : Document
     complete : bool
         Keep what stands at its default; else it is left out.
     """
@@ -63,7 +62,6 @@ def toml_of(document: Document, remarks: Remarks = MappingProxyType({}), head: I
 
     Parameters
     ----------
-    document : Document
     remarks : mapping of tuple of str to str
         One line each, by place.
     head : iterable of str

@@ -47,10 +47,6 @@ def open_log(path: str | PathLike[str]) -> Log:
         ``ros``; ``.mf4`` and ``.mdf`` the extra ``mdf``, ``.tdms`` of LabVIEW ``tdms``, ``.ulg`` of PX4 ``ulog``;
         folders of LeRobot, and ``FOLDER/episode_000003`` in them, ``parquet``. Other packages may bring more.
 
-    Returns
-    -------
-    Log
-
     Raises
     ------
     ExperimentError

@@ -24,7 +24,6 @@ class ArrayLog(Log):
 
     Parameters
     ----------
-    path : path-like
     shapes : mapping of str to tuple of int
         Each array of numbers; a vector has one dimension, also where the file stores it as a row or a column.
     refused, units

@@ -35,7 +35,6 @@ class Log(ABC):
 
     Attributes
     ----------
-    path : path-like
     header : tuple of str
         Names of all columns of numbers.
     refused : mapping of str to str

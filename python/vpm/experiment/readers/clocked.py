@@ -94,7 +94,6 @@ def broken(path: str | PathLike[str], kind: str, error: Exception | str) -> Expe
 
     Parameters
     ----------
-    path : path-like
     kind : str
         As ``"a TDMS file"``.
     error : Exception or str

@@ -30,7 +30,6 @@ class FrameLog(Log):
 
     Parameters
     ----------
-    frame : Frame
     name : str
         What messages call it.
 

@@ -41,7 +41,6 @@ class GuardedLog(Log):
 
     Parameters
     ----------
-    path : path-like
     reader : type
         The class that reads the file.
 

@@ -25,7 +25,6 @@ class Hdf5Log(ArrayLog):
 
     Parameters
     ----------
-    path : path-like
     matlab : bool
         The file was written by MATLAB 7.3: names are those of variables, ``log.q``, and arrays are stored transposed.
     """

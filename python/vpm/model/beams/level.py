@@ -150,7 +150,6 @@ def size_of(level: str, beam: Mapping[str, Any]) -> int:
 
     Parameters
     ----------
-    level : str
     beam : mapping
         Its table.
     """

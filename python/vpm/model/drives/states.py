@@ -26,7 +26,6 @@ def rest(model: Evaluations, theta: Array, coordinates: Array) -> Array:
 
     Parameters
     ----------
-    model : Model
     theta : ndarray, shape (P,)
     coordinates : ndarray, shape (n,)
 
@@ -46,7 +45,6 @@ def follow(model: Evaluations, theta: Array, internal: Array, inputs: Array, vel
 
     Parameters
     ----------
-    model : Model
     theta : ndarray, shape (P,)
     internal : ndarray
         In the order of ``model.internal_names``.
@@ -88,7 +86,6 @@ def commanded_states(model: Evaluations, theta: Array, inputs: Array, dt: float)
 
     Parameters
     ----------
-    model : Model
     theta : ndarray, shape (P,)
     inputs : ndarray, shape (N, nu)
         In the order of ``model.inputs``.

@@ -69,9 +69,7 @@ def beyond(name: str, axis: tuple[float, ...], values: Array, unit: str, time: A
     ----------
     name : str
         Channel.
-    axis : tuple of float
     values, time : ndarray, shape (N,)
-    unit : str
     """
     outside = np.maximum(axis[0] - values, values - axis[-1])
     worst = int(np.argmax(outside))

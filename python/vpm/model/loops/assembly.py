@@ -35,7 +35,6 @@ def assembled(loops: Loops, start: Array, fixed: Mapping[int, float], joints: in
 
     Parameters
     ----------
-    loops : Loops
     start : ndarray, shape (n,)
     fixed : mapping of int to float
         Places of coordinates that are held, and where.
@@ -57,7 +56,6 @@ def mirrored(loops: Loops, start: Array, fixed: Mapping[int, float], joints: int
 
     Parameters
     ----------
-    loops : Loops
     start, fixed, joints
         As for `assembled`.
     """

@@ -45,7 +45,6 @@ class Path:
 
     Parameters
     ----------
-    loops : Loops
     names : sequence of str
         Of all coordinates.
     fixed : sequence of int
