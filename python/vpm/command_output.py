@@ -125,7 +125,6 @@ def speak(run: Callable[[bool], object], options: OutputOptions) -> object:
     ----------
     run : callable
         Takes whether an error of usage is told, and ends the program, at once; gives the exit code.
-    options : OutputOptions
     """
     global _now  # noqa: PLW0603  # one command runs at a time
     _now = options

@@ -187,7 +187,6 @@ def with_provenance(
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     model, experiments, validate, asked, workers
         As for `diagnosed`.
     """
@@ -212,9 +211,6 @@ def diagnosed(
 
     Parameters
     ----------
-    model : Model
-    experiments, validate : list of Experiment
-    asked : Asked
     workers, tell, progress
         As for `diagnose`.
     """

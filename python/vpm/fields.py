@@ -28,7 +28,6 @@ def fits(value: object, hint: object) -> bool:
 
     Parameters
     ----------
-    value : object
     hint : type or other annotation
         What is not known here fits.
     """

@@ -187,7 +187,6 @@ def invertible(model: Model, measured: Sequence[str]) -> Model:
 
     Parameters
     ----------
-    model : Model
     measured : sequence of str
         Joints whose motion is known.
     """

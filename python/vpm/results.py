@@ -213,10 +213,6 @@ class Result(Storable):
     def to_frame(self) -> pd.DataFrame:
         """Table of the result.
 
-        Returns
-        -------
-        pandas.DataFrame
-
         Raises
         ------
         MissingExtraError
@@ -293,7 +289,6 @@ def html_table(caption: str, head: tuple[str, ...], rows: list[tuple[object, ...
 
     Parameters
     ----------
-    caption : str
     head : tuple of str
         Names of the columns.
     rows : list of tuple

@@ -117,12 +117,7 @@ class Parcel:
 
 
 def unpacked(answer: bytes) -> Any:  # noqa: ANN401  whatever the task gives
-    """Result that `run_packed` sent as bytes.
-
-    Parameters
-    ----------
-    answer : bytes
-    """
+    """Result that `run_packed` sent as bytes."""
     return pickle.loads(answer)  # noqa: S301  see above
 
 

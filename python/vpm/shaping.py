@@ -143,10 +143,6 @@ def shaper(
     held : sequence of str, optional
         Joints that follow the command, by default all. The others move with the flexible links, from rest at ``q``.
 
-    Returns
-    -------
-    Shaper
-
     Raises
     ------
     SimulationError, ModelError, CoreError

@@ -294,7 +294,6 @@ def outcomes(
 
     Parameters
     ----------
-    jobs : sequence of callable
     where : int, Executor or callable
         See `Tasks`.
     say : callable, optional
@@ -328,7 +327,6 @@ def until_interrupted(jobs: Sequence[Callable[[], T]], where: Where) -> tuple[li
 
     Parameters
     ----------
-    jobs : sequence of callable
     where : int, Executor or callable
         See `Tasks`.
     """
@@ -343,7 +341,6 @@ def done_by(executor: Executor | Callable[[], Executor], job: Callable[[], T], s
     ----------
     executor : Executor or callable
         See `Tasks`.
-    job : callable
     say : callable, optional
         See `Tasks`.
     """

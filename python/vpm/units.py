@@ -94,21 +94,11 @@ class Unit:
         return (self.factor, self.zero) == (1.0, 0.0)
 
     def to_si(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values of this unit, in SI.
-
-        Parameters
-        ----------
-        values : ndarray
-        """
+        """Values of this unit, in SI."""
         return values * self.factor + self.zero
 
     def from_si(self, values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Values in SI, in this unit.
-
-        Parameters
-        ----------
-        values : ndarray
-        """
+        """Values in SI, in this unit."""
         return (values - self.zero) / self.factor
 
     @property
@@ -311,7 +301,6 @@ def convert(value: float | NDArray[np.float64], from_unit: str, to_unit: str) ->
     ----------
     value : float or ndarray
         In `from_unit`.
-    from_unit, to_unit : str
 
     Returns
     -------

@@ -64,10 +64,6 @@ def budget(
     tell : callable, optional
         Told now and then how far it is.
 
-    Returns
-    -------
-    BudgetReport
-
     Raises
     ------
     SimulationError

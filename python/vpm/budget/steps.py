@@ -129,13 +129,7 @@ def _ahead(rate: float, priority: int | None) -> AbstractContextManager[object]:
 
 
 def start_state(model: Model, experiment: Experiment | None) -> Array | None:
-    """Start state of timed steps: a record's, if contacts or oil make zero impossible.
-
-    Parameters
-    ----------
-    model : Model
-    experiment : Experiment or None
-    """
+    """Start state of timed steps: a record's, if contacts or oil make zero impossible."""
     return initial_state(model, experiment, model.theta) if experiment is not None and model.is_abrupt else None
 
 

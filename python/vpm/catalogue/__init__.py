@@ -69,12 +69,7 @@ def repair_of(name: str) -> str:
 
 
 def signature_of(name: str) -> Signature:
-    """Where an effect shows; anywhere for one that the catalogue does not have any more.
-
-    Parameters
-    ----------
-    name : str
-    """
+    """Where an effect shows; anywhere for one that the catalogue does not have any more."""
     return EFFECTS[name].signature if name in EFFECTS else ANYWHERE
 
 
@@ -139,10 +134,6 @@ def register(
     confused_with : mapping of str to str, optional
         Effects that records may not tell from this one, and what tells them apart.
 
-    Returns
-    -------
-    EffectType
-
     Raises
     ------
     ModelError
@@ -198,10 +189,5 @@ def registered() -> tuple[EffectType, ...]:
 
 
 def adopt(effects: Collection[EffectType]) -> None:
-    """Add what another process has registered, as `register` checked it there.
-
-    Parameters
-    ----------
-    effects : collection of EffectType
-    """
+    """Add what another process has registered, as `register` checked it there."""
     _CATALOGUE.entries.update((effect.name, effect) for effect in effects)

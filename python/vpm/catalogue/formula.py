@@ -35,10 +35,8 @@ class Formula:
 
     Attributes
     ----------
-    text : str
     program : tuple
         Instructions: ``"position"``, ``"velocity"``, ``{"parameter": k}``, ``{"constant": k}`` or an operation.
-    constants : tuple of float
     """
 
     text: str

@@ -136,13 +136,11 @@ class EffectType(Traits):
 
     Attributes
     ----------
-    name : str
     site : {"joint", "body", "link", "beam", "actuator", "cylinder", "supply", "sensor", "world"}
         Kind of component that it sits at; what sits at a body may sit at a beam too, in the frame of its tip. A link is
         a body that its joint turns, or a beam; the world is one site, where there is gravity.
     group : str
         First part of the suffix of its parameters.
-    parameters : tuple of EffectParameter
     law : str
         The law as text.
     sentence : str

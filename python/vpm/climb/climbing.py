@@ -106,10 +106,6 @@ def climb(
     tell : callable, optional
         Called with a sentence at every level.
 
-    Returns
-    -------
-    Climb
-
     Raises
     ------
     IdentificationError

@@ -52,7 +52,6 @@ def autocorrelation(residual: Array, pieces: Sequence[slice], dt: float, channel
         Contiguous in time.
     dt : float
         s.
-    channel : str
     """
     values = _normalised(residual, residual, pieces, _lags(pieces))[1:]
     half = values.size // 2
@@ -102,8 +101,6 @@ def cross_correlation(residual: Array, signal: Array, pieces: Sequence[slice], d
     Parameters
     ----------
     residual, signal : ndarray, shape (N,)
-    pieces : sequence of slice
-    dt : float
     name : str
         The input.
     """
@@ -124,7 +121,6 @@ def effective_samples(residual: Array, pieces: Sequence[slice]) -> float:
     Parameters
     ----------
     residual : ndarray, shape (N,)
-    pieces : sequence of slice
 
     Returns
     -------

@@ -24,7 +24,6 @@ def write_mcap(comparison: Comparison, path: str | PathLike[str]) -> tuple[Path,
 
     Parameters
     ----------
-    comparison : Comparison
     path : path-like
         Of the MCAP file; a layout for Foxglove is written beside it, ``NAME.layout.json``.
 

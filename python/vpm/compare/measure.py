@@ -33,10 +33,6 @@ def compare(run: Run, experiment: Experiment, channels: Sequence[str] | None = N
     channels : sequence of str, optional
         By default every simulated channel that was measured and is no mere copy of the log.
 
-    Returns
-    -------
-    Comparison
-
     Raises
     ------
     ExperimentError

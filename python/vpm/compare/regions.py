@@ -138,12 +138,10 @@ def state_regions(
     Parameters
     ----------
     residual : ndarray, shape (N,)
-    joint : str
     state : mapping of str to ndarray, shape (N,)
         Some of ``position``, ``velocity``, ``acceleration``.
     unit : str
         Of the position.
-    residual_unit : str
     """
     makers: tuple[tuple[str, Callable[[], Region]], ...] = (
         ("velocity", lambda: _speed_region(residual, joint, state["velocity"], unit)),

@@ -106,10 +106,6 @@ def state_feedback(
     points : int
         Along a motion.
 
-    Returns
-    -------
-    StateFeedback
-
     Raises
     ------
     SimulationError

@@ -68,10 +68,6 @@ def flexible_feedforward(
         Largest absolute values, SI, of inputs ``"motor_2"`` and of joints, ``"joint_2.position"`` or
         ``"joint_2.velocity"``.
 
-    Returns
-    -------
-    FlexibleFeedforward
-
     Raises
     ------
     SimulationError

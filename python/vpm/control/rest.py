@@ -30,7 +30,6 @@ def poses(
 
     Parameters
     ----------
-    task : Task
     wanted : ndarray, shape (N, m)
     guess : ndarray, shape (N, n)
     loads : tuple of two ndarray, shape (N, n), optional

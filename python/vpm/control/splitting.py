@@ -54,7 +54,6 @@ def solve(rates: Rates, times: Array, guess: Array, ends: tuple[Array, Array]) -
 
     Parameters
     ----------
-    rates : callable
     times : ndarray, shape (N,)
         Evenly spaced, s.
     guess : ndarray, shape (N, nx)

@@ -18,7 +18,6 @@ class Hidden:
 
     Attributes
     ----------
-    machine : Machine
     site : str
         Where the effect sits, as the model names it; "" for none.
     parameters : dict of str to float

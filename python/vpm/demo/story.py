@@ -46,7 +46,6 @@ def run_demo(
     ----------
     out : Path
         Folder for the report.
-    console : rich.console.Console
     tell : callable
         Called with a sentence at every step.
     hide : str, optional
@@ -108,10 +107,6 @@ def check_hidden(name: str) -> None:
 
 def print_list(console: Console) -> list[dict[str, str]]:
     """Print what the demo's story can hide, a line each, with site and law.
-
-    Parameters
-    ----------
-    console : rich.console.Console
 
     Returns
     -------

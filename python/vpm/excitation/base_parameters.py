@@ -96,10 +96,6 @@ def base_parameters(model: Model, free: Sequence[str] | None = None, *, seed: in
         Of the random states, positions within 2 rad or m, velocities within 5 and accelerations within 20 per second
         and per second squared.
 
-    Returns
-    -------
-    BaseParameters
-
     Raises
     ------
     ExcitationError

@@ -25,17 +25,12 @@ def chirp(
 
     Parameters
     ----------
-    channel, unit : str
     first, last : float
         Frequency at the beginning and at the end, Hz.
     amplitude, mean : float
         In `unit`; the amplitude bounds the deviation from the mean at all times.
     duration, time_step : float
         s.
-
-    Returns
-    -------
-    Excitation
 
     Raises
     ------
@@ -81,10 +76,6 @@ def noise(
     peak : float, optional
         Largest absolute sample that is allowed, in `unit`; noise that goes beyond is refused, not clipped, because
         clipping spreads power over all frequencies.
-
-    Returns
-    -------
-    Excitation
 
     Raises
     ------

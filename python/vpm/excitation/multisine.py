@@ -45,7 +45,6 @@ def multisine(
 
     Parameters
     ----------
-    channel, unit : str
     band : tuple of float
         Lowest and highest frequency, Hz.
     period : float
@@ -65,10 +64,6 @@ def multisine(
         For random phases.
     progress : callable, optional
         Called during the optimisation; ``KeyboardInterrupt`` ends it.
-
-    Returns
-    -------
-    Excitation
 
     Raises
     ------

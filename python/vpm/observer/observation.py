@@ -130,10 +130,6 @@ def observe(
     setup : Setup, optional
         Integrator, substeps and hold.
 
-    Returns
-    -------
-    Observation
-
     Raises
     ------
     SimulationError, ExperimentError

@@ -54,10 +54,6 @@ def optimise(
     progress : callable, optional
         Called with a sentence after every iteration.
 
-    Returns
-    -------
-    Optimum
-
     Raises
     ------
     OptimisationError

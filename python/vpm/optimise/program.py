@@ -48,7 +48,6 @@ class Program:
     Attributes
     ----------
     A : csr_array, shape (ng, nz)
-    groups : list of Group
     slack : ndarray, shape (nz,)
         1 for variables whose sum is made least where the task cannot be done.
     """

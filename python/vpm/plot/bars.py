@@ -32,7 +32,6 @@ def plot_parameters(
 
     Parameters
     ----------
-    names, units : sequence of str
     values, std, start : array-like, shape (p,)
         SI. Where a start is zero, the axis shows the value over its own size.
     """

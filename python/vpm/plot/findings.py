@@ -50,7 +50,6 @@ def plot_joint_over_time(picture: Picture, stages: Mapping[str, Array]) -> Figur
 
     Parameters
     ----------
-    picture : Picture
     stages : mapping of str to ndarray, shape (n,)
         Residuals; NaN, where a sample does not count, leaves a gap.
     """
@@ -75,7 +74,6 @@ def plot_joint_over_state(picture: Picture, stages: Mapping[str, Array]) -> Figu
 
     Parameters
     ----------
-    picture : Picture
     stages : mapping of str to ndarray, shape (n,)
     """
     figure, axes = panels(1, 2, height=3.2, width=11.0)
@@ -130,7 +128,6 @@ def plot_parameter_correlation(names: Sequence[str], correlation: Array) -> Figu
 
     Parameters
     ----------
-    names : sequence of str
     correlation : ndarray, shape (p, p)
     """
     figure, axes = panels(1, height=0.8 + 0.34 * len(names), width=min(11.0, 4.4 + 0.55 * len(names)))

@@ -37,8 +37,6 @@ def plot_channels(
     time : ndarray, shape (N,)
         s.
     data : ndarray, shape (N, C)
-    channels, units : sequence of str
-    title : str
     """
     figure, axes = panels(max(1, len(channels)), height=1.6, share_x=True)
     for at, (channel, unit) in enumerate(zip(channels, units, strict=True)):
@@ -62,7 +60,6 @@ def plot_innovations(
         s.
     innovations, expected : ndarray, shape (N, C)
         And their standard deviation.
-    channels, units : sequence of str
     """
     figure, axes = panels(max(1, len(channels)), height=1.6, share_x=True)
     for at, (channel, unit) in enumerate(zip(channels, units, strict=True)):
@@ -132,7 +129,6 @@ def plot_correlation(lags: Array, values: Array, band: float, name: str) -> Figu
     lags : ndarray, shape (L,)
         s.
     values : ndarray, shape (L,)
-    band : float
     name : str
         What is correlated.
     """

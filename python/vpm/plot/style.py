@@ -165,7 +165,6 @@ def figure_to_svg(figure: Figure, words: str = "") -> str:
 
     Parameters
     ----------
-    figure : Figure
     words : str
         What is to be seen, for those who do not see it.
 

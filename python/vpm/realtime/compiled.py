@@ -60,10 +60,6 @@ def compile_model(
     state : mapping of str to float, or array_like of shape (nx,), optional
         Where it starts, as ``model.state`` takes it; what is not named is zero.
 
-    Returns
-    -------
-    CompiledModel
-
     Raises
     ------
     SimulationError, ModelError

@@ -66,10 +66,6 @@ def c_source(model: Model, *, name: str | None = None, parameters: Sequence[str]
         Names of parameters, or patterns such as ``"*.mass"``, that stay arguments of the functions. All others become
         constants: the fewer stay, the less there is to compute.
 
-    Returns
-    -------
-    CSource
-
     Raises
     ------
     SimulationError

@@ -91,7 +91,6 @@ def reduce_structure(structure: Structure, modes: int = 8) -> Reduction:
 
     Parameters
     ----------
-    structure : Structure
     modes : int
         How many modes to keep, 1 to 64.
 

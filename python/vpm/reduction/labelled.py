@@ -53,7 +53,6 @@ def read_labelled(path: Path, initial: str) -> Labelled | None:
 
     Parameters
     ----------
-    path : pathlib.Path
     initial : str
         Letter with which the name of the matrix begins, where a file holds several: K or M.
 

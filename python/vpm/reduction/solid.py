@@ -61,7 +61,6 @@ def read_mesh(path: Path, scale: float) -> Mesh:
 
     Parameters
     ----------
-    path : pathlib.Path
     scale : float
         Length of its unit (m).
     """

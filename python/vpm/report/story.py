@@ -13,13 +13,7 @@ if TYPE_CHECKING:
 
 
 def print_story(diagnosis: Diagnosis, console: Console) -> None:
-    """Print verdict, effects with their evidence, the gap at each stage, and what was refused and why.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    console : rich.console.Console
-    """
+    """Print verdict, effects with their evidence, the gap at each stage, and what was refused and why."""
     for paragraph in (_verdict, _effects, _steps, _gaps, _refused, _ambiguous, _where, _notes):
         lines = paragraph(diagnosis)
         if lines:

@@ -106,7 +106,6 @@ def draft_of(robot: Robot, tree: Tree, spread: Spread) -> Draft:
 
     Parameters
     ----------
-    robot : Robot
     tree : Tree
         Of its links.
     spread : Spread
@@ -283,8 +282,6 @@ def put_ties(draft: Draft, tree: Tree, moved_by: Mapping[str, float], frequency:
 
     Parameters
     ----------
-    draft : Draft
-    tree : Tree
     moved_by : mapping of str to float
         What each shaft moves where all coordinates are zero (kg m^2), by follower.
     frequency : float

@@ -71,10 +71,6 @@ def export_robot(model: Model, urdf: str | PathLike[str]) -> ExportedRobot:
     urdf : path-like
         File that the model came from; it is read only.
 
-    Returns
-    -------
-    ExportedRobot
-
     Raises
     ------
     ModelError

@@ -81,10 +81,6 @@ def import_robot(
     xacro_args : mapping of str to str, optional
         Arguments of a xacro file.
 
-    Returns
-    -------
-    ImportedRobot
-
     Raises
     ------
     ModelError

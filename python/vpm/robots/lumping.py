@@ -23,7 +23,6 @@ class Lump:
         It carries the link.
     parent : str
         Link that moves and carries the joint, or the world; `place` is that of the joint in the frame of this one.
-    place : Pose
     parts : tuple of (str, Pose)
         Links with their place in the frame of the first, which is the one that moves.
     inertial : Inertial or None

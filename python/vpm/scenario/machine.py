@@ -19,7 +19,6 @@ def machines(entries: tuple[RunEntry, ...], folder: Path) -> Mapping[str, Model]
 
     Parameters
     ----------
-    entries : tuple of RunEntry
     folder : pathlib.Path
         Folder of the scenario file, from where the paths of model files lead.
 

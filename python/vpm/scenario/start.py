@@ -23,10 +23,8 @@ def start_state(document: Document, owner: str, model: Model, inputs: Mapping[st
 
     Parameters
     ----------
-    document : Document
     owner : str
         What to call the machine in messages.
-    model : Model
     inputs : mapping of str to ndarray
         What the scenario gives, by channel.
 
@@ -82,7 +80,6 @@ def held_inputs(model: Model, state: Array, given: Collection[str]) -> Mapping[s
 
     Parameters
     ----------
-    model : Model
     state : ndarray, shape (nx,)
         At the beginning.
     given : collection of str

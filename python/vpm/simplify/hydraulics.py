@@ -32,8 +32,6 @@ def simpler(model: Model, drive: str, change: str) -> Model:
 
     Parameters
     ----------
-    model : Model
-    drive : str
     change : str
         One of `SIMPLER`.
 

@@ -110,7 +110,6 @@ def steps_per_sample(records: Sequence[Experiment], rate: float) -> int:
 
     Parameters
     ----------
-    records : sequence of Experiment
     rate : float
         Hz.
 
@@ -135,7 +134,6 @@ def by_the_model(model: Model, experiment: Experiment, mode: str, rate: float, c
 
     Parameters
     ----------
-    model : Model
     experiment : Experiment
         Its commands or references count.
     mode : {"free_run", "closed_loop"}
@@ -174,10 +172,7 @@ def reference_mode(model: Model, experiments: Sequence[Experiment], against: str
 
     Parameters
     ----------
-    model : Model
-    experiments : sequence of Experiment
     against : {"data", "model"}
-    mode : str or None
     """
     if mode is not None:
         return mode

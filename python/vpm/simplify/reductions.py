@@ -114,7 +114,6 @@ def reductions(model: Model, learnt: Sequence[Reduction] = ()) -> dict[tuple[str
 
     Parameters
     ----------
-    model : Model
     learnt : sequence of Reduction
         More of them, which records tell: `vpm.simplify.surrogates`.
 
@@ -135,7 +134,6 @@ def reduced(model: Model, changes: Sequence[Reduction]) -> Model:
 
     Parameters
     ----------
-    model : Model
     changes : sequence of Reduction
         At most one of each site.
 

@@ -45,8 +45,6 @@ def replaced(model: Model, drive: str, entry: str) -> Model:
 
     Parameters
     ----------
-    model : Model
-    drive : str
     entry : str
         The other drive as JSON, without the joint or line that it acts on.
 

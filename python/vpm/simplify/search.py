@@ -87,10 +87,6 @@ def simplify(
     executor : Executor or callable, optional
         Fits reduced models that do not wait for each other, one task each, see `vpm.tasks.Tasks`; steps are timed here.
 
-    Returns
-    -------
-    Ladder
-
     Raises
     ------
     SimulationError

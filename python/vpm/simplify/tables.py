@@ -114,8 +114,6 @@ def force_map(model: Model, drive: str, commands: Array, velocities: Array) -> A
 
     Parameters
     ----------
-    model : Model
-    drive : str
     commands : ndarray, shape (n,)
         SI.
     velocities : ndarray, shape (m,)

@@ -60,7 +60,6 @@ def without_terms(model: Model, name: str, at: str) -> Model:
 
     Parameters
     ----------
-    model : Model
     name : {"velocity", "coupling", "second-order"}
     at : str
         Parts with commas between them, or `MACHINE`.
@@ -128,11 +127,9 @@ def motions(model: Model, records: Sequence[Experiment], mode: str, setup: Setup
 
     Parameters
     ----------
-    model : Model
     records : sequence of Experiment
         Their commands or references drive the model.
     mode : {"free_run", "closed_loop"}
-    setup : Setup
 
     Raises
     ------
@@ -178,8 +175,6 @@ def deformation_share(model: Model, beam: str, along: Sequence[Motion]) -> float
 
     Parameters
     ----------
-    model : Model
-    beam : str
     along : sequence of tuple
         See `motions`.
     """
@@ -202,7 +197,6 @@ def ranked(
 
     Parameters
     ----------
-    model : Model
     changes : sequence of Reduction
         Of single parts, the last of the whole machine.
     share : callable
@@ -238,7 +232,6 @@ def parts(model: Model, q: Array, v: Array, a: Array) -> Array:
 
     Parameters
     ----------
-    model : Model
     q, v, a : ndarray, shape (N, n)
         Coordinates, rates and accelerations.
     """

@@ -53,7 +53,6 @@ class Trials:
     ----------
     model : Model
         The full one.
-    judge : Judge
     refit : Callable
         Says of changes whether the parameters are fitted again.
     tell : callable
@@ -119,7 +118,6 @@ class Trials:
 
         Parameters
         ----------
-        changes : tuple of Reduction
         below : float
             Coarse time of a period (s) from which on the model is not fitted.
         """
@@ -148,7 +146,6 @@ class Trials:
 
         Parameters
         ----------
-        tried : iterable of tuple of Reduction
         below : float
             As for `attempt`.
         """
@@ -332,7 +329,6 @@ class Courses:
     ----------
     model : Model
         The full one.
-    judge : Judge
     """
 
     def __init__(self, model: Model, judge: Judge) -> None:

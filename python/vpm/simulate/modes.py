@@ -64,10 +64,6 @@ def simulate(
         By default estimated from the first samples of the measured positions; at rest at zero without them. Flexible
         links start from the deflection of their equilibrium there.
 
-    Returns
-    -------
-    Run
-
     Raises
     ------
     SimulationError, ExperimentError

@@ -38,7 +38,6 @@ class Resolution(Storable):
 
     Parameters
     ----------
-    integrator : str
     step : float
         s.
     modes : callable

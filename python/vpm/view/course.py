@@ -39,7 +39,6 @@ def course_of(model: Model, source: Run | ScenarioRun | Experiment | None, mode:
 
     Parameters
     ----------
-    model : Model
     source : Run, ScenarioRun, Experiment or None
         Of a scenario the first run whose model it is.
     mode : str, optional

@@ -43,8 +43,6 @@ def draw(scene: Scene, sample: int, *, dark: bool = False, size: tuple[int, int]
 
     Parameters
     ----------
-    scene : Scene
-    sample : int
     dark : bool
         On dark ground.
     size : tuple of int
@@ -124,7 +122,6 @@ def write_film(
 
     Parameters
     ----------
-    scene : Scene
     path : path-like
         MP4, MKV or GIF, by its ending.
     speed : float, optional

@@ -79,12 +79,10 @@ class Page:
 
     Parameters
     ----------
-    model : Model
     course : Course
         A single sample has sliders for the joints, more have a time line.
     port : int, optional
         By default the first free one.
-    dark : bool
     """
 
     def __init__(self, model: Model, course: Course, *, port: int | None = None, dark: bool = False) -> None:

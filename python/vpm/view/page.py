@@ -25,7 +25,6 @@ def write_page(scene: Scene, path: str | PathLike[str]) -> Path:
 
     Parameters
     ----------
-    scene : Scene
     path : path-like
         ``.html`` is customary.
 

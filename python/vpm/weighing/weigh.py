@@ -91,10 +91,6 @@ def weigh(
     setup : Setup, optional
         Integrator, substeps and hold.
 
-    Returns
-    -------
-    Weighing
-
     Raises
     ------
     IdentificationError

@@ -23,7 +23,6 @@ def model_description(
 
     Parameters
     ----------
-    found : Variables
     name, identifier, token, tool : str
         Names of the model and of its files, the hash of all that the FMU computes, and what wrote it.
     period, step : float

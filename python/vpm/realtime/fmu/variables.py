@@ -23,7 +23,6 @@ class Variable:
 
     Attributes
     ----------
-    name : str
     reference : int
         Its value reference.
     causality : {"independent", "input", "local", "output", "parameter"}
@@ -52,7 +51,6 @@ class Variables:
 
     Attributes
     ----------
-    time : Variable
     inputs, states, rates, outputs, parameters : tuple of Variable
         Outputs that show what an input holds are left out.
     dependencies : mapping of int to (tuple of int, tuple of int)
@@ -78,8 +76,6 @@ def variables(model: Model, written: CSource, start: NDArray[np.float64]) -> Var
 
     Parameters
     ----------
-    model : Model
-    written : CSource
     start : ndarray, shape (nx,)
         State to begin in.
 

@@ -102,10 +102,6 @@ def write_fmu(
     library : bool, optional
         Whether the library for this platform is made beside the sources. By default it is where there is a C compiler.
 
-    Returns
-    -------
-    Fmu
-
     Raises
     ------
     SimulationError
