@@ -28,7 +28,6 @@ def in_order(jobs: Sequence[Callable[[], T]], workers: int) -> list[T]:
     """Results of parallel jobs in their order, whatever the number of ``workers``.
 
     The first job that fails raises its error. Ctrl-C stops all of them.
-
     """
     if workers == 1 or len(jobs) < 2:
         return [job() for job in jobs]

@@ -1,7 +1,5 @@
 """Terms and coefficients of a NARX model from records."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Literal
 

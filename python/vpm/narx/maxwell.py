@@ -1,7 +1,5 @@
 """The Maxwell element beside a spring as a difference equation."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Identifiability of an element's coefficients: terms that records determine, and how well."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from vpm.compare import autocorrelation

@@ -1,7 +1,5 @@
 """Records of an element between two points: its force, its length and, where there is one, its drive signal."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

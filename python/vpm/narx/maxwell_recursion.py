@@ -1,7 +1,5 @@
 """The difference equation of the element and what its parameters do to it, as filters over whole records."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

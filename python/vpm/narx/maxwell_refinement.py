@@ -1,9 +1,6 @@
 """All coefficients of an element together, from one that is near: kept where that is better."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
-from typing import TypeAlias
 
 import numpy as np
 
@@ -16,7 +13,7 @@ from vpm.narx.maxwell_records import MaxwellSignals, Samples, element_samples
 from vpm.narx.maxwell_result import MaxwellFit, training_rmse, unrefined
 from vpm.narx.records import RecordLike
 
-Records: TypeAlias = "RecordLike | Sequence[RecordLike]"
+Records = RecordLike | Sequence[RecordLike]
 
 #: Fewest samples of a record or window in motion.
 LEAST = 20

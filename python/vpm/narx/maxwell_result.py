@@ -1,7 +1,5 @@
 """An element from records beside what is known of it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

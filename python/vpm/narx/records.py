@@ -1,10 +1,8 @@
 """Records as the core reads them: one output, some inputs, sample by sample."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TypeAlias, overload
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -14,7 +12,7 @@ from vpm.experiment import Experiment
 from vpm.numbers import Array
 
 #: A log, or arrays by name, which have no clock: their time counts samples.
-RecordLike: TypeAlias = "Experiment | Mapping[str, ArrayLike]"
+RecordLike = Experiment | Mapping[str, ArrayLike]
 
 
 @dataclass(frozen=True)

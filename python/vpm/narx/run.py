@@ -22,7 +22,6 @@ def inside(correlation: Correlation) -> bool:
 
     At most one lag in ten lies outside the band, where one in twenty is expected; and no single lag is larger than the
     largest of all lags would be in 19 of 20 independent signals (Bonferroni's inequality).
-
     """
     values = np.abs(correlation.values[correlation.lags != 0.0]) if correlation.lags[0] >= 0.0 else correlation.values
     if values.size == 0:

@@ -1,7 +1,5 @@
 """One-step prediction and free run side by side, record by record."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

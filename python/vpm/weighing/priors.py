@@ -1,7 +1,5 @@
 """Priors of parameters: from the model file, or from the natural sizes of the records."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

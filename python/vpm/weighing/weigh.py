@@ -6,8 +6,6 @@ Laplace's method about these (D. MacKay, *Neural Computation* 4, 1992). A parame
 records could have said of it, so that more parameters are no advantage by themselves.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -12,7 +12,7 @@ from vpm.experiment import Experiment
 from vpm.numbers import Array
 
 #: A log, or arrays by name with their clock under ``"time"``.
-RecordLike: TypeAlias = "Experiment | Mapping[str, ArrayLike]"
+RecordLike = Experiment | Mapping[str, ArrayLike]
 
 #: ``"applied"``: the force that moves the part, ``F = k x + c dx/dt``. ``"reaction"``: what the part answers with, as a
 #: cylinder's force that pushes its ends apart, ``F = k (x0 - x) - c dx/dt``.

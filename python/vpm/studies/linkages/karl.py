@@ -213,7 +213,6 @@ class Karl:
         A direct singularity is a zero of the derivative of the constraint by the angle, an inverse one by the stroke.
         The second derivative by the same variable never vanishes there, so the other variable turns back: a boundary,
         unless both first derivatives vanish.
-
         """
         rows: list[tuple[int, str, str, float, float]] = []
         for actuator in (0, 1):
@@ -261,7 +260,6 @@ class Karl:
             Strokes of the actuators (m); by default 81 between the two least positive singular ones of each.
         mode : {0, 1, 2, 3}
             Row of `direct`. The prototype is built in mode 0, |q1| < 90 deg and q2 > 0.
-
         """
         one, two = self._strokes(0, first), self._strokes(1, second)
         if mode not in range(4):

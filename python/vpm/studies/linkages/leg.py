@@ -102,7 +102,6 @@ class Leg:
             Lowest and highest angle of hip and knee (rad); by default -50 to 70 deg and -140 to -20 deg.
         count : int
             Number of angles in each range.
-
         """
         ranges = [np.radians((-50.0, 70.0)) if first is None else first]
         ranges.append(np.radians((-140.0, -20.0)) if second is None else second)

@@ -1,7 +1,5 @@
 """The element from records: stages after each other, then all coefficients together where that is better."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

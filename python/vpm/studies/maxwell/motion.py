@@ -1,7 +1,5 @@
 """Windows of tests in motion: k1 and c1, with the noise of the measured force where it belongs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Literal

@@ -1,7 +1,5 @@
 """The regressions of the thesis as they are printed, for reproduction: what they give and why it is no stiffness."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import ArrayLike
 

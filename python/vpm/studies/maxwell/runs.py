@@ -1,7 +1,5 @@
 """Runs of an element over records, and their errors test by test."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Lengths of an element without their noise."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

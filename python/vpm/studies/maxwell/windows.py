@@ -1,7 +1,5 @@
 """Sliding-window estimates of an element's parameters: k0 and s0 from tests at rest, k1 and c1 from tests in motion."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
