@@ -1,7 +1,5 @@
 """Command line of the time of a step against a period: ``vpm budget``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

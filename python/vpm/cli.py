@@ -1,7 +1,5 @@
 """Command line ``vpm``: puts the commands together, one ``*_command.py`` each, and ends with their exit codes."""
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

@@ -1,7 +1,5 @@
 """Command line of the identification at growing detail: ``vpm climb``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

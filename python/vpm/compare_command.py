@@ -1,7 +1,5 @@
 """Command line of the comparison of a model with a log: ``vpm compare``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

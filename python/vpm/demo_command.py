@@ -1,7 +1,5 @@
 """Command line of the demo with a hidden effect: ``vpm demo``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

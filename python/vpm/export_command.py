@@ -1,7 +1,5 @@
 """Command line of robots of other programs: ``vpm export``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

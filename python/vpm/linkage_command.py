@@ -1,7 +1,5 @@
 """Command line of closed linkages, KARL and the leg of HyQ: ``vpm linkage``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Command line of the proving ground: ``vpm prove``."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor

@@ -1,7 +1,5 @@
 """Command line of solids that become flexible links: ``vpm reduce``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """Command line of the report of an earlier diagnosis: ``vpm report``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

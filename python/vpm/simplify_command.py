@@ -1,7 +1,5 @@
 """Command line of model reduction: ``vpm simplify``."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 
