@@ -11,7 +11,7 @@ from places import EXAMPLES
 from synthetic import Truth, nominal, simulate_axis
 from vpm import Model
 from vpm.budget import BudgetReport, Stage, budget
-from vpm.budget.instructions import count_instructions
+from vpm.budget.measure import count_instructions
 from vpm.budget.report import REST
 from vpm.budget.steps import commands
 from vpm.errors import SimulationError
