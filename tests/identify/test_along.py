@@ -11,7 +11,7 @@ from vpm.errors import DivergedError, SimulationError
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.simplify.hydraulics import NO_STATE, SIMPLER, simpler
 from vpm.simplify.replacement import replaced
-from vpm.simplify.tables import force_map
+from vpm.simplify.surrogates import force_map
 
 DT = 1e-3
 

@@ -2,12 +2,18 @@
 
 import hashlib
 import math
+import os
+import platform
+import shutil
+import subprocess
+import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.metadata import version
 from importlib.resources import files
 from os import PathLike
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from zipfile import ZIP_DEFLATED, ZipFile, ZipInfo
 
 from numpy.typing import ArrayLike
@@ -15,7 +21,6 @@ from numpy.typing import ArrayLike
 from vpm.errors import SimulationError
 from vpm.files import probe_file, replacing
 from vpm.model import Model
-from vpm.realtime.fmu.binary import compiler, platform_name, shared_library
 from vpm.realtime.fmu.description import build_description, model_description
 from vpm.realtime.fmu.variables import Variables, variables
 from vpm.realtime.source import CSource, c_source
@@ -28,6 +33,13 @@ MOST_STEPS = 1_000_000
 _PARTS = ("fmu_steps.h", "fmu_keeping.h", "fmu_absent.h")
 #: As files in an FMU are dated, so that the same model gives the same bytes.
 _DATE = (1980, 1, 1, 0, 0, 0)
+
+_SYSTEMS = {"linux": ("linux", ".so"), "darwin": ("darwin", ".dylib"), "win32": ("windows", ".dll")}
+_PROCESSORS = {"amd64": "x86_64", "x86_64": "x86_64", "arm64": "aarch64", "aarch64": "aarch64"}
+#: In C99 mode compilers contract no operations, so that all machines round alike.
+_OPTIONS = ("-std=c99", "-fPIC", "-shared", "-fvisibility=hidden", "-DFMI3_OVERRIDE_FUNCTION_PREFIX=1")
+#: Characters of a source that are optimised in seconds; larger ones, of links with many coordinates, take minutes.
+_LARGE = 500_000
 
 
 @dataclass(frozen=True)
@@ -210,3 +222,53 @@ def _save(path: str | PathLike[str], contents: Mapping[str, str | bytes]) -> Non
             entry = ZipInfo(name, _DATE)
             entry.compress_type, entry.external_attr = ZIP_DEFLATED, 0o644 << 16
             archive.writestr(entry, content)
+
+
+def compiler() -> str | None:
+    """C compiler for an FMU's binary: what ``CC`` names, or ``cc``."""
+    return shutil.which(os.environ.get("CC") or "cc")
+
+
+def platform_name() -> tuple[str, str] | None:
+    """Platform of an FMU's binary, such as ``"x86_64-linux"``, and how its libraries end; or None."""
+    system = _SYSTEMS.get(sys.platform)
+    processor = _PROCESSORS.get(platform.machine().lower())
+    return None if system is None or processor is None else (f"{processor}-{system[0]}", system[1])
+
+
+def shared_library(sources: dict[str, str], files: list[str]) -> bytes:
+    """Compile sources into an FMU's binary, a shared library.
+
+    Parameters
+    ----------
+    sources : dict of str to str
+        Texts by file name.
+    files : list of str
+        Which of them are compiled.
+
+    Raises
+    ------
+    SimulationError
+        The compiler fails; the message has what it says first.
+    """
+    command = compiler()
+    if command is None:
+        raise SimulationError("there is no C compiler `cc` here for the FMU's library; install one, or leave it out")
+    optimise = "-O2" if sum(map(len, sources.values())) <= _LARGE else "-O1"
+    with TemporaryDirectory() as place:
+        folder = Path(place)
+        for name, text in sources.items():
+            (folder / name).write_text(text, encoding="utf-8", newline="\n")
+        words = [command, *_OPTIONS, optimise, *files, "-o", "library", "-lm"]
+        try:
+            done = subprocess.run(  # noqa: S603 - the compiler that the user has
+                words, cwd=folder, capture_output=True, text=True, errors="replace", check=False
+            )
+        except OSError as error:
+            raise SimulationError(f"the C compiler {command} does not start ({error}); install another") from error
+        if done.returncode != 0:
+            first = next((line for line in done.stderr.splitlines() if "error" in line), "it says nothing")
+            raise SimulationError(
+                f"the C compiler {command} fails ({first.strip()[:200]}); install another, or leave it out"
+            )
+        return (folder / "library").read_bytes()
