@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from test_online_observer import CART
+from test_observer import CART
 from vpm.errors import SimulationError
 from vpm.model import Model
 

@@ -1,4 +1,4 @@
-"""Quasi-static pressures and tables of efforts in model files, and both as what a servo-cylinder is made simpler to."""
+"""Valves that follow at once, load and quasi-static pressures, and tables of efforts in the place of cylinders."""
 
 import copy
 import json
@@ -13,15 +13,15 @@ from places import EXAMPLES
 from vpm.errors import ModelError
 from vpm.simplify.reductions import reductions
 from vpm.simplify.replacement import replaced
-from vpm.simplify.tables import force_map, tables
+from vpm.simplify.surrogates import force_map, tables
 from vpm.simulate import Setup, simulate_arrays
 
 RIG = vpm.Model.load(EXAMPLES / "servo_cylinder" / "rig.toml")
 CLOCK = 1e-3 * np.arange(400)
 
 
-def content(*, static: bool = True, clearance: float | None = 1e-4) -> dict[str, Any]:
-    """The rig with quasi-static pressures."""
+def content(*, static: bool = True, clearance: float | None = 1e-4, pressures: str = "quasi_static") -> dict[str, Any]:
+    """The rig with fewer states of its spool and of its pressures."""
     content = copy.deepcopy(RIG.to_dict())
     servo = content["actuators"]["servo"]
     if static:
@@ -29,7 +29,7 @@ def content(*, static: bool = True, clearance: float | None = 1e-4) -> dict[str,
         servo["valve"]["spool"] = "static"
     if clearance is not None:
         servo["valve"]["clearance"] = clearance
-    servo["cylinder"]["pressures"] = "quasi_static"
+    servo["cylinder"]["pressures"] = pressures
     return content
 
 
@@ -79,7 +79,7 @@ def test_slower_motion_comes_nearer() -> None:
     gaps = []
     for frequency in (64.0, 16.0):
         runs = []
-        for model in (quasi_static(), vpm.Model(_full())):
+        for model in (quasi_static(), vpm.Model(content(pressures="chambers"))):
             time = 0.008 / frequency * np.arange(500)
             command = 2e-3 * np.sin(2.0 * np.pi * frequency * time)
             record = vpm.Experiment.from_arrays(time, {"servo.command": command}, model=model, name="sine")
@@ -88,12 +88,6 @@ def test_slower_motion_comes_nearer() -> None:
         gaps.append(float(np.std(found - full) / np.std(full)))
     assert 0.01 < gaps[0] < 0.5
     assert gaps[1] < 0.5 * gaps[0]
-
-
-def _full() -> dict[str, Any]:
-    full = content()
-    full["actuators"]["servo"]["cylinder"]["pressures"] = "chambers"
-    return full
 
 
 def _start(model: vpm.Model) -> np.ndarray:
@@ -191,3 +185,61 @@ def test_table_forgets_what_only_a_valve_has() -> None:
     model = replaced(slow, "servo", json.dumps(table(quasi_static())))
     assert model.supplies == ()
     assert all(effect.at != "servo" for effect in model.effects)
+
+
+@pytest.mark.parametrize(
+    ("change", "states", "position"),
+    [
+        ({"pressures": "chambers"}, ("servo.chamber_a", "servo.chamber_b"), 0.04),
+        ({"static": False, "pressures": "load"}, ("servo.spool", "servo.spool_rate", "servo.load"), 0.06),
+        ({"pressures": "load"}, ("servo.load",), 0.1),
+    ],
+)
+def test_reduced_drives_lose_states_and_little_motion(
+    change: dict[str, Any], states: tuple[str, ...], position: float
+) -> None:
+    model, full = vpm.Model(content(clearance=None, **change)), moved(RIG, integrator="auto")
+    assert model.internal_names == states
+    run = moved(model, integrator="auto")
+    apart = np.ptp(run["axis.position"] - full["axis.position"]) / np.ptp(full["axis.position"])
+    assert 1e-4 < apart < position
+
+
+def test_file_keeps_the_load_pressure(tmp_path: Path) -> None:
+    model = vpm.Model(content(clearance=None, pressures="load"))
+    again = vpm.Model.load(model.save(tmp_path / "reduced.toml"))
+    assert again.internal_names == ("servo.load",)
+    assert "servo.valve.frequency" not in again.parameters
+
+
+def test_measured_pressures_are_the_start_of_the_load_pressure() -> None:
+    model = vpm.Model(content(static=False, clearance=None, pressures="load"))
+    columns = {
+        "servo.command": np.zeros(50),
+        "servo.pressure_a": np.full(50, 5e6),
+        "servo.pressure_b": np.full(50, 4e6),
+    }
+    record = vpm.Experiment.from_arrays(1e-3 * np.arange(50), columns, model=model)
+    state = vpm.initial.initial_state(model, record, model.theta)
+    alpha = 1.0 - (10.0 / 16.0) ** 2
+    assert state[model.state_names.index("servo.load")] == pytest.approx(5e6 - alpha * 4e6)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"spool": "static"}, "frequency is given, but a static spool follows at once"),
+        ({"frequency": None}, "frequency is missing; add it"),
+    ],
+)
+def test_spool_without_or_with_too_much_is_refused(change: dict[str, Any], message: str) -> None:
+    changed = copy.deepcopy(RIG.to_dict())
+    valve = changed["actuators"]["servo"]["valve"] | change
+    changed["actuators"]["servo"]["valve"] = {key: value for key, value in valve.items() if value is not None}
+    with pytest.raises(ModelError, match=message):
+        vpm.Model(changed)
+
+
+def test_static_spool_cannot_be_slower_than_described() -> None:
+    with pytest.raises(ModelError, match="valve_dynamics makes it slower"):
+        vpm.Model(content(clearance=None, pressures="chambers")).with_effect("valve_dynamics", at="servo", time=1e-3)

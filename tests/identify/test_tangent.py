@@ -1,4 +1,4 @@
-"""A fit of drives without a chance beside another one ends after a whole step; one that has it goes on."""
+"""Fits on a tangent: one that ends at a bound stays there, one without a chance ends after a whole step."""
 
 from collections.abc import Sequence
 from importlib import import_module
@@ -19,6 +19,8 @@ bodies.link = { mass = 1.0, inertia = [0.1, 0.1, 0.1, 0, 0, 0] }
 joints.hinge = { type = "revolute", parent = "world", child = "link", axis = [0, 0, 1] }
 """)
 NAME = "link.center_of_mass.x"
+
+MASS = "link.mass"
 
 
 class _Curved:
@@ -51,3 +53,31 @@ def test_what_neither_reaches_nor_promises_enough_ends(
     )
     assert fit.early == early
     assert fit.values[0] == pytest.approx(expected, abs=1e-3)
+
+
+class _Straight:
+    """Residual ``m - 2``: the largest mass of the model is the best."""
+
+    mode = "inverse_dynamics"
+    blocks = (SimpleNamespace(samples=slice(0, 1)),)
+    motions = (SimpleNamespace(joints=("hinge",)),)
+
+    def evaluate(
+        self, model: Model, theta: np.ndarray, columns: Sequence[int] = (), *_: object
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """The same with an origin as without: it is its own tangent."""
+        return np.array([theta[model.index(MASS)] - 2.0]), np.ones((1, 1))[:, : len(columns)]
+
+
+@pytest.mark.parametrize(("start", "most"), [(0.35, 1.72), (0.3, 0.83), (0.17, 0.45), (0.06, 0.62)])
+def test_a_fit_that_ends_at_a_bound_is_at_the_bound(start: float, most: float) -> None:
+    assert start + (most - start) > most  # what a sum on the way makes of it
+    model = Model.from_toml(f"""
+    name = "arm"
+    gravity = [0, 0, 0]
+    bodies.link = {{ mass = {{ value = {start}, max = {most}, min = 0.01 }}, inertia = [0.1, 0.1, 0.1, 0, 0, 0] }}
+    joints.hinge = {{ type = "revolute", parent = "world", child = "link", axis = [0, 0, 1] }}
+    """)
+    data: Any = _Straight()
+    fit = estimate_on_tangent(model, data, (MASS,), model.theta, bounds={}, tolerance=1e-10)
+    assert fit.values[0] == most
