@@ -31,24 +31,12 @@ class PluginError(VpmError):
 
 @dataclass(frozen=True)
 class Plugin:
-    """An effect, reader or importer that another package offers by an entry point.
+    """An effect, reader or importer that another package offers by an entry point."""
 
-    Attributes
-    ----------
-    kind : {"effects", "readers", "importers"}
-    name : str
-        Of an effect, or the ending of the files that are read or imported, without its dot.
-    package : str
-        Who offers it, with version.
-    refused : str
-        Why it is not used, as the end of a sentence; "" where it is.
-    point : importlib.metadata.EntryPoint
-    """
-
-    kind: str
-    name: str
-    package: str
-    refused: str
+    kind: str  #: One of {"effects", "readers", "importers"}.
+    name: str  #: Of an effect, or the ending of the files that are read or imported, without its dot.
+    package: str  #: Who offers it, with version.
+    refused: str  #: Why it is not used, as the end of a sentence; "" where it is.
     point: EntryPoint
 
     def __str__(self) -> str:

@@ -66,27 +66,14 @@ Power = int | Fraction
 
 @dataclass(frozen=True)
 class Unit:
-    """A unit that was understood.
+    """A unit that was understood."""
 
-    Attributes
-    ----------
-    text : str
-        As it was written.
-    factor : float
-        SI value of one such unit.
-    dimension : tuple of int or Fraction
-        Powers of `BASE_UNITS`.
-    si_terms : tuple of (str, int or Fraction)
-        The same unit with every symbol replaced by its SI symbol; symbols and powers.
-    zero : float
-        SI value of zero of it, which is not zero of temperatures in ``°C`` and ``°F``.
-    """
-
-    text: str
-    factor: float
-    dimension: tuple[Power, ...]
+    text: str  #: As it was written.
+    factor: float  #: SI value of one such unit.
+    dimension: tuple[Power, ...]  #: Powers of `BASE_UNITS`.
+    #: The same unit with every symbol replaced by its SI symbol; symbols and powers.
     si_terms: tuple[tuple[str, Power], ...]
-    zero: float = 0.0
+    zero: float = 0.0  #: SI value of zero of it, which is not zero of temperatures in ``°C`` and ``°F``.
 
     @property
     def is_si(self) -> bool:

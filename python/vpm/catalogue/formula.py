@@ -31,15 +31,10 @@ Instruction = str | dict[str, int]
 
 @dataclass(frozen=True)
 class Formula:
-    """A law as text and as a program in postfix order.
-
-    Attributes
-    ----------
-    program : tuple
-        Instructions: ``"position"``, ``"velocity"``, ``{"parameter": k}``, ``{"constant": k}`` or an operation.
-    """
+    """A law as text and as a program in postfix order."""
 
     text: str
+    #: Instructions: ``"position"``, ``"velocity"``, ``{"parameter": k}``, ``{"constant": k}`` or an operation.
     program: tuple[Instruction, ...]
     constants: tuple[float, ...]
 

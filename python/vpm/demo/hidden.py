@@ -14,21 +14,12 @@ from vpm.demo.machine import Machine
 
 @dataclass(frozen=True)
 class Hidden:
-    """One machine that differs from its model.
-
-    Attributes
-    ----------
-    site : str
-        Where the effect sits, as the model names it; "" for none.
-    parameters : dict of str to float
-        Its true values by the names of the model.
-    beside : tuple of (str, str)
-        Effects and sites that come with it, which the model does not have either.
-    """
+    """One machine that differs from its model."""
 
     machine: Machine
-    site: str
-    parameters: Mapping[str, float]
+    site: str  #: Where the effect sits, as the model names it; "" for none.
+    parameters: Mapping[str, float]  #: Its true values by the names of the model.
+    #: Effects and sites that come with it, which the model does not have either.
     beside: tuple[tuple[str, str], ...] = ()
 
 

@@ -111,14 +111,9 @@ class Span:
 
     Known columns are taken out of new ones once, and steps in these alone give the same estimates as steps in all
     (R. Frisch and F. Waugh, *Econometrica* 1, 1933; M. Lovell, *J. American Statistical Association* 58, 1963).
-
-    Attributes
-    ----------
-    basis : ndarray, shape (n, r)
-        Orthonormal.
     """
 
-    basis: Array
+    basis: Array  #: Orthonormal; shape (n, r).
 
     @classmethod
     def of(cls, columns: Array) -> Span:

@@ -147,44 +147,27 @@ class Checks(Storable):
 
 @dataclass(frozen=True)
 class OwnSimulation:
-    """Settings of the simulations of its own model that a fit is compared with.
+    """Settings of the simulations of its own model that a fit is compared with."""
 
-    Attributes
-    ----------
-    bands : tuple of float
-        Bandwidths with which a simulation is drawn to its log, Hz: the slower, the less it hears of the noise of the
-        log.
-    damping : float
-        Of that.
-    away : float
-        Share of its motion by which a joint may be away from its log.
-    method : str
-        Integrator. Where dry friction turns round, longer steps would be an error of the simulation that a fit takes
-        for the machine's.
-    alike : float
-        A model that leaves so many times more of a log than of its own simulation lacks something, which is more than
-        this.
-    pairs : int
-        Pairs of simulated logs, one with the noise of the other turned round. What is linear in noise cancels from
-        their mean, so that it adds next to nothing to the variance of a fit (antithetic variates: J. Hammersley and K.
-        Morton, *Proc. Cambridge Philosophical Society* 52, 1956).
-    rounds : int
-        Most simulations that correct a fit; one more where the last one moved a value by more than its deviation.
-    draws : int
-        Draws of the noise that tell how far it moves a fit.
-    contradicted : float
-        Probability that a log is taken to be noisier than the draws although it is not.
-    """
-
+    #: Bandwidths with which a simulation is drawn to its log, Hz: the slower, the less it hears of the noise of the
+    #: log.
     bands: tuple[float, ...] = (0.3, 1.0, 3.0)
-    damping: float = 0.5**0.5
-    away: float = 0.3
+    damping: float = 0.5**0.5  #: Damping ratio of that controller.
+    away: float = 0.3  #: Share of its motion by which a joint may be away from its log.
+    #: Integrator. Where dry friction turns round, longer steps would be an error of the simulation that a fit takes
+    #: for the machine's.
     method: str = "adaptive(1e-7)"
+    #: A model that leaves so many times more of a log than of its own simulation lacks something, which is more
+    #: than this.
     alike: float = 2.0
+    #: Pairs of simulated logs, one with the noise of the other turned round. What is linear in noise cancels from
+    #: their mean, so that it adds next to nothing to the variance of a fit (antithetic variates: J. Hammersley and
+    #: K. Morton, *Proc. Cambridge Philosophical Society* 52, 1956).
     pairs: int = 3
+    #: Most simulations that correct a fit; one more where the last one moved a value by more than its deviation.
     rounds: int = 2
-    draws: int = 20
-    contradicted: float = 0.05
+    draws: int = 20  #: Draws of the noise that tell how far it moves a fit.
+    contradicted: float = 0.05  #: Probability that a log is taken to be noisier than the draws although it is not.
 
 
 def _positive(numbers: Mapping[str, float]) -> None:

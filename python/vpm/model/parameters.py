@@ -31,23 +31,12 @@ PUSHING = "negative friction would push along the motion and feed energy into it
 
 @dataclass(frozen=True)
 class Rule:
-    """What may stand at a key that is a parameter: an annotation of the field.
+    """What may stand at a key that is a parameter: an annotation of the field."""
 
-    Attributes
-    ----------
-    unit : str
-        SI unit; "" where it depends on the model.
-    physical : (float, float)
-        Physically possible range (SI).
-    impossible : str
-        What a value outside would mean.
-    kind : {"linear", "shape"}
-        Whether the effort that a motion needs is linear in the parameter.
-    """
-
-    unit: str
-    physical: Range
-    impossible: str = ""
+    unit: str  #: SI unit; "" where it depends on the model.
+    physical: Range  #: Physically possible range (SI).
+    impossible: str = ""  #: What a value outside would mean.
+    #: Whether the effort that a motion needs is linear in the parameter.
     kind: ParameterKind = "shape"
 
 
@@ -73,32 +62,15 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Slot:
-    """Place of a parameter in the document, and what may stand there.
+    """Place of a parameter in the document, and what may stand there."""
 
-    Attributes
-    ----------
-    keys : tuple of str or int
-        Way to it in the document.
-    quantity : Quantity
-        What stands there.
-    unit : str
-        SI unit.
-    physical : (float, float)
-        Physically possible range (SI).
-    impossible : str
-        What a value outside the range would mean.
-    kind : {"linear", "shape"}
-    named : str
-        Dotted name of the parameter, where it is not the keys below the section, joined.
-    """
-
-    keys: Keys
-    quantity: Quantity
-    unit: str
-    physical: Range
-    impossible: str = ""
+    keys: Keys  #: Way to it in the document.
+    quantity: Quantity  #: What stands there.
+    unit: str  #: SI unit.
+    physical: Range  #: Physically possible range (SI).
+    impossible: str = ""  #: What a value outside the range would mean.
     kind: ParameterKind = "shape"
-    named: str = ""
+    named: str = ""  #: Dotted name of the parameter, where it is not the keys below the section, joined.
 
     @property
     def name(self) -> str:

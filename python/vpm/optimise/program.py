@@ -20,41 +20,24 @@ Indices = NDArray[np.int64]
 
 @dataclass(frozen=True)
 class Group:
-    """One function of a nonlinear program at several points.
+    """One function of a nonlinear program at several points."""
 
-    Attributes
-    ----------
-    variables, results : Expression
-        Symbols of one point, shape (nv,), and what follows from them, shape (nr,).
-    count : int
-        Points.
-    V : csr_array, shape (count * nv, nz)
-        Variables of all points.
-    B : csc_array, shape (ng + 1, count * nr)
-        What each result adds to the constraints, and in the last row to the objective.
-    """
-
+    #: Symbols of one point, shape (nv,), and what follows from them, shape (nr,).
     variables: Expression
     results: Expression
-    count: int
-    V: csr_array
+    count: int  #: Points.
+    V: csr_array  #: Variables of all points; shape (count * nv, nz).
+    #: What each result adds to the constraints, and in the last row to the objective; shape (ng + 1, count * nr).
     B: csc_array
 
 
 @dataclass
 class Program:
-    """The program: make ``c z + last row`` least.
+    """The program: make ``c z + last row`` least."""
 
-    Attributes
-    ----------
-    A : csr_array, shape (ng, nz)
-    slack : ndarray, shape (nz,)
-        1 for variables whose sum is made least where the task cannot be done.
-    """
-
-    A: csr_array
+    A: csr_array  #: Shape (ng, nz).
     groups: list[Group]
-    slack: Array
+    slack: Array  #: 1 for variables whose sum is made least where the task cannot be done; shape (nz,).
     c: Array
     _solvers: dict[str, Any] = field(default_factory=dict)
 

@@ -15,25 +15,15 @@ MOST_JOINTS = 500
 
 @dataclass(frozen=True)
 class Lump:
-    """A link that moves, with what is fixed to it.
+    """A link that moves, with what is fixed to it."""
 
-    Attributes
-    ----------
-    joint : Joint
-        It carries the link.
-    parent : str
-        Link that moves and carries the joint, or the world; `place` is that of the joint in the frame of this one.
-    parts : tuple of (str, Pose)
-        Links with their place in the frame of the first, which is the one that moves.
-    inertial : Inertial or None
-        Of all of them together; None where no part has a mass.
-    """
-
-    joint: Joint
+    joint: Joint  #: It carries the link.
+    #: Link that moves and carries the joint, or the world; `place` is that of the joint in the frame of this one.
     parent: str
     place: Pose
+    #: Links with their place in the frame of the first, which is the one that moves.
     parts: tuple[tuple[str, Pose], ...]
-    inertial: Inertial | None
+    inertial: Inertial | None  #: Of all of them together; None where no part has a mass.
 
     @property
     def kept(self) -> bool:
@@ -43,21 +33,11 @@ class Lump:
 
 @dataclass(frozen=True)
 class Tree:
-    """Moving links of a robot, each with what is fixed to it, parents before children.
+    """Moving links of a robot, each with what is fixed to it, parents before children."""
 
-    Attributes
-    ----------
-    root : str
-        Link that stands.
-    lumps : dict of str to Lump
-        By the link that moves.
-    places : dict of str to (str, Pose)
-        Link that moves, or the world, and place in its frame, of every link.
-    """
-
-    root: str
-    lumps: dict[str, Lump]
-    places: dict[str, tuple[str, Pose]]
+    root: str  #: Link that stands.
+    lumps: dict[str, Lump]  #: By the link that moves.
+    places: dict[str, tuple[str, Pose]]  #: Link that moves, or the world, and place in its frame, of every link.
 
 
 def gather(robot: Robot) -> Tree:

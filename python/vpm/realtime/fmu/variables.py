@@ -19,50 +19,29 @@ Causality = Literal["independent", "input", "local", "output", "parameter"]
 
 @dataclass(frozen=True)
 class Variable:
-    """One variable of an FMU.
-
-    Attributes
-    ----------
-    reference : int
-        Its value reference.
-    causality : {"independent", "input", "local", "output", "parameter"}
-    unit : str
-        SI unit, ``"1"`` for none.
-    start : float, optional
-        None where the value is worked out.
-    bounds : (float, float), optional
-        Outside of them the FMU refuses the value.
-    derivative_of : int, optional
-        Reference of the state whose rate it is.
-    """
+    """One variable of an FMU."""
 
     name: str
-    reference: int
+    reference: int  #: Its value reference.
     causality: Causality
-    unit: str = "1"
-    start: float | None = None
-    bounds: tuple[float, float] | None = None
-    derivative_of: int | None = None
+    unit: str = "1"  #: SI unit, ``"1"`` for none.
+    start: float | None = None  #: None where the value is worked out.
+    bounds: tuple[float, float] | None = None  #: Outside of them the FMU refuses the value.
+    derivative_of: int | None = None  #: Reference of the state whose rate it is.
 
 
 @dataclass(frozen=True)
 class Variables:
-    """All variables of an FMU, kind by kind, and the dependencies of those that are worked out.
-
-    Attributes
-    ----------
-    inputs, states, rates, outputs, parameters : tuple of Variable
-        Outputs that show what an input holds are left out.
-    dependencies : mapping of int to (tuple of int, tuple of int)
-        By the reference of a rate or output: the inputs and states that change it, and the parameters that do.
-    """
+    """All variables of an FMU, kind by kind, and the dependencies of those that are worked out."""
 
     time: Variable
+    #: Outputs that show what an input holds are left out.
     inputs: tuple[Variable, ...]
     states: tuple[Variable, ...]
     rates: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
     parameters: tuple[Variable, ...]
+    #: By the reference of a rate or output: the inputs and states that change it, and the parameters that do.
     dependencies: Mapping[int, tuple[tuple[int, ...], tuple[int, ...]]]
 
     @property
