@@ -90,13 +90,7 @@ def _table(machine: Model, channels: Path | None, log: Path) -> Mapping[str, Cha
 
 
 def _write(found: LogCheck, logs: int, table: Mapping[str, ChannelEntry], path: Path, *, given: bool) -> None:
-    """Write the entries as they should be into the file of the channel table; a model file without one gets it.
-
-    Raises
-    ------
-    ModelError
-        A mistake is not in all logs, or an entry does not stand on a line of its own.
-    """
+    """Write the entries as they should be into the file of the channel table; a model file without one gets it."""
     from vpm.log_check.table import corrected_lines, corrected_text, line_of
 
     for one in found.mistakes:

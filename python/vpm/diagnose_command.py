@@ -107,13 +107,7 @@ def diagnose(
 
 
 def _tried(only: list[str] | None, without: list[str] | None) -> list[str] | None:
-    """Names of the effects to try; None for all.
-
-    Raises
-    ------
-    DiagnosisError
-        Nothing is left to try, or what is to be left out was never in.
-    """
+    """Names of the effects to try; None for all."""
     from vpm.discrepancy.screening.candidates import asked_for
     from vpm.errors import DiagnosisError, near_match
 

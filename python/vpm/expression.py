@@ -121,11 +121,6 @@ class Expression:
         ----------
         parts : mapping of str to Quantity
             One for each of `names`.
-
-        Raises
-        ------
-        VpmError
-            Kinds do not go together, or there is no index pulse; says what is wrong behind the text.
         """
         try:
             with np.errstate(all="ignore"):
@@ -141,11 +136,6 @@ def read_expression(text: str) -> Expression:
     ----------
     text : str
         Names of columns, numbers and ``pi`` with ``+ - * /``, constant powers (``x**2``) and functions.
-
-    Raises
-    ------
-    VpmError
-        It is none.
     """
     if len(text) > LONGEST:
         raise VpmError(f'"{text[:30]}..." has {len(text)} characters, but {LONGEST} are the most; write it shorter')

@@ -193,13 +193,7 @@ def _print(lines: list[str]) -> None:
 
 
 def _without(model: Model, free: list[str] | None, fixed: list[str] | None) -> list[str] | None:
-    """Names of the free parameters, less those that are to stay.
-
-    Raises
-    ------
-    IdentificationError
-        A name that is to stay was never free.
-    """
+    """Names of the free parameters, less those that are to stay."""
     if not fixed:
         return free
     given = free if free is not None else list(model.adjustable)

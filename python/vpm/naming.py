@@ -179,13 +179,7 @@ def _searchable(effects: Sequence[str] | None) -> Sequence[str] | None:
 
 
 def _not_searched(effects: Sequence[str] | None, reason: str) -> list[str]:
-    """Note on effects asked for that naming by search does not try.
-
-    Raises
-    ------
-    DiagnosisError
-        There are no others; ``reason`` says why no ranking tries them.
-    """
+    """Note on effects asked for that naming by search does not try."""
     left_out = [name for name in effects or () if not EFFECTS[name].screened]
     if not left_out:
         return []

@@ -262,11 +262,6 @@ def require_dimension(unit: str, expected: str) -> None:
         The unit as it was written.
     expected : str
         A unit of the right kind, which the message suggests.
-
-    Raises
-    ------
-    UnitError
-        The dimensions differ, or a unit cannot be read.
     """
     given, wanted = parse_unit(unit), parse_unit(expected)
     if given.dimension != wanted.dimension:

@@ -190,13 +190,7 @@ def count_instructions(
     *,
     compiled: bool = False,
 ) -> float:
-    """Instructions of a step that takes about so many ``seconds``; ``compiled`` to machine code, if it is to be.
-
-    Raises
-    ------
-    SimulationError
-        There is no valgrind, or it counted nothing.
-    """
+    """Instructions of a step that takes about so many ``seconds``; ``compiled`` to machine code, if it is to be."""
     if shutil.which("valgrind") is None:
         raise SimulationError(
             "instructions are counted by valgrind, which is not here; install your system's package valgrind"

@@ -86,11 +86,6 @@ def time_steps(
     If they are to be ``compiled``, they run as machine code where there is any.
 
     Each way through the inputs begins at ``start``, if it is given.
-
-    Raises
-    ------
-    SimulationError
-        The commands do not lead through a simulation in these steps.
     """
     from vpm._core import Diverged
 

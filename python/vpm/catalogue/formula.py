@@ -74,11 +74,6 @@ def compile_formula(text: str, names: Sequence[str]) -> Formula:
         functions abs, sqrt, exp, tanh, sin and cos.
     names : sequence of str
         Parameters, in the order of the core.
-
-    Raises
-    ------
-    ModelError
-        The text is no such expression, or is longer than the core has room for.
     """
     if len(names) > MOST_NUMBERS:
         raise ModelError(f'the law "{text}" has {len(names)} parameters, but {MOST_NUMBERS} are the most; use fewer')

@@ -92,12 +92,7 @@ def run_demo(
 
 
 def check_hidden(name: str) -> None:
-    """Refuse an effect that the demo's story cannot hide.
-
-    Raises
-    ------
-    DiagnosisError
-    """
+    """Refuse an effect that the demo's story cannot hide."""
     if name in LISTED:
         return
     if name in REFUSED:

@@ -257,13 +257,7 @@ def _stated(column: str, log: Log) -> tuple[str, str]:
 def understood(
     unit: str, channel: str, model: Model | None, where: str, expected: str | None = None
 ) -> tuple[Unit, str]:
-    """Unit of a drafted column, of the kind that its channel has in the model, and what the model calls it in SI.
-
-    Raises
-    ------
-    ExperimentError, UnitError
-        It is not, or the unit cannot be read.
-    """
+    """Unit of a drafted column, of the kind that its channel has in the model, and what the model calls it in SI."""
     wanted = model.channel_unit(channel) if model is not None else expected
     try:
         given = parse_unit(unit)

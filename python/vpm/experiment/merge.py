@@ -43,11 +43,6 @@ def merge_clocks(
     columns : dict of str to ndarray, shape (M,)
     sentences : list of str
         For the history.
-
-    Raises
-    ------
-    ExperimentError
-        Clocks differ and interpolation is not allowed, or they share too little time.
     """
     others = [channel for channel, own in clocks.items() if not np.array_equal(own, time)]
     if not others:

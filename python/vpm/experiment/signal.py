@@ -69,11 +69,6 @@ def check_cutoff(cutoff: float, rate: float, samples: int) -> None:
     ----------
     cutoff, rate : float
         Hz, and samples per second.
-
-    Raises
-    ------
-    ExperimentError
-        It is not between zero and half of the rate, or far too low for the record.
     """
     if not 0.0 < cutoff < 0.5 * rate:
         raise ExperimentError(

@@ -72,13 +72,6 @@ def fit_problem(
         Parameters to begin with, in place of the starts of ``fitting``.
     executor : Executor or callable, optional
         Descends from the starts, see `vpm.tasks.Tasks`; threads do if not given.
-
-    Raises
-    ------
-    IdentificationError
-        No start can be simulated.
-    KeyboardInterrupt
-        Ctrl-C before the first start was simulated.
     """
     bounds = limits(model, free, fitting.bounds)
     objective = Objective(model, data, free, bounds, fitting, progress)

@@ -231,13 +231,7 @@ def _with_own_gains(model: Model, data: Problem, names: tuple[str, ...], toleran
 
 
 def check_bounds(free: Sequence[str], fitting: Fitting) -> None:
-    """Refuse bounds of a fit that cannot be meant.
-
-    Raises
-    ------
-    IdentificationError
-        Bounds of a parameter that is not free, or in the wrong order.
-    """
+    """Refuse bounds of a fit that cannot be meant."""
     for name, (low, high) in fitting.bounds.items():
         if name not in free:
             raise IdentificationError(f'bounds: "{name}" is not free; free are {", ".join(free)}')

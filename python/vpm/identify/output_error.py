@@ -195,13 +195,7 @@ class OutputErrorProblem(BegunAnywhere):
 def compared_channels(
     model: Model, experiments: Sequence[Experiment], mode: str, channels: Sequence[str] | None
 ) -> tuple[str, ...]:
-    """Outputs that are compared: those given, or all that every log holds and the mode does not copy from it.
-
-    Raises
-    ------
-    IdentificationError
-        There is none, or one is not in the model or a log.
-    """
+    """Outputs that are compared: those given, or all that every log holds and the mode does not copy from it."""
     chosen = tuple(channels) if channels is not None else _compared(model, experiments, mode)
     if not chosen:
         raise IdentificationError(

@@ -11,13 +11,7 @@ T = TypeVar("T")
 
 
 def worker_count(workers: int | None) -> int:
-    """Number of parallel threads: as asked, or one per core.
-
-    Raises
-    ------
-    IdentificationError
-        Less than one was asked for.
-    """
+    """Number of parallel threads: as asked, or one per core."""
     count = (os.cpu_count() or 1) if workers is None else workers
     if count < 1:
         raise IdentificationError(f"{count} workers can do nothing; give at least 1")

@@ -142,11 +142,6 @@ def check_ties(model: Model, ties: Mapping[str, str], free: Sequence[str]) -> No
         Following parameter to the one whose value it takes.
     free : sequence of str
         Parameters to be fitted.
-
-    Raises
-    ------
-    IdentificationError
-        A name is unknown, a follower is free or followed itself, or the units of a pair differ.
     """
     for follower, leader in ties.items():
         for name in (follower, leader):

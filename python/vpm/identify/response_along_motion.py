@@ -60,12 +60,7 @@ def has_hidden(model: Model, joints: Sequence[str]) -> bool:
 
 
 def check_along(model: Model, joints: Sequence[str]) -> None:
-    """Raise an error for a machine without a response along a measured motion, because efforts do not follow.
-
-    Raises
-    ------
-    SimulationError
-    """
+    """Raise an error for a machine without a response along a measured motion, because efforts do not follow."""
     for name in model.actuators:
         if model.actuator_type(name) in SAMPLED_TYPES:
             raise SimulationError(

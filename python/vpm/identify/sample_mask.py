@@ -146,12 +146,7 @@ def at_stops(model: Model, experiment: Experiment, m: Motion) -> Mapping[str, ND
 
 
 def check_left(experiment: Experiment, joint: str, name: str, left: int, fewest: int) -> None:
-    """Refuse a record whose sample mask leaves hardly any motion between the ends of a stroke.
-
-    Raises
-    ------
-    IdentificationError
-    """
+    """Refuse a record whose sample mask leaves hardly any motion between the ends of a stroke."""
     if left < fewest:
         raise IdentificationError(
             f"{experiment.name}: only {left} samples of {joint} are left where the piston of {name} does not touch an "

@@ -20,13 +20,7 @@ class Problem:
 
 
 def raise_first(problems: Sequence[Problem], path: str | None) -> NoReturn:
-    """Raise the message of the first problem and say how many more there are.
-
-    Raises
-    ------
-    ModelError
-        Always.
-    """
+    """Raise the message of the first problem and say how many more there are."""
     more = len(problems) - 1
     tail = f" (and {more} more problem{'s' if more > 1 else ''})" if more else ""
     head = f"{path}: " if path else ""

@@ -21,13 +21,7 @@ DEEPEST = 32
 
 
 def read_toml(path: str | PathLike[str]) -> dict[str, Any]:
-    """Read the content of a TOML file.
-
-    Raises
-    ------
-    ModelError
-        The file cannot be read, is not UTF-8, or breaks the syntax of TOML.
-    """
+    """Read the content of a TOML file."""
     if reason := unreadable(path):
         raise ModelError(reason, path=str(path))
     if (plugin := importer_of(path)) is not None:
@@ -90,13 +84,7 @@ def check_plain(content: Mapping[str, object], path: str | None = None) -> None:
 
 
 def parse_toml(text: str, path: str | None = None) -> dict[str, Any]:
-    """Read the content of a TOML text.
-
-    Raises
-    ------
-    ModelError
-        The text breaks the syntax of TOML; the error knows line and column.
-    """
+    """Read the content of a TOML text."""
     head = f"{path}: " if path else ""
     try:
         content = tomllib.loads(text)

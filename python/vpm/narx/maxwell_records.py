@@ -56,11 +56,6 @@ def element_samples(
         Time between samples of mappings, which have no clock, s.
     least : int
         Fewest samples of a record.
-
-    Raises
-    ------
-    IdentificationError
-        No record, a missing channel, no clock, too few samples, a sample that is no number, clocks that differ.
     """
     found = [_samples(record, signals, step, f"record {at}", least) for at, record in enumerate(as_list(records))]
     if not found:

@@ -69,13 +69,7 @@ def read_labelled(path: Path, initial: str) -> Labelled | None:
 
 
 def read_labelled_nodes(path: Path) -> dict[int, tuple[float, float, float]]:
-    """Places of nodes by their labels: GRID cards, the *NODE lines of an input file, or lines ``label x y z``.
-
-    Raises
-    ------
-    ReductionError
-        The file cannot be read, or its places stand in a frame of their own.
-    """
+    """Places of nodes by their labels: GRID cards, the *NODE lines of an input file, or lines ``label x y z``."""
     text = _text(path)
     found: dict[int, tuple[float, float, float]] = {}
     turned: list[str] = []

@@ -22,11 +22,6 @@ def read_matrix(path: Path, *, triangle: bool = False) -> Matrix:
         as Abaqus (``FORMAT=COORDINATE``) and CalculiX (``.sti``, ``.mas``) write them.
     triangle : bool
         Only one triangle of a symmetric matrix is in the file.
-
-    Raises
-    ------
-    ReductionError
-        The file cannot be read, or holds something else.
     """
     try:
         matrix = _read(path)
@@ -62,13 +57,7 @@ def _read(path: Path) -> Matrix:
 
 
 def read_nodes(path: Path) -> Array:
-    """Node places beside the matrices from a text file, or an ``.npy``, of three numbers each.
-
-    Raises
-    ------
-    ReductionError
-        The file cannot be read, or holds something else.
-    """
+    """Node places beside the matrices from a text file, or an ``.npy``, of three numbers each."""
     try:
         _ = read_bytes(path)
         if path.suffix.lower() == ".npy":

@@ -154,13 +154,7 @@ def with_real_bodies(structure: Structure) -> Structure:
 
 
 def check_structure(structure: Structure) -> None:
-    """Refuse matrices that are those of no structure.
-
-    Raises
-    ------
-    ReductionError
-        One sentence: what is wrong, by how much, and the repair.
-    """
+    """Refuse matrices that are those of no structure."""
     n = structure.size
     for what in ("stiffness", "mass"):
         matrix: Matrix = getattr(structure, what)

@@ -112,13 +112,7 @@ def import_robot(
 
 
 def robot_of(markup: Markup, *, floating: bool) -> Robot:
-    """Parts of an imported robot, by the format of its file.
-
-    Raises
-    ------
-    ModelError
-        It is neither URDF nor MJCF, or cannot be right.
-    """
+    """Parts of an imported robot, by the format of its file."""
     if markup.root.tag == "mujoco":
         if floating:
             raise ModelError(

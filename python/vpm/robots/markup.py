@@ -56,13 +56,7 @@ class Markup:
     root: Element
 
     def fail(self, element: Element, text: str) -> NoReturn:
-        """Raise an error about an element of the markup.
-
-        Raises
-        ------
-        ModelError
-            Always.
-        """
+        """Raise an error about an element of the markup."""
         raise ModelError(f"{self.path}, line {element.line}: {text}", path=self.path, line=element.line)
 
     def need(self, element: Element, tag: str, whose: str) -> Element:
@@ -104,13 +98,7 @@ def clean(text: str) -> str:
 
 
 def read_markup(path: str | PathLike[str]) -> Markup:
-    """Read the markup of an XML file.
-
-    Raises
-    ------
-    ModelError
-        It cannot be read, is no XML, is too large or too deep, or declares a document type.
-    """
+    """Read the markup of an XML file."""
     if reason := unreadable(path):
         raise ModelError(reason, path=str(path))
     try:
@@ -128,13 +116,7 @@ def read_markup(path: str | PathLike[str]) -> Markup:
 
 
 def parse_markup(content: bytes, path: str) -> Markup:
-    """Parse the markup of an XML file's bytes.
-
-    Raises
-    ------
-    ModelError
-        As `read_markup`.
-    """
+    """Parse the markup of an XML file's bytes."""
     open_elements: list[Element] = []
     roots: list[Element] = []
     parser = expat.ParserCreate()

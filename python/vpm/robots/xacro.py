@@ -18,15 +18,7 @@ def is_xacro(markup: Markup) -> bool:
 
 
 def expanded(markup: Markup, arguments: Mapping[str, str]) -> Markup:
-    """The URDF that a xacro file stands for.
-
-    Raises
-    ------
-    ModelError
-        It cannot be expanded, or not in time.
-    MissingExtraError
-        The library is not there.
-    """
+    """The URDF that a xacro file stands for."""
     for package in ("xacrodoc", "xacro"):
         if importlib.util.find_spec(package) is None:
             raise MissingExtraError(package, "robots")

@@ -23,13 +23,7 @@ def refuse(where: Keys | str, rest: str) -> NoReturn:
 
 
 def raise_first(problems: Sequence[Problem]) -> NoReturn:
-    """Raise the message of the first problem and say how many more there are.
-
-    Raises
-    ------
-    ScenarioError
-        Always.
-    """
+    """Raise the message of the first problem and say how many more there are."""
     more = len(problems) - 1
     tail = f" (and {more} more problem{'s' if more > 1 else ''})" if more else ""
     raise ScenarioError(f"{problems[0]}{tail}", where=problems[0].where, more=more)

@@ -112,11 +112,6 @@ def steps_per_sample(records: Sequence[Experiment], rate: float) -> int:
     ----------
     rate : float
         Hz.
-
-    Raises
-    ------
-    SimulationError
-        The records are faster than the controller, differ, or their period is no whole number of its periods.
     """
     counts = {round(record.dt * rate, 6) for record in records}
     for record in records:
@@ -141,11 +136,6 @@ def by_the_model(model: Model, experiment: Experiment, mode: str, rate: float, c
         Hz; the full model takes twice as many steps, at least.
     channels : sequence of str
         What is compared.
-
-    Raises
-    ------
-    SimulationError
-        The mode goes by the measured motion, or the full model cannot be simulated.
     """
     if mode not in ("free_run", "closed_loop"):
         raise SimulationError(

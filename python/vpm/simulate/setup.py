@@ -105,12 +105,7 @@ class Setup(Storable):
 
 
 def _check_integrator(name: str) -> None:
-    """Refuse a setup with an unknown integrator, or a meaningless tolerance.
-
-    Raises
-    ------
-    SimulationError
-    """
+    """Refuse a setup with an unknown integrator, or a meaningless tolerance."""
     from vpm._core import check_integrator
 
     if name in INTEGRATORS:

@@ -226,13 +226,7 @@ def show(page: Page) -> bool:
 
 
 def free_port(port: int | None) -> int:
-    """Free port for a live page: the one that is asked for, or the first free one.
-
-    Raises
-    ------
-    VpmError
-        The port is in use.
-    """
+    """Free port for a live page: the one that is asked for, or the first free one."""
     for number in range(FIRST_PORT, FIRST_PORT + PORTS) if port is None else (port,):
         with socket.socket() as probe:
             probe.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)

@@ -138,13 +138,7 @@ class _Sizes:
         return Prior(value, FACTOR, *box, logarithmic=True)
 
     def _size(self, effect: Effect, parameter: EffectParameter) -> float:
-        """Size for priors of a kind of quantity at the joint of an effect, in the records.
-
-        Raises
-        ------
-        IdentificationError
-            The records do not show it.
-        """
+        """Size for priors of a kind of quantity at the joint of an effect, in the records."""
         joint = self._joint(effect.at)
         way, speed = 0.5 * float(np.ptp(self._shown[f"{joint}.position"])), self._strength(f"{joint}.velocity")
         effort = self._strength(f"{joint}.effort") or max(

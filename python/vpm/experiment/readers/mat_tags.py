@@ -37,13 +37,7 @@ class _Broken(Exception):  # noqa: N818
 
 
 def check_tags(path: str | PathLike[str]) -> None:
-    """Refuse a file whose tags do not fit its content; files of other versions are left to their readers.
-
-    Raises
-    ------
-    ExperimentError
-        The place in the file, and what does not fit.
-    """
+    """Refuse a file whose tags do not fit its content; files of other versions are left to their readers."""
     content = memoryview(Path(path).read_bytes())
     order = {b"IM": "<", b"MI": ">"}.get(bytes(content[126:128]))
     if order is None or len(content) < _HEADER or content[125 if order == "<" else 124] != 1:

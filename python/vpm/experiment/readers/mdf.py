@@ -165,12 +165,7 @@ def _stream(path: str | PathLike[str]) -> io.BufferedReader | io.BytesIO:
 
 
 def _check_records(file: MDF) -> None:
-    """Refuse MDF channels that lie outside of their records, which the library does not check.
-
-    Raises
-    ------
-    ValueError
-    """
+    """Refuse MDF channels that lie outside of their records, which the library does not check."""
     groups: list[Any] = list(file.groups)
     for at, group in enumerate(groups):
         room = 8 * int(group.channel_group.samples_byte_nr)
@@ -212,13 +207,7 @@ def _has_formula(conversion: Any) -> bool:  # noqa: ANN401
 
 
 def _formula(conversion: Any) -> str:  # noqa: ANN401
-    """Formula of an MDF conversion that is one.
-
-    Raises
-    ------
-    VpmError
-        It is a table of formulas.
-    """
+    """Formula of an MDF conversion that is one."""
     formula = conversion.formula
     if not formula:
         raise VpmError("a table of formulas")

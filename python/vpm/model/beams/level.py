@@ -102,10 +102,6 @@ def parse_level(text: str) -> Level:
     text : str
         ``"rigid"``, or a name with a number: ``"bezier(3)"``.
 
-    Raises
-    ------
-    ValueError
-        There is no such level, or its number is missing or out of range; the rest of a sentence, with the repair.
     """
     found = _WRITTEN.fullmatch(text)
     name = found["name"] if found else text.partition("(")[0].strip()

@@ -103,13 +103,7 @@ class ReducedLink:
 
     @classmethod
     def from_bytes(cls, content: bytes) -> Self:
-        """Reduced solid from a file's content.
-
-        Raises
-        ------
-        ModelError
-            It is something else, or damaged.
-        """
+        """Reduced solid from a file's content."""
         try:
             with zipfile.ZipFile(io.BytesIO(content)) as archive:
                 if sum(member.file_size for member in archive.infolist()) > BYTES:
@@ -173,13 +167,7 @@ _ARRAYS = tuple(field.name for field in fields(ReducedLink) if field.name != "in
 
 
 def read_bytes(path: str | PathLike[str]) -> bytes:
-    """Content of a file of a reduced solid.
-
-    Raises
-    ------
-    ModelError
-        It cannot be read, or is far too large.
-    """
+    """Content of a file of a reduced solid."""
     if reason := unreadable(path):
         raise ModelError(reason)
     try:
@@ -198,13 +186,7 @@ def embedded(content: bytes) -> str:
 
 
 def link_of(text: str) -> ReducedLink:
-    """Reduced solid that a text of `embedded` stands for.
-
-    Raises
-    ------
-    ModelError
-        It is none, or damaged.
-    """
+    """Reduced solid that a text of `embedded` stands for."""
     try:
         content = base64.b64decode(text.removeprefix(EMBEDDED), validate=True)
     except (binascii.Error, ValueError):

@@ -150,13 +150,7 @@ def written(term: Sequence[Factor], names: Sequence[str]) -> str:
 
 
 def factors_of(text: str, names: Sequence[str]) -> tuple[Factor, ...]:
-    """Factors of a written NARX term.
-
-    Raises
-    ------
-    ValueError
-        The text is no term, names a signal that is not there, or the output at the sample that is computed.
-    """
+    """Factors of a written NARX term."""
     if text.strip() == "1":
         return ()
     factors: list[Factor] = []

@@ -54,13 +54,7 @@ class Sampled(Drive):
         return [key for key in self.SAVED if getattr(self, key) is not None]
 
     def with_file(self, path: Path) -> Self:
-        """Sampled drive with the numbers of a saved result.
-
-        Raises
-        ------
-        VpmError
-            The file is not there, or holds something else.
-        """
+        """Sampled drive with the numbers of a saved result."""
         result, kind = Result.load(path), type(self).__name__
         if type(result).__name__ != kind:
             raise VpmError(f"{path} is a saved {type(result).__name__}, but the type {self.type} needs a {kind}")

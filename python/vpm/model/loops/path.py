@@ -77,13 +77,7 @@ class Path:
         return tuple(found)
 
     def _tangent(self, q: Array) -> Array:
-        """Unit vector along the path.
-
-        Raises
-        ------
-        ModelError
-            There is not one way, but none or several.
-        """
+        """Unit vector along the path."""
         ways = null_space(self._loops.at(q).jacobian[:, self._free])
         left = ways.shape[1]
         if left != 1:

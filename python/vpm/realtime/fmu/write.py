@@ -245,11 +245,6 @@ def shared_library(sources: dict[str, str], files: list[str]) -> bytes:
         Texts by file name.
     files : list of str
         Which of them are compiled.
-
-    Raises
-    ------
-    SimulationError
-        The compiler fails; the message has what it says first.
     """
     command = compiler()
     if command is None:

@@ -92,25 +92,14 @@ def _numbers(title: str, name: str, given: ArrayLike) -> Array:
 
 
 def check_sense(sense: str) -> float:
-    """Check the sense of a force channel: the factor that makes it an applied one.
-
-    Raises
-    ------
-    IdentificationError
-        The word is unknown.
-    """
+    """Check the sense of a force channel: the factor that makes it an applied one."""
     if sense not in {"applied", "reaction"}:
         raise IdentificationError(f'sense is "{sense}"; give "applied" for F = k x + c dx/dt, or "reaction" for -F')
     return 1.0 if sense == "applied" else -1.0
 
 
 def check_moves(columns: Columns, displacement: str) -> None:
-    """Refuse a displacement channel that stands still.
-
-    Raises
-    ------
-    IdentificationError
-    """
+    """Refuse a displacement channel that stands still."""
     x = columns.values[0]
     if np.ptp(x) <= 16.0 * np.finfo(np.float64).eps * float(np.abs(x).max()):
         raise IdentificationError(

@@ -24,11 +24,6 @@ def rowwise(question: Callable[..., Array], *tables: ArrayLike, what: str) -> Ar
     Returns
     -------
     ndarray, shape (...) or (N, ...)
-
-    Raises
-    ------
-    ModelError
-        Shapes do not fit, or the core refuses.
     """
     arrays = [np.asarray(table, dtype=float) for table in tables]
     for array in arrays:

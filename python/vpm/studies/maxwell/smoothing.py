@@ -18,11 +18,6 @@ def smoothed(one: Samples, cutoff: float | None) -> Samples:
     ----------
     cutoff : float, optional
         Hz, well above the motion.
-
-    Raises
-    ------
-    IdentificationError
-        The cut-off is not between zero and half the sampling rate, or the record is too short for it.
     """
     if cutoff is None:
         return one

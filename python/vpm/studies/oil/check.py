@@ -70,10 +70,6 @@ def check_record(time: ArrayLike, geometry: CylinderGeometry, channels: Mapping[
         s.
     channels : mapping of str to array-like
         Numbers stand for constant channels; SI.
-
-    Raises
-    ------
-    IdentificationError
     """
     instants = np.asarray(time, dtype=np.float64).ravel()
     if instants.size < FEWEST:
