@@ -183,13 +183,7 @@ def with_provenance(
     asked: Asked,
     workers: int | None,
 ) -> Diagnosis:
-    """Diagnosis with its provenance, as this process knows it; paths may differ where it was computed.
-
-    Parameters
-    ----------
-    model, experiments, validate, asked, workers
-        As for `diagnosed`.
-    """
+    """Diagnosis with its provenance, as this process knows it; paths may differ where it was computed."""
     usual = {"effects": None, "cutoff": None, "limit": None, "names": RANKING, "check": True, "workers": None}
     given = {**usual, **asked, "workers": workers}
     settings: dict[str, tuple[object, object]] = {name: (given[name], default) for name, default in usual.items()}
@@ -207,13 +201,7 @@ def diagnosed(
     tell: Tell | None = None,
     progress: Progress | None = None,
 ) -> Diagnosis:
-    """Diagnosis of `diagnose` without its provenance; a task for an executor.
-
-    Parameters
-    ----------
-    workers, tell, progress
-        As for `diagnose`.
-    """
+    """Diagnosis of `diagnose` without its provenance; a task for an executor."""
     effects, cutoff, limit = asked.get("effects"), asked.get("cutoff"), asked.get("limit")
     setup = asked.get("setup") or Setup()
     records = records_of(model, experiments, validate)

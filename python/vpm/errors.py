@@ -281,10 +281,6 @@ def near_match(name: str, candidates: Iterable[str], *, what: str = "the choices
 
     Parameters
     ----------
-    name : str
-        The name that is not known.
-    candidates : iterable of str
-        The known names.
     what : str
         How the list is announced when nothing is near.
 

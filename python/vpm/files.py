@@ -72,11 +72,6 @@ def replacing(path: str | PathLike[str]) -> Iterator[Path]:
 def write_text(path: str | PathLike[str], text: str) -> Path:
     """Write a text file in UTF-8, or leave what is there; lines end as they do in the text.
 
-    Returns
-    -------
-    pathlib.Path
-        Where it was written.
-
     Raises
     ------
     FileError

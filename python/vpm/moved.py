@@ -23,11 +23,6 @@ def names_of_study(package: str, study: str) -> Callable[[str], object]:
     """Function `__getattr__` of a package that also has the public names of a study.
 
     The study is loaded at the first use of such a name, because it imports the package and not the other way round.
-
-    Parameters
-    ----------
-    package, study : str
-        Names of modules.
     """
 
     def load(name: str) -> object:

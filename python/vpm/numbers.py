@@ -22,12 +22,8 @@ def array_of(given: ArrayLike, what: str, error: type[VpmError] = VpmError) -> A
 
     Parameters
     ----------
-    given : array_like
-        Of any shape.
     what : str
         Name for messages, as the beginning of a sentence.
-    error : type
-        Class of the error.
 
     Raises
     ------

@@ -285,15 +285,7 @@ class Result(Storable):
 
 
 def html_table(caption: str, head: tuple[str, ...], rows: list[tuple[object, ...]]) -> str:
-    """HTML table of a result with escaped text; numbers are shortened.
-
-    Parameters
-    ----------
-    head : tuple of str
-        Names of the columns.
-    rows : list of tuple
-        One tuple per row, as long as `head`.
-    """
+    """HTML table of a result with escaped text; numbers are shortened."""
 
     def cells(tag: str, values: tuple[object, ...]) -> str:
         return "<tr>" + "".join(f"<{tag}>{html.escape(_plain(value))}</{tag}>" for value in values) + "</tr>"

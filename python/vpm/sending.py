@@ -61,8 +61,6 @@ def run_packed(their_version: str, folders: Sequence[str], content: bytes, attem
         Of vpm where the work was packed.
     folders : sequence of str
         Folders of modules that the work is made of, beside those that are installed.
-    content : bytes
-        See `packed`.
     attempt : int
         So that an executor that remembers answers to the same call does not answer another attempt by an old one.
 

@@ -153,8 +153,6 @@ class Tasks(Generic[K]):
             By which its end is told.
         job : callable
             A function of a module or a `functools.partial` of one, unless it runs on threads.
-        name : str
-            What sentences call it.
         """
         self._ready.append(_Task(key, job, name or f"task {key}"))
 
@@ -294,14 +292,8 @@ def outcomes(
 
     Parameters
     ----------
-    where : int, Executor or callable
-        See `Tasks`.
-    say : callable, optional
-        See `Tasks`.
     heard : callable, optional
         Called in this thread with what has ended since, as it comes.
-    names : sequence of str
-        What sentences call the jobs.
     """
     found: list[Done[int] | None] = [None] * len(jobs)
     with Tasks[int](where, say) as tasks:
@@ -324,26 +316,13 @@ def until_interrupted(jobs: Sequence[Callable[[], T]], where: Where) -> tuple[li
     """Results of tasks, None for those that Ctrl-C ended, and whether it was pressed.
 
     The first job in their order that fails raises its error, after the others have ended.
-
-    Parameters
-    ----------
-    where : int, Executor or callable
-        See `Tasks`.
     """
     found, interrupted = outcomes(jobs, where)
     return [None if done is None else _value(done) for done in found], interrupted
 
 
 def done_by(executor: Executor | Callable[[], Executor], job: Callable[[], T], say: Say | None = None) -> T:
-    """Result of one task that an executor does; its error is raised.
-
-    Parameters
-    ----------
-    executor : Executor or callable
-        See `Tasks`.
-    say : callable, optional
-        See `Tasks`.
-    """
+    """Result of one task that an executor does; its error is raised."""
     (found,), interrupted = outcomes([job], executor, say)
     if interrupted or found is None:
         raise KeyboardInterrupt

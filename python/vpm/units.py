@@ -258,8 +258,6 @@ def require_dimension(unit: str, expected: str) -> None:
 
     Parameters
     ----------
-    unit : str
-        The unit as it was written.
     expected : str
         A unit of the right kind, which the message suggests.
     """

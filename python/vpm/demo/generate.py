@@ -119,15 +119,7 @@ def _reading(machine: Machine, state: State, disturbance: float) -> float:
 
 
 def write_log(path: Path, rows: npt.NDArray[np.float64]) -> None:
-    """Write a generated log as comma-separated values.
-
-    Parameters
-    ----------
-    path
-        File to write.
-    rows
-        Shape (samples, 4), in the order of `COLUMNS`.
-    """
+    """Write a generated log, rows (samples, 4) in the order of `COLUMNS`, as comma-separated values."""
     lines = [",".join(COLUMNS)]
     lines += [f"{time:.3f},{q:.6f},{u:.4f},{wanted:.6f}" for time, q, u, wanted in rows.tolist()]
     _write(path, "\n".join(lines) + "\n")
@@ -150,11 +142,6 @@ def truth(hidden: str) -> str:
     ----------
     hidden
         A name in `HIDDEN`.
-
-    Returns
-    -------
-    str
-        A TOML document. Its parameter names are those of the model.
     """
     entry = HIDDEN[hidden]
     machine = entry.machine
@@ -189,8 +176,6 @@ def generate(folder: Path, hidden: str = DEFAULT, seed: int = SEED) -> None:
         Where to write; made if it is not there.
     hidden
         The effect that the machine has and the model does not: a name in `HIDDEN`.
-    seed
-        Seed of the encoder noise. The same seed gives the same files.
 
     Raises
     ------

@@ -149,10 +149,6 @@ def advance(machine: Machine, state: State, commands: Sequence[float]) -> None:
 
     Parameters
     ----------
-    machine
-        The true machine.
-    state
-        Its state, which is changed.
     commands
         All commands up to now [A].
     """

@@ -44,14 +44,8 @@ def run_demo(
 
     Parameters
     ----------
-    out : Path
-        Folder for the report.
-    tell : callable
-        Called with a sentence at every step.
     hide : str, optional
         Another effect to hide, of `vpm.demo.hidden.LISTED`; its log is made first, into the folder ``log`` in ``out``.
-    wrote : callable, optional
-        Called with the files of the report.
 
     Raises
     ------

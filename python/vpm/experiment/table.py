@@ -58,8 +58,6 @@ def read_table(path: str | PathLike[str], dialect: Dialect, wanted: Sequence[str
     ----------
     path : path-like
         Text: a line of column names, then numbers. Blank lines do not count.
-    dialect : Dialect
-        How the file writes them.
     wanted : sequence of str
         Columns to read; others may hold anything.
     clock : str

@@ -55,13 +55,6 @@ def own_residual(
 ) -> Own | None:
     """Closed-loop predictions' residual: what ``data`` leaves of simulations of ``model`` itself.
 
-    Parameters
-    ----------
-    model : Model
-        At the values of a fit.
-    seed : int
-        Of the noise.
-
     Returns
     -------
     Own or None
@@ -272,8 +265,6 @@ def noise_of(
 
     Parameters
     ----------
-    model : Model
-        As fitted.
     quiet : sequence of Experiment
         The records as the model would have written them without noise: what these leave no drive is to blame for.
     """

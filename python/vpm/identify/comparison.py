@@ -75,13 +75,7 @@ def comparison(
     fitting: Fitting | None = None,
     free: Sequence[str] = (),
 ) -> Problem:
-    """Set up what a fit compares.
-
-    Parameters
-    ----------
-    model, records, mode, cutoff, setup, ties, fitting, free
-        As for `identify`.
-    """
+    """Set up what a fit compares."""
     chosen = fitting or Fitting()
     workers = 1 if chosen.starts > 1 else worker_count(chosen.workers or None)  # starts take the threads instead
     _check_offsets(model, mode, chosen)

@@ -178,8 +178,6 @@ def onward(
 
     Parameters
     ----------
-    low, high : ndarray
-        Box of the coordinates.
     evaluate : callable, optional
         Gives the points in place of the objective.
     """

@@ -99,13 +99,7 @@ AnyBegun = TypeVar("AnyBegun", bound=BegunAnywhere)
 
 
 def first_state_derivative(model: Model, data: BegunAnywhere) -> Array:
-    """Derivative of the residual by all open first states of all records, (n, records * k).
-
-    Parameters
-    ----------
-    model : Model
-        At which values.
-    """
+    """Derivative of the residual by all open first states of all records, (n, records * k)."""
     sizes, records = data.open_states(model)
     places = np.flatnonzero(sizes)
     known = _departures(data, sizes, records)
@@ -219,8 +213,6 @@ def first_state_slopes(
     ----------
     begin : callable
         First state (nx,) at parameters.
-    columns : sequence of int
-        Parameters in question.
     fixed : sequence of int
         States that nothing moves, because they are known or fitted.
 
@@ -248,8 +240,6 @@ def add_first_state(
 
     Parameters
     ----------
-    outputs : callable
-        Outputs of a simulation from a first state.
     state : ndarray, shape (nx,)
     slopes : dict
         Of `first_state_slopes`.

@@ -170,14 +170,8 @@ def fit_of(
 
     Parameters
     ----------
-    model : Model
-        The model at the start values.
-    data : problem
-        What was fitted.
     before : ndarray
         Residual of the model that the fit is to be compared with.
-    experiments : sequence of str
-        Names of the records.
     ties : mapping of str to str, optional
         Parameters that take the value of another.
     """

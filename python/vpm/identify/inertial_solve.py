@@ -157,8 +157,6 @@ def effective_samples(white: Array, robust: Array, rows: int) -> float:
     ----------
     white, robust : ndarray, shape (k,)
         Variances of the estimates, were the noise independent, and as they are.
-    rows : int
-        Equations.
     """
     ratio = np.where(robust > 0.0, white / np.where(robust > 0.0, robust, 1.0), 1.0)
     return float(rows * min(1.0, np.exp(np.mean(np.log(np.maximum(ratio, 1e-12)))))) if ratio.size else float(rows)

@@ -80,13 +80,7 @@ def real_bodies(model: Model, free: Sequence[str], low: Array, high: Array) -> t
 
 
 def on_the_border(model: Model, free: Sequence[str]) -> list[tuple[list[str], str]]:
-    """Free moments, and a sentence, of bodies whose moments of inertia are as unequal as any body's can be.
-
-    Parameters
-    ----------
-    model : Model
-        As fitted.
-    """
+    """Free moments, and a sentence, of bodies whose moments of inertia are as unequal as any body's can be."""
     told = []
     for body in dict.fromkeys(name.rpartition(".inertia.")[0] for name in free if ".inertia." in name):
         largest, *others = sorted((model.parameters[f"{body}.inertia.{axis}"].value, axis) for axis in AXES)[::-1]

@@ -140,8 +140,6 @@ def check_ties(model: Model, ties: Mapping[str, str], free: Sequence[str]) -> No
     ----------
     ties : mapping of str to str
         Following parameter to the one whose value it takes.
-    free : sequence of str
-        Parameters to be fitted.
     """
     for follower, leader in ties.items():
         for name in (follower, leader):

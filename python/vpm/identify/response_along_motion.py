@@ -130,8 +130,6 @@ def respond(
     theta : ndarray, shape (P,)
     experiment : Experiment
         Tells what drives held at the beginning.
-    columns : sequence of int
-        Parameters to differentiate by.
     channels : sequence of str
         Outputs to give, see `shown_channels`; the same in all calls with one ``known``.
     known : Following, optional

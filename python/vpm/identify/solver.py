@@ -75,8 +75,6 @@ def descend(
     ----------
     evaluate : callable
         The point at coordinates (n,); its cost is infinite where there is none.
-    start : Point
-        Inside the box.
     tolerance : float
         Relative change of the coordinates or of the cost at which to stop.
     cost : callable, optional

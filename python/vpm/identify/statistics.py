@@ -35,11 +35,6 @@ def correlation_length(residual: Array) -> int:
     Parameters
     ----------
     residual : ndarray, shape (n,)
-
-    Returns
-    -------
-    int
-        At least 1.
     """
     n = residual.size
     centred = residual - residual.mean()

@@ -61,8 +61,6 @@ def estimate_on_tangent(
 
     Parameters
     ----------
-    model : Model
-        With the start values.
     origin : ndarray, shape (P,)
         Where the tangent touches.
     bounds : mapping

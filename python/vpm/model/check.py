@@ -39,8 +39,6 @@ def check_document(content: Mapping[str, object], path: str | None = None) -> Ch
     ----------
     content : mapping
         As `tomllib` gives it.
-    path : str, optional
-        File that it comes from, for messages.
 
     Raises
     ------

@@ -59,13 +59,7 @@ _KINDS: Mapping[str, str] = {
 
 
 def schema_problems(error: ValidationError, *, within: tuple[str, ...] = ()) -> list[Problem]:
-    """Problems of a model file's form that the schema found, rewritten as sentences.
-
-    Parameters
-    ----------
-    within : tuple of str
-        Place of the validated part in the file.
-    """
+    """Problems of a model file's form that the schema found, rewritten as sentences."""
     problems = []
     # Unknown keys come first: the key that is missing is often the one that is misspelt.
     for detail in sorted(error.errors(include_url=False), key=lambda found: found["type"] != "extra_forbidden"):

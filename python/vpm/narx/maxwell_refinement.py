@@ -79,8 +79,6 @@ def refined(
 
     Parameters
     ----------
-    samples : list of Samples
-        Training records.
     bases : tuple of two Basis
         Of k0 and s0, with the terms to fit.
     degree : int, optional

@@ -102,15 +102,7 @@ class Draft:
 
 
 def draft_of(robot: Robot, tree: Tree, spread: Spread) -> Draft:
-    """Content of the model file of a robot, but for the ties of joints that follow others.
-
-    Parameters
-    ----------
-    tree : Tree
-        Of its links.
-    spread : Spread
-        How uncertain parameters are.
-    """
+    """Content of the model file of a robot, but for the ties of joints that follow others."""
     draft = Draft({"name": robot.name, "gravity": list(robot.gravity)})
     draft.remarks["gravity",] = "m/s^2"
     for lump in tree.lumps.values():

@@ -78,13 +78,6 @@ def held_inputs(model: Model, state: Array, given: Collection[str]) -> Mapping[s
 
     A reference holds what its controller measures at the beginning, a pressure is that of the model file.
 
-    Parameters
-    ----------
-    state : ndarray, shape (nx,)
-        At the beginning.
-    given : collection of str
-        Channels that the scenario gives.
-
     Returns
     -------
     mapping of str to (float, str)

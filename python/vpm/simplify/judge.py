@@ -134,8 +134,6 @@ def by_the_model(model: Model, experiment: Experiment, mode: str, rate: float, c
     mode : {"free_run", "closed_loop"}
     rate : float
         Hz; the full model takes twice as many steps, at least.
-    channels : sequence of str
-        What is compared.
     """
     if mode not in ("free_run", "closed_loop"):
         raise SimulationError(

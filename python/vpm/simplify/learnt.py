@@ -175,12 +175,8 @@ def trained(
 
     Parameters
     ----------
-    model : Model
-        The full one.
     element : Replacement
         A NARX model, where the search begins; it stays what it is where the machine cannot be simulated with it.
-    records : sequence of Experiment
-        To learn from.
     mode : {"free_run", "closed_loop"}
     channels : sequence of str, optional
         What is compared; by default all that the records hold.

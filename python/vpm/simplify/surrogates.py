@@ -47,10 +47,6 @@ def surrogates(
 
     Parameters
     ----------
-    model : Model
-        The full one, which is learnt from.
-    records : sequence of Experiment
-        To learn from.
     mode : str
         Sampled drives run in free runs and closed loops only.
     rate : float
@@ -123,8 +119,6 @@ def tables(
 
     Parameters
     ----------
-    model : Model
-        The full one.
     taught : sequence of mapping of str to ndarray, shape (N,)
         What it does on the records to learn from.
     runs : callable

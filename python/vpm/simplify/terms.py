@@ -81,24 +81,12 @@ def without_terms(model: Model, name: str, at: str) -> Model:
 
 
 def terms_site(name: str, at: str) -> str:
-    """Place at which left-out terms of the equations exclude each other: sets of parts do, flexible links do not.
-
-    Parameters
-    ----------
-    name, at : str
-        See `without_terms`.
-    """
+    """Place at which left-out terms of the equations exclude each other: sets of parts do, flexible links do not."""
     return at if name == "second-order" else MACHINE
 
 
 def coupling_joints(content: Mapping[str, Any]) -> tuple[str, ...]:
-    """Joints with coupling terms: they move with coordinates inward of them.
-
-    Parameters
-    ----------
-    content : mapping
-        Of a model file.
-    """
+    """Joints with coupling terms: they move with coordinates inward of them."""
     carriers = {joint["child"]: (name, joint) for name, joint in content.get("joints", {}).items()}
     beams = content.get("beams", {})
 
@@ -150,8 +138,6 @@ def effort_share(model: Model, reduced: Model, along: Sequence[Motion]) -> float
     ----------
     model, reduced : Model
         Of the same coordinates.
-    along : sequence of tuple
-        See `motions`.
 
     Returns
     -------
@@ -172,11 +158,6 @@ def deformation_share(model: Model, beam: str, along: Sequence[Motion]) -> float
 
     ``sqrt(d^T K^-1 d / q^T K q)`` with mean squares along the motion: d what the terms are of the forces on the elastic
     coordinates q, K their stiffness. Both are energies, so that neither units nor shape functions matter.
-
-    Parameters
-    ----------
-    along : sequence of tuple
-        See `motions`.
     """
     first_order = without_terms(model, "second-order", beam)
     own = [k for k, name in enumerate(model.coordinates) if name.startswith(f"{beam}.")]

@@ -43,8 +43,6 @@ def draw(scene: Scene, sample: int, *, dark: bool = False, size: tuple[int, int]
 
     Parameters
     ----------
-    dark : bool
-        On dark ground.
     size : tuple of int
         Pixels across and up.
 
@@ -126,10 +124,6 @@ def write_film(
         MP4, MKV or GIF, by its ending.
     speed : float, optional
         Seconds of the machine in a second of film; by default 1, or as slow that a short motion takes `SHORT` seconds.
-    dark : bool
-        On dark ground.
-    progress : callable, optional
-        Told how far it is.
 
     Raises
     ------

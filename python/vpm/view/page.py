@@ -21,18 +21,7 @@ STAGE = 0.78
 
 
 def write_page(scene: Scene, path: str | PathLike[str]) -> Path:
-    """Write the page of a scene.
-
-    Parameters
-    ----------
-    path : path-like
-        ``.html`` is customary.
-
-    Returns
-    -------
-    pathlib.Path
-        Where it was written.
-    """
+    """Write the page of a scene."""
     return write_text(path, page_of(scene))
 
 

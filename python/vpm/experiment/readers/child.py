@@ -68,8 +68,6 @@ def serve(module: str, name: str, path: str, seconds: int, space: int) -> None:
     ----------
     module, name : str
         Class of the reader.
-    path : str
-        The file.
     seconds, space : int
         Limits of processor time, s, and of address space, bytes.
     """

@@ -96,8 +96,6 @@ def broken(path: str | PathLike[str], kind: str, error: Exception | str) -> Expe
     ----------
     kind : str
         As ``"a TDMS file"``.
-    error : Exception or str
-        What the parser says.
     """
     told = str(error).strip().splitlines()
     reason = (told[0] if told else type(error).__name__)[:200]

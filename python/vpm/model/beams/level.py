@@ -131,22 +131,10 @@ def _example(name: str) -> str:
 
 
 def deforms_of(beam: Mapping[str, Any]) -> tuple[str, ...]:
-    """Components in which a beam deforms at its level; none of a reduced solid, which has modes.
-
-    Parameters
-    ----------
-    beam : mapping
-        Its table.
-    """
+    """Components in which a beam deforms at its level; none of a reduced solid, which has modes."""
     return () if "reduced" in beam else tuple(beam.get("deforms", USUAL))
 
 
 def size_of(level: str, beam: Mapping[str, Any]) -> int:
-    """Coordinates that a beam of a model file has at a level.
-
-    Parameters
-    ----------
-    beam : mapping
-        Its table.
-    """
+    """Coordinates that a beam of a model file has at a level."""
     return len(parse_level(level).coordinates(deforms_of(beam)))

@@ -53,11 +53,6 @@ def mirrored(loops: Loops, start: Array, fixed: Mapping[int, float], joints: int
     """Another assembly that is as near to a start as the one that is found from there, or nearer; or None.
 
     It is sought opposite to the start, in all joints and in each of them: a linkage has its mirror image there.
-
-    Parameters
-    ----------
-    start, fixed, joints
-        As for `assembled`.
     """
     first = _closed(loops, start, range(joints))
     away = float(np.linalg.norm(first - start))

@@ -18,8 +18,6 @@ def rowwise(question: Callable[..., Array], *tables: ArrayLike, what: str) -> Ar
         Takes as many tables (N, 2) as are given.
     *tables : array_like, shape (2,) or (N, 2)
         Single rows are repeated where others are tables.
-    what : str
-        Name for messages.
 
     Returns
     -------
