@@ -55,67 +55,39 @@ class Weighed:
 
 @dataclass(frozen=True)
 class Answer:
-    """One case with the answer to it.
+    """One case with the answer to it."""
 
-    Attributes
-    ----------
-    machine, kind, request, seed, noise_level
-        The case; ``request`` is what `blind.make_case` takes.
-    known : bool
-        Whether the catalogue is said to have all that is hidden.
-    hidden : tuple of Named
-    strengths : tuple of float
-        How far each hidden effect stands clear of the noise, see `blind.Oracle`, where the other one of a pair is
-        there with parameters that nobody knows either; nothing has none.
-    verdict : str
-        Of the diagnosis; "" if it failed.
-    named : tuple of Named
-        Accepted effects in their order.
-    ranking : tuple of Named
-        Accepted effects, then the other candidates in the order of what they explain of the validation data.
-    rivals : tuple of str
-        Names that the diagnosis says it cannot tell from an accepted one.
-    nominal_gap, recalibrated_gap, gap, oracle_gap : float
-        Root mean square of the unseen residual of `vpm.identify.InverseDynamicsProblem` in units of the signal: nominal
-        model, nominal effects with refitted parameters, repaired model, and model with the hidden effect that was
-        fitted from the truth. NaN where it is not known.
-    oracle_note : str
-        Why there is no oracle gap.
-    seconds, making : float
-        Time of the processor for the diagnosis, and for making the case.
-    error : str
-        Why it failed, or "".
-    late : bool
-        Whether the diagnosis was ended by the limit of time and this is what it knew until then.
-    alone : tuple of float
-        Strengths of effects where the other one of a pair is not there.
-    weighed : tuple of Weighed
-        Evidence of all effects of which a ranking told it.
-    """
-
+    #: The case; ``request`` is what `blind.make_case` takes.
     machine: str
     kind: str
     request: tuple[str, ...]
     seed: int
     noise_level: float
-    known: bool
+    known: bool  #: Whether the catalogue is said to have all that is hidden.
     hidden: tuple[Named, ...] = ()
+    #: How far each hidden effect stands clear of the noise, see `blind.Oracle`, where the other one of a pair is
+    #: there with parameters that nobody knows either; nothing has none.
     strengths: tuple[float, ...] = ()
-    verdict: str = ""
-    named: tuple[Named, ...] = ()
+    verdict: str = ""  #: Of the diagnosis; "" if it failed.
+    named: tuple[Named, ...] = ()  #: Accepted effects in their order.
+    #: Accepted effects, then the other candidates in the order of what they explain of the validation data.
     ranking: tuple[Named, ...] = ()
-    rivals: tuple[str, ...] = ()
+    rivals: tuple[str, ...] = ()  #: Names that the diagnosis says it cannot tell from an accepted one.
+    #: Root mean square of the unseen residual of `vpm.identify.InverseDynamicsProblem` in units of the signal:
+    #: nominal model, nominal effects with refitted parameters, repaired model, and model with the hidden effect
+    #: that was fitted from the truth. NaN where it is not known.
     nominal_gap: float = np.nan
     recalibrated_gap: float = np.nan
     gap: float = np.nan
     oracle_gap: float = np.nan
-    oracle_note: str = ""
+    oracle_note: str = ""  #: Why there is no oracle gap.
+    #: Time of the processor for the diagnosis, and for making the case.
     seconds: float = 0.0
     making: float = 0.0
-    error: str = ""
-    late: bool = False
-    alone: tuple[float, ...] = ()
-    weighed: tuple[Weighed, ...] = ()
+    error: str = ""  #: Why it failed, or "".
+    late: bool = False  #: Whether the diagnosis was ended by the limit of time and this is what it knew until then.
+    alone: tuple[float, ...] = ()  #: Strengths of effects where the other one of a pair is not there.
+    weighed: tuple[Weighed, ...] = ()  #: Evidence of all effects of which a ranking told it.
 
     @property
     def solvable(self) -> bool:
@@ -165,9 +137,6 @@ def answered(case: Case, kind: str, request: Sequence[str], strengths: Sequence[
 
     Parameters
     ----------
-    case : Case
-    kind : str
-    request : sequence of str
     strengths : sequence of float
         Of each hidden effect.
     limit : float

@@ -46,33 +46,20 @@ class Truth:
 
 @dataclass(frozen=True)
 class Plan:
-    """A case before it is simulated.
-
-    Attributes
-    ----------
-    base : tuple of (effect, site)
-        Effects that the nominal model has.
-    with_effect, without : mapping
-        Everything that is true of the machine with the hidden effect, and of the one without.
-    varied : tuple of str
-        Parameters that the oracle recalibrates.
-    paths : tuple of ndarray, shape (actuators, samples)
-        References of the records.
-    generator : Generator
-        For the noise.
-    """
+    """A case before it is simulated."""
 
     machine: Machine
     seed: int
     noise_level: float
     draft: Draft
-    base: tuple[tuple[str, str], ...]
+    base: tuple[tuple[str, str], ...]  #: Effects that the nominal model has.
     truth: Truth
+    #: Everything that is true of the machine with the hidden effect, and of the one without.
     with_effect: Mapping[str, float]
     without: Mapping[str, float]
-    varied: tuple[str, ...]
-    paths: tuple[Array, ...]
-    generator: Generator
+    varied: tuple[str, ...]  #: Parameters that the oracle recalibrates.
+    paths: tuple[Array, ...]  #: References of the records; shape (actuators, samples).
+    generator: Generator  #: For the noise.
 
 
 class _Columns:

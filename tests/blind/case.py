@@ -37,25 +37,16 @@ NEEDED = frozenset(need for effect in EFFECTS.values() for need in effect.needs)
 
 @dataclass(frozen=True)
 class Case:
-    """One case of the proving ground.
+    """One case of the proving ground."""
 
-    Attributes
-    ----------
-    machine, seed, noise_level
-        As asked for.
-    model_text, true_text : str
-        The nominal model, and the same with the true values of its parameters: both lack the hidden effects.
-    train, validate : tuple of Experiment
-        Records to fit and to judge.
-    truth : Truth
-    oracle : Oracle
-    """
-
+    #: As asked for.
     machine: str
     seed: int
     noise_level: float
+    #: The nominal model, and the same with the true values of its parameters: both lack the hidden effects.
     model_text: str
     true_text: str
+    #: Records to fit and to judge.
     train: tuple[Experiment, ...]
     validate: tuple[Experiment, ...]
     truth: Truth
@@ -151,10 +142,8 @@ def strengths_beside(
 
     Parameters
     ----------
-    machine : str
     requests : iterable of (hidden, name, seed)
         The two that are hidden, and which of them is judged.
-    noise_level : float
 
     Returns
     -------

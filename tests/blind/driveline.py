@@ -131,9 +131,7 @@ class Driven(Driveline):
         self.gain = gain
 
     def outputs(self) -> Array:
-        """See `Plant`."""
         return self.encoder
 
     def advance(self, command: Array, time: float) -> None:
-        """See `Plant`."""
         super().advance(self.gain * command, time)

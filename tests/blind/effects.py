@@ -17,34 +17,21 @@ Draw = Callable[[Generator, "Scale"], dict[str, float]]
 
 @dataclass(frozen=True)
 class Scale:
-    """What is usual at a site.
+    """What is usual at a site."""
 
-    Attributes
-    ----------
-    effort, speed, way : float
-        Root mean square effort and speed, and reach of the motion [E, C/s, C].
-    inertia : float
-        What the drive has to accelerate [E s^2/C].
-    command : float
-        Root mean square command.
-    mass, lever : float
-        Of a body: mass [kg], and distance of a load on it from its joint [m].
-    coulomb, viscous : float
-        Friction that is there anyway [E, E s/C].
-    centre : float
-        Middle of the motion [C].
-    """
-
+    #: Root mean square effort and speed, and reach of the motion [E, C/s, C].
     effort: float = 1.0
     speed: float = 1.0
     way: float = 1.0
-    inertia: float = 1.0
-    command: float = 1.0
+    inertia: float = 1.0  #: What the drive has to accelerate [E s^2/C].
+    command: float = 1.0  #: Root mean square command.
+    #: Of a body: mass [kg], and distance of a load on it from its joint [m].
     mass: float = 1.0
     lever: float = 0.0
+    #: Friction that is there anyway [E, E s/C].
     coulomb: float = 0.0
     viscous: float = 0.0
-    centre: float = 0.0
+    centre: float = 0.0  #: Middle of the motion [C].
 
 
 @dataclass(frozen=True)

@@ -160,24 +160,14 @@ class Controller(Protocol):
 
 @dataclass(frozen=True)
 class Inputs:
-    """What comes from outside.
+    """What comes from outside."""
 
-    Attributes
-    ----------
-    references : ndarray, shape (samples, actuators, records)
-    owner : ndarray, shape (columns,)
-        The record whose reference a column follows.
-    noise : ndarray, shape (samples, actuators and sensors, records)
-        Standard normal numbers. That of a drive is not in its logged command: the effort that it delivers is not quite
-        what it was told.
-    loud : ndarray, shape (records,)
-        The column of each record that has this noise.
-    """
-
-    references: Array
-    owner: NDArray[np.int64]
+    references: Array  #: Shape (samples, actuators, records).
+    owner: NDArray[np.int64]  #: The record whose reference a column follows; shape (columns,).
+    #: Standard normal numbers. That of a drive is not in its logged command: the effort that it delivers is not
+    #: quite what it was told; shape (samples, actuators and sensors, records).
     noise: Array
-    loud: NDArray[np.int64]
+    loud: NDArray[np.int64]  #: The column of each record that has this noise; shape (records,).
 
 
 def closed_loop(

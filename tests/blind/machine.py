@@ -17,27 +17,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Draft:
-    """One example of a machine, without a hidden effect.
+    """One example of a machine, without a hidden effect."""
 
-    Attributes
-    ----------
-    values : mapping
-        Everything that is true of it, as ``site.name`` or ``site.effect.parameter``.
-    calibratable : mapping
-        Relative uncertainty of what the model file leaves to be calibrated, by the same keys.
-    base : tuple of (effect, site)
-        Effects that the model file knows.
-    scales : mapping
-        What is usual at a site.
-    rate : float
-        Sampling rate [Hz].
-    """
-
-    values: Mapping[str, float]
+    values: Mapping[str, float]  #: Everything that is true of it, as ``site.name`` or ``site.effect.parameter``.
+    #: Relative uncertainty of what the model file leaves to be calibrated, by the same keys.
     calibratable: Mapping[str, float]
-    base: tuple[tuple[str, str], ...]
-    scales: Mapping[str, Scale]
-    rate: float
+    base: tuple[tuple[str, str], ...]  #: Effects that the model file knows.
+    scales: Mapping[str, Scale]  #: What is usual at a site.
+    rate: float  #: Sampling rate [Hz].
 
 
 @dataclass(frozen=True)
@@ -51,25 +38,15 @@ class Signal:
 
 @dataclass(frozen=True)
 class Layout:
-    """Signals and sites of a machine.
+    """Signals and sites of a machine."""
 
-    Attributes
-    ----------
-    sensors, commands, references : tuple of Signal
-        The first sensors are those that the controllers see, one for each actuator.
-    sites : mapping
-        Sites of each kind.
-    without : tuple of str
-        Effects that make no sense on the machine.
-    absent : mapping
-        Parameters that an effect has where it is not there, other than zero.
-    """
-
+    #: The first sensors are those that the controllers see, one for each actuator.
     sensors: tuple[Signal, ...]
     commands: tuple[Signal, ...]
     references: tuple[Signal, ...]
-    sites: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    without: tuple[str, ...] = ()
+    sites: Mapping[str, tuple[str, ...]] = field(default_factory=dict)  #: Sites of each kind.
+    without: tuple[str, ...] = ()  #: Effects that make no sense on the machine.
+    #: Parameters that an effect has where it is not there, other than zero.
     absent: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
 

@@ -23,31 +23,21 @@ CLEAR = 1.0
 
 @dataclass(frozen=True)
 class Oracle:
-    """What only the generator knows.
+    """What only the generator knows."""
 
-    Attributes
-    ----------
-    with_effect, without_effect : tuple of mapping
-        Outputs without noise and counts of each record (training records first), by channel.
-    sensor_noise : mapping
-        Standard deviation of noise and counts of each sensed channel.
-    noise : mapping
-        Standard deviation, below 25 Hz, that noise brings into each channel of the closed loop.
-    gap, recalibrated : mapping
-        Root mean square, on the validation records and below 25 Hz, of what the effect changes in each channel, and of
-        what is left of it after a recalibration, both in units of ``noise``. Beside the channels there may be weighted
-        sums of them that show an effect better, such as the force of a cylinder.
-    taught : mapping
-        What is left after the recalibration on the training records. An effect that shows on none of them, such as a
-        stop that only the validation record runs into, can be told by nobody who fits on the others.
-    """
-
+    #: Outputs without noise and counts of each record (training records first), by channel.
     with_effect: tuple[Mapping[str, Array], ...]
     without_effect: tuple[Mapping[str, Array], ...]
-    sensor_noise: Mapping[str, float]
+    sensor_noise: Mapping[str, float]  #: Standard deviation of noise and counts of each sensed channel.
+    #: Standard deviation, below 25 Hz, that noise brings into each channel of the closed loop.
     noise: Mapping[str, float]
+    #: Root mean square, on the validation records and below 25 Hz, of what the effect changes in each channel, and
+    #: of what is left of it after a recalibration, both in units of ``noise``. Beside the channels there may be
+    #: weighted sums of them that show an effect better, such as the force of a cylinder.
     gap: Mapping[str, float]
     recalibrated: Mapping[str, float]
+    #: What is left after the recalibration on the training records. An effect that shows on none of them, such as a
+    #: stop that only the validation record runs into, can be told by nobody who fits on the others.
     taught: Mapping[str, float]
 
     @property

@@ -62,9 +62,6 @@ def jobs(
     ----------
     machines, effects : sequence of str
         All if empty.
-    seeds : sequence of int
-    noise_levels : sequence of float
-    kinds : sequence of str
     each : int
         Cases of each effect and machine; of no effect four times as many, and five times as many pairs.
 
@@ -135,7 +132,6 @@ def answers(
 
     Parameters
     ----------
-    todo : sequence of Job
     workers : int
         Processes; 0 takes one for each core, 1 works here.
     limit : float

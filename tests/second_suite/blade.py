@@ -73,27 +73,17 @@ class Part:
 
 @dataclass(frozen=True)
 class Blade:
-    """Sizes in SI.
-
-    Attributes
-    ----------
-    length, width, thickness, density : float
-    root : float
-        From the axis to the clamp.
-    tip_mass, tip_inertia : float
-        The mass is the one that the assumed modes are made with.
-    gauge, pad : float
-        Arc lengths of the strain gauge, and of the place whose deflection is a coordinate.
-    modes, elements : int
-    """
+    """Sizes in SI."""
 
     length: float
     width: float
     thickness: float
     density: float
-    root: float
+    root: float  #: From the axis to the clamp.
+    #: The mass is the one that the assumed modes are made with.
     tip_mass: float
     tip_inertia: float
+    #: Arc lengths of the strain gauge, and of the place whose deflection is a coordinate.
     gauge: float
     pad: float
     modes: int = 4

@@ -45,29 +45,18 @@ NUDGE, SPREAD = 0.1, 0.06
 
 @dataclass(frozen=True)
 class Case:
-    """One case.
+    """One case."""
 
-    Attributes
-    ----------
-    machine, request, seed, kind
-        ``kind`` is single, pair, outside, none or parameters.
-    document : dict
-        The model file.
-    train, holdout : list of Experiment
-    hidden : tuple of Hidden
-    strengths : tuple of float
-        Of each hidden effect, see the rule above.
-    """
-
+    #: ``kind`` is single, pair, outside, none or parameters.
     machine: str
     request: str
     seed: int
     kind: str
-    document: dict[str, Any]
+    document: dict[str, Any]  #: The model file.
     train: list[Experiment]
     holdout: list[Experiment]
     hidden: tuple[Hidden, ...]
-    strengths: tuple[float, ...]
+    strengths: tuple[float, ...]  #: Of each hidden effect, see the rule above.
 
     @property
     def solvable(self) -> bool:

@@ -151,7 +151,6 @@ def simulated(
     ----------
     machine, values, hidden
         One structure, numbers by column.
-    inputs : Inputs
     noisy : ndarray of bool, shape (columns,)
         Which columns have noise and counts.
     rng : Generator

@@ -21,39 +21,23 @@ Range = tuple[float, float]
 
 @dataclass(frozen=True)
 class Joint:
-    """A joint with its drive and its encoder, if it has them.
-
-    Attributes
-    ----------
-    name : str
-    drive, encoder : str
-        "" for none.
-    gain : float
-        Effort per command.
-    noise, resolution : float
-        Of the encoder (SI).
-    drive_noise : float
-        Standard deviation of what the drive adds unseen from sample to sample, in A.
-    prismatic : bool
-        Logged in mm, else in degrees.
-    speed_unit, per_speed_unit, speed_noise : str, float, float
-        Of a tachometer, if there is one: unit in the log, SI per unit, noise (SI).
-    command_unit : str
-        Of the drive.
-    """
+    """A joint with its drive and its encoder, if it has them."""
 
     name: str
+    #: "" for none.
     drive: str = ""
     encoder: str = ""
-    gain: float = 1.0
+    gain: float = 1.0  #: Effort per command.
+    #: Of the encoder (SI).
     noise: float = 0.0
     resolution: float = 0.0
-    drive_noise: float = 0.0
-    prismatic: bool = False
+    drive_noise: float = 0.0  #: Standard deviation of what the drive adds unseen from sample to sample, in A.
+    prismatic: bool = False  #: Logged in mm, else in degrees.
+    #: Of a tachometer, if there is one: unit in the log, SI per unit, noise (SI).
     speed_unit: str = ""
     per_speed_unit: float = 1.0
     speed_noise: float = 0.0
-    command_unit: str = "A"
+    command_unit: str = "A"  #: Of the drive.
 
     @property
     def channel(self) -> str:
@@ -98,70 +82,40 @@ class Choice:
 
 @dataclass(frozen=True)
 class Machine:
-    """A machine.
-
-    Attributes
-    ----------
-    name : str
-    joints : tuple of Joint
-        In the order of the coordinates.
-    rate, substeps : float, int
-        Samples per second, and steps of the simulation from one to the next.
-    lengths : tuple of float
-        Of the records [s]; the last one judges.
-    values : mapping of str to float
-        True numbers of the textbook machine; ``JOINT.coulomb``, ``JOINT.viscous`` and ``JOINT.rotor`` are known here.
-    adjustable : mapping of str to float
-        Those that the model file gives an uncertainty, relative to the value.
-    tree : callable
-    law : callable
-        Makes the controller: from the machine and how many columns.
-    motion : callable
-        References of one record: from generator, time, and the number of the record to (samples, n).
-    torque : callable
-        Commands beside the controller: likewise, to (samples, n), and whether the controller is switched off.
-    document : callable
-        The model file as a dict, from a function that writes a number by its name, and from the names left out.
-    choices, outside, pairs : tuple
-        What can be hidden.
-    friction_at_load : bool
-        Whether dry and viscous friction sits behind a soft or loose gear.
-    latency : int
-        Samples from a reading to the command that it makes.
-    same : tuple
-        Pairs of answers that are one physics here.
-    known_loop : bool
-        Whether the model file has the controller, and the log its references and what is added to its commands.
-    rest : callable, optional
-        Where the coordinates stand at first, from the values and the first references (n, columns).
-    line : callable, optional
-        Of a machine whose only joint is moved by a cylinder: the line that the cylinder closes.
-    gauges : tuple of PressureGauge
-        Of the chambers a and b of that cylinder.
-    """
+    """A machine."""
 
     name: str
-    joints: tuple[Joint, ...]
+    joints: tuple[Joint, ...]  #: In the order of the coordinates.
+    #: Samples per second, and steps of the simulation from one to the next.
     rate: float
     substeps: int
-    lengths: tuple[float, ...]
+    lengths: tuple[float, ...]  #: Of the records [s]; the last one judges.
+    #: True numbers of the textbook machine; ``JOINT.coulomb``, ``JOINT.viscous`` and ``JOINT.rotor`` are known
+    #: here.
     values: Mapping[str, float]
-    adjustable: Mapping[str, float]
+    adjustable: Mapping[str, float]  #: Those that the model file gives an uncertainty, relative to the value.
     tree: Tree
-    law: Callable[[Machine, int], Law]
+    law: Callable[[Machine, int], Law]  #: Makes the controller: from the machine and how many columns.
+    #: References of one record: from generator, time, and the number of the record to (samples, n).
     motion: Callable[[np.random.Generator, Array, int], Array]
+    #: The model file as a dict, from a function that writes a number by its name, and from the names left out.
     document: Callable[[Callable[[str], object], frozenset[str]], dict[str, object]]
+    #: What can be hidden.
     choices: tuple[Choice, ...]
     outside: tuple[Choice, ...] = ()
     pairs: tuple[tuple[tuple[str, str], ...], ...] = ()
+    #: Commands beside the controller: likewise, to (samples, n), and whether the controller is switched off.
     torque: Callable[[np.random.Generator, Array, int], tuple[Array, bool]] | None = None
-    friction_at_load: bool = True
-    latency: int = 0
+    friction_at_load: bool = True  #: Whether dry and viscous friction sits behind a soft or loose gear.
+    latency: int = 0  #: Samples from a reading to the command that it makes.
+    #: Whether the model file has the controller, and the log its references and what is added to its commands.
     known_loop: bool = False
-    same: tuple[tuple[tuple[str, str], tuple[str, str]], ...] = ()
+    same: tuple[tuple[tuple[str, str], tuple[str, str]], ...] = ()  #: Pairs of answers that are one physics here.
+    #: Where the coordinates stand at first, from the values and the first references (n, columns).
     rest: Callable[[Values, Array], Array] | None = None
+    #: Of a machine whose only joint is moved by a cylinder: the line that the cylinder closes.
     line: Line | None = None
-    gauges: tuple[PressureGauge, ...] = ()
+    gauges: tuple[PressureGauge, ...] = ()  #: Of the chambers a and b of that cylinder.
 
     @property
     def driven(self) -> tuple[int, ...]:

@@ -62,33 +62,19 @@ class Motion:
 
 @dataclass(frozen=True)
 class Leg:
-    """The machine.
+    """The machine."""
 
-    Attributes
-    ----------
-    payload : float
-        On the slider (kg).
-    bushings : tuple of float or None
-        Stiffness and damping of hip and knee in the plane, (N/m, N s/m, N/m, N s/m); None for revolute joints.
-    drive : {"torques", "pistons", "springs", "hydraulic"}
-        Of the joint controllers: torques on the joints, forces of the cylinders, or currents of their valves.
-    proportional : float
-        Of the joint controllers (N m/rad).
-    period : float or None
-        Sample time of the controllers (s); None is without sampling.
-    method : {"Radau", "DOP853"}
-        Of SciPy: implicit, or explicit of order 8.
-    springs : tuple
-        Stiffness, free length and damping of the hip's and the knee's cylinder.
-    """
-
-    payload: float = 0.0
+    payload: float = 0.0  #: On the slider (kg).
+    #: Stiffness and damping of hip and knee in the plane, (N/m, N s/m, N/m, N s/m); None for revolute joints.
     bushings: Bushings | None = None
+    #: Of the joint controllers: torques on the joints, forces of the cylinders, or currents of their valves; one of
+    #: {"torques", "pistons", "springs", "hydraulic"}.
     drive: Drive = "torques"
-    proportional: float = 150.0
-    period: float | None = None
+    proportional: float = 150.0  #: Of the joint controllers (N m/rad).
+    period: float | None = None  #: Sample time of the controllers (s); None is without sampling.
+    #: Stiffness, free length and damping of the hip's and the knee's cylinder.
     springs: tuple[tuple[float, float, float], tuple[float, float, float]] = SPRINGS
-    method: Literal["Radau", "DOP853"] = "DOP853"
+    method: Literal["Radau", "DOP853"] = "DOP853"  #: Of SciPy: implicit, or explicit of order 8.
     ground: Ground = field(default_factory=Ground)
     oil: Hydraulics = field(default_factory=Hydraulics)
 

@@ -17,40 +17,20 @@ from vpm.simulate import Setup, simulate
 
 @dataclass(frozen=True)
 class Case:
-    """One example.
+    """One example."""
 
-    Attributes
-    ----------
-    model : str
-        File below the folder of examples.
-    mode : str
-        In which it is fitted; data come from a closed loop where there are references, else from a free run.
-    step, samples : float, int
-        Clock of the log.
-    inputs : callable
-        Time to commands or references, by channel.
-    noise : mapping
-        Logged outputs, and the standard deviation of their noise, SI.
-    free : mapping
-        Free parameters, and the factor by which they start beside the truth.
-    start : mapping
-        First states of the record, by their names; the rest as after a long rest.
-    fine : Setup
-        How the data are simulated.
-    setup : Setup
-        How the fit simulates.
-    """
-
-    model: str
-    mode: str
+    model: str  #: File below the folder of examples.
+    mode: str  #: In which it is fitted; data come from a closed loop where there are references, else from a free run.
+    #: Clock of the log.
     step: float
     samples: int
-    inputs: Callable[[Array], Mapping[str, Array]]
-    noise: Mapping[str, float]
-    free: Mapping[str, float]
+    inputs: Callable[[Array], Mapping[str, Array]]  #: Time to commands or references, by channel.
+    noise: Mapping[str, float]  #: Logged outputs, and the standard deviation of their noise, SI.
+    free: Mapping[str, float]  #: Free parameters, and the factor by which they start beside the truth.
+    #: First states of the record, by their names; the rest as after a long rest.
     start: Mapping[str, float] = field(default_factory=dict)
-    fine: Setup = field(default_factory=Setup)
-    setup: Setup = field(default_factory=Setup)
+    fine: Setup = field(default_factory=Setup)  #: How the data are simulated.
+    setup: Setup = field(default_factory=Setup)  #: How the fit simulates.
     known: tuple[str, ...] = ()
 
     @property

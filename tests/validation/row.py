@@ -15,21 +15,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Row:
-    """A value of the package beside its reference.
-
-    Attributes
-    ----------
-    name, unit, source : str
-    found, expected : ndarray
-    relative, absolute : float
-        Largest difference allowed: ``absolute + relative |expected|``.
-    """
+    """A value of the package beside its reference."""
 
     name: str
     found: Array
     expected: Array
     unit: str
     source: str
+    #: Largest difference allowed: ``absolute + relative |expected|``.
     relative: float = 0.0
     absolute: float = 0.0
 

@@ -41,12 +41,10 @@ class TwoLinks:
         self.tilt = stack(columns, ["world"], "gravity_tilt.angle")[0]
 
     def inertia(self, q: Array) -> tuple[Array, ...]:
-        """See `Links`."""
         turned = self.coupling * np.cos(q[1])
         return self.alone + self.outer + 2.0 * turned, self.outer + turned, self.outer
 
     def load(self, q: Array, v: Array) -> Array:
-        """See `Links`."""
         turning = self.coupling * np.sin(q[1])
         far = self.weight_2 * np.sin(q[0] + q[1] + self.tilt)
         near = self.weight_1 * np.sin(q[0] + self.tilt)
@@ -72,7 +70,6 @@ class Arm2R:
         )
 
     def draft(self, generator: Generator, needs: Sequence[str]) -> Draft:
-        """See `Machine`."""
         g = generator
         length = float(g.uniform(0.3, 0.5))
         masses = float(g.uniform(3.0, 6.0)), float(g.uniform(1.0, 2.5))
@@ -121,7 +118,6 @@ class Arm2R:
         return Draft(values, calibratable, tuple(base), scales, float(g.choice((250.0, 500.0, 1000.0))))
 
     def text(self, values: Mapping[str, float], draft: Draft, base: Sequence[tuple[str, str]]) -> str:
-        """See `Machine`."""
         show = Writer(values, draft.calibratable)
         parts = [f'name = "{self.name}"\ngravity = [0.0, 0.0, -9.81]']
         for k, (joint, body, drive, sensor, servo) in enumerate(
@@ -159,19 +155,15 @@ limit = {show(f"{servo}.limit", "A")}""")
         return "\n\n".join([*parts, show.effects(base, dict.fromkeys(JOINTS, ("N m", "rad")))])
 
     def plant(self, columns: Sequence[Column], step: float) -> Driven:
-        """See `Machine`."""
         return Driven(JOINTS, columns, TwoLinks(columns), step, stack(columns, DRIVES, "gain"))
 
     def controller(self, columns: Sequence[Column], dt: float) -> Cascade:
-        """See `Machine`."""
         return Cascade.of(columns, SERVOS, dt)
 
     def mixed(self, values: Mapping[str, float]) -> Mapping[str, Mapping[str, float]]:
-        """See `Machine`."""
         del values
         return {}
 
     def reference(self, generator: Generator, draft: Draft, time: Array, kind: str) -> Array:
-        """See `Machine`."""
         shape, values = (moves if kind == "validate" else sines), draft.values
         return np.array([shape(generator, time, values["motion.way"], values["motion.speed"]) for _ in JOINTS])

@@ -43,12 +43,10 @@ class _Mass:
         self.swings = bool(self.unbalance.any())
 
     def inertia(self, q: Array) -> tuple[Array, ...]:
-        """See `Links`."""
         del q
         return (self.total,)
 
     def load(self, q: Array, v: Array) -> Array:
-        """See `Links`."""
         return self.unbalance * np.sin(q + self.tilt) if self.swings else np.zeros_like(v)
 
 
@@ -80,7 +78,6 @@ class Axis:
         )
 
     def draft(self, generator: Generator, needs: Sequence[str]) -> Draft:
-        """See `Machine`."""
         g, rotary = generator, self.rotary
         mass = float(g.uniform(3.0, 40.0)) if not rotary else float(g.uniform(1.0, 4.0))
         centre = float(g.uniform(0.03, 0.12)) if rotary else 0.0
@@ -135,7 +132,6 @@ class Axis:
         return Draft(values, calibratable, tuple(base), scales, float(g.choice((250.0, 500.0, 1000.0, 2000.0))))
 
     def text(self, values: Mapping[str, float], draft: Draft, base: Sequence[tuple[str, str]]) -> str:
-        """See `Machine`."""
         show = Writer(values, draft.calibratable)
         effort, coordinate, command = ("N m", "rad", "A") if self.rotary else ("N", "m", "V")
         if self.rotary:
@@ -177,21 +173,17 @@ limit = {show("servo.limit", command)}
 {show.effects(base, {"axis": (effort, coordinate)})}"""
 
     def plant(self, columns: Sequence[Column], step: float) -> Driven:
-        """See `Machine`."""
         mass, gain = _Mass(columns, rotary=self.rotary), stack(columns, ["drive"], "gain")
         return Driven(["axis"], columns, mass, step, gain)
 
     def controller(self, columns: Sequence[Column], dt: float) -> Cascade:
-        """See `Machine`."""
         return Cascade.of(columns, ["servo"], dt)
 
     def mixed(self, values: Mapping[str, float]) -> Mapping[str, Mapping[str, float]]:
-        """See `Machine`."""
         del values
         return {}
 
     def reference(self, generator: Generator, draft: Draft, time: Array, kind: str) -> Array:
-        """See `Machine`."""
         shape = moves if kind == "validate" else sines
         return shape(generator, time, draft.values["motion.way"], draft.values["motion.speed"])[None, :]
 

@@ -37,11 +37,9 @@ class _Plant(Chain):
     gain: Array
 
     def outputs(self) -> Array:
-        """See `Plant`."""
         return np.concatenate([self.joint_angles(), self.strains()])
 
     def advance(self, command: Array, time: float) -> None:
-        """See `Plant`."""
         super().advance(self.gain * command, time)
 
 
@@ -66,7 +64,6 @@ class FlexibleArm:
         )
 
     def draft(self, generator: Generator, needs: Sequence[str]) -> Draft:
-        """See `Machine`."""
         g = generator
         dry = g.uniform() < 0.6 or any(need.startswith("coulomb") for need in needs)
         lengths, thick = (0.5, 0.45), (float(g.uniform(5e-3, 6.5e-3)), float(g.uniform(3.5e-3, 4.5e-3)))
@@ -126,7 +123,6 @@ class FlexibleArm:
         return Draft(values, calibratable, tuple(base), scales, float(g.choice((500.0, 1000.0))))
 
     def text(self, values: Mapping[str, float], draft: Draft, base: Sequence[tuple[str, str]]) -> str:
-        """See `Machine`."""
         show = Writer(values, draft.calibratable)
         parts = [f'name = "{self.name}"\ngravity = [0.0, 0.0, -9.81]']
         hubs = ("hub", "flange")
@@ -194,22 +190,18 @@ limit = {show(f"{SERVOS[k]}.limit", "A")}""")
         return "\n\n".join([*parts, show.effects(base, dict.fromkeys(JOINTS, ("N m", "rad")))])
 
     def plant(self, columns: Sequence[Column], step: float) -> _Plant:
-        """See `Machine`."""
         plant = _Plant(columns, step)
         plant.gain = stack(columns, DRIVES, "gain")
         return plant
 
     def controller(self, columns: Sequence[Column], dt: float) -> Cascade:
-        """See `Machine`."""
         return Cascade.of(columns, SERVOS, dt)
 
     def mixed(self, values: Mapping[str, float]) -> Mapping[str, Mapping[str, float]]:
-        """See `Machine`."""
         del values
         return {}
 
     def reference(self, generator: Generator, draft: Draft, time: Array, kind: str) -> Array:
-        """See `Machine`."""
         shape, values = (moves if kind == "validate" else sines), draft.values
         paths = [shape(generator, time, values["motion.way"], values["motion.speed"]) for _ in JOINTS]
         return np.array([path + jumps(generator, time, JUMP) for path in paths])

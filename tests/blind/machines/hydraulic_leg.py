@@ -70,12 +70,10 @@ class _Plant:
         self.oil.start(links.load(q, np.zeros_like(q)) / self.triangles(q)[1])
 
     def outputs(self) -> Array:
-        """See `Plant`."""
         pa, pb = self.oil.pa, self.oil.pb
         return np.concatenate([self.joints.encoder, pa[:1], pb[:1], pa[1:], pb[1:]])
 
     def advance(self, command: Array, time: float) -> None:
-        """See `Plant`."""
         v, half = self.joints.v, 0.5 * self.joints.step
         length, lever = self.triangles(self.joints.q + half * v)
         middle = length - (RETRACTED + 0.5 * STROKE)
@@ -112,7 +110,6 @@ class HydraulicLeg:
         )
 
     def draft(self, generator: Generator, needs: Sequence[str]) -> Draft:
-        """See `Machine`."""
         g = generator
         masses = 0.885 * float(g.uniform(0.8, 1.2)), 0.876 * float(g.uniform(0.8, 1.2))
         centres = 0.14 * float(g.uniform(0.9, 1.1)), 0.1254 * float(g.uniform(0.9, 1.1))
@@ -175,7 +172,6 @@ class HydraulicLeg:
         return Draft(values, calibratable, tuple(base), scales, float(g.choice((500.0, 1000.0))))
 
     def text(self, values: Mapping[str, float], draft: Draft, base: Sequence[tuple[str, str]]) -> str:
-        """See `Machine`."""
         show = Writer(values, draft.calibratable)
         parts = [
             f"""name = "{self.name}"
@@ -245,17 +241,14 @@ limit = {show(f"{joint}_loop.limit", "A")}""")
         return "\n\n".join([*parts, show.effects(base, dict.fromkeys(JOINTS, ("N m", "rad")))])
 
     def plant(self, columns: Sequence[Column], step: float) -> _Plant:
-        """See `Machine`."""
         return _Plant(columns, step)
 
     def controller(self, columns: Sequence[Column], dt: float) -> Proportional:
-        """See `Machine`."""
         del dt
         loops = [f"{joint}_loop" for joint in JOINTS]
         return Proportional(stack(columns, loops, "proportional"), stack(columns, loops, "limit"))
 
     def mixed(self, values: Mapping[str, float]) -> Mapping[str, Mapping[str, float]]:
-        """See `Machine`."""
         return {
             f"{d}.force": {
                 f"{d}.pressure_a": values[f"{d}.area"],
@@ -265,6 +258,5 @@ limit = {show(f"{joint}_loop.limit", "A")}""")
         }
 
     def reference(self, generator: Generator, draft: Draft, time: Array, kind: str) -> Array:
-        """See `Machine`."""
         shape, values = (moves if kind == "validate" else sines), draft.values
         return np.array([q + shape(generator, time, values["motion.way"], values["motion.speed"]) for q in START])

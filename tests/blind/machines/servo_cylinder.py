@@ -39,12 +39,10 @@ class _Slide:
         self.mass = stack(columns, ["slide"], "mass") + stack(columns, ["slide"], "payload.mass")
 
     def inertia(self, q: Array) -> tuple[Array, ...]:
-        """See `Links`."""
         del q
         return (self.mass,)
 
     def load(self, q: Array, v: Array) -> Array:
-        """See `Links`."""
         del q
         return np.zeros_like(v)
 
@@ -58,11 +56,9 @@ class _Plant:
         self.seal = stack(columns, ["servo"], "pressure_dependent_friction.area")
 
     def outputs(self) -> Array:
-        """See `Plant`."""
         return np.concatenate([self.axis.encoder, self.oil.pa, self.oil.pb])
 
     def advance(self, command: Array, time: float) -> None:
-        """See `Plant`."""
         x, v = self.axis.motor_q, self.axis.motor_v
         force = self.oil.middle_force(command, x, v)
         if self.seal.any():
@@ -100,7 +96,6 @@ class ServoCylinder:
         )
 
     def draft(self, generator: Generator, needs: Sequence[str]) -> Draft:
-        """See `Machine`."""
         g = generator
         mass, way, speed = float(g.uniform(3.0, 25.0)), 0.028, float(g.uniform(0.06, 0.12))
         viscous, coulomb = float(g.uniform(300.0, 900.0)), float(g.uniform(5.0, 30.0))
@@ -144,7 +139,6 @@ class ServoCylinder:
         return Draft(values, calibratable, tuple(base), scales, float(g.choice((500.0, 1000.0, 2000.0))))
 
     def text(self, values: Mapping[str, float], draft: Draft, base: Sequence[tuple[str, str]]) -> str:
-        """See `Machine`."""
         show = Writer(values, draft.calibratable)
         return f"""name = "{self.name}"
 gravity = [0.0, 0.0, -9.81]
@@ -201,20 +195,16 @@ limit = {show("servo.limit", "A")}
 {show.effects(base, {"axis": ("N", "m")})}"""
 
     def plant(self, columns: Sequence[Column], step: float) -> _Plant:
-        """See `Machine`."""
         return _Plant(columns, step)
 
     def controller(self, columns: Sequence[Column], dt: float) -> Proportional:
-        """See `Machine`."""
         del dt
         return Proportional(stack(columns, ["loop"], "proportional"), stack(columns, ["servo"], "limit"))
 
     def mixed(self, values: Mapping[str, float]) -> Mapping[str, Mapping[str, float]]:
-        """See `Machine`."""
         area = values["servo.area"]
         return {"servo.force": {"servo.pressure_a": area, "servo.pressure_b": -area * values["servo.ratio"]}}
 
     def reference(self, generator: Generator, draft: Draft, time: Array, kind: str) -> Array:
-        """See `Machine`."""
         shape = moves if kind == "validate" else sines
         return shape(generator, time, draft.values["motion.way"], draft.values["motion.speed"])[None, :]
