@@ -40,11 +40,6 @@ def poses(
     Returns
     -------
     q, u : ndarray, shapes (N, n), (N, m)
-
-    Raises
-    ------
-    SimulationError
-        There is no such pose.
     """
     model, count, m = task.model, guess.shape[1], wanted.shape[1]
     free = np.arange(len(model.joints) if stiff else count)

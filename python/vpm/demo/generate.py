@@ -78,14 +78,10 @@ def record(
 
     Parameters
     ----------
-    machine
-        The true machine.
     reference
         Reference angle [rad] over time [s].
     duration
         Length of the record [s].
-    noise
-        Source of the encoder noise.
 
     Returns
     -------

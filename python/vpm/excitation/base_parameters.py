@@ -40,7 +40,6 @@ def regressor(model: Model, position: Array, velocity: Array, acceleration: Arra
 
     Parameters
     ----------
-    model : Model
     position, velocity, acceleration : ndarray, shape (N, n)
     names : sequence of str
         k dotted names.

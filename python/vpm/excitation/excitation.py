@@ -177,13 +177,7 @@ class Excitation(Result):
 
 
 def clock(duration: float, time_step: float, *, whole: bool = False) -> Array:
-    """Sample times of an excitation, s: whole periods without the last sample, otherwise with both ends.
-
-    Raises
-    ------
-    ExcitationError
-        A number is not positive, or there are fewer than ten samples.
-    """
+    """Sample times of an excitation, s: whole periods without the last sample, otherwise with both ends."""
     if not (np.isfinite(duration) and np.isfinite(time_step) and time_step > 0.0 and duration > 0.0):
         raise ExcitationError(f"a duration of {duration:g} s in steps of {time_step:g} s is none; give positive times")
     count = round(duration / time_step)

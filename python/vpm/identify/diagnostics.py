@@ -67,11 +67,8 @@ def remarks(
 
     Parameters
     ----------
-    fit : Fit
     limits : mapping
         Bounds of the parameters that rest on one.
-    blocks : sequence of Block
-        What was compared.
     others : int
         Unknowns beside the parameters, such as first states.
     reasons : mapping of str to str, optional

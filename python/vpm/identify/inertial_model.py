@@ -22,7 +22,6 @@ def repaired(model: Model, values: Mapping[str, float]) -> Model:
 
     Parameters
     ----------
-    model : Model
     values : mapping of str to float
         As `inertial_regression` names them, all ten of a body.
 

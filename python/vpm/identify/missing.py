@@ -50,13 +50,8 @@ def whiteness(
 
     Parameters
     ----------
-    model : Model
-        As fitted.
-    records : sequence of Experiment
-    data : problem
     residual : ndarray, shape (n,)
     jacobian : ndarray, shape (n, p)
-    checks : Checks
     """
     plain = untied(data)
     unseen = _of_unseen(model, plain) if isinstance(plain, InverseDynamicsProblem) else []

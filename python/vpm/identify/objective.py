@@ -164,10 +164,8 @@ def noise_levels(blocks: Sequence[Block], residual: Array, *, robust: bool) -> M
 
     Parameters
     ----------
-    blocks : sequence of Block
     residual : ndarray
         Weighted as the blocks say.
-    robust : bool
     """
     levels = {}
     for channel in dict.fromkeys(block.channel for block in blocks):

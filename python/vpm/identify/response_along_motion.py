@@ -137,11 +137,6 @@ def respond(
         filtered, and only at the samples that the filter retains.
     origin : ndarray, shape (P,), optional
         How links bend or what drives do is taken from the tangent at these values, not worked out at ``theta``.
-
-    Raises
-    ------
-    DivergedError
-        What is worked out along the motion left the finite numbers.
     """
     from vpm._core import Diverged
 

@@ -83,11 +83,6 @@ def refined(
         Of k0 and s0, with the terms to fit.
     degree : int, optional
         Of both maps; by default the terms of the bases.
-
-    Raises
-    ------
-    IdentificationError
-        Fewer than two samples for each coefficient.
     """
     wide, dropped = widened(samples, bases, signals, degree)
     wide, more_dropped = identifiable_bases(begun.staged, samples, wide)

@@ -34,11 +34,6 @@ def series(record: RecordLike, output: str, inputs: Sequence[str], name: str = "
     record : Experiment or mapping of str to array-like, shape (N,)
     name : str
         Of a record without a name.
-
-    Raises
-    ------
-    IdentificationError
-        A channel is missing, or has another length or shape.
     """
     names = [output, *inputs]
     known = record.channels if isinstance(record, Experiment) else tuple(record)

@@ -141,7 +141,6 @@ def panels(
 
     Parameters
     ----------
-    rows, columns : int
     height : float
         Of one row, inches.
     width : float

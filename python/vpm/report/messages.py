@@ -21,7 +21,6 @@ def estimate(value: float, std: float, unit: str, stated: float | None = None) -
     ----------
     value, std : float
         A deviation of zero stands for a value that was held.
-    unit : str
     stated : float, optional
         Value of the model file; None for what the file does not have.
     """

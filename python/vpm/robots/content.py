@@ -35,7 +35,6 @@ class Names:
         ----------
         what : str
             ``"joint"``, ``"link"``: what is put before or behind a name that will not do, and stands in the note.
-        name : str
         suffixes : sequence of str
             Of the names that it brings with it, such as the coordinates of a joint.
         """

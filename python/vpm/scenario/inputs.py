@@ -57,12 +57,10 @@ def sampled(signal: Signal, keys: Keys, unit: str, clock: Clock) -> Array:
 
     Parameters
     ----------
-    signal : Signal
     keys : tuple
         Its place in the file.
     unit : str
         SI unit of the channel that it drives.
-    clock : Clock
 
     Raises
     ------

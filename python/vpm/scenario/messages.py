@@ -11,13 +11,7 @@ Keys = tuple[str | int, ...]
 
 
 def refuse(where: Keys | str, rest: str) -> NoReturn:
-    """Refuse a scenario with a message on a problem at a place.
-
-    Raises
-    ------
-    ScenarioError
-        Always.
-    """
+    """Refuse a scenario with a message on a problem at a place."""
     named = where if isinstance(where, str) else place(*where)
     raise ScenarioError(f"{named} {rest}", where=named)
 

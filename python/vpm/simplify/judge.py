@@ -85,7 +85,6 @@ class Judge:
 
         Parameters
         ----------
-        model : Model
         setup : Setup
             Its substeps are those of one step of the controller.
 

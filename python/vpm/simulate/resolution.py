@@ -175,15 +175,12 @@ def resolution(model: Model, states: Array, commands: Array, dt: float, setup: S
 
     Parameters
     ----------
-    model : Model
     states : ndarray, shape (N, nx)
         Those of the run.
     commands : ndarray, shape (N, nu)
         What is held from each of them on.
     dt : float
         Time between samples, s.
-    setup : Setup
-    duration : float
     """
     method, internal = setup.method(model), states[:, 2 * model.core.n_coordinates :]
     passed = states[[0, *outermost(states[:, : len(model.joints)])]]

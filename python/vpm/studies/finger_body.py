@@ -45,11 +45,6 @@ class Finger:
             Layers of elements through the epidermis; 12 times as many lie around the quarter.
         pole : float
             From 0 (even) to below 1: how much smaller elements get towards the pole.
-
-        Raises
-        ------
-        VpmError
-            The layers leave no tissue on the bone, or there is no element.
         """
         cuts = [self.bone, self.radius - self.epidermis - self.dermis, self.radius - self.epidermis, self.radius]
         if min(np.diff(cuts)) <= 0.0 or self.bone <= 0.0:

@@ -89,13 +89,7 @@ class Stressed:
 
 
 def loaded(yoke: Yoke, fineness: int, loads: dict[str, Load], young: float) -> dict[str, Stressed]:
-    """Solve the knee's frame under all loads.
-
-    Raises
-    ------
-    VpmError
-        The mesh cannot be made.
-    """
+    """Solve the knee's frame under all loads."""
     if not 1 <= fineness <= 6:
         raise VpmError(f"a mesh with {fineness} bricks through the frame cannot be solved; take 1 to 6")
     solid, held, pad = frame(yoke, fineness, young, POISSON)

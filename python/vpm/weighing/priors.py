@@ -117,13 +117,7 @@ class _Sizes:
         self._shown = {name: outputs[:, at] for at, name in enumerate(model.output_channels)}
 
     def prior(self, effect: Effect, parameter: EffectParameter, value: float, box: tuple[float, float]) -> Prior:
-        """Prior of a parameter of which the model file says nothing.
-
-        Raises
-        ------
-        IdentificationError
-            The records do not show its size, or it stands at a limit that nothing reaches.
-        """
+        """Prior of a parameter of which the model file says nothing."""
         neutral = None if parameter.shape else parameter.neutral
         if neutral in NATURAL and neutral is not None:
             share = NEAR if parameter.scale == "one" else SHARE

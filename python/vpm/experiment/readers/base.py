@@ -11,12 +11,7 @@ from vpm.experiment.table import Table, missing_column
 
 @contextmanager
 def reading(path: str | PathLike[str]) -> Iterator[None]:
-    """Context for every reader's parser: whatever it raises about a broken file becomes one sentence.
-
-    Raises
-    ------
-    ExperimentError
-    """
+    """Context for every reader's parser: whatever it raises about a broken file becomes one sentence."""
     try:
         yield
     except VpmError:

@@ -121,13 +121,7 @@ class ReducedLink:
             ) from None
 
     def save(self, path: str | PathLike[str]) -> Path:
-        """Write a file that ``reduced = "..."`` of a flexible link names.
-
-        Returns
-        -------
-        pathlib.Path
-            Where it was written.
-        """
+        """Write a file that ``reduced = "..."`` of a flexible link names."""
         with replacing(path) as beside:
             beside.write_bytes(self.to_bytes())
         return Path(path)

@@ -35,16 +35,8 @@ def columns(record: RecordLike, names: tuple[str, ...], fewest: int) -> Columns:
     ----------
     record : Experiment or mapping of str to array-like, shape (N,)
         A mapping has its clock under ``"time"``, s.
-    names : tuple of str
     fewest : int
         Samples that the question needs at least.
-
-    Raises
-    ------
-    IdentificationError
-        A channel is missing.
-    ExperimentError
-        A channel has another length, holds a value that is no finite number, or the clock does not increase.
     """
     is_log = isinstance(record, Experiment)
     title = record.name if isinstance(record, Experiment) else "record"
