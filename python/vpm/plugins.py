@@ -16,12 +16,7 @@ KINDS = {"effects": "effect", "readers": "reader", "importers": "importer"}
 
 
 class PluginError(VpmError):
-    """What another package offers cannot be used.
-
-    Attributes
-    ----------
-    plugin, package : str
-    """
+    """What another package offers cannot be used."""
 
     def __init__(self, message: str, *, plugin: str = "", package: str = "") -> None:
         super().__init__(message)

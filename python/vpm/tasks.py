@@ -99,8 +99,6 @@ class Tasks(Generic[K]):
         processes take its place, or what the function makes. An executor that a function made ends with the block.
     say : callable, optional
         Called with a sentence where a task died or a pool broke; a `RuntimeWarning` says it if not given.
-    folders : sequence of str
-        See `vpm.sending.run_packed`.
 
     Raises
     ------

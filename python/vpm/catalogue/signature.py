@@ -23,21 +23,12 @@ Axis = Literal[
 
 @dataclass(frozen=True)
 class Signature:
-    """How an effect shows itself.
+    """How an effect shows itself."""
 
-    Attributes
-    ----------
-    lives_in : tuple of str
-        What to draw the residual over. Of several the one that explains most of the effect in the data at hand.
-    looks : str
-        What is to be seen there, a sentence without its full stop.
-    excite : str
-        The experiment that shows it best, a sentence without its full stop.
-    """
-
+    #: What to draw the residual over. Of several the one that explains most of the effect in the data at hand.
     lives_in: tuple[Axis, ...]
-    looks: str
-    excite: str
+    looks: str  #: What is to be seen there, a sentence without its full stop.
+    excite: str  #: The experiment that shows it best, a sentence without its full stop.
 
 
 #: For effects that users add without saying where they live: what explains most of it is drawn.

@@ -229,14 +229,9 @@ def _commands_per_effort(model: Model, m: Motion, after: float) -> Array:
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations of white noise on the channels of some records, in the units of their data.
+    """Standard deviations of white noise on the channels of some records, in the units of their data."""
 
-    Attributes
-    ----------
-    instruments, drives : ndarray, shape (records, channels)
-        Of readings, and of what commands do not tell.
-    """
-
+    #: Of readings, and of what commands do not tell; shape (records, channels).
     instruments: Array
     drives: Array
 

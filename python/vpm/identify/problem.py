@@ -92,8 +92,6 @@ class TiedProblem:
 
     Parameters
     ----------
-    data : problem
-        The problem behind it.
     ties : mapping of str to str
         Following parameter to the one whose value it takes; see `check_ties`.
     """

@@ -32,8 +32,6 @@ class Judge:
         To fit on, and to judge on.
     rate : float
         Steps per second, Hz.
-    mode : str
-        See `vpm.simulate.MODES`.
     channels : sequence of str, optional
         What is compared; by default all that can be.
     """

@@ -51,8 +51,6 @@ class Trials:
 
     Parameters
     ----------
-    model : Model
-        The full one.
     refit : Callable
         Says of changes whether the parameters are fitted again.
     tell : callable
@@ -323,13 +321,7 @@ def _agree(rungs: Sequence[Rung]) -> bool:
 
 
 class Courses:
-    """Commands along the first record to judge on, worked out once for all models with the same drives.
-
-    Parameters
-    ----------
-    model : Model
-        The full one.
-    """
+    """Commands along the first record to judge on, worked out once for all models with the same drives."""
 
     def __init__(self, model: Model, judge: Judge) -> None:
         self._full, self._judge = model, judge

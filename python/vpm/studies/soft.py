@@ -52,29 +52,14 @@ class State:
 
 @dataclass
 class SoftBody:
-    """A body of revolution about z, in layers; x of the mesh is the radius.
+    """A body of revolution about z, in layers; x of the mesh is the radius."""
 
-    Parameters
-    ----------
-    mesh : MeshQuad2
-        Metres.
-    layer : ndarray of int, shape (elements,)
-    materials : sequence of Material
-        Of each layer.
-    contact : ndarray of int
-        Facets that may touch the obstacle.
-    held : callable or ndarray of int
-        Facets that do not move.
-    penalty : float
-        Contact stiffness, Pa/m of the undeformed surface.
-    """
-
-    mesh: MeshQuad2
-    layer: NDArray[np.int64]
-    materials: Sequence[Material]
-    contact: NDArray[np.int64]
-    held: NDArray[np.int64]
-    penalty: float
+    mesh: MeshQuad2  #: Metres.
+    layer: NDArray[np.int64]  #: Shape (elements,).
+    materials: Sequence[Material]  #: Of each layer.
+    contact: NDArray[np.int64]  #: Facets that may touch the obstacle.
+    held: NDArray[np.int64]  #: Facets that do not move.
+    penalty: float  #: Contact stiffness, Pa/m of the undeformed surface.
 
     def __post_init__(self) -> None:
         skfem = finite_elements()

@@ -28,11 +28,6 @@ class FrameLog(Log):
 
     Times of day and spans are told in seconds from the first of their column. Missing values are NaN.
 
-    Parameters
-    ----------
-    name : str
-        What messages call it.
-
     Raises
     ------
     ExperimentError

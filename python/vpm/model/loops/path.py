@@ -45,8 +45,6 @@ class Path:
 
     Parameters
     ----------
-    names : sequence of str
-        Of all coordinates.
     fixed : sequence of int
         Places of those that are held.
     """
