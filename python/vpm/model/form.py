@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from pydantic import ValidationError
+from pydantic_core import ErrorDetails
 
 from vpm.errors import near_match
 from vpm.model.component import Component
@@ -43,10 +44,11 @@ _EXAMPLES: Mapping[str, str] = {
     "gauges.at": "at = 0.05",
 }
 
-#: What has to stand at a place, by the kind of error that says it does not.
+#: What has to stand at a place of a file, by the kind of error that says it does not.
 _KINDS: Mapping[str, str] = {
     "float_type": "a number",
     "float_parsing": "a number",
+    "int_type": "a whole number",
     "finite_number": "a finite number",
     "string_type": "text in quotes",
     "bool_type": "true or false",
@@ -61,8 +63,7 @@ _KINDS: Mapping[str, str] = {
 def schema_problems(error: ValidationError, *, within: tuple[str, ...] = ()) -> list[Problem]:
     """Problems of a model file's form that the schema found, rewritten as sentences."""
     problems = []
-    # Unknown keys come first: the key that is missing is often the one that is misspelt.
-    for detail in sorted(error.errors(include_url=False), key=lambda found: found["type"] != "extra_forbidden"):
+    for detail in unknown_keys_first(error):
         written = (*within, *detail["loc"])
         keys, tables = located(written)
         if keys[-1] == "value" and tables == (Quantity,) and detail["type"] not in {"missing", "extra_forbidden"}:
@@ -74,6 +75,27 @@ def schema_problems(error: ValidationError, *, within: tuple[str, ...] = ()) -> 
             )
         )
     return problems
+
+
+def unknown_keys_first(error: ValidationError) -> list[ErrorDetails]:
+    """Errors of a file's form, unknown keys first: the key that is missing is often the one that is misspelt."""
+    return sorted(error.errors(include_url=False), key=lambda found: found["type"] != "extra_forbidden")
+
+
+def usual_sentence(kind: str, key: str, tables: Tables, found: object, example: str | None = None) -> str | None:
+    """Rest of the sentence for an error of form that any file may have; None for all others."""
+    if kind == "extra_forbidden":
+        return f"is not a known key; {near_match(key, keys_of(*tables))}"
+    if kind == "missing":
+        return "is missing; add it" + (f", for example {example}" if example else "")
+    if kind == "string_too_short":
+        return "is empty text; give it a content"
+    return f"is {shown(found)}, but has to be {_KINDS[kind]}; correct it" if kind in _KINDS else None
+
+
+def reason_sentence(reason: str) -> str:
+    """Rest of the sentence for what a check of a file's form complains about."""
+    return reason if reason.startswith(("has ", "is ")) else f"is wrong: {reason}"
 
 
 def _other_types(key: str, tables: Tables) -> tuple[tuple[str, ...], str]:
@@ -95,12 +117,9 @@ def _sentence(
         other, own = _other_types(str(keys[-1]), tables)
         if other:
             return f'belongs to type = "{" or ".join(other)}", but this is {own}; change the type or remove the key'
-        return f"is not a known key; {near_match(str(keys[-1]), keys_of(*tables))}"
-    if kind == "missing":
-        example = _EXAMPLES.get(".".join(map(str, keys))) or _example(str(keys[0]), str(keys[-1]))
-        return "is missing; add it" + (f", for example {example}" if example else "")
-    if kind in _KINDS:
-        return f"is {shown(found)}, but has to be {_KINDS[kind]}; correct it"
+    example = _EXAMPLES.get(".".join(map(str, keys))) or _example(str(keys[0]), str(keys[-1]))
+    if usual := usual_sentence(kind, str(keys[-1]), tables, found, example):
+        return usual
     if kind in {"too_short", "too_long"}:
         needed = context.get("min_length") or context.get("max_length")
         if isinstance(found, Mapping):
@@ -121,8 +140,6 @@ def _choice_sentence(
     kind: str, keys: tuple[str | int, ...], found: object, context: Mapping[str, Any], fallback: str
 ) -> str:
     """Rest of the sentence where the form allows one of several things, or something more special."""
-    if kind == "string_too_short":
-        return "is empty text; give it a content"
     if kind in {"literal_error", "union_tag_invalid"}:
         choices = re.findall(r"'([^']*)'", str(context.get("expected") or context.get("expected_tags")))
         tag = context.get("tag", found)
@@ -135,6 +152,5 @@ def _choice_sentence(
     if kind == "union_tag_not_found":
         return 'has no type; add one, for example type = "pd"'
     if kind == "value_error":
-        reason = str(context.get("error", fallback))
-        return reason if reason.startswith(("has ", "is ")) else f"is wrong: {reason}"
+        return reason_sentence(str(context.get("error", fallback)))
     return f"is {shown(found)}: {fallback[:1].lower()}{fallback[1:]}"

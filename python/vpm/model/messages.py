@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NoReturn
 
-from vpm.errors import ModelError
+from vpm.errors import ModelError, ScenarioError
 
 
 @dataclass(frozen=True)
@@ -19,12 +19,14 @@ class Problem:
         return f"{self.where} {self.rest}"
 
 
-def raise_first(problems: Sequence[Problem], path: str | None) -> NoReturn:
+def raise_first(
+    problems: Sequence[Problem], path: str | None, error: type[ModelError | ScenarioError] = ModelError
+) -> NoReturn:
     """Raise the message of the first problem and say how many more there are."""
     more = len(problems) - 1
     tail = f" (and {more} more problem{'s' if more > 1 else ''})" if more else ""
     head = f"{path}: " if path else ""
-    raise ModelError(f"{head}{problems[0]}{tail}", where=problems[0].where, path=path, more=more)
+    raise error(f"{head}{problems[0]}{tail}", where=problems[0].where, path=path, more=more)
 
 
 def place(*keys: str | int) -> str:

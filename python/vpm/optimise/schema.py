@@ -1,14 +1,15 @@
 """Form of a task file: which keys there are and what kind of value each takes."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any
+from typing import Annotated
 
 from pydantic import BeforeValidator, Field, ValidationError
+from pydantic_core import ErrorDetails
 
-from vpm.errors import near_match
 from vpm.model.entry import Entry, Number, Switch, Text, Vector
+from vpm.model.form import unknown_keys_first, usual_sentence
 from vpm.model.messages import Problem, place, shown
-from vpm.model.schema import keys_of, located
+from vpm.model.schema import located
 
 #: Words of `minimise` that are no channels.
 GOALS = ("time", "energy")
@@ -105,19 +106,15 @@ class Document(Entry):
 
 
 def schema_problems(error: ValidationError) -> list[Problem]:
-    """What the schema found, as sentences; unknown keys come first, for what is missing is often what is misspelt."""
-    found = sorted(error.errors(include_url=False), key=lambda one: one["type"] != "extra_forbidden")
-    return [_problem(dict(one)) for one in found]
+    """Problems of a task file's form that the schema found, rewritten as sentences."""
+    return [_problem(found) for found in unknown_keys_first(error)]
 
 
-def _problem(found: dict[str, Any]) -> Problem:
+def _problem(found: ErrorDetails) -> Problem:
     keys = tuple(key for key in found["loc"] if key != "channels" and not str(key).startswith("dict["))
     kind, context = found["type"], found.get("ctx", {})
-    if kind == "extra_forbidden":
-        _, tables = located(found["loc"], Document)
-        return Problem(place(*keys), f"is not a known key; {near_match(str(keys[-1]), keys_of(*tables))}")
-    if kind == "missing":
-        return Problem(place(*keys), "is missing; add it")
+    if usual := usual_sentence(kind, str(keys[-1]), located(found["loc"], Document)[1], found["input"]):
+        return Problem(place(*keys), usual)
     if kind == "value_error":
         return Problem(place(*keys), f"{context['error']}; it is {shown(found['input'])}")
     return Problem(place(*keys), f"is wrong ({found['msg'].lower()}); it is {shown(found['input'])}")

@@ -6,8 +6,9 @@ from typing import Any
 from pydantic import ValidationError
 
 from vpm.errors import near_match
+from vpm.model.form import reason_sentence, unknown_keys_first, usual_sentence
 from vpm.model.messages import Problem, place, shown
-from vpm.model.schema import Place, Tables, keys_of, located
+from vpm.model.schema import Place, Tables, located
 from vpm.scenario.schema import INPUTS, SIGNALS, Document
 
 #: How a key is written, for messages about missing ones.
@@ -29,24 +30,11 @@ _EXAMPLES: Mapping[str, str] = {
     "at": 'at = "axis"',
 }
 
-#: What has to stand at a place, by the kind of error that says it does not.
-_KINDS: Mapping[str, str] = {
-    "float_type": "a number",
-    "int_type": "a whole number",
-    "finite_number": "a finite number",
-    "string_type": "text in quotes",
-    "dict_type": "a table",
-    "model_type": "a table",
-    "model_attributes_type": "a table",
-    "list_type": "a list",
-    "tuple_type": "a list",
-}
-
 
 def schema_problems(error: ValidationError) -> list[Problem]:
-    """Problems of a scenario file's form that the schema found; unknown keys come first."""
+    """Problems of a scenario file's form that the schema found, rewritten as sentences."""
     problems = []
-    for detail in sorted(error.errors(include_url=False), key=lambda found: found["type"] != "extra_forbidden"):
+    for detail in unknown_keys_first(error):
         keys = _without_type(detail["loc"])
         if keys[-1] == "value" and detail["type"] not in {"missing", "extra_forbidden"} and _nested(keys):
             keys = keys[:-1]  # bare numbers have no such key
@@ -73,22 +61,14 @@ def _nested(keys: Place) -> bool:
 
 def _sentence(kind: str, keys: Place, tables: Tables, found: object, context: Mapping[str, Any]) -> str:
     """Rest of the sentence for one error of a scenario's form."""
-    if kind == "extra_forbidden":
-        return f"is not a known key; {near_match(str(keys[-1]), keys_of(*tables))}"
-    if kind == "missing":
-        example = _EXAMPLES.get(str(keys[-1]))
-        return "is missing; add it" + (f", for example {example}" if example else "")
-    if kind in _KINDS:
-        return f"is {shown(found)}, but has to be {_KINDS[kind]}; correct it"
+    if usual := usual_sentence(kind, str(keys[-1]), tables, found, _EXAMPLES.get(str(keys[-1]))):
+        return usual
     if kind == "greater_than_equal":
         return f"is {found}, but has to be {context['ge']} or more; correct it"
     if kind == "too_short":
         return f"is empty; add {_EXAMPLES.get(str(keys[-1]), 'an entry')}"
-    if kind == "string_too_short":
-        return "is empty text; give it a content"
     if kind == "union_tag_not_found":
         return f'has no type; add for example type = "points"; {near_match("", SIGNALS, what="the types are")}'
     if kind == "union_tag_invalid":
         return f"has the type {shown(context.get('tag'))}; {near_match(str(context.get('tag')), SIGNALS)}"
-    reason = str(context.get("error", f"is {shown(found)}, which cannot be; correct it"))
-    return reason if reason.startswith(("has ", "is ")) else f"is wrong: {reason}"
+    return reason_sentence(str(context.get("error", f"is {shown(found)}, which cannot be; correct it")))

@@ -1,11 +1,11 @@
 """Problems of a scenario file, each as one sentence: where, the failing condition, the numbers, the repair."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NoReturn
 
 from vpm.errors import ScenarioError
-from vpm.model.messages import Problem, place
+from vpm.model.messages import place
 
 Keys = tuple[str | int, ...]
 
@@ -14,13 +14,6 @@ def refuse(where: Keys | str, rest: str) -> NoReturn:
     """Refuse a scenario with a message on a problem at a place."""
     named = where if isinstance(where, str) else place(*where)
     raise ScenarioError(f"{named} {rest}", where=named)
-
-
-def raise_first(problems: Sequence[Problem]) -> NoReturn:
-    """Raise the message of the first problem and say how many more there are."""
-    more = len(problems) - 1
-    tail = f" (and {more} more problem{'s' if more > 1 else ''})" if more else ""
-    raise ScenarioError(f"{problems[0]}{tail}", where=problems[0].where, more=more)
 
 
 @contextmanager

@@ -15,6 +15,7 @@ from vpm.batch import side_by_side
 from vpm.errors import DivergedError, ScenarioError, SimulationError, VpmError, near_match
 from vpm.experiment import Experiment
 from vpm.model import Model
+from vpm.model.messages import raise_first
 from vpm.model.reading import parse_toml, read_toml
 from vpm.numbers import Array
 from vpm.results import html_table
@@ -22,7 +23,7 @@ from vpm.scenario.clock import check_numbers, clock_of
 from vpm.scenario.form import schema_problems
 from vpm.scenario.inputs import given_inputs
 from vpm.scenario.machine import machines
-from vpm.scenario.messages import in_file, raise_first, refuse
+from vpm.scenario.messages import in_file, refuse
 from vpm.scenario.outcome import ScenarioInterruptedError, ScenarioRun
 from vpm.scenario.panels import checked_columns, checked_panels
 from vpm.scenario.schema import Document
@@ -53,7 +54,7 @@ class Scenario:
             try:
                 self._document = Document.model_validate(content)
             except ValidationError as error:
-                raise_first(schema_problems(error))
+                raise_first(schema_problems(error), path, ScenarioError)
             self._path = path
             self._clock = clock_of(self._document)
             self._setup = _setup(self._document)
