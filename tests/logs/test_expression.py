@@ -99,10 +99,36 @@ def log(tmp_path: Path) -> Path:
     return path
 
 
-def load(log: Path, *lines: str) -> Experiment:
+def load(log: Path, *lines: str, time: str = 'column = "t", unit = "s"') -> Experiment:
     table = log.with_name("table.toml")
-    table.write_text("\n".join(['time = { column = "t", unit = "s" }', *lines]), encoding="utf-8")
+    table.write_text("\n".join([f"time = {{ {time} }}", *lines]), encoding="utf-8")
     return Experiment.load(log, table)
+
+
+STAMP = (
+    'value = "sec + ns", columns = {{ sec = {{ column = "{}", unit = "s" }}, ns = {{ column = "{}", unit = "ns" }} }}'
+)
+
+
+def test_a_clock_of_seconds_and_nanoseconds(tmp_path: Path) -> None:
+    """A stamp of ROS 2 is a whole number of seconds since 1970, and the nanoseconds beyond."""
+    log, nanoseconds = tmp_path / "stamps.csv", 1763980000_987654321 + np.arange(400, dtype=np.int64) * 4_000_000
+    rows = np.column_stack([nanoseconds // 10**9, nanoseconds % 10**9, np.arange(400)])
+    np.savetxt(log, rows, delimiter=",", header="stamp.sec,stamp.nanosec,position[0]", comments="", fmt="%d")
+    stamp = STAMP.format("stamp.sec", "stamp.nanosec")
+    record = load(log, 'q = { column = "position[0]", unit = "rad" }', time=f'{stamp}, unit = "s"')
+    # Doubles of this size are 2.4e-7 s apart.
+    np.testing.assert_allclose(record.time - record.time[0], 4e-3 * np.arange(400), atol=5e-7)
+    np.testing.assert_array_equal(record["q"], np.arange(400.0))
+
+
+def test_a_clock_of_several_columns_has_a_number_in_each_row(log: Path) -> None:
+    names, *rows = (line.split(",") for line in log.read_text(encoding="utf-8").splitlines())
+    for row in rows[::2]:
+        row[names.index("s")] = ""
+    log.write_text("\n".join(",".join(row) for row in (names, *rows)), encoding="utf-8")
+    with pytest.raises(ExperimentError, match=r'column "s" has a clock of its own.*; map one column to time'):
+        load(log, 's = { column = "s", unit = "1" }', time=f'{STAMP.format("t", "z")}, unit = "s"')
 
 
 def test_values_over_columns(log: Path) -> None:

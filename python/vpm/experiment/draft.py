@@ -47,20 +47,28 @@ def mapped_draft(log: Log, table: Mapping[str, ChannelEntry], model: Model | Non
     path = log.path
     present = _present_columns(path, table, log)
     columns = list(dict.fromkeys(column for found in present.values() for column in found.values()))
-    content = log.read(columns, present["time"][""])
+    entry, clock = table["time"], next(iter(present["time"].values()))
+    content = log.read(columns, clock)
     source = Source(str(path), content.lines, str(path))
-    entry = table["time"]
-    clock_factor = understood(entry.unit, "time", None, str(path), expected="s")[0].factor
-    clock = present["time"][""]
-    if clock in content.stamps and clock_factor * entry.scale != 1.0:
+    unit = understood(entry.unit, "time", None, str(path), expected="s")[0]
+    if clock in content.stamps and (entry.value or unit.factor * entry.scale != 1.0):
+        made = entry.value or f"{unit.factor * entry.scale:g} s"
         raise ExperimentError(
-            f'{path}: the clock "{entry.column}" holds stamps, which are read in seconds, but its entry makes '
-            f'{clock_factor * entry.scale:g} s of each; write unit = "s" and no scale',
+            f'{path}: the clock "{clock}" holds stamps, which are read in seconds, but its entry makes {made} of each; '
+            'map that column alone, write unit = "s" and no scale',
             path=str(path),
             channel="time",
         )
-    draft = Draft(source, (content.columns[clock] * entry.scale + entry.offset) * clock_factor)
-    own_clocks = {column: (own * entry.scale + entry.offset) * clock_factor for column, own in content.clocks.items()}
+    if entry.value and content.clocks:
+        raise ExperimentError(
+            f'{path}: the column "{next(iter(content.clocks))}" has a clock of its own, which the value '
+            f'"{entry.value}" of the time does not tell; map one column to time',
+            path=str(path),
+            channel="time",
+        )
+    read = _built(source, content, "time", entry, present["time"]) if entry.value else content.columns[clock]
+    draft = Draft(source, unit.to_si(read * entry.scale + entry.offset))
+    own_clocks = {column: unit.to_si(own * entry.scale + entry.offset) for column, own in content.clocks.items()}
     content = replace(content, clocks=own_clocks)
     draft.history += [f"Read {draft.time.size} rows of {Path(path).name}.", *content.notes]
     draft.unused = tuple(column for column in log.header if column not in columns)
@@ -77,12 +85,6 @@ def _present_columns(
     if "time" not in table:
         raise ExperimentError(
             f'{path}: the channel table maps no column to "time"; add time = {{ column = "...", unit = "s" }}',
-            path=str(path),
-        )
-    if table["time"].value:
-        raise ExperimentError(
-            f'{path}: the channel table maps the value "{table["time"].value}" to time; map a column, with scale and '
-            "offset",
             path=str(path),
         )
     owners: dict[str, str] = {}
@@ -130,7 +132,7 @@ def _map_channel(
     for name, part in entry.parts.items():
         what = f'column "{part.column}" ({channel})'
         check_finite(content.columns[columns[name]], clock, what, source, channel=channel)
-    raw = _built(draft, content, channel, entry, columns) if entry.value else content.columns[columns[""]]
+    raw = _built(draft.source, content, channel, entry, columns) if entry.value else content.columns[columns[""]]
     draft.columns[channel] = given.to_si(raw * entry.scale + entry.offset)
     words = [f"{channel} is {entry.told}"]
     if entry.value:
@@ -159,8 +161,8 @@ def _clock(draft: Draft, content: Table, channel: str, columns: Mapping[str, str
     return first
 
 
-def _built(draft: Draft, content: Table, channel: str, entry: ChannelEntry, columns: Mapping[str, str]) -> Array:
-    """Value of a drafted channel over several columns, in the unit of the entry."""
+def _built(source: Source, content: Table, channel: str, entry: ChannelEntry, columns: Mapping[str, str]) -> Array:
+    """Value of a drafted channel, or of the clock, over several columns, in the unit of the entry."""
     units = {name: parse_unit(part.unit) for name, part in entry.columns.items()}
     parts = {
         name: Quantity(units[name].to_si(content.columns[column]), units[name].dimension)
@@ -177,7 +179,7 @@ def _built(draft: Draft, content: Table, channel: str, entry: ChannelEntry, colu
             raise VpmError(f'"{entry.value}" comes out in rad or 1, but its unit is {entry.unit}; write unit = "rad"')
     except VpmError as error:
         raise ExperimentError(
-            f"{draft.source.name}, channel {channel}: {error}", path=draft.source.path, channel=channel
+            f"{source.name}, channel {channel}: {error}", path=source.path, channel=channel
         ) from error
     return np.asarray(given.from_si(value.values), dtype=np.float64)
 
