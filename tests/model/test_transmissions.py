@@ -390,8 +390,11 @@ def test_joints_follow_from_as_many_shafts() -> None:
         joints_from_shafts(half, model)
     mixed = half.with_channel("roll.position", joints[1], "rad")
     np.testing.assert_allclose(joints_from_shafts(mixed, model)["pitch.position"], joints[0], atol=1e-12)
+    # A second encoder that is off by what its shaft winds up moves the other joint by its share of both shafts.
+    wound = log.with_channel("roll.position", joints[1] + 1e-3, "rad")
+    np.testing.assert_allclose(joints_from_shafts(wound, model)["pitch.position"], joints[0], atol=1e-12)
     alike = wrist.model(transmissions__right__ratios={"pitch": 100.0, "roll": 80.0})
-    with pytest.raises(ExperimentError, match="log as many independent shafts as joints"):
+    with pytest.raises(ExperimentError, match="at least as many independent shafts as joints"):
         joints_from_shafts(log, alike)
     with pytest.raises(ExperimentError, match="do not tell"):
         vpm.identify(model, half, ["left.inertia"])

@@ -18,8 +18,9 @@ def joints_from_shafts(
 ) -> Experiment:
     """Record with positions of joints in the place of those of shafts that tell them.
 
-    Law: ``q = R^-1 (theta - R_known q_known)``, R the ratios of the joints that the log does not hold, ``theta`` behind
-    gain and offset of a sensor. A record that holds all joints, or no shaft that turns with others, stays as it is.
+    Law: ``q = R^+ (theta - R_known q_known)``, R the ratios of the joints that the log does not hold, ``theta`` behind
+    gain and offset of a sensor. Where more shafts are logged than joints lack, as beside a linear scale on one of them,
+    R^+ takes least squares. A record that holds all joints, or no shaft that turns with others, stays as it is.
 
     Parameters
     ----------
@@ -31,8 +32,8 @@ def joints_from_shafts(
     Raises
     ------
     ExperimentError
-        The shafts in the record are not as many as the joints that it lacks, or do not tell them; or their ratios, or
-        errors of their sensors, are to be fitted to what would follow from these; or a sensor is late.
+        The shafts in the record do not tell the joints that it lacks; or their ratios, or errors of their sensors, are
+        to be fitted to what would follow from these; or a sensor is late.
     """
     values = model.theta if theta is None else theta
     held = [joint for joint in model.joints if f"{joint}.position" in experiment]
@@ -53,7 +54,7 @@ def joints_from_shafts(
     angles -= np.array(known) @ np.array([experiment[f"{joint}.position"] for joint in held]) if held else 0.0
     spent = {f"{name}.position" for name in shafts}
     told = experiment.select([channel for channel in experiment.channels if channel not in spent])
-    for joint, position in zip(lacking, np.linalg.solve(ratios, angles), strict=True):
+    for joint, position in zip(lacking, np.linalg.pinv(ratios) @ angles, strict=True):
         told = told.with_channel(f"{joint}.position", position, model.channel_unit(f"{joint}.position"))
     return told
 
@@ -62,12 +63,12 @@ def _check_regular(
     experiment: Experiment, model: Model, ratios: Array, shafts: Sequence[str], lacking: Sequence[str]
 ) -> None:
     """Complain about shafts that do not tell the joints."""
-    if len(shafts) == len(lacking) and np.linalg.cond(ratios / np.linalg.norm(ratios, axis=0)) <= REGULAR:
+    if len(shafts) >= len(lacking) and np.linalg.cond(ratios / np.linalg.norm(ratios, axis=0)) <= REGULAR:
         return
     raise ExperimentError(
         f"{experiment.name}: the positions of {len(shafts)} transmissions ({', '.join(shafts)}) do not tell those of "
-        f"{len(lacking)} joints ({', '.join(lacking)}) of {model.name}; log as many independent shafts as joints, or "
-        f'the joints themselves, such as "{lacking[0]}.position"',
+        f"{len(lacking)} joints ({', '.join(lacking)}) of {model.name}; log at least as many independent "
+        f'shafts as joints, or the joints themselves, such as "{lacking[0]}.position"',
         channel=f"{lacking[0]}.position",
     )
 
