@@ -135,7 +135,7 @@ def _within_reach(model: Model, free: Sequence[str]) -> dict[str, tuple[float, f
     for name in free:
         parameter = model.parameters[name]
         value, spread = parameter.value, parameter.uncertainty or np.inf
-        if parameter.kind != "linear" and value > 0.0 and np.isfinite(spread):
+        if parameter.kind != "linear" and value > 0.0 <= parameter.minimum and np.isfinite(spread):
             factor = float(np.exp(REACH * spread / value))
             found[name] = max(parameter.minimum, value / factor), min(parameter.maximum, value * factor)
     return found

@@ -7,6 +7,8 @@ pendulum imitates a hardening spring.
 
 from __future__ import annotations
 
+import numpy as np
+
 from vpm.discrepancy.confirmation.confirmation import Judged
 from vpm.model import Model, Parameter
 from vpm.numbers import NORMAL_95, short
@@ -17,7 +19,7 @@ FAR = 3.0
 
 
 def moved_far(model: Model, recalibrated: Judged) -> list[str]:
-    """Notes on parameters that a recalibration clearly moved far from their prior in the model file."""
+    """Notes on parameters that a recalibration clearly moved far from their prior, alone or together."""
     notes = []
     for name, std in zip(recalibrated.free, recalibrated.fit.std, strict=True):
         before, after = model.parameters[name], recalibrated.model.parameters[name]
@@ -27,7 +29,32 @@ def moved_far(model: Model, recalibrated: Judged) -> list[str]:
                 f"recalibration moved {name} from {short(before.value)} to {short(after.value)} {before.unit}, "
                 f"{abs(after.value - before.value) / spread:.1f} times its stated uncertainty"
             )
+    together = {name: away for name, away in _least_departures(model, recalibrated).items() if away > FAR}
+    if together:
+        notes.append(
+            f"the records show {', '.join(together)} only together; no values that explain them lie nearer to the "
+            f"model file than {max(together.values()):.1f} times their stated uncertainties: question the file, or "
+            "look for what it lacks there, such as a load"
+        )
     return notes
+
+
+def _least_departures(model: Model, recalibrated: Judged) -> dict[str, float]:
+    """Prior departures, in stated uncertainties, of parameters in unidentifiable combinations.
+
+    Values anywhere along these combinations explain the records as well. Those count whose squared departures have the
+    least sum: of Gaussian priors the most probable.
+    """
+    parts = [dict(zip(one.names, one.weights, strict=True)) for one in recalibrated.fit.unseen]
+    if not parts:
+        return {}
+    names = [name for name in recalibrated.free if any(name in part for part in parts)]
+    spreads = np.array([_stated(model.parameters[name]) for name in names])
+    moved = [recalibrated.model.parameters[name].value - model.parameters[name].value for name in names]
+    along = np.array([[part.get(name, 0.0) for part in parts] for name in names]) / spreads[:, None]
+    away = np.array(moved) / spreads
+    away -= along @ np.linalg.lstsq(along, away, rcond=None)[0]
+    return dict(sorted(zip(names, map(float, np.abs(away)), strict=True), key=lambda item: -item[1]))
 
 
 def driven_away(nominal: Model, recalibrated: Judged, final: Judged, ranked: Model | None = None) -> dict[str, float]:

@@ -74,12 +74,13 @@ def estimate(
     progress: Progress | None = None,
     most_evaluations: int = MOST_EVALUATIONS,
     worth: Worth | None = None,
-    feasible: bool = False,
+    nearest: bool = False,
 ) -> Estimate:
     """Estimate ``free`` parameters of ``model``: the residual of ``data`` becomes least.
 
     A first step solves the problem as if it were linear (which on the inverse-dynamics regressor it mostly is); the
-    trust-region reflective method of SciPy finishes where it is not.
+    trust-region reflective method of SciPy finishes where it is not. Moments of inertia move as those of real bodies
+    do, see `vpm.identify.moments`.
 
     Parameters
     ----------
@@ -99,9 +100,8 @@ def estimate(
         Where to stop in any case.
     worth : Worth, optional
         A fit that has not reached it in time ends with the best values until then.
-    feasible : bool
-        Move free moments of inertia in coordinates of real bodies, see `vpm.identify.moments`, and leave what nothing
-        shows where it was.
+    nearest : bool
+        Leave what nothing shows where it was.
 
     Raises
     ------
@@ -109,10 +109,8 @@ def estimate(
         Ctrl-C before the start was evaluated; later it ends the fit with the best values until then.
     """
     columns = [model.index(name) for name in free]
-    box = low, high = limits(model, free, bounds or {})
-    frame = Coordinates()
-    if feasible:
-        frame, low, high = real_bodies(model, free, low, high)
+    box = limits(model, free, bounds or {})
+    frame, low, high = real_bodies(model, free, *box)
     counter = _Counter(model, data, columns, progress, worth, frame)
     first = start = np.clip(frame.at(model.theta[columns]), low, high)
     interrupted = early = False
@@ -120,8 +118,8 @@ def estimate(
         if columns:
             start = _linear_step(counter, start, low, high)
             if not linear_only:
-                start = _refine(counter, start, low, high, tolerance, most_evaluations, descends=not feasible)
-        start = _nearest(counter, start, first, low, high) if feasible else start
+                start = _refine(counter, start, low, high, tolerance, most_evaluations, descends=not nearest)
+        start = _nearest(counter, start, first, low, high) if nearest else start
         residual, jacobian = counter(start)
         # Derivatives may leave all bounds where the motion itself does not; the best with derivatives stands then.
         if counter.best is not None and not np.all(np.isfinite(residual)):
@@ -357,7 +355,7 @@ def _descended(counter: _Counter, start: Array, low: Array, high: Array, most: i
     first = counter.point(start)
     lengths = column_lengths(first.jacobian)
     stated = (counter.model.parameters[name].uncertainty for name in counter.names)
-    spread = np.array([np.inf if one is None or not one > 0.0 else one for one in stated])
+    spread = counter.frame.spread(np.array([np.inf if one is None or not one > 0.0 else one for one in stated]))
     prior = first.cost / len(first.residual) / (spread * lengths) ** 2
     box = Box(low, high, sizes(start, first.cost, lengths), damping=np.where(np.isfinite(spread), prior / DAMPING, 1.0))
     found = descend(counter.point, first, box, tolerance=FLAT, most_evaluations=most, cost=counter.cost)

@@ -143,9 +143,9 @@ def _plainly(model: Model, data: Problem, names: tuple[str, ...], tolerance: flo
     """Fit by least squares from the model's own values."""
 
     def again(fitted: Model, less: Problem, _: Estimate) -> Estimate:
-        return estimate(fitted, less, names, tolerance=tolerance, feasible=True)
+        return estimate(fitted, less, names, tolerance=tolerance, nearest=True)
 
-    return estimate(model, data, names, tolerance=tolerance, progress=progress, feasible=True), again
+    return estimate(model, data, names, tolerance=tolerance, progress=progress, nearest=True), again
 
 
 def _by_engine(

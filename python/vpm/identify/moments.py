@@ -36,6 +36,14 @@ class Coordinates:
         """Coordinates (p,) for moments of inertia from parameters (p,)."""
         return parameters if self.matrix is None else np.asarray(np.linalg.solve(self.matrix, parameters))
 
+    def spread(self, stated: Array) -> Array:
+        """Standard deviations (p,) of coordinates for moments from those of parameters; infinite where unknown."""
+        if self.matrix is None:
+            return stated
+        shares = np.linalg.inv(self.matrix)
+        parts = np.multiply(shares, stated, out=np.zeros_like(shares), where=shares != 0.0)
+        return np.asarray(np.linalg.norm(parts, axis=1))
+
     def by_coordinates(self, jacobian: Array) -> Array:
         """Derivative (n, p) by the coordinates of moments, from that by the parameters."""
         return jacobian if self.matrix is None or not jacobian.size else np.asarray(jacobian @ self.matrix)

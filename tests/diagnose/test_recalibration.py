@@ -1,0 +1,72 @@
+"""Recalibration of a pendulum that carries more than its file says; torques are those of a closed form."""
+
+import numpy as np
+import pytest
+
+import vpm
+from vpm.simulate import Setup
+
+GRAVITY, RATE, SECONDS = 9.81, 100.0, 5.0
+#: What the file says: mass, place along the link and beside it, thickness and length as moments about the centre.
+MASS, ALONG, BESIDE, THIN, LONG = 5.0, 0.3, 0.01, 0.002, 0.06
+#: Torques are those of the samples, between which they go straight.
+SMOOTH = Setup(hold="first_order")
+FILE = f"""
+name = "pendulum"
+gravity = [0.0, 0.0, -{GRAVITY}]
+[bodies.link]
+mass = {{ value = {MASS}, unit = "kg", uncertainty = 0.5 }}
+center_of_mass = [{{ value = {ALONG}, uncertainty = 0.03 }}, 0.0, {{ value = {BESIDE}, uncertainty = 0.01 }}]
+inertia = [
+    {{ value = {THIN}, uncertainty = 0.001 }}, {{ value = {LONG}, uncertainty = 0.02 }},
+    {{ value = {LONG}, uncertainty = 0.02 }}, 0.0, 0.0, 0.0,
+]
+[joints.pin]
+type = "revolute"
+parent = "world"
+child = "link"
+axis = [0.0, 1.0, 0.0]
+[actuators.motor]
+joint = "pin"
+gain = 1.0
+command_unit = "N m"
+"""
+
+
+def swung(along: float, beside: float, about_pin: float, seed: int) -> vpm.Experiment:
+    """Record of a motion, with the torque ``I a - m g (x cos q + z sin q)`` that a link along x needs about y.
+
+    ``along`` and ``beside`` are the first moments m x and m z, kg m.
+    """
+    rng, time = np.random.default_rng(seed), np.arange(0.0, SECONDS, 1.0 / RATE)
+    phases, pulsations = rng.uniform(0.0, 2.0 * np.pi, 3), 2.0 * np.pi * np.array([0.25, 0.6, 1.1])
+    waves = np.array([0.8, 0.35, 0.12])[:, None] * np.sin(np.outer(pulsations, time) + phases[:, None])
+    q, a = waves.sum(axis=0), -(pulsations**2 @ waves)
+    torque = about_pin * a - GRAVITY * (along * np.cos(q) + beside * np.sin(q))
+    noise = rng.normal(0.0, (1e-5, 0.02), (time.size, 2)).T
+    columns = {"pin.position": q + noise[0], "motor.command": torque + noise[1]}
+    return vpm.Experiment.from_arrays(time, columns, model=vpm.Model.from_toml(FILE))
+
+
+@pytest.mark.parametrize(
+    ("load", "place"),
+    [
+        (0.0, (0.0, 0.0)),
+        (1.0, (0.5, -0.2)),  # the common centre of mass lies on the other side of the link's axis
+        (2.0, (0.8, -0.1)),  # the moment about y exceeds the file's other two, which nothing shows, taken together
+    ],
+)
+def test_bodies_become_what_the_records_show_of_them(load: float, place: tuple[float, float]) -> None:
+    about_pin = LONG + MASS * (ALONG**2 + BESIDE**2) + load * (place[0] ** 2 + place[1] ** 2)
+    moments = MASS * ALONG + load * place[0], MASS * BESIDE + load * place[1]
+    train, test = (swung(*moments, about_pin, seed) for seed in (1, 2))
+    why = vpm.diagnose(
+        vpm.Model.from_toml(FILE), train, test, names="search", effects=["spring"], setup=SMOOTH, check=False
+    )
+    assert why.verdict in {"parameters_only", "no_disagreement"}
+    found = {name: parameter.value for name, parameter in why.model.parameters.items()}
+    mass, x, z = (found[f"link.{name}"] for name in ("mass", "center_of_mass.x", "center_of_mass.z"))
+    assert (mass * x, mass * z) == pytest.approx(moments, abs=0.01)
+    # The load's first moment is 1.6 kg m, and one stated uncertainty of mass or of place makes 0.15 kg m.
+    assert any("link.center_of_mass.x" in note and "stated uncertainties" in note for note in why.notes) == (load > 1.0)
+    assert found["link.inertia.yy"] + mass * (x**2 + z**2) == pytest.approx(about_pin, rel=0.01)
