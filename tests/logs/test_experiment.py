@@ -12,7 +12,16 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from vpm.errors import ExperimentError, ModelError, UnitError
-from vpm.experiment import Experiment, Motion, common_cutoff, motion
+from vpm.experiment import (
+    Experiment,
+    Motion,
+    choose_cutoff,
+    common_cutoff,
+    drawn_noise,
+    instrument_noise,
+    motion,
+    read_noise,
+)
 from vpm.model import ChannelEntry, Model, load_channel_table
 from vpm.numbers import Array
 
@@ -471,11 +480,39 @@ def test_resampling_keeps_motion_and_removes_what_would_fold() -> None:
     down = exp.resample(100.0)
     assert down.rate == pytest.approx(100.0)
     inner = slice(40, -40)
-    np.testing.assert_allclose(down["a.position"][inner], np.sin(2 * np.pi * 3 * down.time)[inner], atol=0.012)
+    np.testing.assert_allclose(down["a.position"][inner], np.sin(2 * np.pi * 3 * down.time)[inner], atol=0.005)
     up = Experiment.from_arrays(time, {"a.position": slow}).resample(3333.0)
     np.testing.assert_allclose(up["a.position"], np.sin(2 * np.pi * 3 * up.time), atol=1e-6)
     assert up.time[-1] <= time[-1] + 1e-9
     assert "Resampled from 1000 Hz to 100 Hz below a filter at 40 Hz" in down.history[-1]
+
+
+@pytest.mark.parametrize(("rate", "share"), [(100.0, 0.08), (400.0, 0.32)])
+def test_noise_is_known_behind_an_anti_aliasing_filter(rate: float, share: float) -> None:
+    """White noise keeps the share of its power that is below the filter, and none above."""
+    time, sigma = np.arange(20_000) / 1000.0, 3e-3
+    noise = sigma * np.random.default_rng(7).standard_normal(time.size)
+    record = Experiment.from_arrays(time, {"a.position": np.sin(time) + noise}).resample(rate)
+    level, edge = sigma * np.sqrt(share), 0.2  # differences hear most of the edge, where the filter falls off
+    assert instrument_noise(record, "a.position") == pytest.approx(level, rel=edge)
+    assert np.std((record["a.position"] - np.sin(record.time))[100:-100]) == pytest.approx(level, rel=0.1)
+    again = drawn_noise(record, "a.position", np.random.default_rng(8))
+    assert np.std(again) == pytest.approx(level, rel=edge)
+    power = np.abs(np.fft.rfft(again * np.hanning(again.size))) ** 2
+    lines = np.fft.rfftfreq(again.size)
+    assert np.mean(power[lines > 0.45]) < 1e-3 * np.mean(power[lines < 0.35])
+    passed = read_noise(record, "a.position", np.array([0.0, 0.2, 0.39, 0.41, 0.5]))
+    assert passed.tolist() == [1.0, 1.0, 1.0, 0.0, 0.0]
+    chosen = choose_cutoff(record["a.position"][:, None], rate, [rate], [record.retained["a.position"]])
+    assert chosen.noise[0] == pytest.approx(level / np.sqrt(0.8), rel=0.1)  # as if it went on to half of the rate
+
+
+def test_what_is_interpolated_to_a_higher_rate_was_read_at_the_lower_one() -> None:
+    time, sigma = np.arange(4000) / 100.0, 3e-3
+    noise = sigma * np.random.default_rng(9).standard_normal(time.size)
+    record = Experiment.from_arrays(time, {"a.position": np.sin(time) + noise}).resample(500.0)
+    assert record.read_rate("a.position") == pytest.approx(100.0)
+    assert instrument_noise(record, "a.position") == pytest.approx(sigma, rel=0.1)
 
 
 def test_loading_can_resample_an_uneven_clock() -> None:

@@ -149,7 +149,8 @@ def _state(run: Run, experiment: Experiment) -> tuple[dict[str, Array], dict[str
     for joint in joints if len(experiment) >= FEWEST_SAMPLES else ():
         channel = f"{joint}.position"
         raw, read = experiment[channel][:, None], [experiment.read_rate(channel)]
-        position = lowpass(raw, experiment.rate, choose_cutoff(raw, experiment.rate, read).cutoff)[:, 0]
+        cutoff = choose_cutoff(raw, experiment.rate, read, [experiment.retained.get(channel, np.inf)]).cutoff
+        position = lowpass(raw, experiment.rate, cutoff)[:, 0]
         velocity = differentiate(position, experiment.dt)
         motion = {"position": position, "velocity": velocity, "acceleration": differentiate(velocity, experiment.dt)}
         for (quantity, values), per in zip(motion.items(), ("", "/s", "/s^2"), strict=True):

@@ -57,7 +57,8 @@ def quickest(record: Experiment, m: Motion, joints: Sequence[str]) -> float:
     found = HIGHEST * record.rate
     for joint in joints:
         channel = f"{joint}.position"
-        noise = choose_cutoff(record[channel][:, None], record.rate, [record.read_rate(channel)]).noise[0]
+        read, retained = [record.read_rate(channel)], [record.retained.get(channel, np.inf)]
+        noise = choose_cutoff(record[channel][:, None], record.rate, read, retained).noise[0]
         speed = np.abs(m.velocity[m.kept, m.joints.index(joint)])
         least = 0.5 * STANDSTILL_SHARE * float(np.quantile(speed, 0.999))
         if noise > 0.0:

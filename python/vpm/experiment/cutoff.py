@@ -48,7 +48,9 @@ class CutoffChoice:
     limited: bool  #: The choice is the lowest or the highest frequency that is offered.
 
 
-def choose_cutoff(position: Array, rate: float, read: Sequence[float] | None = None) -> CutoffChoice:
+def choose_cutoff(
+    position: Array, rate: float, read: Sequence[float] | None = None, retained: Sequence[float] | None = None
+) -> CutoffChoice:
     """Cut-off frequency for deriving velocity and acceleration from measured positions.
 
     Parameters
@@ -59,6 +61,8 @@ def choose_cutoff(position: Array, rate: float, read: Sequence[float] | None = N
         Hz.
     read : sequence of float, optional
         Rate at which each joint's position was read, Hz, where its samples in between are interpolated.
+    retained : sequence of float, optional
+        Frequency above which a filter took noise from each joint's position, Hz.
 
     Returns
     -------
@@ -81,8 +85,9 @@ def choose_cutoff(position: Array, rate: float, read: Sequence[float] | None = N
     offered = np.geomspace(lowest, HIGHEST * rate, 80)
     total = np.zeros(offered.size)
     noise, band = [], []
-    for column, own in zip(position.T, read or [rate] * position.shape[1], strict=True):
-        frequency, spectrum, floor = position_spectrum(column, rate, own)
+    every = (position.T, read or [rate] * position.shape[1], retained or [np.inf] * position.shape[1])
+    for column, own, most in zip(*every, strict=True):
+        frequency, spectrum, floor = position_spectrum(column, rate, own, most)
         moving = spectrum > CLEARLY_ABOVE * floor
         within = moving & (frequency <= HIGHEST * rate)
         error = _expected_error(frequency, np.where(moving, spectrum - floor, 0.0), spectrum, rate, offered)
@@ -93,7 +98,9 @@ def choose_cutoff(position: Array, rate: float, read: Sequence[float] | None = N
     return CutoffChoice(float(offered[pick]), tuple(noise), tuple(band), pick in {0, offered.size - 1})
 
 
-def position_spectrum(position: Array, rate: float, read: float | None = None) -> tuple[Array, Array, Array]:
+def position_spectrum(
+    position: Array, rate: float, read: float | None = None, retained: float = np.inf
+) -> tuple[Array, Array, Array]:
     """Power spectrum of a position for its cut-off, smoothed and one-sided, and the noise floor.
 
     Welch's method on second differences, divided by their gain ``(2 - 2 cos w)^2``: positions fall so steeply with
@@ -106,6 +113,8 @@ def position_spectrum(position: Array, rate: float, read: float | None = None) -
         Hz.
     read : float, optional
         Rate at which the position was read, Hz. What is interpolated says nothing of noise above half of it.
+    retained : float
+        Frequency above which a filter took the noise, Hz.
 
     Returns
     -------
@@ -114,8 +123,8 @@ def position_spectrum(position: Array, rate: float, read: float | None = None) -
     spectrum : ndarray, shape (F,)
         Unit of the position squared per hertz.
     floor : ndarray, shape (F,)
-        What white noise gives whose level is the median over the top fifth of the frequencies that were read, and at
-        least that of the quantisation. Its lowest lines are raised by the window and the smoothing.
+        What white noise gives whose level is the median over the top fifth of the frequencies that were read and not
+        filtered, and at least that of the quantisation. Its lowest lines are raised by the window and the smoothing.
     """
     from scipy.signal import welch
 
@@ -128,7 +137,8 @@ def position_spectrum(position: Array, rate: float, read: float | None = None) -
     seen = np.convolve(np.concatenate([gain[1:2], gain, gain[-2:-1]]), [1.0 / 6.0, 2.0 / 3.0, 1.0 / 6.0], "valid")
     spectrum = _smooth(np.asarray(power[1:], dtype=np.float64)) / gain[1:]
     top = rate if read is None else read
-    top_fifth = (frequency[1:] >= 0.4 * top) & (frequency[1:] <= 0.5 * top)
+    most = min(0.5 * top, retained)
+    top_fifth = (frequency[1:] >= 0.8 * most) & (frequency[1:] <= most)
     kept = 1.0 if top >= rate else interpolation_gain(frequency[1:][top_fifth] / top, smooth=True) ** 2
     level = float(np.median(spectrum[top_fifth] / kept))
     step = quantisation_step(position)

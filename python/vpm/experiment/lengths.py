@@ -91,8 +91,10 @@ def _told(
     at = PchipInterpolator(lengths[order], places[order])(length)
     rest = experiment.select([one for one in experiment.channels if one != channel])
     told = rest.with_channel(position, at, model.channel_unit(position))
-    slower = {position: experiment.slower[channel]} if channel in experiment.slower else {}
-    return replace(told, slower={**told.slower, **slower})
+    slower, retained = (
+        {**one, position: one[channel]} if channel in one else one for one in (experiment.slower, experiment.retained)
+    )
+    return replace(told, slower=slower, retained=retained)
 
 
 @lru_cache(maxsize=64)

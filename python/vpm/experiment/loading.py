@@ -42,6 +42,7 @@ class Parts(NamedTuple):
     history: tuple[str, ...]
     unused_columns: tuple[str, ...]
     slower: Mapping[str, float]
+    retained: Mapping[str, float]
 
 
 def load_parts(
@@ -158,6 +159,7 @@ def _finish(draft: Draft, name: str, irregular: str, resample: float | None) -> 
         record.history,
         record.unused_columns,
         record.slower,
+        record.retained,
     )
 
 

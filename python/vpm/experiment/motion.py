@@ -271,7 +271,8 @@ def _choice(experiment: Experiment, model: Machine) -> CutoffChoice:
     """Cut-off frequency for the motion of a log."""
     channels = _of(tuple(model.joints), "position")
     read = [experiment.read_rate(channel) for channel in channels]
-    return choose_cutoff(_channels(experiment, model, channels), experiment.rate, read)
+    retained = [experiment.retained.get(channel, np.inf) for channel in channels]
+    return choose_cutoff(_channels(experiment, model, channels), experiment.rate, read, retained)
 
 
 def _of(owners: tuple[str, ...], quantity: str) -> tuple[str, ...]:

@@ -23,7 +23,7 @@ from vpm.experiment.grid import (
     is_smooth,
     make_uniform,
 )
-from vpm.experiment.signal import anti_alias, differentiate, interpolate, lowpass
+from vpm.experiment.signal import RETAINED_BAND, anti_alias, differentiate, interpolate, lowpass
 from vpm.files import replacing
 from vpm.numbers import Array, array_of
 from vpm.results import Result
@@ -45,6 +45,7 @@ class _Changes(TypedDict, total=False):
     channels: tuple[str, ...]
     units: tuple[str, ...]
     slower: Mapping[str, float]
+    retained: Mapping[str, float]
 
 
 _Record = TypeVar("_Record", bound="Experiment")
@@ -72,6 +73,8 @@ class Experiment(Result):
     slower : mapping of str to float
         Rate at which a channel was read, Hz, where that is below the rate of the record, whose samples between two
         readings are interpolated.
+    retained : mapping of str to float
+        Frequency above which a filter of this library took a channel away, Hz, and its noise with it.
     """
 
     name: str
@@ -82,6 +85,7 @@ class Experiment(Result):
     history: tuple[str, ...] = ()
     unused_columns: tuple[str, ...] = field(default=())
     slower: Mapping[str, float] = field(default_factory=dict)
+    retained: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Take read-only copies of a record's arrays and check that the parts fit together."""
@@ -351,14 +355,22 @@ class Experiment(Result):
         factor = self.rate / rate
         data = self.data if factor <= 1.0 else anti_alias(self.data, factor)
         time, data, _ = make_uniform(self.time, data, self.channels, rate, Source(self.name))
-        how = f"below a filter at {0.4 * rate:.6g} Hz" if factor > 1.0 else "without a filter"
-        return self._changed(f"Resampled from {self.rate:.6g} Hz to {rate:.6g} Hz {how}.", time=time, data=data)
+        kept = 0.5 * RETAINED_BAND * rate
+        how = f"below a filter at {kept:.6g} Hz" if factor > 1.0 else "without a filter"
+        told = f"Resampled from {self.rate:.6g} Hz to {rate:.6g} Hz {how}."
+        if factor <= 1.0:
+            read = {channel: self.read_rate(channel) for channel in self.channels} if factor < 1.0 else self.slower
+            return self._changed(told, time=time, data=data, slower=read)
+        retained = {channel: min(kept, self.retained.get(channel, kept)) for channel in self.channels}
+        return self._changed(told, time=time, data=data, retained=retained)
 
     def filter(self, channel: str, cutoff: float, order: int = 4) -> Self:
         """Record with one channel behind a zero-phase Butterworth filter (see `vpm.experiment.signal.lowpass`)."""
         values = lowpass(self[channel], self.rate, cutoff, order)
         sentence = f"{channel} was filtered at {cutoff:.6g} Hz (Butterworth of order {order}, forward and backward)."
-        return self._with_column(channel, values, self.unit(channel), sentence)
+        filtered = self._with_column(channel, values, self.unit(channel), sentence)
+        retained = min(cutoff, self.retained.get(channel, cutoff))
+        return replace(filtered, retained={**self.retained, channel: retained})
 
     def differentiate(self, channel: str, name: str | None = None) -> Self:
         """Record with the derivative of a channel as a further one.
@@ -406,7 +418,10 @@ class Experiment(Result):
         verb = "replaced by" if name in self else "added from"
         sentence = f"{name} was {verb} values in {unit}."
         changed = self._with_column(name, parsed.to_si(column), parsed.si, sentence)
-        return replace(changed, slower={other: rate for other, rate in self.slower.items() if other != name})
+        slower, retained = (
+            {other: known for other, known in one.items() if other != name} for one in (self.slower, self.retained)
+        )
+        return replace(changed, slower=slower, retained=retained)
 
     def align(self, delays: Mapping[str, float]) -> Self:
         """Record with some channels moved back by the times by which they lag the others.

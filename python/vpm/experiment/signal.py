@@ -21,6 +21,9 @@ MOTION_FILTER_ORDER = 4
 #: Share of the new Nyquist frequency that the anti-aliasing filter keeps.
 RETAINED_BAND = 0.8
 
+#: Ripple of one pass of the anti-aliasing filter, dB.
+RIPPLE = 0.05
+
 #: Share of the motion filter's cut-off frequency below which it changes an amplitude by less than 0.1 %.
 UNDISTORTED_BAND = 0.4
 
@@ -170,8 +173,12 @@ def parallel_filter(values: Array, decimation: int) -> Array:
 
 
 def anti_alias(values: Array, factor: float) -> Array:
-    """Anti-aliased signal: zero-phase Chebyshev (order 8, 0.05 dB), 80 % of Nyquist after `factor`."""
-    return _anti_aliased(values, factor, 1)
+    """Anti-aliased signal: zero-phase Chebyshev (order 8, 0.05 dB), 80 % of Nyquist after `factor`.
+
+    An even order takes its ripple from a constant in each pass. It is given back, for friction and gravity are no
+    smaller in a record of another rate.
+    """
+    return np.asarray(_anti_aliased(values, factor, 1) * 10.0 ** (2.0 * RIPPLE / 20.0))
 
 
 def _anti_aliased(values: Array, factor: float, every: int) -> Array:
@@ -183,7 +190,7 @@ def _anti_alias_sections(factor: float) -> Array:
     """Sections of the signal's anti-alias filter, designed once for each factor."""
     from scipy.signal import cheby1
 
-    return np.asarray(cheby1(8, 0.05, RETAINED_BAND / factor, output="sos"), dtype=np.float64)
+    return np.asarray(cheby1(8, RIPPLE, RETAINED_BAND / factor, output="sos"), dtype=np.float64)
 
 
 def interpolation_gain(share: Array, *, smooth: bool) -> Array:

@@ -81,7 +81,8 @@ def _accelerations(model: Model, record: Experiment) -> Iterator[Related]:
         position, acceleration = f"{joint}.position", f"{joint}.acceleration"
         if position not in record or acceleration not in record:
             continue
-        cutoff = choose_cutoff(record[position][:, None], record.rate, [record.read_rate(position)]).cutoff
+        read, retained = [record.read_rate(position)], [record.retained.get(position, np.inf)]
+        cutoff = choose_cutoff(record[position][:, None], record.rate, read, retained).cutoff
         inside = slice((edge := settling_samples(record.rate, cutoff)), len(record) - edge)
         if len(record) <= 4 * edge:
             continue
