@@ -94,7 +94,7 @@ def test_noise_is_told_where_a_tracker_follows_what_is_slow_of_it(band: float) -
     tracked = TrackedRecords(true, [record], Settings())
     residual, _ = tracked.follow(true, true.theta, Tracker(band))
     left = np.std(np.concatenate([residual[part, 0] for part in tracked.parts]))
-    (told,) = tracked.structured(residual, band, tracked.parts)
+    (told,) = tracked.structured(residual, band, tracked.parts, true)
     assert told.noise == pytest.approx(left, rel=0.15)
 
 

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.linalg import expm
 
 import vpm
 from vpm.experiment import Experiment
@@ -97,3 +98,40 @@ def test_nothing_is_named_from_speeds_of_a_bench_that_misses_nothing() -> None:
     why = vpm.diagnose(Model.from_toml(BENCH), bench(3, 0.0), bench(4, 0.0), workers=1)
     assert why.verdict == "parameters_only"
     assert not why.effects
+
+
+FAST = 1000.0  # Hz; a scope that reads torques and speeds
+#: Noise of a reading by the scope, N m and rad/s.
+SHAKEN = {"drive.command": 0.2, "motor.velocity": 0.02, "shaft.velocity": 0.02}
+LIGHT = 0.01  # N m s/rad: a shaft that rings for seconds
+
+
+def scoped(seed: int, seconds: float = 16.0) -> Experiment:
+    """Record of a scope whose bench rings as it begins, of which every tenth sample is kept behind a filter."""
+    random, step = np.random.default_rng(seed), 1.0 / FAST
+    time = np.arange(0.0, seconds, step)
+    tones = [(4.0, 0.4), (2.0, 1.3), (1.0, 3.1)]
+    turns = [2.0 * np.pi * f * time + random.uniform(0.0, 2.0 * np.pi) for _, f in tones]
+    torque = np.array([a for a, _ in tones]) @ np.sin(turns)
+    pull = np.array([SHAFT, LIGHT, -LIGHT])  # x: twist of the shaft, both speeds
+    system = np.zeros((4, 4))
+    system[:3] = [[0.0, 1.0, -1.0, 0.0], [*-pull / MOTOR, 1.0 / MOTOR], [*pull / WHEEL, 0.0]]
+    # Exact while a torque holds (C. Van Loan, IEEE Trans. Automatic Control 23, 1978).
+    moved = np.asarray(expm(system * step))
+    states = [np.array([random.uniform(-0.05, 0.05), FIRST, FIRST])]
+    for u in torque[:-1]:
+        states.append(moved[:3, :3] @ states[-1] + moved[:3, 3] * u)
+    motor, wheel = np.array(states)[:, 1:].T
+    values = {"drive.command": torque, "motor.velocity": motor, "shaft.velocity": wheel - motor}
+    values = {name: one + SHAKEN[name] * random.standard_normal(one.size) for name, one in values.items()}
+    return Experiment.from_arrays(time, values, model=Model.from_toml(BENCH), name=f"scope {seed}").resample(0.1 * FAST)
+
+
+@pytest.mark.parametrize("seed", [5, 6])
+def test_nothing_is_missing_of_a_record_behind_an_anti_aliasing_filter(seed: int) -> None:
+    """The filter leaves no noise above its edge; noise of the torque rings in the shaft, as its first twist does."""
+    why = vpm.diagnose(Model.from_toml(BENCH), scoped(seed), workers=1)
+    assert why.verdict == "parameters_only", why.summary
+    assert why.model.parameters["shaft.spring.stiffness"].value == pytest.approx(SHAFT, rel=0.01)
+    for gap in why.gap.values():  # what rings in a narrow band is some tenth more in one record than in another
+        assert gap.after == pytest.approx(gap.noise_floor, rel=0.3)

@@ -60,6 +60,10 @@ class Judgement(Storable):
         """Whether a judgement counts: more than chance, and more than errors of laws."""
         return not self.lacks(settings)
 
+    def is_repeated(self, settings: Settings) -> bool:
+        """Whether a judgement is more than chance: enough goes, from piece after piece."""
+        return self.least > settings.worth and self.score > settings.score
+
     def is_faint(self, settings: Settings, parts: int) -> bool:
         """Whether a judgement fails only by its score, and would count with more parts of the record."""
         enough = replace(self, score=math.sqrt(parts) * self.score)

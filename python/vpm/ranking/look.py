@@ -33,7 +33,7 @@ class Look:
         Channels in their root mean squares; derivatives are taken as known for effects that do nothing at first.
     explained : ndarray, shape (m,)
         Error power of each channel that all effects of the model remove that are not exact, as a multiple of what is
-        left. Here and below error power is what stands out of white noise: what a sensor adds no model can remove.
+        left. Here and below error power is what stands out of noise: what a sensor adds no model can remove.
     added : ndarray, shape (m,)
         The same of those that were added.
     """
@@ -47,7 +47,8 @@ class Look:
         cost = fitter.cost(fitted.structure, fitted.residual, noise)
         self.fitted = replace(fitted, cost=cost)
         self.left = self._squares(fitted.residual)
-        told = tracked.structured(fitted.residual, fitted.tracker.band, tracked.parts)
+        own = fitted.structure
+        told = tracked.structured(fitted.residual, fitted.tracker.band, tracked.parts, own.model, own.theta)
         self._quiet = np.minimum([one.noise for one in told] / np.array(noise.deviations), 1.0) ** 2
         power, chance = self._above_noise(self.left)
         self._clear = power > SURE * chance

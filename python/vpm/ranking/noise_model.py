@@ -85,7 +85,12 @@ class Structured:
     noise: float  #: Root mean square of the noise.
 
     @classmethod
-    def of(cls, pieces: Sequence[Array], passed: Sequence[Array] | None = None) -> Structured:
+    def of(
+        cls,
+        pieces: Sequence[Array],
+        passed: Sequence[Array] | None = None,
+        drawn: Sequence[Sequence[Array]] = (),
+    ) -> Structured:
         """Spectrum of a signal in pieces (n,) above white noise.
 
         Parameters
@@ -93,6 +98,8 @@ class Structured:
         pieces : sequence of ndarray
         passed : sequence of ndarray, optional
             Share of the power of white noise that is in each line of each piece, where not all of it is.
+        drawn : sequence of sequence of ndarray
+            Draws of other noise, in pieces each, which is not white.
         """
         places = np.concatenate([frequencies(len(piece)) for piece in pieces])
         powers = np.concatenate([dct(piece, norm="ortho") ** 2 for piece in pieces])
@@ -102,8 +109,13 @@ class Structured:
         counts = np.array([len(band) for band in bands])
         most = np.array([np.sum(band) for band in bands]) / chdtri(counts, ndtr(SURE))
         level = max(float(np.min(most / white)), 1e-300)
-        most = np.maximum(most, level * white)
-        return cls(edges, 1.0 - level * white / most, float(np.sqrt(level * np.mean(shares))))
+        other = np.zeros(len(powers))
+        for several in drawn:
+            other += np.concatenate([dct(piece, norm="ortho") ** 2 for piece in several]) / len(drawn)
+        noise = level * white + np.array([np.mean(band) for band in _banded(places, other)[1]])
+        return cls(
+            edges, 1.0 - noise / np.maximum(most, noise), float(np.sqrt(level * np.mean(shares) + np.mean(other)))
+        )
 
     def part_of(self, piece: Array) -> Array:
         """Part of a signal's piece (n,) above white noise."""

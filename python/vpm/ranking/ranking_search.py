@@ -131,7 +131,7 @@ class Search:
 
         Commands that are held for a sample come half a sample late. A spring takes nearly all of that back, with three
         numbers more. It may leave less because it answers to noise otherwise, so samples have to be more probable by
-        it.
+        it. How a command was recorded is no law of the machine, so that its effect may be slight.
         """
         if self.fitter.tracked.setup.hold != AUTOMATIC:
             return []
@@ -141,7 +141,7 @@ class Search:
             smooth, view = Fitter(self.fitter.tracked.with_hold(course), settings), View(now.view.noise)
             with contextlib.suppress(*ASTRAY):
                 fitted = smooth.finished(smooth.fitted(now.fitted.structure, now.fitted.tracker, view), view)
-                if (judgement := now.judged(fitted)).counts(settings):
+                if (judgement := now.judged(fitted)).is_repeated(settings):
                     ways.append((judgement, smooth, fitted))
             if not ways:
                 return []  # if straight lines are no better, no curve is

@@ -36,6 +36,8 @@ PER_OCTAVE, LINES = 3, 12
 #: The level of a band may be higher than its lines say, as sure as a normal variable is below so many deviations: by
 #: chance it is higher still once in 700 bands.
 SURE = 3.0
+#: Draws of the noise of commands, with a seed as any other: with them each line of a spectrum is known to a half.
+DRAWS, SEED = 4, 20160331
 
 # ---- where fits begin and how they go on -------------------------------------------------------------------------
 

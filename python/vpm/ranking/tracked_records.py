@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import VpmError
-from vpm.experiment import Experiment, read_noise
+from vpm.experiment import Experiment, drawn_noise, read_noise
 from vpm.initial import initial_state, joints_by_velocity
 from vpm.model import Model
 from vpm.numbers import Array
@@ -25,15 +25,17 @@ from vpm.ranking.noise_model import NoiseModel, Parts, Structured, frequencies
 from vpm.ranking.settings import (
     CONTROLLED,
     DAMPING,
+    DRAWS,
     LONGEST,
     LONGEST_OF_FOURTH_ORDER,
     PARTS,
+    SEED,
     STEPS,
     STRETCHES,
     Settings,
 )
 from vpm.simulate import Setup
-from vpm.simulate.setup import AUTOMATIC
+from vpm.simulate.setup import AUTOMATIC, HOLDS
 
 #: Places of parameters by which there are derivatives, and by how much these may be moved; exact ones if not given.
 By: TypeAlias = tuple[Sequence[int], Array | None]
@@ -151,12 +153,49 @@ class TrackedRecords:
                     left[end - len(reading) : end, column] = lfilter(zeros, poles, reading)
         return left
 
-    def structured(self, residual: Array, band: float, parts: Parts) -> list[Structured]:
-        """Part of a tracked residual (N, m) above the noise of each channel."""
+    def structured(
+        self, residual: Array, band: float, parts: Parts, model: Model, theta: Array | None = None
+    ) -> list[Structured]:
+        """Part of a tracked residual (N, m) above the noise of each channel.
+
+        A ``model`` near the machine says what noise of commands does to it, with its own parameters or ``theta``.
+        """
+        moved = self._moved_by_commands(model, model.theta if theta is None else theta, band)
         return [
-            Structured.of([values[part] for part in parts], self._passed(band, parts, channel))
-            for values, channel in zip(residual.T, self.records[0].channels, strict=True)
+            Structured.of(
+                [values[part] for part in parts],
+                self._passed(band, parts, channel),
+                [[one[part, place] for part in parts] for one in moved],
+            )
+            for place, (values, channel) in enumerate(zip(residual.T, self.records[0].channels, strict=True))
         ]
+
+    def _moved_by_commands(self, model: Model, theta: Array, band: float) -> list[Array]:
+        """Changes of a tracked residual (N, m) by noise of commands, drawn several times.
+
+        A command that is held from sample to sample is what a controller sent, and exact. One that runs on in between
+        was read like any output: what its noise does to the machine, such as the ringing of a shaft, is not missing.
+        """
+        if self.setup.course == HOLDS[0]:
+            return []
+        random, tracker = np.random.default_rng(SEED), Tracker(band).coarse
+        with contextlib.suppress(VpmError, ArithmeticError):
+            quiet, _ = self.follow(model, theta, tracker)
+            return [self._with_noise_of_commands(random).follow(model, theta, tracker)[0] - quiet for _ in range(DRAWS)]
+        return []
+
+    def _with_noise_of_commands(self, random: np.random.Generator) -> TrackedRecords:
+        """Tracked records whose commands have noise as in their logs once more."""
+        other = copy.copy(self)
+        noisy = []
+        for record, log in zip(self.records, self.experiments, strict=True):
+            inputs = record.inputs.copy()
+            for column, channel in enumerate(self.model.input_channels):
+                if channel in log:
+                    inputs[:, column] += drawn_noise(log, channel, random)
+            noisy.append(replace(record, inputs=inputs))
+        other.records = tuple(noisy)
+        return other
 
     def _passed(self, band: float, parts: Parts, channel: str) -> list[Array]:
         """Share of white sensor noise that a tracker passes to the residual, by frequency.

@@ -28,15 +28,15 @@ def gaps(held_out: TrackedRecords, stages: tuple[Model, Model, Model], band: flo
     if not held_out.records:
         return {}
     parts = [slice(part.start, held.stop) for part, held in zip(held_out.parts, held_out.held_back, strict=True)]
-    before, recalibrated, after = (_left(held_out, model, model.theta, band) for model in stages)
+    before, recalibrated, after = (_left(held_out, model, model.theta, band, parts) for model in stages)
     found = stages[-1]
-    bare = _left(held_out, found, without_sizes(found, found.theta, approximate(found)), band)
+    bare = _left(held_out, found, without_sizes(found, found.theta, approximate(found)), band, parts)
     signals = (before, recalibrated, after, held_out.motion, bare)
     levels = np.array([np.sqrt(np.mean(np.concatenate([one[part] for part in parts]) ** 2, axis=0)) for one in signals])
     unknown = np.full(after.shape[1], np.nan)
     shares, noise = unknown, unknown
     if np.all(np.isfinite(recalibrated)):
-        filters = held_out.structured(recalibrated, band, parts)
+        filters = held_out.structured(recalibrated, band, parts, stages[1])
         shares, noise = _shares((recalibrated, held_out.drawn(band)), after, parts, filters)
     names = held_out.records[0].channels
     units = map(stages[0].channel_unit, names)
@@ -55,13 +55,32 @@ def gaps(held_out: TrackedRecords, stages: tuple[Model, Model, Model], band: flo
     }
 
 
-def _left(tracked: TrackedRecords, model: Model, theta: Array, band: float) -> Array:
+def _left(tracked: TrackedRecords, model: Model, theta: Array, band: float, parts: Parts) -> Array:
     """Residual of validation records by channel (N, m); NaN where the model diverges."""
     try:
-        residual, _ = tracked.follow(model, theta, Tracker(band))
+        return _from_likely_start(tracked, model, theta, Tracker(band), parts)
     except ASTRAY:
         return np.full_like(tracked.motion, np.nan)
-    return residual
+
+
+def _from_likely_start(tracked: TrackedRecords, model: Model, theta: Array, tracker: Tracker, parts: Parts) -> Array:
+    """Residual of validation records (N, m) from their most likely unmeasured first states, as fits have them.
+
+    Where a machine began unseen is no error of its model: a shaft may ring long after its record has begun.
+    """
+    firsts = tracked.firsts
+    own, sizes = len(theta), np.tile(firsts.sizes, firsts.records)
+    start, unseen = np.append(theta, np.zeros(len(sizes))), list(range(own, own + len(sizes)))
+    residual, slopes = tracked.follow(model, start, tracker, unseen)
+    if not unseen:
+        return residual
+    rows = np.concatenate([np.arange(part.start, part.stop) for part in parts])
+    weights = 1.0 / np.maximum(np.sqrt(np.mean(residual[rows] ** 2, axis=0)), 1e-300)
+    columns = (slopes[rows] * weights[:, None]).reshape(-1, len(sizes)) * sizes
+    normal = columns.T @ columns + np.eye(len(sizes))
+    move = -np.linalg.solve(normal, columns.T @ (residual[rows] * weights).ravel()) * sizes
+    moved, _ = tracked.follow(model, np.append(theta, move), tracker)
+    return min(residual, moved, key=lambda one: float(np.sum((one[rows] * weights) ** 2)))
 
 
 def _shares(
