@@ -105,10 +105,10 @@ class Structured:
         powers = np.concatenate([dct(piece, norm="ortho") ** 2 for piece in pieces])
         shares = np.ones(len(powers)) if passed is None else np.concatenate(list(passed))
         edges, bands = _banded(places, powers)
-        white = np.maximum([np.mean(band) for band in _banded(places, shares)[1]], 1e-300)
-        counts = np.array([len(band) for band in bands])
-        most = np.array([np.sum(band) for band in bands]) / chdtri(counts, ndtr(SURE))
-        level = max(float(np.min(most / white)), 1e-300)
+        passes = _banded(places, shares)[1]
+        white = np.maximum([np.mean(band) for band in passes], 1e-300)
+        most = np.array([np.sum(band) for band in bands]) / chdtri([len(band) for band in bands], ndtr(SURE))
+        level = _white_level(bands, passes)
         other = np.zeros(len(powers))
         for several in drawn:
             other += np.concatenate([dct(piece, norm="ortho") ** 2 for piece in several]) / len(drawn)
@@ -121,6 +121,21 @@ class Structured:
         """Part of a signal's piece (n,) above white noise."""
         kept = self.kept[np.searchsorted(self.edges, frequencies(len(piece)), side="right")]
         return np.asarray(idct(dct(piece, norm="ortho") * kept, norm="ortho"))
+
+
+def _white_level(bands: Sequence[Array], passed: Sequence[Array]) -> float:
+    """Highest level of white noise in a spectrum, of the quietest bands that lie beside each other.
+
+    What stands out of noise only adds to a band, so that each bounds the level, and several together bound it closer:
+    chance makes less of many lines. Lines through which little passes count as few.
+    """
+    sums = [np.cumsum([0.0, *map(np.sum, several)]) for several in (bands, passed, [one**2 for one in passed])]
+    first, last = np.triu_indices(len(bands) + 1, 1)
+    power, share, square = (one[last] - one[first] for one in sums)
+    counts = share**2 / np.maximum(square, 1e-300)
+    known = counts > LINES / 2
+    bounds = power[known] * counts[known] / chdtri(counts[known], ndtr(SURE)) / share[known]
+    return max(float(np.min(bounds, initial=np.inf)), 1e-300)
 
 
 def frequencies(count: int) -> Array:
