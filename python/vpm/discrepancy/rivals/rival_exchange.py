@@ -19,16 +19,21 @@ from vpm.discrepancy.rivals.ambiguity import Rivals, as_good
 from vpm.discrepancy.rivals.nested_model import contains
 from vpm.discrepancy.screening.probe import probe
 from vpm.discrepancy.search.backward_elimination import Stage
-from vpm.discrepancy.search.candidate_choice import Accepted, alike, choose, schwarz
+from vpm.discrepancy.search.candidate_choice import REFINED, Accepted, alike, choose, schwarz
 from vpm.discrepancy.search.search import Search
 from vpm.identify import Gain, gain, segments
+
+#: Why a rival takes the place of an effect, where validation data prefer it, and where they do not tell.
+BETTER = "in its place predicts the validation data better"
+SHOWN = "in its place leaves less than half of the training data, and validation data do not discriminate the two"
 
 
 def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search, tuple[Rivals, ...]]:
     """Exchange one effect for the rival that the validation data prefer most, if there is one.
 
     A rival counts that acts at the same site and is confused with the effect. A rival changes a name and adds none, so
-    it need not halve the residual. It only has to predict the validation data better than the effect.
+    it need not halve the residual. It only has to predict the validation data better than the effect. Where these do
+    not tell, as at one speed, training records do: there it has to leave less than half.
 
     Returns
     -------
@@ -49,13 +54,13 @@ def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search
         without = known[place].without
         whole = trial if without is None else finished(without, data, trial)
         if _preferred(found.final, found.accepted[place], whole, data, thresholds) > 0.0:
-            reason = "in its place predicts the validation data better"
-            return exchanged(found, known, data, place, whole, reason)
+            better = gain(found.final.validation, whole.judged.validation, segments(data.validation)).relative > 0.0
+            return exchanged(found, known, data, place, whole, BETTER if better else SHOWN)
     return found, tuple(known)
 
 
 def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresholds: Thresholds) -> float:
-    """Standard deviations by which validation data prefer a rival for an exchange; 0 if not in every view."""
+    """Standard deviations by which data prefer a rival for an exchange; 0 if not in every view."""
     if trial.probe.candidate.effect.late and entry.effect.late:
         return 0.0  # their runs along the reference said which, and the residual knows less of it
     if not alike(trial.probe.candidate, entry.trial.probe.candidate) or refuse_trial(trial, thresholds):
@@ -66,17 +71,19 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
         final.validation, judged.validation * shrinkage(data.validation, final, judged), segments(data.validation)
     )
     more = len(trial.parameters) - len(entry.trial.parameters)
-    if not earned(fitted, more) or validation.score < thresholds.score(validation.pieces):
+    shown = fitted.score >= thresholds.score(fitted.pieces)
+    open_there = as_good(final, trial, data) and validation.harm < NORMAL_95_ONE_SIDED
+    trained = shown and open_there and fitted.relative > 1.0 - REFINED
+    if not earned(fitted, more) or not (trained or validation.score >= thresholds.score(validation.pieces)):
         return 0.0
     nested = contains(judged, trial.parameters, final, entry.trial.parameters)
-    shown = nested and fitted.score >= thresholds.score(fitted.pieces)
-    if validation.harm > (0.0 if shown else -NORMAL_95_ONE_SIDED):
+    if not trained and validation.harm > (0.0 if nested and shown else -NORMAL_95_ONE_SIDED):
         return 0.0
     if data.simulation is not None and final.simulated is not None and judged.simulated is not None:
         simulated = gain(final.simulated, judged.simulated, segments(data.simulation))
         if simulated.harm > NORMAL_95_ONE_SIDED and simulated.relative < -LEAST_GAIN:
             return 0.0
-    return validation.score
+    return fitted.score if trained else validation.score
 
 
 def timed_again(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search, tuple[Rivals, ...]]:
