@@ -6,12 +6,13 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
-from typing import Any, TypedDict, get_args
+from typing import Any, TypeAlias, TypedDict, get_args
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis, Empirical
 from vpm.discrepancy.diagnosis_fields import accepted_effect, classes, examined, gaps_of, of_search, step
 from vpm.discrepancy.evidence import gather
+from vpm.discrepancy.noise.sensor_drift import Drift, sensor_drifts, without_drifts
 from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
 from vpm.discrepancy.plot_samples import pictures, traces, where
 from vpm.discrepancy.preparation import Records, data_of, nominal_of, recalibrated_of, records_of
@@ -20,7 +21,7 @@ from vpm.discrepancy.ranked_effects import tracker_gaps
 from vpm.discrepancy.recorded_calls import recorded
 from vpm.discrepancy.remainder.empirical_formula import beside
 from vpm.discrepancy.remainder.remainder import Remainder, remainder
-from vpm.discrepancy.remainder.residual_by_joint import only_where_closed
+from vpm.discrepancy.remainder.residual_by_joint import FLOOR_FACTOR, only_where_closed
 from vpm.discrepancy.rivals.ambiguity import Rivals, listed
 from vpm.discrepancy.rivals.discriminating_experiment import experiments as experiments_for
 from vpm.discrepancy.screening.candidates import asked_for
@@ -57,6 +58,8 @@ STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, w
 UNFILTERED = "the cut-off frequency is not used, for an observer filters nothing"
 #: Said where something stays unexplained, of readings whose errors no candidate describes.
 NO_SENSOR = "no offset, gain or delay of {channels} was tried: describe a sensor of them in the model file to try these"
+#: Diagnoses once more without drifts of sensors.
+Again: TypeAlias = Callable[[Sequence[Drift]], Diagnosis]
 #: What is odd in a channel and may pass for an effect.
 NOTED = ("delay", "frozen", "clipped", "spikes")
 
@@ -238,17 +241,29 @@ def _diagnosis(
     names: Names,
     each: ParallelCandidates,
     tell: Tell | None,
+    drifted: Sequence[str] = (),
 ) -> Diagnosis:
-    """Diagnosis on checked records: it names effects, judges them, and describes the rest."""
+    """Diagnosis on checked records: it names effects, judges them, and describes the rest.
+
+    With sentences on drifts of sensors that were taken out of the records.
+    """
     began = time.perf_counter()
     say = tell or (lambda _: None)
     training, validation, notes = records
     # A record cut off in the middle of a motion does not say what its controller remembers.
     mode = "restarts" if notes else judging_mode(model, validation)
-    by = (names, effects, limit)
+    by, given = (names, effects, limit), tuple(notes)
+    notes.extend(drifted)
     ranking = ranking_of(model, (training, validation), by, setup, say, each, notes)
+
+    def again(drifts: Sequence[Drift]) -> Diagnosis:
+        fitted, kept = (without_drifts(several, drifts) for several in (training, validation))
+        told = [drift.sentence for drift in drifts]
+        return _diagnosis(model, (fitted, kept, [*given]), effects, cutoff, setup, limit, names, each, tell, told)
+
+    once_more = None if drifted else again
     try:
-        return _measured(model, records, ranking, by, (mode, cutoff, setup), each, say, began)
+        return _measured(model, records, ranking, by, (mode, cutoff, setup), each, say, began, once_more)
     except KeyboardInterrupt:
         known = ranking or Ranking((), (), model, model)
         told = ranked_notes(known, (), known.interrupted) if ranking is not None else []
@@ -266,6 +281,7 @@ def _measured(
     each: ParallelCandidates,
     say: Tell,
     began: float,
+    again: Again | None,
 ) -> Diagnosis:
     """Diagnosis from a ranking, or by a search where there is none, measured on validation records."""
     training, validation, notes = records
@@ -285,7 +301,7 @@ def _measured(
     say("recalibrating the nominal parameters")
     recalibrated = recalibrated_of(model, data, notes, each)
     found, ambiguous, late = named(ranking, recalibrated, data, by, say, each, notes)
-    known = _Known(model, records, data, nominal, recalibrated, ranking, ambiguous, late, began)
+    known = _Known(model, records, data, nominal, recalibrated, ranking, ambiguous, late, began, again)
     plain = partial(of_search, model, records, recalibrated, found, data.training)
     try:
         return _told(known, found, mode, setup, each, say)
@@ -314,6 +330,7 @@ class _Known:
     ambiguous: tuple[Rivals, ...]
     late: bool  #: Whether Ctrl-C left open what else would do.
     began: float  #: When it began, by the clock of this process, s.
+    again: Again | None  #: Diagnoses records without drifts of sensors; None where it did.
 
 
 @dataclass(frozen=True)
@@ -339,6 +356,11 @@ def _told(known: _Known, found: Search, mode: str, setup: Setup, each: ParallelC
     rest, stopped = until_stopped(lambda: _rest(known.recalibrated, found, data, gap, each, say), None)
     beyond = tracker_gaps(known.ranking, data.training.joints) if known.ranking is not None else {}
     said = verdict(data, known.nominal, known.recalibrated, found, gap | beyond, left, rest)
+    if said[0] == "unexplained" and not found.accepted and known.again is not None:
+        pairs = ((data.training, found.final.fit.residual), (data.validation, found.final.validation))
+        if drifts := sensor_drifts(found.final.model, pairs, gap, FLOOR_FACTOR):
+            say("diagnosing again without the drift of sensors")
+            return replace(known.again(drifts), seconds=time.perf_counter() - known.began)
     concluded = _concluded(known, found, said, gap, floor, rest)
     if stopped or known.late:
         notes.append(STOPPED_LATE)

@@ -1,6 +1,8 @@
-"""A boom on a geared motor that carries a mass at its tip; records are of cubic finite elements and not of the core."""
+"""A boom on a geared motor, with a mass at its tip or a drifting bridge; records are of cubic finite elements."""
 
 from __future__ import annotations
+
+import re
 
 import numpy as np
 import pytest
@@ -60,7 +62,7 @@ def shapes(s: float, size: float) -> tuple[np.ndarray, np.ndarray]:
     return np.array(deflection), np.array(curvature) / size**2
 
 
-def swung(seed: int) -> Experiment:
+def swung(seed: int, tip: float = TIP, push: float = 1.0, drift: tuple[float, float] = (0.0, 0.0)) -> Experiment:
     """Record of small motion, linear and exact between samples: angle and slowest modes of the clamped boom."""
     size, count = LENGTH / ELEMENTS, 2 * (ELEMENTS + 1)
     mass, stiffness = np.zeros((2, count, count))
@@ -71,7 +73,7 @@ def swung(seed: int) -> Experiment:
         deflection, curvature = shapes(0.5 * (point + 1.0), size)
         mass[here, here] += 0.5 * size * weight * DENSITY * WIDTH * HEIGHT * np.outer(deflection, deflection)
         stiffness[here, here] += 0.5 * size * weight * YOUNG * WIDTH * HEIGHT**3 / 12.0 * np.outer(curvature, curvature)
-    mass[-2, -2] += TIP
+    mass[-2, -2] += tip
     rigid = np.array([value for node in range(ELEMENTS + 1) for value in (node * size, 1.0)])
     squares, modes = eigh(stiffness[2:, 2:], mass[2:, 2:])
     squares, modes = squares[:MODES], np.vstack([np.zeros((2, MODES)), modes[:, :MODES]])
@@ -85,7 +87,7 @@ def swung(seed: int) -> Experiment:
     system[MODES + 1 : -1] = np.linalg.solve(inertia, force)
     rng, time, step = np.random.default_rng(seed), STEP * np.arange(COUNT), expm(STEP * system)
     tones = [(3.0, 0.3), (2.0, 0.8), (1.2, 1.9)]
-    voltage = sum(a * np.sin(2.0 * np.pi * f * time + rng.uniform(0.0, 2.0 * np.pi)) for a, f in tones)
+    voltage = push * sum(a * np.sin(2.0 * np.pi * f * time + rng.uniform(0.0, 2.0 * np.pi)) for a, f in tones)
     states = np.zeros((COUNT, 2 * MODES + 3))
     for k in range(COUNT - 1):
         states[k, -1] = voltage[k]
@@ -94,7 +96,9 @@ def swung(seed: int) -> Experiment:
     values = {
         "motor.command": voltage,
         "shoulder.position": states[:, 0] + 5e-5 * rng.standard_normal(COUNT),
-        "root.strain": 0.5 * HEIGHT * states[:, 1 : MODES + 1] @ bent + 3e-7 * rng.standard_normal(COUNT),
+        "root.strain": 0.5 * HEIGHT * states[:, 1 : MODES + 1] @ bent
+        + 3e-7 * rng.standard_normal(COUNT)
+        + np.linspace(*drift, COUNT),
     }
     return Experiment.from_arrays(time, values, model=Model.from_toml(FILE), name=f"boom {seed}")
 
@@ -111,3 +115,17 @@ def test_a_tip_mass_is_named_whatever_the_constant_of_the_motor() -> None:
     assert moment == pytest.approx(TIP * LENGTH**2, rel=0.1)
     assert found["boom.payload.x"] == 0.0  # upright, as the axis is
     assert why.gap["root.strain"].after < 0.1 * why.gap["root.strain"].recalibrated
+
+
+def test_a_drifting_bridge_is_no_missing_physics() -> None:
+    """Its zero moves by a tenth of the strains: no force of the boom does that, and a sensor is named."""
+    ends = {"boom 3": (2e-6, 6e-6), "boom 4": (7e-6, 4e-6)}
+    train, test = (swung(seed, 0.0, 0.2, ends[f"boom {seed}"]) for seed in (3, 4))
+    model = Model.from_toml(FILE)
+    why = vpm.diagnose(model, train, test, effects=["payload"], names="search", check=False, workers=1)
+    assert why.verdict == "parameters_only", why.summary
+    told = [re.search(r"offset of root.strain drifts from (\S+) to (\S+) 1 in (boom \d)", note) for note in why.notes]
+    found = {one[3]: (float(one[1]), float(one[2])) for one in told if one is not None}
+    assert found.keys() == ends.keys()
+    for name, pair in found.items():
+        assert pair == pytest.approx(ends[name], abs=3e-7)
