@@ -98,6 +98,9 @@ def test_nothing_is_named_from_speeds_of_a_bench_that_misses_nothing() -> None:
     why = vpm.diagnose(Model.from_toml(BENCH), bench(3, 0.0), bench(4, 0.0), workers=1)
     assert why.verdict == "parameters_only"
     assert not why.effects
+    # The hub weighs nothing about its axis, so that nothing could move behind a gap: the answer says what to describe.
+    reasons = {(one.name, one.site): one.reason for one in why.refused}
+    assert "give its body a rotational inertia" in reasons["backlash", "motor"]
 
 
 FAST = 1000.0  # Hz; a scope that reads torques and speeds

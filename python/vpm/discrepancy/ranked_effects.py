@@ -166,7 +166,7 @@ def staged(
             accepted.append(Accepted(trial, one.rivals, one.evidence, one.probability, one.side, one.class_probability))
             stages.append(Stage("added", *one.key, trial.judged))
         if ranking.rounds:
-            outside |= _unpromising(ranking, offered(stages[-1].judged))
+            outside |= _unpromising(ranking, stages[-1].judged.model, offered(stages[-1].judged))
     except KeyboardInterrupt:
         if not accepted:
             raise
@@ -371,11 +371,23 @@ def refused_by(ranking: Ranking, outside: Mapping[Key, str], settings: RankingSe
     return tuple(RefusedEffect(*key, reason) for key, reason in reasons.items())
 
 
-def _unpromising(ranking: Ranking, offered: Sequence[Candidate]) -> dict[Key, str]:
+def _unpromising(ranking: Ranking, model: Model, offered: Sequence[Candidate]) -> dict[Key, str]:
     """Effects that no round of a ranking fitted, with the reason."""
     tried = {one.key for several in ranking.rounds for one in several}
     reason = "the first step of a fit predicted less evidence than others did, or too little for a fit"
-    return {candidate.key: reason for candidate in offered if candidate.key not in tried}
+    left = [candidate for candidate in offered if candidate.key not in tried]
+    return {candidate.key: _why_unbuilt(model, candidate) or reason for candidate in left}
+
+
+def _why_unbuilt(model: Model, candidate: Candidate) -> str:
+    """Why a model cannot have an effect that a ranking offers, or "": behind a split joint nothing may have inertia."""
+    if not candidate.effect.splits:
+        return ""
+    try:
+        _ = model.with_effect(candidate.effect.name, candidate.site, **candidate.starts[0]).core
+    except VpmError as error:
+        return f"no machine has it as described: {error}"
+    return ""
 
 
 def _accepts(several: Sequence[Ranked], settings: RankingSettings) -> bool:
