@@ -90,7 +90,7 @@ class Explainer:
             if any(doubtful & set(self._affected(one, left)) for one in pair)
         ]
         before = self.judge.guessed(part)
-        pairs = self._balancing(pairs, part, left)
+        pairs = self._leaving_less_effort(pairs, part, left)
         tried = self._ordered("trying", self.judge.guessed, pairs, part)
         few = [pair for pair, shares in tried if shares.cost < before.cost][: self.settings.fitted]
         for pair, after in self._ordered("fitting", self.judge.fitted, few, part)[:1]:
@@ -181,10 +181,10 @@ class Explainer:
             tried = [one for one in tried if not one.is_clock]
         # The mirror image of a machine explains most of a log as well as the machine does.
         tried += self._about((one for one in everything if one.is_mirror), some, left)
-        tried = self._balancing(list(dict.fromkeys(tried)), part, left)
+        tried = self._leaving_less_effort(list(dict.fromkeys(tried)), part, left)
         return self._hopeful(tried, part, self.judge.guessed(part)) if tried else []
 
-    def _balancing(self, corrections: Sequence[Change], part: Experiment, left: Shares) -> list[Change]:
+    def _leaving_less_effort(self, corrections: Sequence[Change], part: Experiment, left: Shares) -> list[Change]:
         """Corrections with which less is left of the efforts that they affect, and of all; all where none follow.
 
         That takes no run of the model, and what a slow tracker makes of a force that is missing does not enter.
@@ -194,19 +194,19 @@ class Explainer:
             affected = {name for one in correction.each for name in self._affected(one, left)} & set(left.efforts)
             if not affected:
                 return True
-            efforts = self.judge.balanced(correction.applied(part))
+            efforts = self.judge.efforts_left(correction.applied(part))
             return bool(efforts) and all(
                 mean_logarithm(efforts, names) <= mean_logarithm(left.efforts, names) for names in (affected, efforts)
             )
 
-        told = self.each("balancing", better, corrections, self._words)
+        told = self.each("comparing efforts", better, corrections, self._words)
         return [one for one, kept in zip(corrections, told, strict=True) if kept is True]
 
     def _doubtful(self, left: Shares) -> set[str]:
         """Channels that the model does not explain; all where its file rules out the values by which it does.
 
-        But for those at which efforts balance: a wrong unit or sign shows there. What shows in the motion alone is a
-        small force of which a slow tracker makes a large error, such as one at which a joint sticks.
+        But for those without an inverse-dynamics residual: a wrong unit or sign shows there. What shows in the motion
+        alone is a small force of which a slow tracker makes a large error, such as one at which a joint sticks.
         """
         share = self.settings.doubtful
         found = set(left.by_channel) if left.far > self.settings.far else left.above(share)

@@ -66,7 +66,7 @@ class Shares:
     unlikely: float = 0.0
     chance: float = 1.0  #: Of deviations as large as these.
     floor: float = 0.0  #: Shares below this are as good as nothing.
-    #: What a balance of efforts leaves of that at each position, by channel; none where it takes a run of the model.
+    #: Inverse-dynamics residual of the effort at each position, by channel; none where it takes a run of the model.
     efforts: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -88,8 +88,8 @@ class Shares:
         return self.cost, self.logarithm(self.by_channel)
 
 
-class _Balance(NamedTuple):
-    """Values by which a balance of efforts leaves least, and what it leaves of them."""
+class _Regressed(NamedTuple):
+    """Values that leave least of the inverse-dynamics residual, and what they leave of efforts."""
 
     values: Array
     efforts: dict[str, float]
@@ -126,12 +126,12 @@ class Judge:
             return self._lost(record, values)
         return self._shares(tracked, residual, tracker, values)
 
-    def balanced(self, record: Experiment) -> Mapping[str, float]:
-        """What a balance of efforts leaves at each position as a share; see `Shares.efforts`."""
+    def efforts_left(self, record: Experiment) -> Mapping[str, float]:
+        """Inverse-dynamics residual of the effort at each position as a share; see `Shares.efforts`."""
         if not self._at_once:
             return {}
-        balance = self._balance(record, self._structure(record))
-        return {} if balance is None else balance.efforts
+        near = self._regressed(record, self._structure(record))
+        return {} if near is None else near.efforts
 
     @cached_property
     def _at_once(self) -> bool:
@@ -152,8 +152,8 @@ class Judge:
             parameter = self.model.effect(*key).parameter_names["coulomb"]
             values[self.model.index(parameter)] = structure.priors[parameter].spread
         tried = [plain, self.measured(record, values)]
-        if (balance := self._balanced(record, structure, plain)) is not None:
-            tried.append(self.measured(record, balance.values))
+        if (near := self._regressed_if_lost(record, structure, plain)) is not None:
+            tried.append(self.measured(record, near.values))
         return min(tried, key=lambda shares: shares.order)
 
     def fitted(self, record: Experiment) -> Shares:
@@ -164,11 +164,11 @@ class Judge:
         """
         structure, plain = self._structure(record), self.measured(record)
         starts = [(structure, plain)]
-        if (balance := self._balanced(record, structure, plain)) is not None:
-            starts.append((replace(structure, theta=balance.values), self.measured(record, balance.values)))
+        if (near := self._regressed_if_lost(record, structure, plain)) is not None:
+            starts.append((replace(structure, theta=near.values), self.measured(record, near.values)))
         found = [self._fitted(record, *start) or plain for start in starts]
         best = min(found, key=lambda shares: shares.order)
-        return best if balance is None else replace(best, efforts=balance.efforts)
+        return best if near is None else replace(best, efforts=near.efforts)
 
     def fitted_from(self, record: Experiment, known: Array, efforts: Mapping[str, float]) -> Shares:
         """Shares at values that are ``known`` from another record, or when a fit from there has ended.
@@ -196,11 +196,11 @@ class Judge:
         shares = self._shares(tracked, found.residual, tracker, found.structure.theta)
         return self._with_departure(shares, found.structure)
 
-    def _balanced(self, record: Experiment, structure: Structure, plain: Shares) -> _Balance | None:
-        """Balance of efforts of a record; None where the model as it is follows the record, by its ``plain`` shares."""
-        return self._balance(record, structure) if plain.above(self.settings.doubtful) else None
+    def _regressed_if_lost(self, record: Experiment, structure: Structure, plain: Shares) -> _Regressed | None:
+        """Regression on a record; None where the model as it is follows the record, by its ``plain`` shares."""
+        return self._regressed(record, structure) if plain.above(self.settings.doubtful) else None
 
-    def _balance(self, record: Experiment, structure: Structure) -> _Balance | None:
+    def _regressed(self, record: Experiment, structure: Structure) -> _Regressed | None:
         """Values that leave least of the inverse-dynamics residual of a record, see `vpm.ranking.regression`.
 
         None where no efforts follow from the motion. Values that the model file rules out are none: commands that are
@@ -213,7 +213,7 @@ class Judge:
             problem = InverseDynamicsProblem(self.model, [record])
             found = regressed(replace(structure, priors=priors), problem)
             left = _left_of_efforts(problem, self.model, found.theta) if self._at_once else {}
-            return _Balance(found.theta, left)
+            return _Regressed(found.theta, left)
         except ASTRAY:
             return None
 
@@ -284,7 +284,7 @@ class Judge:
         refined = replace(correction, delay=delay)
         shares = self.measured(refined.applied(record), np.array(values))
         shares = self._with_departure(shares, without_delay(found.structure))
-        return refined, replace(shares, efforts=self.balanced(refined.applied(record)))
+        return refined, replace(shares, efforts=self.efforts_left(refined.applied(record)))
 
     def _with_departure(self, shares: Shares, structure: Structure) -> Shares:
         """Shares with how far the parameters of the model are from what its file states."""
@@ -454,7 +454,7 @@ def rows_of(part: Experiment, record: Experiment) -> NDArray[np.intp]:
 
 
 def _left_of_efforts(problem: InverseDynamicsProblem, model: Model, values: Array) -> dict[str, float]:
-    """What a balance leaves of the effort at each position, as a share of its variance, by channel.
+    """Inverse-dynamics residual of the effort at each position, as a share of its variance, by channel.
 
     Of the variance, for what holds a weight says nothing of the scale of a motion.
     """
