@@ -6,7 +6,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
-from typing import Any, TypeAlias, TypedDict, get_args
+from typing import Any, TypedDict, get_args
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis, Empirical
@@ -58,8 +58,6 @@ STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, w
 UNFILTERED = "the cut-off frequency is not used, for an observer filters nothing"
 #: Said where something stays unexplained, of readings whose errors no candidate describes.
 NO_SENSOR = "no offset, gain or delay of {channels} was tried: describe a sensor of them in the model file to try these"
-#: Diagnoses once more without drifts of sensors.
-Again: TypeAlias = Callable[[Sequence[Drift]], Diagnosis]
 #: What is odd in a channel and may pass for an effect.
 NOTED = ("delay", "frozen", "clipped", "spikes")
 
@@ -220,7 +218,7 @@ def diagnosed(
         odd = [str(one) for one in found if one.kind in NOTED]
     most = max(LEAST_LIMIT, 2 * len(model.joints)) if limit is None else limit
     names = asked.get("names", RANKING)
-    diagnosis = _diagnosis(model, records, effects, cutoff, setup, most, names, each, tell)
+    diagnosis = _diagnosis(model, records, (names, effects, most), cutoff, setup, each, tell or (lambda _: None))
     blind = [] if diagnosis.verdict != "unexplained" else _without_sensor(model, records[0])
     return replace(diagnosis, notes=(*odd, *diagnosis.notes, *blind))
 
@@ -234,42 +232,49 @@ def _without_sensor(model: Model, records: Sequence[Experiment]) -> list[str]:
 def _diagnosis(
     model: Model,
     records: Records,
-    effects: Sequence[str] | None,
+    by: tuple[Names, Sequence[str] | None, int],
     cutoff: float | None,
     setup: Setup,
-    limit: int,
-    names: Names,
     each: ParallelCandidates,
-    tell: Tell | None,
-    drifted: Sequence[str] = (),
+    say: Tell,
 ) -> Diagnosis:
-    """Diagnosis on checked records: it names effects, judges them, and describes the rest.
-
-    With sentences on drifts of sensors that were taken out of the records.
-    """
+    """Diagnosis on checked records; once more without the drifts of sensors where these explain a channel."""
     began = time.perf_counter()
-    say = tell or (lambda _: None)
-    training, validation, notes = records
-    # A record cut off in the middle of a motion does not say what its controller remembers.
-    mode = "restarts" if notes else judging_mode(model, validation)
-    by, given = (names, effects, limit), tuple(notes)
-    notes.extend(drifted)
-    ranking = ranking_of(model, (training, validation), by, setup, say, each, notes)
-
-    def again(drifts: Sequence[Drift]) -> Diagnosis:
+    training, validation, given = records
+    drifts = list[Drift]()
+    while True:
         fitted, kept = (without_drifts(several, drifts) for several in (training, validation))
-        told = [drift.sentence for drift in drifts]
-        return _diagnosis(model, (fitted, kept, [*given]), effects, cutoff, setup, limit, names, each, tell, told)
+        taken = (fitted, kept, [*given, *(drift.sentence for drift in drifts)])
+        # A record cut off in the middle of a motion does not say what its controller remembers.
+        mode = "restarts" if given else judging_mode(model, kept)
+        outcome = _named_and_judged(model, taken, by, (mode, cutoff, setup), each, say, may_drift=not drifts)
+        if isinstance(outcome, Diagnosis):
+            return replace(outcome, seconds=time.perf_counter() - began)
+        say("diagnosing again without the drift of sensors")
+        drifts = outcome
 
-    once_more = None if drifted else again
+
+def _named_and_judged(
+    model: Model,
+    records: Records,
+    by: tuple[Names, Sequence[str] | None, int],
+    how: tuple[str, float | None, Setup],
+    each: ParallelCandidates,
+    say: Tell,
+    *,
+    may_drift: bool,
+) -> Diagnosis | list[Drift]:
+    """Diagnosis that names effects, judges them, and describes the rest; drifts of sensors where it needs them."""
+    training, validation, notes = records
+    ranking = ranking_of(model, (training, validation), by, how[2], say, each, notes)
     try:
-        return _measured(model, records, ranking, by, (mode, cutoff, setup), each, say, began, once_more)
+        return _measured(model, records, ranking, by, how, each, say, may_drift=may_drift)
     except KeyboardInterrupt:
         known = ranking or Ranking((), (), model, model)
         told = ranked_notes(known, (), known.interrupted) if ranking is not None else []
         told.append(STOPPED_UNMEASURED if known.effects else STOPPED)
         notes.extend(note for note in dict.fromkeys(told) if note not in notes)
-        return unmeasured(model, records, known, Settings(effects=limit), time.perf_counter() - began)
+        return unmeasured(model, records, known, Settings(effects=by[2]))
 
 
 def _measured(
@@ -280,9 +285,9 @@ def _measured(
     how: tuple[str, float | None, Setup],
     each: ParallelCandidates,
     say: Tell,
-    began: float,
-    again: Again | None,
-) -> Diagnosis:
+    *,
+    may_drift: bool,
+) -> Diagnosis | list[Drift]:
     """Diagnosis from a ranking, or by a search where there is none, measured on validation records."""
     training, validation, notes = records
     (mode, cutoff, setup), (_, effects, limit) = how, by
@@ -294,27 +299,24 @@ def _measured(
         notes.extend([] if cutoff is None else [UNFILTERED])
         told = diagnosed_by_tracker(ranking, model, records, (effects, limit), setup, reason)
         more = ranked_notes(ranking, told.refused, told.interrupted)
-        return replace(told, notes=(*told.notes, *more), seconds=time.perf_counter() - began)
+        return replace(told, notes=(*told.notes, *more))
     data = data_of(model, training, validation, mode, cutoff, setup, notes)
     say("comparing the nominal model with the data")
     nominal = nominal_of(model, data, notes)
     say("recalibrating the nominal parameters")
     recalibrated = recalibrated_of(model, data, notes, each)
     found, ambiguous, late = named(ranking, recalibrated, data, by, say, each, notes)
-    known = _Known(model, records, data, nominal, recalibrated, ranking, ambiguous, late, began, again)
-    plain = partial(of_search, model, records, recalibrated, found, data.training)
+    known = _Known(model, records, data, nominal, recalibrated, ranking, ambiguous, late, may_drift)
+    so_far = partial(of_search, model, records, recalibrated, found, data.training)
     try:
         return _told(known, found, mode, setup, each, say)
     except BROKEN as error:
         notes.append(FAILED.format(what="what follows the search", error=error))
-        return plain(time.perf_counter() - began)
+        return so_far()
     except KeyboardInterrupt:
         notes.append(STOPPED_UNJUDGED)
         gap = gaps_of(data, nominal, recalibrated, found.final, {})
-        found_so_far = plain(time.perf_counter() - began)
-        return replace(
-            found_so_far, verdict="effect_found" if found.accepted else "interrupted", gap=gap, interrupted=True
-        )
+        return replace(so_far(), verdict="effect_found" if found.accepted else "interrupted", gap=gap, interrupted=True)
 
 
 @dataclass(frozen=True)
@@ -329,8 +331,7 @@ class _Known:
     ranking: Ranking | None
     ambiguous: tuple[Rivals, ...]
     late: bool  #: Whether Ctrl-C left open what else would do.
-    began: float  #: When it began, by the clock of this process, s.
-    again: Again | None  #: Diagnoses records without drifts of sensors; None where it did.
+    may_drift: bool  #: Whether drifts of sensors are still in the records.
 
 
 @dataclass(frozen=True)
@@ -345,8 +346,10 @@ class _Concluded:
     accepted: tuple[Accepted, ...]
 
 
-def _told(known: _Known, found: Search, mode: str, setup: Setup, each: ParallelCandidates, say: Tell) -> Diagnosis:
-    """Diagnosis after naming: noise floor, remaining residual, and verdict."""
+def _told(
+    known: _Known, found: Search, mode: str, setup: Setup, each: ParallelCandidates, say: Tell
+) -> Diagnosis | list[Drift]:
+    """Diagnosis after naming: noise floor, remaining residual, and verdict; or drifts of sensors."""
     data, (_, _, notes) = known.data, known.records
     say("measuring the noise floor")
     measure = partial(examined, known.nominal, known.recalibrated, data, mode, setup)
@@ -356,11 +359,10 @@ def _told(known: _Known, found: Search, mode: str, setup: Setup, each: ParallelC
     rest, stopped = until_stopped(lambda: _rest(known.recalibrated, found, data, gap, each, say), None)
     beyond = tracker_gaps(known.ranking, data.training.joints) if known.ranking is not None else {}
     said = verdict(data, known.nominal, known.recalibrated, found, gap | beyond, left, rest)
-    if said[0] == "unexplained" and not found.accepted and known.again is not None:
+    if said[0] == "unexplained" and not found.accepted and known.may_drift:
         pairs = ((data.training, found.final.fit.residual), (data.validation, found.final.validation))
         if drifts := sensor_drifts(found.final.model, pairs, gap, FLOOR_FACTOR):
-            say("diagnosing again without the drift of sensors")
-            return replace(known.again(drifts), seconds=time.perf_counter() - known.began)
+            return drifts
     concluded = _concluded(known, found, said, gap, floor, rest)
     if stopped or known.late:
         notes.append(STOPPED_LATE)
@@ -413,7 +415,7 @@ def _whole(
         final.model,
         fit_of(final.model, data.training, final.fit, nominal.fit.residual, [e.name for e in training]),
         (),
-        time.perf_counter() - known.began,
+        0.0,
         interrupted,
         empirical=concluded.empirical,
         classes=classes(accepted, ambiguous),
@@ -433,7 +435,7 @@ def _whole(
             told = replace(told, **{field: compute()})
     except KeyboardInterrupt:
         told = replace(told, interrupted=True, notes=(*told.notes, STOPPED_BARE))
-    return replace(told, seconds=time.perf_counter() - known.began)
+    return told
 
 
 def _rest(

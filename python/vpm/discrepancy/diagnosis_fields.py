@@ -31,9 +31,7 @@ from vpm.simulate import Setup
 ALIKE = "predicts the validation data as well"
 
 
-def of_search(
-    model: Model, records: Records, start: Judged, found: Search, fitted: Problem, seconds: float
-) -> Diagnosis:
+def of_search(model: Model, records: Records, start: Judged, found: Search, fitted: Problem) -> Diagnosis:
     """Diagnosis with the fields of the search alone, where what follows it could not be computed or was stopped.
 
     Parameters
@@ -45,8 +43,6 @@ def of_search(
     found : Search
     fitted : problem
         What was fitted.
-    seconds : float
-        Time it took.
     """
     training, validation, notes = records
     names = ", ".join(entry.label for entry in found.accepted) or "no effect"
@@ -73,7 +69,7 @@ def of_search(
             [e.name for e in training],
         ),
         (),
-        seconds,
+        0.0,
         found.interrupted,
     )
 

@@ -18,9 +18,7 @@ if TYPE_CHECKING:
     from vpm.ranking import Settings as RankingSettings
 
 
-def unmeasured(
-    model: Model, records: Records, ranking: Ranking, settings: RankingSettings, seconds: float
-) -> Diagnosis:
+def unmeasured(model: Model, records: Records, ranking: Ranking, settings: RankingSettings) -> Diagnosis:
     """Unmeasured diagnosis of a ranking, which may be empty.
 
     Values are those of the ranking, and nobody has looked at how sure they are.
@@ -34,8 +32,6 @@ def unmeasured(
     ranking : Ranking
     settings : vpm.ranking.Settings
         Of the ranking.
-    seconds : float
-        Time it took.
     """
     training, validation, notes = records
     effects = ranking.effects
@@ -57,7 +53,7 @@ def unmeasured(
         ranking.model,
         _fit(model, ranking.model, [record.name for record in training]),
         (),
-        seconds,
+        0.0,
         interrupted=True,
         classes=tuple((f"{one.effect} at {one.site}", *one.rivals) for one in effects if one.rivals),
         stated={name: parameter.value for name, parameter in model.parameters.items()},

@@ -90,7 +90,7 @@ def diagnosed_by_tracker(
         settings,
     )
     notes.extend([BY_TRACKER.format(reason=reason, band=band), *moved_far(model, recalibrated)])
-    told = of_search(model, records, nominal, found, data.training, 0.0)
+    told = of_search(model, records, nominal, found, data.training)
     if not ranking.gaps:
         return told
     gap = tracker_gaps(ranking, None)
