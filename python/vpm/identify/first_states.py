@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import DivergedError
+from vpm.identify.identifiability import least_step
 from vpm.identify.problem import Block
 from vpm.identify.settings import Checks
 from vpm.identify.whiteness import DEPENDENT, basis, explained_by, explained_size
@@ -138,7 +139,8 @@ def _nearer(model: Model, data: AnyBegun, early: Rows) -> AnyBegun:
         slopes = np.where(early[:, None], first_state_derivative(model, data), 0.0)
         if not slopes.shape[1]:
             break
-        step[:, places] = -_solved(slopes, residual).reshape(records, places.size)
+        # Along the directions that the data show.
+        step[:, places] = least_step(slopes, residual, DEPENDENT).reshape(records, places.size)
         for share in SHARES:
             tried = data.begun(_departures(data, sizes, records) + share * step)
             left = _residual(model, tried, early)
@@ -157,13 +159,6 @@ def _early(data: BegunAnywhere, share: float) -> Rows:
     """True for the first of the rows (n,) that count of each record, until these are a share of them."""
     counted = [np.cumsum(block.moving > 0.0) for block in data.blocks]
     return np.concatenate([number <= share * number[-1] for number in counted])
-
-
-def _solved(slopes: Array, residual: Array) -> Array:
-    """Least-squares solution for first states along the directions that the data show."""
-    lengths = np.linalg.norm(slopes, axis=0)
-    lengths[lengths == 0.0] = 1.0
-    return np.asarray(np.linalg.lstsq(slopes / lengths, residual, rcond=DEPENDENT)[0] / lengths)
 
 
 def _departures(data: BegunAnywhere, sizes: Array, records: int) -> Array:

@@ -13,7 +13,7 @@ from scipy.special import stdtrit
 from vpm.errors import IdentificationError, near_match
 from vpm.experiment import Experiment
 from vpm.identify.feasibility import faults
-from vpm.identify.identifiability import Base, find_base, unseen_combinations
+from vpm.identify.identifiability import Base, find_base, least_step, unseen_combinations
 from vpm.identify.inertial_fit import KNOWN, TOGETHER, UNSEEN, VAGUE, InertialFit
 from vpm.identify.inertial_model import inertial_regression
 from vpm.identify.inertial_regression import InertialRegression
@@ -21,7 +21,6 @@ from vpm.identify.inertial_solve import (
     Solution,
     channel_noise,
     effective_samples,
-    least_squares,
     solve_free,
     solve_physical,
     solve_pulled,
@@ -126,7 +125,7 @@ def _base_and_noise(regression: InertialRegression, tolerance: float) -> tuple[B
                 f"no effort depends on any of {', '.join(regression.names[:12])}; these data hold nothing about them",
                 parameters=regression.names,
             )
-        beta = least_squares(table[:, :, list(base.kept)].reshape(-1, base.rank), effort.ravel())
+        beta = least_step(table[:, :, list(base.kept)].reshape(-1, base.rank), -effort.ravel())
         rest = regression.effort - regression.regressor[:, :, list(base.kept)] @ beta
         noise = channel_noise(rest, regression.effort, base.rank)
     return base, noise

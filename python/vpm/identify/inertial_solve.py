@@ -7,7 +7,7 @@ import numpy as np
 from scipy.fft import next_fast_len, rfft
 
 from vpm.identify.feasibility import Distance, nearest
-from vpm.identify.identifiability import Base, column_lengths
+from vpm.identify.identifiability import Base, column_lengths, least_step
 from vpm.identify.inertial_regression import InertialRegression
 from vpm.identify.statistics import autoregression
 from vpm.numbers import Array
@@ -32,18 +32,12 @@ def weighted(regression: InertialRegression, noise: Array) -> tuple[Array, Array
     return regression.regressor / noise[:, None], regression.effort / noise
 
 
-def least_squares(columns: Array, right: Array) -> Array:
-    """Solve least squares for inertial parameters with columns scaled to equal length."""
-    lengths = column_lengths(columns)
-    return np.asarray(np.linalg.lstsq(columns / lengths, right, rcond=None)[0] / lengths)
-
-
 def solve_free(regression: InertialRegression, base: Base, noise: Array, nominal: Array) -> Solution:
     """Solve for base parameters; single inertial parameters as near to the nominal ones as those allow."""
     table, effort = weighted(regression, noise)
     mine = table[:, :, list(base.kept)]
     columns = mine.reshape(-1, base.rank)
-    beta = least_squares(columns, effort.ravel())
+    beta = least_step(columns, -effort.ravel())
     inverse = _inverse(columns)
     robust = inverse @ score_covariance(mine, effort - mine @ beta, regression.slices) @ inverse
     sizes = 1.0 / column_lengths(table.reshape(-1, len(nominal)))
@@ -60,7 +54,7 @@ def solve_pulled(regression: InertialRegression, noise: Array, nominal: Array, d
     count = len(nominal)
     known = np.diag(1.0 / deviations)
     columns = np.vstack([table.reshape(-1, count), known])
-    values = nominal + least_squares(columns, np.concatenate([(effort - table @ nominal).ravel(), np.zeros(count)]))
+    values = nominal + least_step(columns, np.concatenate([(table @ nominal - effort).ravel(), np.zeros(count)]))
     inverse = _inverse(columns)
     meat = _small_sample(score_covariance(table, effort - table @ values, regression.slices), effort.size, count)
     covariance = inverse @ (meat + known**2) @ inverse
