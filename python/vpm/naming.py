@@ -13,7 +13,6 @@ from vpm.discrepancy.ranked_effects import notes as notes_of
 from vpm.discrepancy.rivals.ambiguity import Rivals, rivals
 from vpm.discrepancy.rivals.rival_discrimination import discriminated
 from vpm.discrepancy.rivals.rival_exchange import in_order, replaced, timed_again
-from vpm.discrepancy.search.backlash_contacts import with_predicted_contacts
 from vpm.discrepancy.search.forward_step import forward_step
 from vpm.discrepancy.search.search import Search, begin, further
 from vpm.discrepancy.search.usual_friction import with_usual_friction
@@ -161,8 +160,7 @@ def _settled(
         found = changed if found.interrupted else further(changed, data, effects, limit, tell, each)
         if len(found.accepted) != 1 or len(known) != 1 or found.final is not changed.final:
             known = rivals(found.final, data, found.accepted, effects, each, found.last)
-    found, known = in_order(found, known)
-    return with_predicted_contacts(found, data, each), known
+    return in_order(found, known)
 
 
 def until_stopped(work: Callable[[], Found], nothing: Found) -> tuple[Found, bool]:

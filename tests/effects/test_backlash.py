@@ -9,7 +9,6 @@ from vpm.catalogue import EFFECTS
 from vpm.discrepancy.screening.backlash_flights import flights
 from vpm.discrepancy.screening.backlash_start import only_compliant, read_off
 from vpm.discrepancy.screening.candidates import Candidate
-from vpm.discrepancy.search.backlash_contacts import beginnings, with_contact
 from vpm.identify import InverseDynamicsProblem
 from vpm.numbers import Array
 
@@ -134,19 +133,6 @@ def test_play_is_named_and_none_is_seen_where_there_is_none(loose: tuple[Experim
     assert gap.value == pytest.approx(GAP, rel=0.15)
     tight = record(1e-9, 1), record(1e-9, 2)
     assert "backlash" not in {effect.name for effect in diagnose(model, tight[:1], tight[1:], effects=effects).effects}
-
-
-def test_contacts_are_tried_by_frequency_and_damping_ratio() -> None:
-    model = Model.from_toml(TEXT).with_effect("backlash", at="axis", gap=GAP, stiffness=1.0)
-    tried = with_contact(model, ("backlash", "axis"), 14.0, 0.2).parameters
-    stiffness = 1.05 * MASS * (2.0 * np.pi * 14.0) ** 2
-    assert tried["axis.backlash.stiffness"].value == pytest.approx(stiffness)
-    assert tried["axis.backlash.contact_damping"].value == pytest.approx(0.4 * np.sqrt(1.05 * MASS * stiffness))
-
-
-def test_models_run_along_the_first_seconds_of_all_records_together(loose: tuple[Experiment, ...]) -> None:
-    assert [part.time[-1] for part in beginnings(loose)] == pytest.approx([3.0, 3.0], abs=2e-3)
-    assert beginnings(loose[:1])[0] is loose[0]
 
 
 def test_flights_are_those_of_one_step_after_the_other() -> None:
