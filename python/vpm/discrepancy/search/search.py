@@ -19,7 +19,6 @@ from vpm.discrepancy.search.backward_elimination import (
     without_tight_bounds,
 )
 from vpm.discrepancy.search.candidate_choice import Accepted
-from vpm.discrepancy.search.effect_pair import Pair, together
 from vpm.discrepancy.search.search_round import Round, Tell
 from vpm.identify.tangent import has_tangent
 from vpm.model import Model
@@ -89,100 +88,114 @@ def further(
     A new effect in the place of another one leaves what the other one had covered. A second effect that was refused
     before may be clear in that.
     """
-    stages, accepted, ranking = list(found.stages), list(found.accepted), list(found.ranking)
-    dropped = {(r.name, r.site): r.reason for r in found.refused if (r.name, r.site) in found.gone}
-    refused: dict[Key, str] = {}
-    last: Tried | None = None
-    over = Over()
+    going = _Going(found, data, effects, limit, tell, each)
     interrupted = False
-    first = 1 + max((candidate.round for candidate in ranking), default=0)
-    waiting, tried = list[Key](), 0  # what a round would have accepted at other joints, too, and of how many
-    for number in range(first, 2 * limit + 2):
-        outcome = Round(stages[-1].judged, data, number, tell, each, tried)
-        best, pair, again = None, None, False
-        try:
-            if len(accepted) < limit and not (accepted and outcome.done()):
-                best = _next(outcome, waiting, dropped)
-                again = best is not None
-                if not again:
-                    outcome = Round(stages[-1].judged, data, number, tell, each)
-                    best, pair = _whole(outcome, effects, set(dropped), several=len(accepted) + 1 < limit)
-                    waiting = outcome.elsewhere(best) if best is not None and pair is None else []
-                    tried = outcome.tried
-        except KeyboardInterrupt:
-            interrupted = True
-        ranking += outcome.ranked()
-        if pair is not None:
-            accepted.append(pair.first)
-            stages.append(Stage("added", *pair.first.key, pair.first.trial.judged))
-            tell(f"round {number}: accepted {pair.first.trial.probe.candidate.label}, beside another one")
-            outcome, best = pair.outcome, pair.second
-            ranking += outcome.ranked()
-        refused = outcome.refused
-        if best is None:
-            over = Over(tuple(outcome.probes), tuple(outcome.trials))
-            break
-        # Beside the first of a pair, and in a round of a few, little else was tried.
-        known = Tried(best.key, outcome.current, tuple(outcome.probes), tuple(outcome.trials))
-        last = known if pair is None and not again else None
-        accepted.append(best)
-        stages.append(Stage("added", *best.key, best.trial.judged))
-        try:
-            tell(f"round {number}: accepted {best.trial.probe.candidate.label}")
-            _reconsidered(stages, accepted, data, dropped)
-        except KeyboardInterrupt:
-            interrupted = True
-        if interrupted:
-            break
     try:
-        if not interrupted:
-            stages[-1], same = _loosened(stages[-1], data)
-            last = last if same and not dropped else None
+        while going.another():
+            pass
+        going.loosen()
     except KeyboardInterrupt:
         interrupted = True
-    return Search(
-        tuple(stages), tuple(accepted), _listed({**dropped, **refused}), tuple(ranking), interrupted, last, over
-    )
+    return going.outcome(interrupted=interrupted)
 
 
-def _next(outcome: Round, waiting: list[Key], dropped: Mapping[Key, str]) -> Accepted | None:
-    """First candidate that still waits for the search and is accepted beside what came in meanwhile."""
-    while waiting:
-        key = waiting.pop(0)
-        if key not in dropped and (best := outcome.again(key)) is not None:
-            return best
-    return None
+class _Going:
+    """Search that goes on: whatever Ctrl-C interrupts, `outcome` is what is known until then."""
 
+    def __init__(
+        self,
+        found: Search,
+        data: Data,
+        effects: Sequence[str] | None,
+        limit: int,
+        tell: Tell,
+        each: ParallelCandidates,
+    ) -> None:
+        self.found, self.data, self.effects, self.limit, self.tell, self.each = found, data, effects, limit, tell, each
+        self.stages, self.accepted, self.rounds = list(found.stages), list(found.accepted), list[Round]()
+        self.dropped = {(r.name, r.site): r.reason for r in found.refused if (r.name, r.site) in found.gone}
+        self.last: Tried | None = None
+        self.over = Over()
+        self.number = max((candidate.round for candidate in found.ranking), default=0)
+        # What a round would have accepted at other joints, too, and of how many candidates.
+        self.waiting, self.tried = list[Key](), 0
 
-def _reconsidered(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
-    """Search after an effect came in: that is fitted to the end, and what it makes needless is dropped."""
-    if has_tangent(accepted[-1].trial.judged.model, data.training):
-        accepted[-1] = refitted(accepted[-1], data)
-        stages[-1] = replace(stages[-1], judged=accepted[-1].trial.judged)
-    drop_replaced(stages, accepted, data, dropped)
-    drop_springs(stages, accepted, data, dropped)
-    release_shown(stages, accepted, data)
+    def another(self) -> bool:
+        """Whether one more effect comes in; those that it makes needless are dropped."""
+        self.number += 1
+        if self.number > 2 * self.limit + 1:
+            return False
+        outcome = self._begun(self.tried)
+        if len(self.accepted) >= self.limit or (self.accepted and outcome.done()):
+            return False
+        best = self._waited(outcome)
+        # In a round of a few, little else was tried.
+        alone = best is None
+        if best is None:
+            self.rounds.pop()
+            outcome = self._begun()
+            best = self._best(outcome)
+            self.waiting, self.tried = [] if best is None else outcome.elsewhere(best), outcome.tried
+        if best is None:
+            self.over = Over(tuple(outcome.probes), tuple(outcome.trials))
+            return False
+        known = Tried(best.key, outcome.current, tuple(outcome.probes), tuple(outcome.trials))
+        self.last = known if alone else None
+        self.accepted.append(best)
+        self.stages.append(Stage("added", *best.key, best.trial.judged))
+        self.tell(f"round {self.number}: accepted {best.label}")
+        self._reconsider()
+        return True
 
+    def loosen(self) -> None:
+        """Refit the last stage without tight bounds; what an effect competed with is then known no more."""
+        stage = self.stages[-1]
+        self.stages[-1] = replace(stage, judged=without_tight_bounds(stage.judged, self.data))
+        if self.dropped or self.stages[-1].judged is not stage.judged:
+            self.last = None
 
-def _whole(
-    outcome: Round, effects: Sequence[str] | None, without: set[Key], *, several: bool
-) -> tuple[Accepted | None, Pair | None]:
-    """Best candidate of a search round, or the pair of effects where ``several`` may come in."""
-    best = outcome.light(effects, without)
-    if best is None or outcome.weak(best):
-        best = outcome.heavy(effects, without) or best
-    pair = together(outcome, best, outcome.data, effects, without) if several else None
-    return best or (outcome.by_prediction(without) if pair is None else None), pair
+    def outcome(self, *, interrupted: bool) -> Search:
+        """Search as far as it went."""
+        refused = {**self.dropped, **(self.rounds[-1].refused if self.rounds else {})}
+        ranking = [candidate for outcome in self.rounds for candidate in outcome.ranked()]
+        return Search(
+            tuple(self.stages),
+            tuple(self.accepted),
+            tuple(RefusedEffect(*key, reason) for key, reason in refused.items()),
+            (*self.found.ranking, *ranking),
+            interrupted,
+            self.last,
+            self.over,
+        )
 
+    def _begun(self, tried: int = 0) -> Round:
+        self.rounds.append(Round(self.stages[-1].judged, self.data, self.number, self.tell, self.each, tried))
+        return self.rounds[-1]
 
-def _loosened(stage: Stage, data: Data) -> tuple[Stage, bool]:
-    """Last stage of the search without tight bounds, and whether it is unchanged."""
-    loosened = replace(stage, judged=without_tight_bounds(stage.judged, data))
-    return loosened, loosened.judged is stage.judged
+    def _waited(self, outcome: Round) -> Accepted | None:
+        """First candidate that still waits for the search and is accepted beside what came in meanwhile."""
+        while self.waiting:
+            key = self.waiting.pop(0)
+            if key not in self.dropped and (best := outcome.again(key)) is not None:
+                return best
+        return None
 
+    def _best(self, outcome: Round) -> Accepted | None:
+        """Best candidate of a search round; where it leaves most, those with a motion of their own compete too."""
+        best = outcome.light(self.effects, set(self.dropped))
+        if best is None or outcome.weak(best):
+            best = outcome.heavy(self.effects, set(self.dropped)) or best
+        return best or outcome.by_prediction(set(self.dropped))
 
-def _listed(refused: dict[Key, str]) -> tuple[RefusedEffect, ...]:
-    return tuple(RefusedEffect(name, site, reason) for (name, site), reason in refused.items())
+    def _reconsider(self) -> None:
+        """Fit the search's new effect to the end, and drop what it makes needless."""
+        stages, accepted, data = self.stages, self.accepted, self.data
+        if has_tangent(accepted[-1].trial.judged.model, data.training):
+            accepted[-1] = refitted(accepted[-1], data)
+            stages[-1] = replace(stages[-1], judged=accepted[-1].trial.judged)
+        drop_replaced(stages, accepted, data, self.dropped)
+        drop_springs(stages, accepted, data, self.dropped)
+        release_shown(stages, accepted, data)
 
 
 def ambiguities(accepted: Sequence[Accepted]) -> tuple[Ambiguity, ...]:

@@ -352,10 +352,6 @@ class Round:
         for key, entry in self._ranking.items():
             self._ranking[key] = replace(entry, accepted=key == accepted)
 
-    def after(self, judged: Judged) -> Round:
-        """Next round with ``judged`` as its model."""
-        return Round(judged, self.data, self.number + 1, self.tell, self.each)
-
     def ranked(self) -> list[RankedCandidate]:
         """Ranked candidates of the round: accepted ones, then by validation gain, then by predicted gain."""
         return sorted(self._ranking.values(), key=_by_gain)
