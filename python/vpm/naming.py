@@ -12,7 +12,7 @@ from vpm.discrepancy.ranked_effects import free_joints, searched, why_not_ranked
 from vpm.discrepancy.ranked_effects import notes as notes_of
 from vpm.discrepancy.rivals.ambiguity import Rivals, rivals
 from vpm.discrepancy.rivals.rival_discrimination import discriminated
-from vpm.discrepancy.rivals.rival_exchange import in_order, replaced, timed_again
+from vpm.discrepancy.rivals.rival_exchange import in_order, replaced
 from vpm.discrepancy.search.forward_step import forward_step
 from vpm.discrepancy.search.search import Search, begin, further
 from vpm.discrepancy.search.usual_friction import with_usual_friction
@@ -149,8 +149,6 @@ def _settled(
     known = rivals(found.final, data, found.accepted, effects, each, found.last)
     for _ in range(limit):
         changed, known = replaced(found, known, data)
-        if changed is found:
-            changed, known = timed_again(found, known, data)
         if changed is found and not found.interrupted:
             changed, known = discriminated(found, known, data, each)
         if changed is found and not found.interrupted:

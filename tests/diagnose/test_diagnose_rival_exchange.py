@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, field, replace
 from importlib import import_module
-from types import SimpleNamespace
 from typing import cast
 
 import numpy as np
@@ -11,11 +10,9 @@ import pytest
 import vpm
 from inverse_dynamics import inverse_dynamics_data
 from shared_cases import shared_case
-from vpm.catalogue import EFFECTS
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge
+from vpm.discrepancy.confirmation.confirmation import Judged, judge
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
-from vpm.discrepancy.rivals import rival_exchange
 from vpm.discrepancy.rivals.ambiguity import Rivals
 from vpm.discrepancy.rivals.rival_exchange import earned, in_order
 from vpm.discrepancy.screening.candidates import candidates
@@ -112,58 +109,6 @@ def test_a_search_goes_on_beside_what_took_the_place_of_an_effect(monkeypatch: p
     assert {(one.effect, one.site) for one in known} == {entry.key for entry in found.accepted}
     assert ("bias_force", "axis") not in {(c.name, c.site) for c in found.ranking}
     assert [one.reason for one in found.refused if one.name == "bias_force"] == ["exchanged"]
-
-
-@dataclass(frozen=True)
-class _Named:
-    """A search in which effects are known by their keys alone."""
-
-    accepted: tuple[SimpleNamespace, ...]
-    last: SimpleNamespace | None = None
-    gone: frozenset[tuple[str, str]] = frozenset()
-
-
-@pytest.mark.parametrize(
-    ("last", "alone", "again"), [("ripple", False, True), ("delay", False, False), ("", True, False)]
-)
-def test_what_is_late_is_chosen_again_beside_effects_that_came_later(
-    monkeypatch: pytest.MonkeyPatch, last: str, alone: bool, again: bool
-) -> None:
-    """An encoder is late, and its drive was blamed while another effect was missing."""
-
-    def trial(name: str, site: str) -> SimpleNamespace:
-        candidate = SimpleNamespace(key=(name, site), effect=EFFECTS[name])
-        return SimpleNamespace(probe=SimpleNamespace(candidate=candidate))
-
-    def entry(name: str, site: str) -> SimpleNamespace:
-        return SimpleNamespace(key=(name, site), effect=EFFECTS[name], trial=trial(name, site))
-
-    delay, ripple = entry("input_delay", "first"), entry("torque_ripple", "elbow")
-    own, right, other = trial("input_delay", "first"), trial("sensor_delay", "encoder_1"), trial("spring", "elbow")
-    found = _Named((delay,) if alone else (delay, ripple), {"ripple": ripple, "delay": delay}.get(last))
-    without = SimpleNamespace(baseline=None)
-    known = [SimpleNamespace(without=without, tried=(right, other)) for _ in found.accepted]
-    data = SimpleNamespace(training=SimpleNamespace(motions=[SimpleNamespace(dt=1e-3)]))
-    asked = list[list[SimpleNamespace]]()
-
-    def choose(supported: list[SimpleNamespace], _: object) -> SimpleNamespace:
-        asked.append(supported)
-        return SimpleNamespace(trial=right)
-
-    for name, instead in {
-        "refuse_trial": lambda *_: "",
-        "probe": lambda *_: None,
-        "confirm": lambda *_: own,
-        "finished": lambda _, __, trial: trial,
-        "choose": choose,
-        "exchanged": lambda *args: ("exchanged", args[3:5]),
-    }.items():
-        monkeypatch.setattr(rival_exchange, name, instead)
-    changed: tuple[object, object] = rival_exchange.timed_again(
-        cast("Search", found), cast("list[Rivals]", known), cast("Data", data)
-    )
-    assert changed == (("exchanged", (0, right)) if again else (found, tuple(known)))
-    assert asked == ([[own, right]] if again else [])
 
 
 @dataclass

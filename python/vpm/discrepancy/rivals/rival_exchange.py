@@ -12,14 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confirm, finished, shrinkage
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, finished, shrinkage
 from vpm.discrepancy.confirmation.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, Thresholds, refuse_trial
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.rivals.ambiguity import Rivals, as_good
 from vpm.discrepancy.rivals.nested_model import contains
-from vpm.discrepancy.screening.probe import probe
 from vpm.discrepancy.search.backward_elimination import Stage
-from vpm.discrepancy.search.candidate_choice import REFINED, Accepted, alike, choose, schwarz
+from vpm.discrepancy.search.candidate_choice import REFINED, Accepted, alike, schwarz
 from vpm.discrepancy.search.search import Search
 from vpm.identify import Gain, gain, segments
 
@@ -84,36 +83,6 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
         if simulated.harm > NORMAL_95_ONE_SIDED and simulated.relative < -LEAST_GAIN:
             return 0.0
     return fitted.score if trained else validation.score
-
-
-def timed_again(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search, tuple[Rivals, ...]]:
-    """Exchange each delay or lag for another one if that is better beside all other effects.
-
-    When it came in, another effect was missing. Its error was attributed to the drive rather than to an instrument.
-    That disturbed the predictions that discriminate a delay from a lag. One that came in last was chosen beside all the
-    others already.
-    """
-    thresholds = _thresholds(known, data)
-    for place, entry in enumerate(found.accepted):
-        without = known[place].without
-        chosen_last = found.last is not None and found.last.key == entry.key
-        if not entry.effect.late or len(found.accepted) < 2 or chosen_last or without is None:
-            continue
-        others = [
-            t
-            for t in known[place].tried
-            if t.probe.candidate.effect.late
-            and t.probe.candidate.key not in found.gone
-            and not refuse_trial(t, thresholds)
-        ]
-        if not others:
-            continue
-        own = confirm(without, data, probe(without.baseline, data.training, entry.trial.probe.candidate))
-        trial = choose([own, *others], data).trial
-        if trial is not own:
-            reason = "in its place is what their runs along the reference say"
-            return exchanged(found, known, data, place, finished(without, data, trial), reason)
-    return found, tuple(known)
 
 
 def _thresholds(known: Sequence[Rivals], data: Data) -> Thresholds:

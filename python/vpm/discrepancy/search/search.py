@@ -15,8 +15,6 @@ from vpm.discrepancy.search.backward_elimination import (
     drop_replaced,
     drop_springs,
     refitted,
-    release_shown,
-    without_tight_bounds,
 )
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search_round import Round, Tell
@@ -93,7 +91,6 @@ def further(
     try:
         while going.another():
             pass
-        going.loosen()
     except KeyboardInterrupt:
         interrupted = True
     return going.outcome(interrupted=interrupted)
@@ -147,13 +144,6 @@ class _Going:
         self._reconsider()
         return True
 
-    def loosen(self) -> None:
-        """Refit the last stage without tight bounds; what an effect competed with is then known no more."""
-        stage = self.stages[-1]
-        self.stages[-1] = replace(stage, judged=without_tight_bounds(stage.judged, self.data))
-        if self.dropped or self.stages[-1].judged is not stage.judged:
-            self.last = None
-
     def outcome(self, *, interrupted: bool) -> Search:
         """Search as far as it went."""
         refused = {**self.dropped, **(self.rounds[-1].refused if self.rounds else {})}
@@ -164,7 +154,7 @@ class _Going:
             tuple(RefusedEffect(*key, reason) for key, reason in refused.items()),
             (*self.found.ranking, *ranking),
             interrupted,
-            self.last,
+            None if self.dropped else self.last,
             self.over,
         )
 
@@ -195,7 +185,6 @@ class _Going:
             stages[-1] = replace(stages[-1], judged=accepted[-1].trial.judged)
         drop_replaced(stages, accepted, data, self.dropped)
         drop_springs(stages, accepted, data, self.dropped)
-        release_shown(stages, accepted, data)
 
 
 def ambiguities(accepted: Sequence[Accepted]) -> tuple[Ambiguity, ...]:
