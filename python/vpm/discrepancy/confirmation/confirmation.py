@@ -270,7 +270,7 @@ def measured(
         held,
         gain(current.fit.residual, fitted, segments(data.training)),
         gain(current.validation, validation, segments(data.validation)),
-        _simulated_gain(current, judged, data),
+        simulated_gain(current, judged, data),
         timed.validation if timed is not None else _away_gain(current, judged, data.validation, probe),
         diverged,
         is_clear(judged, own),
@@ -378,7 +378,8 @@ def acts_on(model: Model, problem: InverseDynamicsProblem, site: str) -> Array:
     return samples
 
 
-def _simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:
+def simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:
+    """Confirmed gain by simulation of the validation records; None where a model cannot simulate them."""
     if data.simulation is None or current.simulated is None or judged.simulated is None:
         return None
     return gain(current.simulated, judged.simulated, segments(data.simulation))

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, finished, shrinkage
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, finished, shrinkage, simulated_gain
 from vpm.discrepancy.confirmation.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, Thresholds, refuse_trial
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.rivals.ambiguity import Rivals, as_good
@@ -64,25 +64,28 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
         return 0.0  # their runs along the reference said which, and the residual knows less of it
     if not alike(trial.probe.candidate, entry.trial.probe.candidate) or refuse_trial(trial, thresholds):
         return 0.0
-    judged = trial.judged
-    fitted = gain(final.fit.residual, judged.fit.residual, segments(data.training))
-    validation = gain(
-        final.validation, judged.validation * shrinkage(data.validation, final, judged), segments(data.validation)
-    )
+    fitted, validation, simulated = _gains(final, trial.judged, data)
     more = len(trial.parameters) - len(entry.trial.parameters)
+    worse = simulated is not None and simulated.harm > NORMAL_95_ONE_SIDED and simulated.relative < -LEAST_GAIN
+    if worse or not earned(fitted, more):
+        return 0.0
     shown = fitted.score >= thresholds.score(fitted.pieces)
-    open_there = as_good(final, trial, data) and validation.harm < NORMAL_95_ONE_SIDED
-    trained = shown and open_there and fitted.relative > 1.0 - REFINED
-    if not earned(fitted, more) or not (trained or validation.score >= thresholds.score(validation.pieces)):
-        return 0.0
-    nested = contains(judged, trial.parameters, final, entry.trial.parameters)
-    if not trained and validation.harm > (0.0 if nested and shown else -NORMAL_95_ONE_SIDED):
-        return 0.0
-    if data.simulation is not None and final.simulated is not None and judged.simulated is not None:
-        simulated = gain(final.simulated, judged.simulated, segments(data.simulation))
-        if simulated.harm > NORMAL_95_ONE_SIDED and simulated.relative < -LEAST_GAIN:
-            return 0.0
-    return fitted.score if trained else validation.score
+    silent = as_good(final, trial, data) and validation.harm < NORMAL_95_ONE_SIDED
+    if shown and silent and fitted.relative > 1.0 - REFINED:
+        return fitted.score
+    nested = shown and contains(trial.judged, trial.parameters, final, entry.trial.parameters)
+    sure = validation.score >= thresholds.score(validation.pieces)
+    return validation.score if sure and validation.harm <= (0.0 if nested else -NORMAL_95_ONE_SIDED) else 0.0
+
+
+def _gains(final: Judged, judged: Judged, data: Data) -> tuple[Gain, Gain, Gain | None]:
+    """Gains of a rival for an exchange: on training and validation records, and by simulation if there is one."""
+    unseen = judged.validation * shrinkage(data.validation, final, judged)
+    return (
+        gain(final.fit.residual, judged.fit.residual, segments(data.training)),
+        gain(final.validation, unseen, segments(data.validation)),
+        simulated_gain(final, judged, data),
+    )
 
 
 def _thresholds(known: Sequence[Rivals], data: Data) -> Thresholds:
