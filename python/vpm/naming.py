@@ -11,9 +11,7 @@ from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.ranked_effects import free_joints, searched, why_not_ranked
 from vpm.discrepancy.ranked_effects import notes as notes_of
 from vpm.discrepancy.rivals.ambiguity import Rivals, rivals
-from vpm.discrepancy.rivals.rival_discrimination import discriminated
 from vpm.discrepancy.rivals.rival_exchange import in_order, replaced
-from vpm.discrepancy.search.forward_step import forward_step
 from vpm.discrepancy.search.search import Search, begin, further
 from vpm.discrepancy.search.usual_friction import with_usual_friction
 from vpm.errors import DiagnosisError, VpmError
@@ -142,17 +140,12 @@ def _settled(
 ) -> tuple[Search, tuple[Rivals, ...]]:
     """Names and their order, with the rivals of each, after it was removed again.
 
-    Where something takes the place of an effect, or comes in beside it as runs of the model support it, the search goes
-    on beside that.
+    Where something takes the place of an effect, the search goes on beside that.
     """
     tell("looking for what else would do in the place of each effect")
     known = rivals(found.final, data, found.accepted, effects, each, found.last)
     for _ in range(limit):
         changed, known = replaced(found, known, data)
-        if changed is found and not found.interrupted:
-            changed, known = discriminated(found, known, data, each)
-        if changed is found and not found.interrupted:
-            changed = forward_step(found, data, each)
         if changed is found:
             break
         found = changed if found.interrupted else further(changed, data, effects, limit, tell, each)

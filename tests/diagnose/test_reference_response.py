@@ -185,19 +185,6 @@ def test_steps_of_a_run_beside_dry_friction_do_not_blur_what_parts_a_delay_from_
     assert np.linalg.norm(run.left - ideal[0]) < np.linalg.norm(ideal[1] - ideal[0])
 
 
-@pytest.mark.nightly
-@pytest.mark.parametrize("hidden", ["input_delay", "sensor_delay"])
-def test_little_that_is_late_beside_a_hysteresis_is_named_if_runs_ask_for_it_too(hidden: str) -> None:
-    """It takes a fifth of what the hysteresis leaves: of so little, three times the usual certainty is asked else."""
-    case = shared_case("axis_linear", ("hysteresis", "sensor_delay"), 140)
-    why = vpm.diagnose(
-        case.model(), case.train, case.validate, effects=("hysteresis", hidden), names="search", workers=1
-    )
-    assert [effect.name for effect in why.effects] == ["hysteresis", hidden]
-    late, truth = why.effects[1].parameters[0], case.truth.hidden[1].parameters["time"]
-    assert late.value == pytest.approx(truth, abs=2.0 * late.std)
-
-
 def test_one_noise_counts_once_however_many_readings_show_it() -> None:
     generator = np.random.default_rng(5)
     noise = generator.standard_normal((2000, 2)) + 1j * generator.standard_normal((2000, 2))

@@ -128,9 +128,7 @@ def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
         estimates.append(EffectParameterEstimate(short, dotted, parameter.value, parameter.unit, std))
     texts = {e.name: f"{e.value:.4g} {e.unit}" for e in estimates}
     notes = [f"{alias.parameter} held: not discriminated from {alias.partner}" for alias in entry.trial.held]
-    if entry.trial.from_prediction:
-        notes.append("shown by closed-loop predictions; the inverse-dynamics residual hardly shows it")
-    elif not entry.ranked and not is_clear(final, tuple(e.dotted for e in estimates if e.std > 0.0)):
+    if not entry.ranked and not is_clear(final, tuple(e.dotted for e in estimates if e.std > 0.0)):
         notes.append("beside the effects that came later, its interval covers zero: one of them may be enough")
     return AcceptedEffect(
         candidate.effect.name,

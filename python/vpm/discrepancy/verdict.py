@@ -177,7 +177,7 @@ def _is_explanation(found: Search, tracked: float, mostly_open: bool) -> bool:
     if found.within_laws:
         return True
     if np.isnan(tracked):
-        return _shown_by_predictions(found) or not mostly_open
+        return not mostly_open
     return tracked <= MOSTLY_OPEN or (tracked < 1.0 and not mostly_open)
 
 
@@ -185,16 +185,6 @@ def _farthest(away: Mapping[str, float]) -> str:
     """Sentence of the verdict on the parameter farthest from the model file, by its stated uncertainty."""
     name, times = next(iter(away.items()))
     return f"{name} would be off by {times:.1f} times its stated uncertainty"
-
-
-def _shown_by_predictions(found: Search) -> bool:
-    """Whether the verdict rests on closed-loop predictions: all effects come from them and explain their error.
-
-    What the inverse-dynamics residual hardly shows may leave as much of it as there was, and be the explanation.
-    """
-    return all(
-        entry.trial.from_prediction and entry.trial.validation.relative >= MOST_OF_IT for entry in found.accepted
-    )
 
 
 def _nothing_missing(

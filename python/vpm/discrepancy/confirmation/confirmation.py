@@ -7,11 +7,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vpm.discrepancy.confirmation.delay_in_closed_loop import gain_in_closed_loop, timed_in_closed_loop
-from vpm.discrepancy.confirmation.delay_in_motion import CREEPING, Timed, is_dry, is_late
+from vpm.discrepancy.confirmation.delay_in_motion import CREEPING, Timed, is_dry, is_late, timed_in_motion
 from vpm.discrepancy.confirmation.low_frequency import has_impacts, low_frequency
 from vpm.discrepancy.confirmation.refit_start import nearer_start
-from vpm.discrepancy.confirmation.whittle_likelihood import ClosedLoopPrediction
 from vpm.discrepancy.screening.candidates import joint_at
 from vpm.discrepancy.screening.compliance_and_stop_start import ends_apart
 from vpm.discrepancy.screening.probe import ROUNDED, Alias, Baseline, Probe, size_is_clear
@@ -106,12 +104,8 @@ class Trial:
         Why the simulation of the validation records stopped, or "".
     clear : bool
         Whether the effect's size differs from zero on the training data.
-    from_prediction : bool
-        Whether the gains are those of closed-loop predictions, where the residual hardly shows them.
     error : float
         Largest share of its signal that the model without the effect leaves of a validation channel.
-    supported : bool
-        Whether closed-loop predictions support it too, so that little that is sure is enough.
     here : Gain or None
         The validation gain of the effort on the joint where the effect acts, if nothing is lost elsewhere.
     """
@@ -127,9 +121,7 @@ class Trial:
     diverged: str
     clear: bool
     low_frequency: Gain | None = None
-    from_prediction: bool = False
     error: float = 0.0
-    supported: bool = False
     here: Gain | None = None
 
     @property
@@ -234,11 +226,10 @@ def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) ->
         origin = None if origin is None else judged.model.theta
         judged, diverged = judged_anyhow(judged.model, free, data, bounds, origin, worth)
     own = free[len(current.free) :]
-    timed, prediction = _timed(current, judged, data, probe)
+    timed = _timed(current, judged, data, probe)
     if timed is not None:
         judged, diverged = judged_anyhow(judged.model, free, data, {**bounds, **timed.bounds}, origin)
-    trial = measured(current, data, probe, judged, own, (*doubtful, *held), timed, diverged)
-    return _checked_by_prediction(trial, current, prediction, data)
+    return measured(current, data, probe, judged, own, (*doubtful, *held), timed, diverged)
 
 
 def finished(current: Judged, data: Data, trial: Trial) -> Trial:
@@ -391,22 +382,12 @@ def _low_frequency_gain(current: Judged, validation: Array, data: InverseDynamic
     return gain(low_frequency(data, current.validation), low_frequency(data, validation), segments(data))
 
 
-def _timed(
-    current: Judged, judged: Judged, data: Data, probe: Probe
-) -> tuple[Timed | None, ClosedLoopPrediction | None]:
-    """Confirmation of a delay beside dry friction: fitted in motion, with its closed-loop prediction if any."""
+def _timed(current: Judged, judged: Judged, data: Data, probe: Probe) -> Timed | None:
+    """Confirmation of a delay beside dry friction: fitted in motion."""
     if not is_late(probe.candidate.effect, current.model) or has_tangent(probe.model, data.training):
-        return None, None
+        return None
     before, late = (current.model, current.free), (judged.model, judged.free)
-    return timed_in_closed_loop(before, late, data.training, data.validation, data.simulation, judged.bounds)
-
-
-def _checked_by_prediction(trial: Trial, current: Judged, prediction: ClosedLoopPrediction | None, data: Data) -> Trial:
-    """Confirmation trial of a delay that worsens simulations, judged by closed-loop predictions."""
-    if prediction is None or data.simulation is None or trial.simulated is None or trial.simulated.relative >= 0.0:
-        return trial
-    gained = gain_in_closed_loop(current.model, current.free, prediction, data.simulation)
-    return trial if gained is None else replace(trial, simulated=gained)
+    return timed_in_motion(before, late, data.training, data.validation, judged.bounds)
 
 
 def _away_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem, probe: Probe) -> Gain | None:

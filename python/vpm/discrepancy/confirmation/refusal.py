@@ -58,9 +58,9 @@ class Thresholds:
         """Threshold of the validation gain, in standard deviations by Student's t for so few pieces."""
         return float(stdtrit(max(1, pieces - 1), 1.0 - FALSE_ALARM_LEVEL / max(1, self.candidates)))
 
-    def needed(self, validation: Gain, *, supported: bool = False) -> float:
+    def needed(self, validation: Gain) -> float:
         """Standard deviations of gain below which an effect is refused; more where most of the residual stays."""
-        modest = validation.relative < MODEST_GAIN and not supported
+        modest = validation.relative < MODEST_GAIN
         return self.score(validation.pieces) * (MODEST_FACTOR if modest else 1.0)
 
     def met(self, validation: Gain) -> bool:
@@ -101,11 +101,6 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
         _only_impacts(trial),
     )
     return next(filter(None, reasons), "")
-
-
-def impossible_trial(trial: Trial, interval: float) -> str:
-    """Reason of refusal of an effect whose estimates are physically impossible, whatever its gain, or ""."""
-    return _too_short(trial, interval) or _no_way(trial) or _creeps(trial) or _trifling_size(trial)
 
 
 def refuse_ringing(share: float, trial: Trial) -> str:
@@ -329,7 +324,7 @@ def _too_little(trial: Trial, thresholds: Thresholds) -> str:
         return ""
     if validation.relative < WORTH_A_NAME:
         return f"it {_moves('the validation error', validation, 'only ')}"
-    needed = thresholds.needed(validation, supported=trial.supported)
+    needed = thresholds.needed(validation)
     if validation.score < needed:
         return (
             f"its gain of {percent(validation.relative)} on validation data is {validation.score:.1f} standard "

@@ -31,10 +31,10 @@ def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dro
     is set free for the trial: a spring that may rest elsewhere needs no constant force beside it. One name for what two
     would say is the shorter answer. The same holds for a size, such as a difference of dry friction beside a constant
     force, which are one effect in motion. Where neither size has work to do beside it, these data do not tell, and both
-    names stay. What closed-loop predictions show is not judged by the residual, which hardly shows it.
+    names stay.
     """
     newest = accepted[-1]
-    for entry in (one for one in accepted[:-1] if not one.trial.from_prediction):
+    for entry in accepted[:-1]:
         current = stages[-1].judged
         own = set(entry.trial.parameters)
         freed = {alias.parameter for other in accepted for alias in other.trial.held if alias.partner in own}

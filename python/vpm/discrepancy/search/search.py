@@ -33,20 +33,12 @@ class Tried:
 
 
 @dataclass(frozen=True)
-class Over:
-    """Last round of the search: candidates that it screened and refitted in vain."""
-
-    probes: tuple[Probe, ...] = ()
-    trials: tuple[Trial, ...] = ()
-
-
-@dataclass(frozen=True)
 class Search:
     """Outcome of the search, also of one that Ctrl-C ended.
 
-    ``last`` is given if nothing has changed since the last effect came in; ``over`` is the last round, if it accepted
-    nothing. ``left`` comes from a ranking: by joint the share of validation error power that effects leave. ``ranked``
-    is its model, and ``within_laws`` says whether it leaves less than the errors of laws.
+    ``last`` is given if nothing has changed since the last effect came in. ``left`` comes from a ranking: by joint the
+    share of validation error power that effects leave. ``ranked`` is its model, and ``within_laws`` says whether it
+    leaves less than the errors of laws.
     """
 
     stages: tuple[Stage, ...]
@@ -55,7 +47,6 @@ class Search:
     ranking: tuple[RankedCandidate, ...]
     interrupted: bool = False
     last: Tried | None = None
-    over: Over = field(default_factory=Over)
     left: Mapping[str, float] = field(default_factory=dict)
     ranked: Model | None = None
     within_laws: bool = False
@@ -112,7 +103,6 @@ class _Going:
         self.stages, self.accepted, self.rounds = list(found.stages), list(found.accepted), list[Round]()
         self.dropped = {(r.name, r.site): r.reason for r in found.refused if (r.name, r.site) in found.gone}
         self.last: Tried | None = None
-        self.over = Over()
         self.number = max((candidate.round for candidate in found.ranking), default=0)
         # What a round would have accepted at other joints, too, and of how many candidates.
         self.waiting, self.tried = list[Key](), 0
@@ -134,7 +124,6 @@ class _Going:
             best = self._best(outcome)
             self.waiting, self.tried = [] if best is None else outcome.elsewhere(best), outcome.tried
         if best is None:
-            self.over = Over(tuple(outcome.probes), tuple(outcome.trials))
             return False
         known = Tried(best.key, outcome.current, tuple(outcome.probes), tuple(outcome.trials))
         self.last = known if alone else None
@@ -155,7 +144,6 @@ class _Going:
             (*self.found.ranking, *ranking),
             interrupted,
             None if self.dropped else self.last,
-            self.over,
         )
 
     def _begun(self, tried: int = 0) -> Round:
@@ -175,7 +163,7 @@ class _Going:
         best = outcome.light(self.effects, set(self.dropped))
         if best is None or outcome.weak(best):
             best = outcome.heavy(self.effects, set(self.dropped)) or best
-        return best or outcome.by_prediction(set(self.dropped))
+        return best
 
     def _reconsider(self) -> None:
         """Fit the search's new effect to the end, and drop what it makes needless."""

@@ -12,12 +12,6 @@ import numpy as np
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, acts_on, confirm, finished
 from vpm.discrepancy.confirmation.delay_in_motion import in_motion, is_late
-from vpm.discrepancy.confirmation.friction_near_rest import (
-    is_supported,
-    judged_by_prediction,
-    needs_prediction,
-    prediction_without,
-)
 from vpm.discrepancy.confirmation.low_frequency import low_frequency
 from vpm.discrepancy.confirmation.refusal import (
     CLEAR_GAIN,
@@ -29,7 +23,6 @@ from vpm.discrepancy.confirmation.refusal import (
     refuse_trial,
     worse_in_simulation,
 )
-from vpm.discrepancy.confirmation.whittle_likelihood import ClosedLoopPrediction
 from vpm.discrepancy.diagnosis import RankedCandidate
 from vpm.discrepancy.noise.link_ringing import NOISE_ONLY, noise_alone, only_ringing
 from vpm.discrepancy.noise.residual_structure import structure
@@ -98,29 +91,6 @@ class Round:
             self._promising = [one for one in self._promising if one.drop >= RINGING]
         self.confirm()
         return self.best()
-
-    def by_prediction(self, without: set[Key]) -> Accepted | None:
-        """Best friction near rest of the round, which only closed-loop predictions show."""
-        tried = [
-            p for p in self.probes if p.candidate.key not in without and needs_prediction(self.current, self.data, p)
-        ]
-        before = self.prediction if tried else None
-        if before is None:
-            return None
-        self.tell(f"round {self.number}: running with {', '.join(p.candidate.label for p in tried)}")
-        ask = partial(judged_by_prediction, self.current, self.data, before, self.thresholds())
-        answers = self.each(f"round {self.number}: running", ask, tried, lambda p: p.candidate.label, refit_effort)
-        for one, answer in zip(tried, answers, strict=True):
-            if not isinstance(answer, Trial):
-                self.refused[one.candidate.key] = answer.reason if isinstance(answer, Failure) else answer
-        supported = [answer for answer in answers if isinstance(answer, Trial)]
-        if not supported:
-            return None
-        best = Accepted(max(supported, key=lambda trial: trial.validation.score), ())
-        self.refused.pop(best.key, None)
-        self._ranking[best.key] = replace(self._ranking[best.key], unseen=best.trial.validation.relative)
-        self.mark(best.key)
-        return best
 
     def again(self, key: Key) -> Accepted | None:
         """Candidate that an earlier round would have accepted too, if the round accepts it beside what came in."""
@@ -292,27 +262,9 @@ class Round:
         """Reason why a trial of the round is refused, or ""."""
         candidate = trial.probe.candidate
         reason = refuse_trial(trial, thresholds) or self._only_timing(trial, thresholds)
-        if reason and self._is_predicted(trial, thresholds):
-            reason = ""
         if not reason and is_read_off(self.current.model, self.data.training, candidate):
             reason = only_compliant(trial.judged.model, candidate.site, self.data.training)
         return reason or only_ringing(self.current, self.data, trial)
-
-    def _is_predicted(self, trial: Trial, thresholds: Thresholds) -> bool:
-        """Whether closed-loop predictions support a delay of the round that gains little and surely.
-
-        Stiction imitates a delay in an inverse-dynamics residual, but not in a prediction. A prediction also does not
-        depend on the sample to which a command was logged.
-        """
-        late = is_late(trial.probe.candidate.effect, trial.judged.model) and not self._takes_long()
-        if not late or refuse_trial(replace(trial, supported=True), thresholds) or self.prediction is None:
-            return False
-        return is_supported(self.prediction, trial, self.data, thresholds)
-
-    @cached_property
-    def prediction(self) -> ClosedLoopPrediction | None:
-        """Closed-loop prediction of the training records by the round's model."""
-        return prediction_without(self.current, self.data)
 
     def _only_timing(self, trial: Trial, thresholds: Thresholds) -> str:
         """Why an otherwise accepted trial of the round does no more than shifted commands do, or ""."""
