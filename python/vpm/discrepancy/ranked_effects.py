@@ -224,7 +224,7 @@ def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
     probe = Probe(candidate, model, moving, held, blind, values, dict.fromkeys(own, np.nan), np.nan)
     free = (*known, *moving)
     judged, diverged = _refitted(current, model, candidate, one, free, data)
-    return measured(current, data, probe, judged, moving, held, None, diverged)
+    return measured(current, data, probe, judged, moving, held, diverged)
 
 
 def _has_derivatives(columns: Array) -> NDArray[np.bool_]:

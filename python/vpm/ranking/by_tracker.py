@@ -185,7 +185,6 @@ def _beside(current: Judged, model: Model, one: Ranked, data: _Followed, *, refi
         gain(current.fit.residual, judged.fit.residual, segments(data.training)),
         gain(current.validation, judged.validation, segments(data.validation)),
         None,
-        None,
         "",
         not np.isnan(judged.fit.covariance).any() and is_clear(judged, own),
         error=max(share for _, share, _ in gaps(data.validation, current.validation).values()),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vpm.discrepancy.confirmation.delay_in_motion import CREEPING, Timed, is_dry, is_late, timed_in_motion
+from vpm.discrepancy.confirmation.delay_in_motion import is_late, timed_in_motion
 from vpm.discrepancy.confirmation.low_frequency import has_impacts, low_frequency
 from vpm.discrepancy.confirmation.refit_start import nearer_start
 from vpm.discrepancy.screening.candidates import joint_at
@@ -95,9 +95,6 @@ class Trial:
         Against the model without the effect.
     simulated : Gain or None
         The same by simulation of the validation records, if there is one.
-    away : Gain or None
-        The validation gain away from reversals, for an effect of a drive or an instrument, or a compliant joint, on
-        a machine with dry friction.
     low_frequency : Gain or None
         The validation gain of the low-frequency part, where a backlash is in the model already; None elsewhere.
     diverged : str
@@ -117,7 +114,6 @@ class Trial:
     training: Gain
     validation: Gain
     simulated: Gain | None
-    away: Gain | None
     diverged: str
     clear: bool
     low_frequency: Gain | None = None
@@ -226,10 +222,9 @@ def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) ->
         origin = None if origin is None else judged.model.theta
         judged, diverged = judged_anyhow(judged.model, free, data, bounds, origin, worth)
     own = free[len(current.free) :]
-    timed = _timed(current, judged, data, probe)
-    if timed is not None:
-        judged, diverged = judged_anyhow(judged.model, free, data, {**bounds, **timed.bounds}, origin)
-    return measured(current, data, probe, judged, own, (*doubtful, *held), timed, diverged)
+    if (timed := _timed(current, judged, data, probe)) is not None:
+        judged, diverged = judged_anyhow(judged.model, free, data, {**bounds, **timed}, origin)
+    return measured(current, data, probe, judged, own, (*doubtful, *held), diverged)
 
 
 def finished(current: Judged, data: Data, trial: Trial) -> Trial:
@@ -238,7 +233,7 @@ def finished(current: Judged, data: Data, trial: Trial) -> Trial:
         return trial
     known = trial.judged
     judged, diverged = judged_anyhow(known.model, known.free, data, dict(known.bounds))
-    return measured(current, data, trial.probe, judged, trial.parameters, trial.held, None, diverged)
+    return measured(current, data, trial.probe, judged, trial.parameters, trial.held, diverged)
 
 
 def measured(
@@ -248,10 +243,9 @@ def measured(
     judged: Judged,
     own: tuple[str, ...],
     held: tuple[Alias, ...],
-    timed: Timed | None,
     diverged: str,
 ) -> Trial:
-    """Confirmed gain of a refit on all data; a delay fitted in motion counts by its gain in motion."""
+    """Confirmed gain of a refit on all data."""
     fitted = judged.fit.residual * shrinkage(data.training, current, judged)
     validation = judged.validation * shrinkage(data.validation, current, judged)
     return Trial(
@@ -262,7 +256,6 @@ def measured(
         gain(current.fit.residual, fitted, segments(data.training)),
         gain(current.validation, validation, segments(data.validation)),
         simulated_gain(current, judged, data),
-        timed.validation if timed is not None else _away_gain(current, judged, data.validation, probe),
         diverged,
         is_clear(judged, own),
         _low_frequency_gain(current, validation, data.validation),
@@ -382,32 +375,11 @@ def _low_frequency_gain(current: Judged, validation: Array, data: InverseDynamic
     return gain(low_frequency(data, current.validation), low_frequency(data, validation), segments(data))
 
 
-def _timed(current: Judged, judged: Judged, data: Data, probe: Probe) -> Timed | None:
-    """Confirmation of a delay beside dry friction: fitted in motion."""
+def _timed(current: Judged, judged: Judged, data: Data, probe: Probe) -> dict[str, tuple[float, float]] | None:
+    """Bounds to confirm a delay beside dry friction, from samples in motion; None where these do not tell."""
     if not is_late(probe.candidate.effect, current.model) or has_tangent(probe.model, data.training):
         return None
-    before, late = (current.model, current.free), (judged.model, judged.free)
-    return timed_in_motion(before, late, data.training, data.validation, judged.bounds)
-
-
-def _away_gain(current: Judged, judged: Judged, data: InverseDynamicsProblem, probe: Probe) -> Gain | None:
-    """Confirmed gain on samples at which every joint is clearly in motion.
-
-    At a reversal a joint with dry friction sticks for a while, which no smooth law follows. A delay or a joint
-    compliance imitates that there, and nowhere else.
-    """
-    imitates = probe.candidate.effect.site in {"actuator", "sensor"} or probe.candidate.effect.winds_up
-    if not is_dry(current.model) or not imitates:
-        return None
-    counted = np.ones(current.validation.size)
-    speeds = [np.abs(data.state(record)[1]) for record in range(len(data.motions))]
-    largest = np.max([np.quantile(speed, 0.999, axis=0) for speed in speeds], axis=0)
-    for record, speed in enumerate(speeds):
-        creeping = (speed < CREEPING * largest).any(axis=1)
-        near = creeping | np.append(creeping[1:], False) | np.insert(creeping[:-1], 0, False)
-        for block in data.efforts(record):
-            counted[block.samples] = ~near
-    return gain(current.validation * counted, judged.validation * counted, segments(data))
+    return timed_in_motion(judged.model, judged.free, current.free, data.training, judged.bounds)
 
 
 def _bounds(probe: Probe) -> dict[str, tuple[float, float]]:

@@ -9,13 +9,12 @@ is fitted there, and held within that estimate while all other parameters are fi
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from vpm.catalogue import EffectType
-from vpm.identify import Gain, InverseDynamicsProblem, estimate, gain, segments
+from vpm.identify import InverseDynamicsProblem, estimate
 from vpm.identify.identifiability import column_lengths
 from vpm.model import Model
 from vpm.numbers import Array
@@ -46,15 +45,6 @@ class InMotion:
         return self.counted * residual, self.counted[:, None] * jacobian
 
 
-@dataclass(frozen=True)
-class Timed:
-    """Delay that was fitted in motion, with its interval."""
-
-    bounds: Mapping[str, tuple[float, float]]  #: Of its own parameters, by dotted name.
-    #: On validation samples in motion, against the model without it that was fitted to the same samples.
-    validation: Gain
-
-
 def is_dry(model: Model) -> bool:
     """Whether a joint of a model has dry friction and can stick, so that delays are fitted in motion."""
     return any(effect.type.sticks for effect in model.effects)
@@ -80,38 +70,34 @@ def in_motion(problem: InverseDynamicsProblem) -> Array:
 
 
 def timed_in_motion(
-    current: tuple[Model, Sequence[str]],
-    late: tuple[Model, Sequence[str]],
+    model: Model,
+    free: Sequence[str],
+    known: Sequence[str],
     training: InverseDynamicsProblem,
-    validation: InverseDynamicsProblem,
     bounds: Mapping[str, tuple[float, float]],
-) -> Timed | None:
-    """Fit a model without a delay and with it to the samples in motion; None where those are too few.
+) -> dict[str, tuple[float, float]] | None:
+    """Bounds of a delay's parameters by a fit to the samples in motion; None where those are too few.
 
     Parameters
     ----------
-    current, late : (Model, sequence of str)
-        Without the effect and with it, each with its free parameters; those that only ``late`` has are the effect's.
-    training, validation : InverseDynamicsProblem
+    model : Model
+        With the delay.
+    free, known : sequence of str
+        Its free parameters, and those of the model without the delay.
+    training : InverseDynamicsProblem
     bounds : mapping
-        Bounds of free parameters that replace those of the models.
+        Bounds of free parameters that replace those of the model.
     """
-    fitted, predicted = InMotion(training), InMotion(validation)
-    own = [name for name in late[1] if name not in current[1]]
-    if np.count_nonzero(fitted.counted) < FEWEST * (len(late[1]) + 1) or not np.any(predicted.counted):
+    fitted = InMotion(training)
+    own = [name for name in free if name not in known]
+    if np.count_nonzero(fitted.counted) < FEWEST * (len(free) + 1):
         return None
-    left, spread = [], {}
-    for model, free in (current, late):
-        shown = _shown(model, free, fitted, own)
-        fit = estimate(model, fitted, shown, bounds=bounds, tolerance=TOLERANCE)
-        values = dict(zip(shown, map(float, fit.values), strict=True))
-        moved = model.with_parameters(values)
-        left.append(predicted.evaluate(moved, moved.theta)[0])
-        spread = {name: (values[name], float(s)) for name, s in zip(shown, fit.std, strict=True) if name in own}
-    if not np.all(np.isfinite([s for _, s in spread.values()])):
+    shown = _shown(model, free, fitted, own)
+    fit = estimate(model, fitted, shown, bounds=bounds, tolerance=TOLERANCE)
+    found = {name: (float(v), float(s)) for name, v, s in zip(shown, fit.values, fit.std, strict=True) if name in own}
+    if not np.all(np.isfinite([std for _, std in found.values()])):
         return None
-    near = {name: _near(late[0], name, *spread[name], bounds) for name in own}
-    return Timed(near, gain(left[0], left[1], segments(validation)))
+    return {name: _near(model, name, *found[name], bounds) for name in own}
 
 
 def _near(

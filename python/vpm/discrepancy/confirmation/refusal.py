@@ -93,11 +93,9 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
         _no_way(trial),
         _creeps(trial),
         _trifling_gain(trial),
-        _only_training(trial),
         _not_clear(trial),
         worse_in_simulation(trial),
         _too_little(trial, thresholds),
-        _only_reversals(trial),
         _only_impacts(trial),
     )
     return next(filter(None, reasons), "")
@@ -282,14 +280,6 @@ def _trifling_size(trial: Trial) -> str:
     )
 
 
-def _only_training(trial: Trial) -> str:
-    seen, validation = trial.training, trial.validation
-    if validation.relative >= 0.0:
-        return ""
-    joined = "and" if seen.relative < 0.0 else "but"
-    return f"it {_moves('the training error', seen)}, {joined} {_moves('the validation error', validation)}"
-
-
 def _not_clear(trial: Trial) -> str:
     if trial.clear:
         return ""
@@ -332,15 +322,6 @@ def _too_little(trial: Trial, thresholds: Thresholds) -> str:
             f"when {thresholds.candidates} candidates are tried"
         )
     return ""
-
-
-def _only_reversals(trial: Trial) -> str:
-    if trial.away is None or trial.away.relative >= LEAST_GAIN:
-        return ""
-    return (
-        "it lowers the validation error only where a joint with dry friction turns round and sticks for a while; "
-        f"elsewhere it {_moves('that', trial.away, 'only ')}"
-    )
 
 
 def worse_in_simulation(trial: Trial) -> str:

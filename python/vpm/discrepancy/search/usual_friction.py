@@ -129,7 +129,7 @@ class _Beside:
         spread = dict(zip(own, (float(judged.fit.std[judged.free.index(name)]) for name in own), strict=True))
         drop = 1.0 - float(self.fitted @ self.fitted) / float(left @ left)
         probe = Probe(candidate, judged.model, own, (), (), values, spread, drop)
-        return measured(less, self.data, probe, judged, own, (), None, "")
+        return measured(less, self.data, probe, judged, own, (), "")
 
 
 def _sizes(model: Model, candidate: Candidate) -> list[str]:
