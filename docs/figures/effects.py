@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 import vpm
 from vpm.catalogue import EFFECTS, EffectParameter, EffectType
-from vpm.discrepancy.site_states import View
+from vpm.discrepancy.evidence import View
 from vpm.identify import InverseDynamicsProblem
 from vpm.plot.style import BLUE, SOFT, label, panels, styled
 

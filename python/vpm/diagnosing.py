@@ -10,7 +10,7 @@ from typing import Any, TypedDict, get_args
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis, Empirical
-from vpm.discrepancy.diagnosis_fields import accepted_effect, classes, examined, gaps_of, of_search, step
+from vpm.discrepancy.diagnosis_fields import accepted_effect, classes, examined, gaps_of, of_search, step, unmeasured
 from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.noise.sensor_drift import Drift, sensor_drifts, without_drifts
 from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
@@ -27,7 +27,6 @@ from vpm.discrepancy.rivals.discriminating_experiment import experiments as expe
 from vpm.discrepancy.screening.candidates import asked_for
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search import Search, ambiguities
-from vpm.discrepancy.unmeasured import unmeasured
 from vpm.discrepancy.verdict import is_negligible, verdict
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records

@@ -5,7 +5,7 @@ import pytest
 
 import vpm
 from shared_cases import shared_case
-from vpm.discrepancy.screening.drive_limit_start import limit_start
+from vpm.discrepancy.screening.candidates import limit_start
 from vpm.identify import InverseDynamicsProblem
 
 

@@ -6,8 +6,7 @@ import pytest
 from vpm import Experiment, Model, diagnose
 from vpm._core import soft_flights
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.screening.backlash_flights import flights
-from vpm.discrepancy.screening.backlash_start import only_compliant, read_off
+from vpm.discrepancy.screening.backlash_start import flights, only_compliant, read_off
 from vpm.discrepancy.screening.candidates import Candidate
 from vpm.identify import InverseDynamicsProblem
 from vpm.numbers import Array

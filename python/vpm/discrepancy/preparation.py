@@ -1,4 +1,10 @@
-"""Preparation of a diagnosis: training and validation records, the nominal and the recalibrated model."""
+"""Preparation of a diagnosis: training and validation records, the nominal and the recalibrated model.
+
+The customary preparation filters the motion just above the band that is kept (M. Gautier, ICRA 1997). At a reversal so
+smooth a motion passes through rest sooner or later than the joint did. Dry friction, hysteresis or backlash along it
+then err by more than a weak effect. Laws that are linear in the motion leave noise at its frequency, and the band
+removes it later. So the filter of the states may be as fast as their noise allows.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +14,19 @@ from dataclasses import replace
 import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge, judged_anyhow
-from vpm.discrepancy.motion_filters import filters
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.prior_departure import moved_far
 from vpm.discrepancy.screening.candidates import shares_at, slow_speeds
 from vpm.discrepancy.stuck_channels import check_moving, check_stuck
 from vpm.errors import DiagnosisError, DivergedError
-from vpm.experiment import Experiment, joints_from_sensors
+from vpm.experiment import Experiment, Motion, choose_cutoff, joints_from_sensors
+from vpm.experiment.cutoff import HIGHEST
+from vpm.experiment.signal import UNDISTORTED_BAND
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
 from vpm.identify.comparison import relative_to_drives
 from vpm.identify.parallel import worker_count
+from vpm.identify.response_along_motion import bends, has_own_drives
+from vpm.identify.sample_mask import STANDSTILL_SHARE
 from vpm.model import Model
 from vpm.simulate import Setup
 
@@ -28,6 +37,8 @@ REACH = 4.0
 
 #: Records to fit, records to judge on, and notes on both.
 Records = tuple[tuple[Experiment, ...], tuple[Experiment, ...], list[str]]
+#: The motion is filtered at most so many times as high as the least error of its acceleration asks for.
+QUICKER = 4.0
 
 
 def records_of(model: Model, experiments: Sequence[Experiment], validate: Sequence[Experiment]) -> Records:
@@ -138,4 +149,46 @@ def _within_reach(model: Model, free: Sequence[str]) -> dict[str, tuple[float, f
         if parameter.kind != "linear" and value > 0.0 <= parameter.minimum and np.isfinite(spread):
             factor = float(np.exp(REACH * spread / value))
             found[name] = max(parameter.minimum, value / factor), min(parameter.maximum, value * factor)
+    return found
+
+
+def filters(
+    model: Model, training: InverseDynamicsProblem, cutoff: float | None
+) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Cut-off frequency of the motion filter and highest compared frequency of each record, Hz.
+
+    Parameters
+    ----------
+    model : Model
+        Flexible links and drives with states respond to the whole motion, and noise rings in them. For these, and where
+        ``cutoff`` is given, the band is that of the motion filter.
+    training : InverseDynamicsProblem
+        With the cut-off frequencies that suit each record.
+    cutoff : float or None
+    """
+    own = tuple(m.cutoff for m in training.motions)
+    bands = tuple(UNDISTORTED_BAND * one for one in own)
+    if cutoff is not None or bends(model) or has_own_drives(model):
+        return own, bands
+    pairs = zip(training.experiments, training.motions, strict=True)
+    highest = (quickest(record, m, training.joints) for record, m in pairs)
+    return tuple(max(one, min(QUICKER * one, most)) for one, most in zip(own, highest, strict=True)), bands
+
+
+def quickest(record: Experiment, m: Motion, joints: Sequence[str]) -> float:
+    """Highest cut-off frequency of a motion filter at which velocity noise does not look like motion, Hz.
+
+    White noise of the position with deviation ``s`` at the rate ``r`` has the density ``2 s^2 / r``; its derivative
+    below ``f`` the mean square ``(2 pi)^2 (2 s^2 / r) f^3 / 3``. Two deviations are to stay below the speed under which
+    a joint counts as standing.
+    """
+    found = HIGHEST * record.rate
+    for joint in joints:
+        channel = f"{joint}.position"
+        read, retained = [record.read_rate(channel)], [record.retained.get(channel, np.inf)]
+        noise = choose_cutoff(record[channel][:, None], record.rate, read, retained).noise[0]
+        speed = np.abs(m.velocity[m.kept, m.joints.index(joint)])
+        least = 0.5 * STANDSTILL_SHARE * float(np.quantile(speed, 0.999))
+        if noise > 0.0:
+            found = min(found, float(np.cbrt(3.0 * record.rate * least**2 / (8.0 * np.pi**2 * noise**2))))
     return found

@@ -11,7 +11,7 @@ import numpy as np
 
 from vpm.catalogue.kinds import Side
 from vpm.discrepancy.screening.candidates import Key
-from vpm.discrepancy.screening.location_parameter import ANYWHERE
+from vpm.discrepancy.screening.linear_step import ANYWHERE
 from vpm.model import Effect, Model
 from vpm.numbers import Array
 from vpm.ranking.settings import MOVE, OVERTONE

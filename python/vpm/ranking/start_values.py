@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from vpm.discrepancy.screening.candidates import Candidate
 from vpm.discrepancy.screening.compliance_and_stop_start import moved
-from vpm.discrepancy.screening.location_parameter import ANYWHERE
+from vpm.discrepancy.screening.linear_step import ANYWHERE
 from vpm.model import Model
 from vpm.ranking.parameter_priors import Sizes
 from vpm.ranking.settings import LOSS, PLACES

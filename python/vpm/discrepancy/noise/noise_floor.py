@@ -1,4 +1,8 @@
-"""Noise floor of a residual: instrument noise, and the error of the comparison itself."""
+"""Noise floor of a residual: instrument noise, and the error of the comparison itself.
+
+Flexible links ring by noise of the measured motion: that is not white in the residual, and no missing physics. Its size
+follows from simulations of the model with noise like that of the records.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +10,14 @@ import warnings
 
 import numpy as np
 
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial
+from vpm.discrepancy.confirmation.refusal import refuse_ringing
 from vpm.discrepancy.noise.noise_spectrum import TIMES, noise_shapes, noise_spectrum, with_noise
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.experiment.signal import RETAINED_BAND
 from vpm.identify import InverseDynamicsProblem, gaps
+from vpm.identify.response_along_motion import bends
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.simulate import Setup, simulate_arrays
@@ -21,6 +28,8 @@ SEED = 20160331
 ENOUGH = 200
 #: Share of the frequencies of a residual that hold no more than noise, for the estimate of what is white in it.
 QUIET_SHARE = 0.4
+#: Ratio of a residual to the noise in it up to which it is noise alone.
+NOISE_ONLY = 1.2
 
 
 def noise_floor(
@@ -136,3 +145,30 @@ def _rows(problem: InverseDynamicsProblem, record: int) -> slice:
 
 def _unit(experiment: Experiment, channel: str) -> str:
     return experiment.units[experiment.channels.index(channel)]
+
+
+def noise_alone(model: Model, data: Data, validation: Array) -> bool:
+    """Whether the ``validation`` residual of flexible links is no more than ringing by noise."""
+    if not bends(model) or data.simulation is None:
+        return False
+    allowed = _ringing(model, data)
+    return all(gap <= NOISE_ONLY * allowed[name] for name, (gap, _, _) in gaps(data.validation, validation).items())
+
+
+def only_ringing(current: Judged, data: Data, trial: Trial) -> str:
+    """Why a trial only damps the ringing of links by noise, or ""."""
+    if data.simulation is None or not bends(current.model) or not trial.probe.candidate.effect.damps:
+        return ""
+    before, after = _ringing(current.model, data), _ringing(trial.judged.model, data)
+    weights = {block.channel: block.weight**2 for block in data.validation.blocks}
+    alone = [sum(weight * ringing[name] ** 2 for name, weight in weights.items()) for ringing in (before, after)]
+    # One record of noise that rings in a narrow band may be twice as large as another: only its share is known.
+    return refuse_ringing(1.0 - alone[1] / alone[0], trial)
+
+
+def _ringing(model: Model, data: Data) -> dict[str, float]:
+    """Root mean square ringing by noise of the records in a model's own simulation, by channel."""
+    if data.simulation is None:
+        return {}
+    nothing = np.zeros(data.validation.blocks[-1].samples.stop)
+    return noise_floor(model, data.validation, nothing, data.simulation.mode, data.simulation.setup)

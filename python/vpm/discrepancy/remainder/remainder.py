@@ -15,12 +15,12 @@ import numpy as np
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.confirmation.refusal import WORTH_A_NAME, Thresholds
 from vpm.discrepancy.diagnosis import Empirical
-from vpm.discrepancy.noise.motion_band import below, motion_band
 from vpm.discrepancy.noise.sample_timing import in_time
 from vpm.discrepancy.remainder.empirical_formula import describe
 from vpm.discrepancy.remainder.seal_friction import Seals, seals
-from vpm.identify import gain, segments
+from vpm.identify import InverseDynamicsProblem, gain, segments
 from vpm.identify.parallel import in_order
+from vpm.model import Model
 from vpm.numbers import Array
 
 #: A later description has to leave less than this share of what an earlier one leaves to be taken in its place.
@@ -29,6 +29,12 @@ CLEARLY = 0.9
 HALF = 0.5
 #: Models that are described: that with the effects, and that without.
 DESCRIBED = 2
+#: Share of the power of the efforts that lies in the band.
+EFFORT_SHARE = 0.99
+#: Order of the low-pass, which passes forward and backward.
+FILTER_ORDER = 2
+#: Above this share of the highest frequency that the samples hold there is nothing to filter.
+WHOLE_BAND = 0.9
 
 
 @dataclass(frozen=True)
@@ -143,3 +149,31 @@ class _View:
         """Sum of squares that a remark on the remainder predicts, at the effort that it names."""
         blocks = (block for block in self.data.validation.blocks if block.channel == choice.empirical.channel)
         return choice.empirical.predicted * sum(_power(own[block.samples]) for block in blocks)
+
+
+def motion_band(problem: InverseDynamicsProblem, model: Model) -> float:
+    """Upper frequency of the motion band, Hz: efforts of all records have nearly all of their power below it.
+
+    The noise of the residual comes from twice differentiated positions, so it grows with the square of the frequency.
+    In a mean over all frequencies it hides what follows the motion; in this band it may not.
+    """
+    found = []
+    for record in range(len(problem.motions)):
+        time, applied, _ = problem.effort(model, model.theta, record)
+        power = np.abs(np.fft.rfft((applied - applied.mean(axis=0)) * np.hanning(len(time))[:, None], axis=0)) ** 2
+        summed = np.cumsum(power, axis=0)
+        places = [np.searchsorted(column, EFFORT_SHARE * column[-1]) for column in summed.T if column[-1] > 0.0]
+        found += [float(place) / (len(time) * float(time[1] - time[0])) for place in places]
+    return max(found, default=np.inf)
+
+
+def below(problem: InverseDynamicsProblem, values: Array, frequency: float) -> Array:
+    """Residual within the motion band: without frequencies above ``frequency``, Hz, and without a time shift."""
+    from scipy.signal import butter, sosfiltfilt
+
+    kept = values.copy()
+    for block in problem.blocks:
+        share = 2.0 * frequency * float(block.time[1] - block.time[0])
+        if 0.0 < share < WHOLE_BAND:
+            kept[block.samples] = sosfiltfilt(butter(FILTER_ORDER, share, output="sos"), values[block.samples])
+    return kept

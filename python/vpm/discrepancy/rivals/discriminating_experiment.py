@@ -9,17 +9,17 @@ T-optimality of A. Atkinson and V. Fedorov, "The design of experiments for discr
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Judged
 from vpm.discrepancy.diagnosis import ProposedExperiment
 from vpm.discrepancy.rivals.ambiguity import Rivals
-from vpm.discrepancy.rivals.designed_motions import Motion, designs
-from vpm.discrepancy.rivals.excitation_range import ExcitationRange, excitation_range
 from vpm.errors import ExcitationError
+from vpm.excitation import Excitation, JointLimits, chirp, multisine, trapezoid
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.response_along_motion import has_hidden, has_own_drives
 from vpm.model import Model
@@ -27,6 +27,16 @@ from vpm.numbers import Array
 
 #: A difference below this many times the noise discriminates nothing.
 TELLING = 1.0
+#: Longest experiment, s, and most samples of one.
+LONGEST, MOST_SAMPLES = 60.0, 20000
+#: Share of the range seen that is used, so that a controller's overshoot stays within it.
+WITHIN = 0.9
+#: Speeds of the trapezoids as shares of the largest one seen; the slow ones creep through the reversal.
+SPEEDS = (1.0, 0.3, 0.05, 0.01)
+#: Amplitudes of chirps and multisines as shares of half the range.
+AMPLITUDES = (1.0, 0.3, 0.05)
+#: Duration of a chirp and period of a multisine, s.
+DURATION = 20.0
 
 
 @dataclass(frozen=True)
@@ -182,3 +192,151 @@ def _with_sentence(found: ProposedExperiment, seen: ExcitationRange) -> Proposed
     else:
         text = f"To tell {found.effect} from {found.rival}, {what}: they would differ by {size}"
     return replace(found, sentence=f"{text}.")
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Designed motion: an excitation, and the motion of all joints (n, joints) that it means."""
+
+    excitation: Excitation
+    parameters: Mapping[str, float | str]
+    position: Array
+    velocity: Array
+    acceleration: Array
+
+    @property
+    def time_step(self) -> float:
+        """Time step of a designed motion, s."""
+        return self.excitation.time_step
+
+
+def designs(seen: ExcitationRange) -> list[Callable[[], Motion]]:
+    """Designed motions to choose from; each raises `ExcitationError` if it does not fit into the limits."""
+    ways = [partial(_way, seen, share) for share in SPEEDS]
+    waves = [partial(design, seen, share) for share in AMPLITUDES for design in (_chirp, _multisine)]
+    return [*ways, *waves]
+
+
+def _way(seen: ExcitationRange, share: float) -> Motion:
+    """Designed motion back and forth at constant speed with rests; a slow one uses the time available."""
+    speed = share * seen.speed
+    middle, half = 0.5 * (seen.low + seen.high), 0.5 * WITHIN * (seen.high - seen.low)
+    half = min(half, 0.05 * LONGEST * speed)
+    limits = {seen.joint: JointLimits((seen.low, seen.high), speed, seen.acceleration)}
+    points = {seen.joint: [middle - half, middle + half, middle - half, middle, middle + half, middle - half]}
+    step = _step(seen, LONGEST)
+    made = trapezoid(points, limits, time_step=step, dwell=0.5, unit=seen.unit)
+    numbers = {"speed": speed, "amplitude": half, "offset": middle, "acceleration": seen.acceleration, "dwell": 0.5}
+    motion = (made[f"{seen.joint}.{quantity}"] for quantity in ("position", "velocity", "acceleration"))
+    return _motion(seen, made, numbers, *motion)
+
+
+def _chirp(seen: ExcitationRange, share: float) -> Motion:
+    middle, amplitude = 0.5 * (seen.low + seen.high), 0.5 * WITHIN * share * (seen.high - seen.low)
+    fastest = _fastest(seen, amplitude)
+    first = max(0.1 * fastest, 2.0 / DURATION)
+    made = chirp(
+        f"{seen.joint}.position",
+        seen.unit,
+        first=min(first, fastest),
+        last=fastest,
+        amplitude=amplitude,
+        duration=DURATION,
+        time_step=_step(seen, DURATION),
+        mean=middle,
+    )
+    numbers = {"amplitude": amplitude, "offset": middle, "first": min(first, fastest), "last": fastest}
+    return _from_position(seen, made, {**numbers, "duration": DURATION})
+
+
+def _multisine(seen: ExcitationRange, share: float) -> Motion:
+    middle, amplitude = 0.5 * (seen.low + seen.high), 0.5 * WITHIN * share * (seen.high - seen.low)
+    fastest = max(_fastest(seen, amplitude), 3.0 / DURATION)
+    made = multisine(
+        f"{seen.joint}.position",
+        seen.unit,
+        band=(1.0 / DURATION, fastest),
+        period=DURATION,
+        time_step=_step(seen, DURATION),
+        peak=amplitude,
+        phases="schroeder",
+    )
+    shifted = Excitation(made.name, made.time, made.data + middle, made.channels, made.units, made.notes)
+    return _from_position(
+        seen, shifted, {"peak": amplitude, "offset": middle, "first": 1.0 / DURATION, "last": fastest}
+    )
+
+
+def _fastest(seen: ExcitationRange, amplitude: float) -> float:
+    """Highest frequency in Hz of a designed sine within the speed and acceleration of the records."""
+    return min(seen.speed / amplitude, float(np.sqrt(seen.acceleration / amplitude))) / (2.0 * np.pi)
+
+
+def _step(seen: ExcitationRange, duration: float) -> float:
+    """Time step of a designed motion: a multiple of that of the records, and a whole part of a second."""
+    step = max(seen.time_step, duration / MOST_SAMPLES)
+    return 1.0 / max(1, int(1.0 / step))
+
+
+def _from_position(seen: ExcitationRange, made: Excitation, numbers: Mapping[str, float | str]) -> Motion:
+    position = made[f"{seen.joint}.position"]
+    velocity = np.gradient(position, made.time_step)
+    return _motion(seen, made, numbers, position, velocity, np.gradient(velocity, made.time_step))
+
+
+def _motion(
+    seen: ExcitationRange,
+    made: Excitation,
+    numbers: Mapping[str, float | str],
+    position: Array,
+    velocity: Array,
+    acceleration: Array,
+) -> Motion:
+    """Designed motion of all joints; those that are not excited stand still."""
+    joints = list(seen.hold)
+    place = joints.index(seen.joint)
+    table = np.tile([seen.hold[name] for name in joints], (position.size, 1))
+    rates, pushes = np.zeros_like(table), np.zeros_like(table)
+    table[:, place], rates[:, place], pushes[:, place] = position, velocity, acceleration
+    return Motion(made, numbers, table, rates, pushes)
+
+
+@dataclass(frozen=True)
+class ExcitationRange:
+    """Excitation range of one joint: way, speed and acceleration; other joints stay at ``hold``."""
+
+    joint: str
+    unit: str  #: rad or m.
+    low: float
+    high: float
+    #: 99.9 % quantiles of the absolute values.
+    speed: float
+    acceleration: float
+    time_step: float  #: s.
+    hold: dict[str, float]  #: Mean position of every joint.
+    command: float  #: Largest command of any actuator.
+    effort: float  #: What the weighted residual has to be multiplied by to be an effort of this joint.
+
+
+def excitation_range(data: InverseDynamicsProblem, joint: str) -> ExcitationRange:
+    """Excitation range of ``joint`` in the records."""
+    motions = data.motions
+    column = motions[0].joints.index(joint)
+    position, velocity, acceleration = (
+        np.concatenate([getattr(m, quantity)[m.kept][:, column] for m in motions])
+        for quantity in ("position", "velocity", "acceleration")
+    )
+    commands = [float(np.abs(m.inputs).max()) for m in motions if m.inputs.size]
+    block = data.efforts(0)[data.joints.index(joint)]
+    return ExcitationRange(
+        joint,
+        "m" if block.unit == "N" else "rad",
+        float(position.min()),
+        float(position.max()),
+        max(float(np.quantile(np.abs(velocity), 0.999)), 1e-12),
+        max(float(np.quantile(np.abs(acceleration), 0.999)), 1e-12),
+        max(m.dt for m in motions),
+        {name: float(np.mean(motions[0].position[:, k])) for k, name in enumerate(motions[0].joints)},
+        max([*commands, 1e-12]),
+        1.0 / block.weight,
+    )

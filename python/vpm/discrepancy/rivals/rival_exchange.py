@@ -15,8 +15,7 @@ import numpy as np
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, finished, shrinkage, simulated_gain
 from vpm.discrepancy.confirmation.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, Thresholds, refuse_trial
 from vpm.discrepancy.diagnosis import RefusedEffect
-from vpm.discrepancy.rivals.ambiguity import Rivals, as_good
-from vpm.discrepancy.rivals.nested_model import contains
+from vpm.discrepancy.rivals.ambiguity import Rivals, as_good, contains
 from vpm.discrepancy.search.backward_elimination import Stage
 from vpm.discrepancy.search.candidate_choice import REFINED, Accepted, alike, schwarz
 from vpm.discrepancy.search.search import Search

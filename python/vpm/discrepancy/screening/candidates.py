@@ -20,7 +20,6 @@ from vpm.discrepancy.screening.compliance_and_stop_start import (
     stop_starts,
     structural_starts,
 )
-from vpm.discrepancy.screening.drive_limit_start import limit_start
 from vpm.errors import DiagnosisError, near_match
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
@@ -36,6 +35,8 @@ PERIODS = 3
 #: Cells of the way in the shortest wave of an octave, waves in one more on the whole way, share of a wave that a slow
 #: sample may pass until the next one, and fewest of them: a wave has two sizes and is told from a mean.
 CELLS, FINER, PASSED, SLOWEST = 32, 4, 0.4, 16
+#: Limits compared, the largest share of the samples that may lie beyond one, and the fewest.
+LIMITS, LIMITED_MOST, LIMITED_LEAST = 30, 0.5, 3
 
 
 @dataclass(frozen=True)
@@ -358,3 +359,43 @@ def _applied(data: InverseDynamicsProblem, joint: str) -> Array:
 
 def _column(data: InverseDynamicsProblem, joint: str) -> int:
     return data.joints.index(joint) if joint in data.joints else 0
+
+
+def limit_start(data: InverseDynamicsProblem, joint: str, actuator: int, residual: Array) -> float | None:
+    """Start value of a drive limit: the cut-off of the command that explains most of a residual.
+
+    A limited drive leaves what the command has too much, which is a ramp in the command with the slope of the gain.
+    Commands of a loop whose drive gives no more run far beyond it, so that shares of the largest one say little.
+
+    Parameters
+    ----------
+    data : InverseDynamicsProblem
+    joint : str
+        On which the drive acts.
+    actuator : int
+        Its number among the inputs.
+    residual : ndarray
+        Of the model without the limit.
+
+    Returns
+    -------
+    float or None
+        None where no such ramp is in the residual.
+    """
+    column = data.joints.index(joint) if joint in data.joints else 0
+    commands = [m.inputs[:, actuator] for m in data.motions]
+    order = np.sort(np.abs(np.concatenate(commands)))
+    most = int(LIMITED_MOST * order.size)
+    if most <= LIMITED_LEAST:
+        return None
+    limits = order[-np.unique(np.geomspace(LIMITED_LEAST, most, LIMITS).astype(np.int64)) - 1]
+    along, power = np.zeros(limits.size), np.zeros(limits.size)
+    for record, (m, command) in enumerate(zip(data.motions, commands, strict=True)):
+        block = data.efforts(record)[column]
+        beyond = command[:, None] - np.clip(command[:, None], -limits, limits)
+        ramps = m.parallel(beyond) * block.moving[:, None]
+        along += ramps.T @ residual[block.samples]
+        power += np.sum(ramps**2, axis=0)
+    taken = along**2 / np.where(power > 0.0, power, np.inf)
+    best = int(np.argmax(taken))
+    return float(limits[best]) if taken[best] > 0.0 else None

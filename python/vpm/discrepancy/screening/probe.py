@@ -17,8 +17,7 @@ from vpm.discrepancy.screening.backlash_start import is_read_off, near_prior, re
 from vpm.discrepancy.screening.candidates import Candidate
 from vpm.discrepancy.screening.compliance_and_stop_start import LOSSES, in_series
 from vpm.discrepancy.screening.joint_compliance_start import best_start, is_searched
-from vpm.discrepancy.screening.linear_step import is_outside, linear_step, softened, step_without
-from vpm.discrepancy.screening.location_parameter import free_location
+from vpm.discrepancy.screening.linear_step import free_location, is_outside, linear_step, softened, step_without
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.identifiability import Span, closest_column, column_lengths, is_alias
 from vpm.identify.response_along_motion import bends

@@ -1,4 +1,9 @@
-"""Choice among candidates that validation data support: least residual, fewest numbers, the machine before sensors."""
+"""Choice among candidates that validation data support: least residual, fewest numbers, the machine before sensors.
+
+Sensor errors are judged by the predicted reading of the sensor itself. Along a measured motion no load changes the
+output of a drive. A constant force and the offset of a pressure gauge may therefore leave the same torque residual. The
+reading of the gauge itself follows from the commands and discriminates the two.
+"""
 
 from __future__ import annotations
 
@@ -13,12 +18,12 @@ from vpm.catalogue.kinds import Side
 from vpm.catalogue.traits import Late
 from vpm.discrepancy.confirmation.confirmation import Data, Trial
 from vpm.discrepancy.confirmation.reference_response import ODDS, Runs, compare_driven
-from vpm.discrepancy.confirmation.refusal import LEAST_GAIN
-from vpm.discrepancy.confirmation.sensor_prediction import preferred_sensor
+from vpm.discrepancy.confirmation.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, WORTH_A_NAME
 from vpm.discrepancy.screening.candidates import Candidate, Key
 from vpm.discrepancy.screening.compliance_and_stop_start import coupled
-from vpm.identify import Gain
+from vpm.identify import Gain, InverseDynamicsProblem, gain, segments
 from vpm.model import Model
+from vpm.numbers import Array
 
 #: Kinds of delay: pure delays, lags of drives, slow spools.
 KINDS: tuple[Late, ...] = ("delay", "lag", "spool")
@@ -181,3 +186,38 @@ def _evidence(trial: Trial) -> float:
     if trial.simulated is not None and trial.simulated.before > 0.0 and not coupled(trial.judged.model):
         left += np.log(max(trial.simulated.after, 1e-300) / trial.simulated.before)
     return float(left)
+
+
+def preferred_sensor(chosen: Trial, equals: Sequence[Trial], data: Data) -> Trial:
+    """Sensor error whose predicted reading supports it, of trials as good as ``chosen``; else ``chosen``.
+
+    On training and validation records it has to predict its channel clearly better than ``chosen`` does, by as much as
+    is worth a name. It may not leave more of all channels together.
+    """
+    if chosen.probe.candidate.effect.site == "sensor":
+        return chosen
+    supported = [t for t in equals if t.probe.candidate.effect.site == "sensor" and _is_supported(t, chosen, data)]
+    return min(supported, key=lambda t: _power(t.judged.validation), default=chosen)
+
+
+def _is_supported(trial: Trial, chosen: Trial, data: Data) -> bool:
+    site, model = trial.probe.candidate.site, trial.judged.model
+    channels = [channel for channel in data.validation.shown if model.sensor_of(channel) == site]
+    pairs = (
+        (data.training, chosen.judged.fit.residual, trial.judged.fit.residual),
+        (data.validation, chosen.judged.validation, trial.judged.validation),
+    )
+    return bool(channels) and all(_better(problem, channels, before, after) for problem, before, after in pairs)
+
+
+def _better(problem: InverseDynamicsProblem, channels: Sequence[str], before: Array, after: Array) -> bool:
+    own = np.zeros(before.size)
+    for block in problem.blocks:
+        own[block.samples] = block.channel in channels
+    gained = gain(before * own, after * own, segments(problem))
+    sure = gained.relative >= WORTH_A_NAME and gained.score >= NORMAL_95_ONE_SIDED
+    return sure and _power(after) <= _power(before)
+
+
+def _power(residual: Array) -> float:
+    return float(residual @ residual)

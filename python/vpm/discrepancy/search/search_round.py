@@ -24,7 +24,7 @@ from vpm.discrepancy.confirmation.refusal import (
     worse_in_simulation,
 )
 from vpm.discrepancy.diagnosis import RankedCandidate
-from vpm.discrepancy.noise.link_ringing import NOISE_ONLY, noise_alone, only_ringing
+from vpm.discrepancy.noise.noise_floor import NOISE_ONLY, noise_alone, only_ringing
 from vpm.discrepancy.noise.residual_structure import structure
 from vpm.discrepancy.noise.sample_timing import InTime, in_time
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
