@@ -13,12 +13,12 @@ from dataclasses import replace
 
 import numpy as np
 
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge, judged_anyhow
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.prior_departure import moved_far
 from vpm.discrepancy.screening.candidates import shares_at, slow_speeds
 from vpm.discrepancy.stuck_channels import check_moving, check_stuck
-from vpm.errors import DiagnosisError, DivergedError
+from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, Motion, choose_cutoff, joints_from_sensors
 from vpm.experiment.cutoff import HIGHEST
 from vpm.experiment.signal import UNDISTORTED_BAND
@@ -97,11 +97,10 @@ def _is_proportional(model: Model, name: str) -> bool:
 
 def nominal_of(model: Model, data: Data, notes: list[str]) -> Judged:
     """Prepare the nominal model: it is judged by the residual alone if it cannot simulate the records."""
-    try:
-        return judge(model, (), data, {})
-    except DivergedError as error:
-        notes.append(f"the nominal model could not simulate the validation records: {error}")
-        return judge(model, (), replace(data, simulation=None), {})
+    nominal, stopped = judged_anyhow(model, (), data, {})
+    if stopped:
+        notes.append(f"the nominal model could not simulate the validation records: {stopped}")
+    return nominal
 
 
 def recalibrated_of(model: Model, data: Data, notes: list[str], each: ParallelCandidates) -> Judged:

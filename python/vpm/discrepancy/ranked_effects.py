@@ -338,8 +338,7 @@ def _placed(rival: Ranked, final: Judged, entry: Accepted, data: Data) -> Trial:
         It cannot stand there.
     """
     model = final.model.without_effect(*entry.key, entry.side)
-    free = tuple(name for name in final.free if name in model.parameters)
-    bounds = {name: pair for name, pair in final.bounds.items() if name in free}
+    free, bounds = final.kept_in(model)
     without, _ = judged_anyhow(model, free, replace(data, simulation=None), bounds)
     model = without.model.with_effect(*rival.key, side=rival.side)
     names = {_anywhere(name): name for name in model.effect(*rival.key, rival.side).parameter_names.values()}

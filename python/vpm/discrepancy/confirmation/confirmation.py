@@ -68,6 +68,11 @@ class Judged:
     simulated: Array | None
     bounds: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
+    def kept_in(self, model: Model) -> tuple[tuple[str, ...], dict[str, tuple[float, float]]]:
+        """Free parameters of a judged model that another model has too, and their bounds."""
+        free = tuple(name for name in self.free if name in model.parameters)
+        return free, {name: pair for name, pair in self.bounds.items() if name in free}
+
     @property
     def baseline(self) -> Baseline:
         """Baseline for the next screening round, from a judged model of the confirmation."""

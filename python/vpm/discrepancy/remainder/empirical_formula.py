@@ -10,11 +10,10 @@ from scipy.linalg import block_diag
 
 from vpm.catalogue import without_law
 from vpm.catalogue.empirical import TERMS
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
 from vpm.discrepancy.diagnosis import Empirical, EmpiricalTerm
 from vpm.discrepancy.remainder.sparse_formula import Formula, select
 from vpm.discrepancy.remainder.state_dependence import Rhythm, Shares, busiest_joint, rhythm, shares
-from vpm.errors import DivergedError
 from vpm.identify import gain, segments
 from vpm.model import Model
 
@@ -97,7 +96,7 @@ def beside(base: Judged, described: Empirical, joint_fit: Judged, data: Data) ->
         return described, base
     own = tuple(term.dotted for term in described.terms)
     start = joint_fit.model.with_parameters({name: base.model.parameters[name].value for name in base.free})
-    fitted = _judge(start, own, data, {})
+    fitted, _ = judged_anyhow(start, own, data, {})
     better = gain(base.validation, fitted.validation, segments(data.validation))
     states = Shares(described.states, described.alike)
     if better.relative < LEAST_GAIN:
@@ -142,7 +141,7 @@ def _fit(formula: Formula, final: Judged, data: Data) -> Judged:
     model = formula.add_to(final.model)
     own = [f"{joint}.empirical.{term}" for joint, terms in formula.terms.items() for term in terms]
     # In a first step the sizes alone: a period has no meaning while they are zero.
-    sized = _judge(model, (*final.free, *own), data, dict(final.bounds))
+    sized, _ = judged_anyhow(model, (*final.free, *own), data, dict(final.bounds))
     periods = [f"{joint}.empirical.period" for joint, shapes in formula.shapes.items() if "period" in shapes]
     if not periods:
         return sized
@@ -150,7 +149,7 @@ def _fit(formula: Formula, final: Judged, data: Data) -> Judged:
     for name in periods:
         value = model.parameters[name].value
         bounds[name] = (value / PERIOD_RANGE, value * PERIOD_RANGE)
-    return _judge(sized.model, (*final.free, *own, *periods), data, bounds)
+    return judged_anyhow(sized.model, (*final.free, *own, *periods), data, bounds)[0]
 
 
 def _without_small(formula: Formula, fitted: Judged) -> Formula:
@@ -171,13 +170,6 @@ def _without_small(formula: Formula, fitted: Judged) -> Formula:
         if not any("sine" in term for term in kept[joint]):
             own.pop("period", None)
     return Formula({joint: terms for joint, terms in kept.items() if terms}, shapes)
-
-
-def _judge(model: Model, free: tuple[str, ...], data: Data, bounds: dict[str, tuple[float, float]]) -> Judged:
-    try:
-        return judge(model, free, data, bounds)
-    except DivergedError:
-        return judge(model, free, replace(data, simulation=None), bounds)
 
 
 def _terms(formula: Formula, fitted: Judged) -> tuple[EmpiricalTerm, ...]:

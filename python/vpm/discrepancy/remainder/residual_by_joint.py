@@ -84,8 +84,7 @@ def only_where_closed(found: Search, data: Data, gap: Mapping[str, ChannelGap], 
     try:
         for entry in reversed(gone):
             model = model.without_effect(*entry.key, entry.side)
-        free = tuple(name for name in found.final.free if name in model.parameters)
-        bounds = {name: pair for name, pair in found.final.bounds.items() if name in free}
+        free, bounds = found.final.kept_in(model)
         judged, _ = judged_anyhow(model, free, data, bounds)
     except VpmError:
         return found  # another one rests on it

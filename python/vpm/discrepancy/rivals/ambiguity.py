@@ -154,8 +154,8 @@ def _without(final: Judged, data: Data, known: Mapping[Key, Tried], entry: Accep
     if entry.key in known:
         return known[entry.key].without
     model = final.model.without_effect(*entry.key)
-    free = tuple(n for n in final.free if n in model.parameters)
-    return judge(model, free, data, {n: pair for n, pair in final.bounds.items() if n in free})
+    free, bounds = final.kept_in(model)
+    return judge(model, free, data, bounds)
 
 
 def _others(without: Judged, data: Data, entry: Accepted, effects: Sequence[str] | None) -> list[Candidate]:

@@ -100,8 +100,7 @@ def drop_springs(stages: list[Stage], accepted: list[Accepted], data: Data, drop
             continue
         if reason := only_compliant(current.model, site, data.training):
             model = current.model.without_effect(name, site)
-            free = tuple(each for each in current.free if each in model.parameters)
-            bounds = {each: pair for each, pair in current.bounds.items() if each in free}
+            free, bounds = current.kept_in(model)
             stages.append(Stage("removed", name, site, judge(model, free, data, bounds)))
             accepted.remove(entry)
             dropped[entry.key] = reason

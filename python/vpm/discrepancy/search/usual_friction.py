@@ -143,8 +143,7 @@ def _reduced(judged: Judged, gone: Sequence[Candidate], data: Data) -> Judged:
     model = judged.model
     for candidate in reversed(gone):
         model = model.without_effect(*candidate.key)
-    free = tuple(name for name in judged.free if name in model.parameters)
-    bounds = {name: ends for name, ends in judged.bounds.items() if name in free}
+    free, bounds = judged.kept_in(model)
     return judge(model, free, data, bounds, linear_only=True)
 
 
