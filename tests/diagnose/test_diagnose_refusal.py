@@ -22,7 +22,6 @@ from vpm.discrepancy.confirmation.refusal import (
     worse_in_simulation,
 )
 from vpm.discrepancy.screening.candidates import Candidate
-from vpm.discrepancy.screening.compliance_and_stop_start import moved
 from vpm.discrepancy.screening.probe import Probe
 from vpm.identify import Gain
 from vpm.model import Model
@@ -72,12 +71,6 @@ def test_a_gain_that_shows_magnified_in_a_balance_is_one(error: float, after: fl
     parts = {"error": error, "validation": Gain(before=1.0, after=after, weight=1.0, score=50.0, pieces=40)}
     one = cast("Trial", SimpleNamespace(**{**vars(trial(1.0 + 0.8 * NEGLIGIBLE)), **parts}))
     assert (refuse_trial(one, Thresholds(30, 1e-3)) == "") == accepted
-
-
-def test_a_gain_that_explains_as_little_as_an_imitation_blames_no_instrument() -> None:
-    little = Gain(before=1.0, after=0.88, weight=1.0, score=50.0, pieces=40)
-    one = cast("Trial", SimpleNamespace(**{**vars(trial(1.02)), "validation": little, "there": little}))
-    assert "an instrument is blamed" in refuse_trial(one, Thresholds(30, 1e-3))
 
 
 @pytest.mark.parametrize(
@@ -158,25 +151,6 @@ def test_what_leaves_no_shift_of_the_commands_is_told_from_it_by_one_sure_questi
     reason = refuse_timing(parts, 0.3, Thresholds(60, 4e-3), beside=beside)
     assert (reason == "") == accepted
     assert accepted or "beside a shift of the commands by 1.2 ms" in reason
-
-
-@pytest.mark.parametrize(("ratio", "accepted"), [(0.05, True), (2.0, True), (20.0, False)])
-def test_a_spring_that_its_damper_holds_back_winds_nothing_up(ratio: float, accepted: bool) -> None:
-    """A stop or a stiffening spring outside of the catalogue is imitated by a joint that slips."""
-    stiffness = 300.0
-    plain = Model.load(MODEL)
-    damping = 2.0 * ratio * (stiffness * moved(plain, "shoulder")) ** 0.5
-    model = plain.with_effect("joint_compliance", at="shoulder", stiffness=stiffness, damping=damping)
-    candidate = Candidate(EFFECTS["joint_compliance"], "shoulder", ({},))
-    parts = {
-        "probe": SimpleNamespace(candidate=candidate),
-        "judged": SimpleNamespace(model=model, bounds={}),
-        "parameters": ("shoulder.compliance.stiffness", "shoulder.compliance.damping"),
-    }
-    one = cast("Trial", SimpleNamespace(**{**vars(trial(1.0)), **parts}))
-    reason = refuse_trial(one, Thresholds(30, 1e-3))
-    assert (reason == "") == accepted
-    assert accepted or "times the critical one" in reason
 
 
 def changed(before: float, after: float) -> Gain:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 
 from scipy.special import stdtrit
 
 from vpm.discrepancy.confirmation.confirmation import Trial
-from vpm.discrepancy.screening.compliance_and_stop_start import coupled, moved
+from vpm.discrepancy.screening.compliance_and_stop_start import coupled
 from vpm.discrepancy.screening.probe import Probe, impossible_values
 from vpm.identify import Gain
 from vpm.model import Model
@@ -37,8 +36,6 @@ NEGLIGIBLE = 0.005
 MAGNIFIED = 4.0
 #: One-sided 95 % quantile of the normal distribution: a simulation that is worse by less is worse by chance.
 NORMAL_95_ONE_SIDED = 1.6448536269514722
-#: Damping ratio from which on a spring in series is none.
-CREEPS = 5.0
 #: Samples that what builds up over a way has to last, to be seen to build up.
 SAMPLED = 2.0
 #: Drop of the training mean square below which a candidate is not refitted at all.
@@ -91,8 +88,7 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
         _too_short(trial, thresholds.interval),
         _no_place(trial),
         _no_way(trial),
-        _creeps(trial),
-        _trifling_gain(trial),
+        _trifling_size(trial),
         _not_clear(trial),
         worse_in_simulation(trial),
         _too_little(trial, thresholds),
@@ -226,43 +222,8 @@ def _no_way(trial: Trial) -> str:
     )
 
 
-def _creeps(trial: Trial) -> str:
-    """Refusal of a spring in series whose damper holds it: it creeps as a fluid coupling does."""
-    candidate, model = trial.probe.candidate, trial.judged.model
-    if not candidate.effect.winds_up:
-        return ""
-    names = model.effect(*candidate.key).parameter_names
-    stiffness, damping = (model.parameters[names[name]].value for name in ("stiffness", "damping"))
-    ratio = damping / (2.0 * math.sqrt(max(stiffness, 1e-300) * moved(trial.judged.model, candidate.site)))
-    if ratio <= CREEPS:
-        return ""
-    return (
-        f"its damping is {ratio:.3g} times the critical one, and it needs {damping / stiffness:.3g} s to come back: "
-        "that is no compliant spring"
-    )
-
-
-def _trifling_gain(trial: Trial) -> str:
-    """Refusal of a sensor error that is smaller than any sensor or link model is accurate to.
-
-    A gain scales whatever else of its signal the model has not quite right, and imitates some of it.
-    """
-    if not trial.probe.candidate.effect.scales:
-        return ""
-    name, drop = trial.parameters[0], trial.validation.relative
-    value = trial.judged.model.parameters[name].value
-    if reason := _trifling_size(trial):
-        return reason
-    if trial.low_frequency is None and 0.0 <= drop < MODEST_GAIN:
-        return (
-            f"{name} comes out as {value:.4g} and {_moves('the validation error', trial.validation, 'only ')}: "
-            "an instrument is blamed where it explains more than an imitation would"
-        )
-    return ""
-
-
 def _trifling_size(trial: Trial) -> str:
-    """Refusal of a sensor gain that is nearly one.
+    """Refusal of a sensor gain that is nearer to one than any sensor or link model is accurate to.
 
     An effort may be the small difference of large readings, as of the pressures on both sides of a piston. A small
     error of a gain then leaves a large error of the effort; a gain that explains most of it is accepted.

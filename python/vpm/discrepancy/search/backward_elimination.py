@@ -6,7 +6,6 @@ from dataclasses import dataclass, replace
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge
 from vpm.discrepancy.confirmation.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED
-from vpm.discrepancy.screening.backlash_start import is_read_off, only_compliant
 from vpm.discrepancy.screening.candidates import Key
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.errors import DivergedError, ModelError
@@ -89,18 +88,3 @@ def refitted(best: Accepted, data: Data) -> Accepted:
     except DivergedError:
         return best
     return replace(best, trial=replace(best.trial, judged=exact))
-
-
-def drop_springs(stages: list[Stage], accepted: list[Accepted], data: Data, dropped: dict[Key, str]) -> None:
-    """Elimination of backlashes that a later effect has reduced to a spring."""
-    for entry in accepted[:]:
-        current = stages[-1].judged
-        name, site = entry.key
-        if not is_read_off(current.model, data.training, entry.trial.probe.candidate):
-            continue
-        if reason := only_compliant(current.model, site, data.training):
-            model = current.model.without_effect(name, site)
-            free, bounds = current.kept_in(model)
-            stages.append(Stage("removed", name, site, judge(model, free, data, bounds)))
-            accepted.remove(entry)
-            dropped[entry.key] = reason

@@ -13,7 +13,6 @@ from vpm.discrepancy.screening.probe import Probe
 from vpm.discrepancy.search.backward_elimination import (
     Stage,
     drop_replaced,
-    drop_springs,
     refitted,
 )
 from vpm.discrepancy.search.candidate_choice import Accepted
@@ -172,7 +171,6 @@ class _Going:
             accepted[-1] = refitted(accepted[-1], data)
             stages[-1] = replace(stages[-1], judged=accepted[-1].trial.judged)
         drop_replaced(stages, accepted, data, self.dropped)
-        drop_springs(stages, accepted, data, self.dropped)
 
 
 def ambiguities(accepted: Sequence[Accepted]) -> tuple[Ambiguity, ...]:
