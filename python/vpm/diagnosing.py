@@ -10,24 +10,33 @@ from typing import Any, TypedDict, get_args
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis, Empirical
-from vpm.discrepancy.diagnosis_fields import accepted_effect, classes, examined, gaps_of, of_search, step, unmeasured
+from vpm.discrepancy.diagnosis_fields import (
+    accepted_effect,
+    classes,
+    examined,
+    gaps_of,
+    of_search,
+    pictures,
+    step,
+    traces,
+    unmeasured,
+    where,
+)
 from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.noise.sensor_drift import Drift, sensor_drifts, without_drifts
 from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
-from vpm.discrepancy.plot_samples import pictures, traces, where
 from vpm.discrepancy.preparation import Records, data_of, nominal_of, recalibrated_of, records_of
 from vpm.discrepancy.provenance import own_settings, provenance
 from vpm.discrepancy.ranked_effects import tracker_gaps
 from vpm.discrepancy.recorded_calls import recorded
 from vpm.discrepancy.remainder.empirical_formula import beside
 from vpm.discrepancy.remainder.remainder import Remainder, remainder
-from vpm.discrepancy.remainder.residual_by_joint import FLOOR_FACTOR, only_where_closed
 from vpm.discrepancy.rivals.ambiguity import Rivals, listed
 from vpm.discrepancy.rivals.discriminating_experiment import experiments as experiments_for
 from vpm.discrepancy.screening.candidates import asked_for
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search import Search, ambiguities
-from vpm.discrepancy.verdict import is_negligible, verdict
+from vpm.discrepancy.verdict import FLOOR_FACTOR, is_negligible, only_where_closed, verdict
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records
 from vpm.experiment.signal import check_cutoff

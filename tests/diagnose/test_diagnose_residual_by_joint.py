@@ -9,7 +9,7 @@ import pytest
 from second_suite.cases import make_case
 from vpm.discrepancy.confirmation.confirmation import Judged, shrinkage
 from vpm.discrepancy.diagnosis import ChannelGap
-from vpm.discrepancy.remainder.residual_by_joint import Joints
+from vpm.discrepancy.verdict import Joints
 from vpm.identify import InverseDynamicsProblem
 
 STRUCTURED: Any = SimpleNamespace(present=True)
