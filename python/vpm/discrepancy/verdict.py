@@ -78,64 +78,91 @@ def verdict(
     rest : Remainder or None
         None where nothing was found and what is left is negligible.
     """
-    main = main_gaps(gap)
-    beside = [g for g in gap.values() if g.mode == OBSERVED]
-    still = [g for g in beside if not _is_nothing(g) and _above([g]) > FLOOR_FACTOR]
-    above, small = _above(main + still or beside), is_negligible(gap)
-    # A channel far above its noise that is nothing beside its signal says nothing of one that is not.
-    structured = left is not None and left.present and _above([g for g in main if not _is_nothing(g)]) > FLOOR_FACTOR
-    remaining = structured or (rest is not None and rest.repeats and not small) or bool(still)
-    remaining = remaining and not found.within_laws
-    worst = max(beside if beside and _is_unmeasured(found, data) else main + beside, key=_clear_of_noise)
-    numbers = _stages(worst)
-    names = ", then ".join(e.trial.probe.candidate.label for e in found.accepted)
-    share_left = (worst.after / worst.recalibrated) ** 2 if worst.recalibrated > 0.0 else 0.0
-    away = driven_away(nominal.model, recalibrated, found.final, found.ranked) if found.accepted else {}
-    if found.accepted and away and not found.interrupted:
+    errors = _Errors.of(data, found, gap, left, rest)
+    if found.accepted:
+        away = driven_away(nominal.model, recalibrated, found.final, found.ranked)
+        return _of_named(found, data, gap, errors, left, rest, {} if found.interrupted else away)
+    if not errors.remaining:
+        return (*_nothing_missing(data, nominal, recalibrated, (errors.main, errors.beside), errors.worst), False)
+    clear = f"The residual is structured and {errors.above:.2g} times the noise floor, and"
+    numbers = f"Error on validation data: {_stages(errors.worst)}."
+    if found.interrupted:
+        return "interrupted", f"{clear} no effect was accepted until then. {numbers}", False
+    return "unexplained", f"{clear} no effect of the catalogue explains it. {numbers}", True
+
+
+@dataclass(frozen=True)
+class _Errors:
+    """Errors on which a verdict stands."""
+
+    main: list[ChannelGap]  #: Of the residual.
+    beside: list[ChannelGap]  #: Of what an observer alone measures.
+    still: list[ChannelGap]  #: Of these, what is clear of noise and not negligible.
+    above: float  #: Ratio of the worst to its noise.
+    structured: bool  #: Whether the residual has structure clear of the noise.
+    remaining: bool  #: Whether there is anything left to explain.
+    worst: ChannelGap
+
+    @classmethod
+    def of(
+        cls,
+        data: Data | None,
+        found: Search,
+        gap: Mapping[str, ChannelGap],
+        left: Structure | None,
+        rest: Remainder | None,
+    ) -> _Errors:
+        """Errors for the `verdict`."""
+        main, beside = main_gaps(gap), [g for g in gap.values() if g.mode == OBSERVED]
+        still = [g for g in beside if not _is_nothing(g) and _above([g]) > FLOOR_FACTOR]
+        # A channel far above its noise that is nothing beside its signal says nothing of one that is not.
+        clear = _above([g for g in main if not _is_nothing(g)]) > FLOOR_FACTOR
+        structured = left is not None and left.present and clear
+        remaining = structured or (rest is not None and rest.repeats and not is_negligible(gap)) or bool(still)
+        worst = max(beside if beside and _is_unmeasured(found, data) else main + beside, key=_clear_of_noise)
+        above = _above(main + still or beside)
+        return cls(main, beside, still, above, structured, remaining and not found.within_laws, worst)
+
+    @property
+    def share_left(self) -> float:
+        """Share of the mean square of the worst error that effects leave, for the verdict."""
+        return (self.worst.after / self.worst.recalibrated) ** 2 if self.worst.recalibrated > 0.0 else 0.0
+
+
+def _of_named(
+    found: Search,
+    data: Data | None,
+    gap: Mapping[str, ChannelGap],
+    errors: _Errors,
+    left: Structure | None,
+    rest: Remainder | None,
+    away: Mapping[str, float],
+) -> tuple[str, str, bool]:
+    """Verdict on named effects, of which ``away`` are parameters that they drive away from the model file."""
+    names, worst = ", then ".join(e.trial.probe.candidate.label for e in found.accepted), errors.worst
+    numbers = f"Error on validation data: {_stages(worst)}, {_percent(worst.after, worst)} after."
+    if away:
         return (
             "unexplained",
             "Only together with values that the model file rules out do effects of the catalogue explain the gap: with "
-            f"{names}, {_farthest(away)}. Error on validation data: {numbers}, {_percent(worst.after, worst)} after.",
+            f"{names}, {_farthest(away)}. {numbers}",
             True,
         )
     tracked = min(found.left.values(), default=np.nan)
-    open_anywhere = structured or (data is None and bool(still))  # without efforts an observer alone can tell
-    mostly_open = (open_anywhere and share_left > MOSTLY_OPEN) or _is_described_better(rest)
+    open_anywhere = errors.structured or (data is None and bool(errors.still))  # without efforts an observer can tell
+    mostly_open = (open_anywhere and errors.share_left > MOSTLY_OPEN) or _is_described_better(rest)
     joints = Joints.of(gap, left, found.left)
     apart = joints.differ and not any(joints.has(entry, found.final.model) for entry in found.accepted)
-    if found.accepted and (
-        _is_spoiled(found, gap, tracked) or (not apart and not _is_explanation(found, tracked, mostly_open))
-    ):
-        leave = f"leave {100.0 * (tracked if tracked >= 1.0 else share_left):.0f} % of its mean square"
+    if _is_spoiled(found, gap, tracked) or (not apart and not _is_explanation(found, tracked, mostly_open)):
+        leave = f"leave {100.0 * (tracked if tracked >= 1.0 else errors.share_left):.0f} % of its mean square"
         return (
             "unexplained",
-            f"The residual is structured and {above:.2g} times the noise floor. The effects of the catalogue that come "
-            f"closest, {names}, {leave}: they are not the explanation. "
-            f"Error on validation data: {numbers}, {_percent(worst.after, worst)} after.",
+            f"The residual is structured and {errors.above:.2g} times the noise floor. The effects of the catalogue "
+            f"that come closest, {names}, {leave}: they are not the explanation. {numbers}",
             True,
         )
-    if found.accepted:
-        return (
-            "effect_found",
-            f"Missing: {names}. Error on validation data: {numbers}, {_percent(worst.after, worst)} after."
-            + (_OPEN.format(joints=", ".join(joints.open)) if apart else _REST if remaining else ""),
-            remaining,
-        )
-    if remaining and found.interrupted:
-        return (
-            "interrupted",
-            f"The residual is structured and {above:.2g} times the noise floor, and no effect was accepted until then. "
-            f"Error on validation data: {numbers}.",
-            False,
-        )
-    if remaining:
-        return (
-            "unexplained",
-            f"The residual is structured and {above:.2g} times the noise floor, and no effect of the catalogue "
-            f"explains it. Error on validation data: {numbers}.",
-            True,
-        )
-    return (*_nothing_missing(data, nominal, recalibrated, (main, beside), worst), False)
+    more = _OPEN.format(joints=", ".join(joints.open)) if apart else _REST if errors.remaining else ""
+    return "effect_found", f"Missing: {names}. {numbers}{more}", errors.remaining
 
 
 def _is_worse_than_none(gap: ChannelGap) -> bool:
