@@ -160,17 +160,21 @@ def changed(before: float, after: float) -> Gain:
 sizes = st.floats(1e-9, 1e9)
 
 
-@given(sizes, sizes)
-def test_what_is_said_of_two_numbers_goes_in_their_direction(a: float, b: float) -> None:
-    """A candidate raises the validation error only where that becomes larger."""
-    c, d = min(a, b), max(a, b)
+@given(sizes, sizes, sizes, sizes)
+def test_what_is_said_of_two_numbers_goes_in_their_direction(a: float, b: float, c: float, d: float) -> None:
+    """A candidate that raises the validation error: it lowers the training error only where that becomes smaller."""
+    c, d = min(c, d), max(c, d)
     assume(1.0 - (d / c) ** 2 < 0.0)
     worse = trial(1.5)
-    vars(worse).update(validation=changed(c, d), there=changed(c, d))
+    vars(worse).update(training=changed(a, b), validation=changed(c, d), there=changed(c, d))
     reason = refuse_trial(worse, Thresholds(30, 1e-3))
-    found = re.fullmatch(r"it raises the validation error by [\d.e+]+ % of its mean square \((\S+) to (\S+)\)", reason)
-    assert found is not None
-    assert float(found[2]) >= float(found[1])
+    said = re.findall(
+        r"(lowers|raises) the (training|validation) error by [\d.e+]+ % of its mean square \((\S+) to (\S+)\)", reason
+    )
+    assert [where for _, where, _, _ in said] == ["training", "validation"]
+    for word, _, before, after in said:
+        assert word == "raises" or float(after) <= float(before)
+        assert word == "lowers" or float(after) >= float(before)
 
 
 def test_a_little_of_the_validation_error_is_told_with_its_direction() -> None:

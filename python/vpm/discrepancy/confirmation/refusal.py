@@ -89,6 +89,7 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
         _no_place(trial),
         _no_way(trial),
         _trifling_size(trial),
+        _only_training(trial),
         _not_clear(trial),
         worse_in_simulation(trial),
         _too_little(trial, thresholds),
@@ -239,6 +240,15 @@ def _trifling_size(trial: Trial) -> str:
         f"{name} comes out as {value:.4g}: less than {percent(NEGLIGIBLE)} of the signal is no more "
         "than an error of the model"
     )
+
+
+def _only_training(trial: Trial) -> str:
+    """Sentence on what raises the validation error, which gains too little there in any case."""
+    seen, validation = trial.training, trial.validation
+    if validation.relative >= 0.0:
+        return ""
+    joined = "and" if seen.relative < 0.0 else "but"
+    return f"it {_moves('the training error', seen)}, {joined} {_moves('the validation error', validation)}"
 
 
 def _not_clear(trial: Trial) -> str:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge
 from vpm.discrepancy.confirmation.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED
 from vpm.discrepancy.screening.candidates import Key
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.errors import DivergedError, ModelError
 from vpm.identify import gain, segments
+from vpm.identify.identifiability import Span, is_alias
 from vpm.model import Model
 
 
@@ -68,6 +71,35 @@ def _renamed(current: Judged, reduced: Judged, model: Model, free: tuple[str, ..
     bare = judge(model, free, replace(data, simulation=None), bounds)
     work = gain(bare.validation, reduced.validation, segments(data.validation))
     return work.relative >= LEAST_GAIN and work.score >= NORMAL_95_ONE_SIDED
+
+
+def release_shown(stages: list[Stage], accepted: list[Accepted], data: Data) -> None:
+    """Release after elimination what was held because something hid it that a later effect explains.
+
+    It stays released if the model predicts validation data better with it. Without this a payload beside an unknown
+    mass, named while friction was missing, never gets its place.
+    """
+    current = stages[-1].judged
+    names = [alias.parameter for entry in accepted for alias in entry.trial.held]
+    names = [name for name in dict.fromkeys(names) if name in current.model.parameters and name not in current.free]
+    if not names or len(accepted) == 1:
+        return
+    model = current.model
+    _, columns = data.training.evaluate(model, model.theta, [model.index(name) for name in names])
+    known, shown = Span.of(current.fit.jacobian), list[str]()
+    for name, column in zip(names, columns.T, strict=True):
+        if np.any(column) and not is_alias(column, known, current.fit.residual):
+            shown.append(name)
+            known = known.beside(column[:, None])
+    if not shown:
+        return
+    try:
+        judged = judge(model, (*current.free, *shown), data, dict(current.bounds))
+    except DivergedError:
+        return
+    if gain(current.validation, judged.validation, segments(data.validation)).relative > 0.0:
+        stages[-1] = replace(stages[-1], judged=judged)
+        accepted[:] = [_released(entry, set(shown)) for entry in accepted]
 
 
 def _released(entry: Accepted, freed: set[str]) -> Accepted:

@@ -14,6 +14,7 @@ from vpm.discrepancy.search.backward_elimination import (
     Stage,
     drop_replaced,
     refitted,
+    release_shown,
 )
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search_round import Round, Tell
@@ -171,6 +172,7 @@ class _Going:
             accepted[-1] = refitted(accepted[-1], data)
             stages[-1] = replace(stages[-1], judged=accepted[-1].trial.judged)
         drop_replaced(stages, accepted, data, self.dropped)
+        release_shown(stages, accepted, data)
 
 
 def ambiguities(accepted: Sequence[Accepted]) -> tuple[Ambiguity, ...]:
