@@ -8,6 +8,8 @@ from shared_cases import shared_case
 from vpm.discrepancy.confirmation.delay_in_motion import CREEPING, in_motion
 from vpm.identify import InverseDynamicsProblem
 
+#: A lag, and the delays that it may be taken for.
+LATE = ("actuator_lag", "input_delay", "sensor_delay")
 #: A difference of friction between the ways, with a delay of two sampling intervals behind it.
 HIDDEN, SEED = ("asymmetric_friction", "input_delay"), 0
 
@@ -33,3 +35,37 @@ def test_only_samples_in_clear_motion_count() -> None:
     largest = max(float(np.quantile(np.abs(m.velocity), 0.999)) for m in problem.motions)
     assert np.all(speed[counted > 0.0] >= CREEPING * largest)
     assert 0.3 < counted.mean() < 1.0
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize(
+    ("hidden", "seed", "named"),
+    [("actuator_lag", 5, {"actuator_lag"}), ("input_delay", 2, {"input_delay", "sensor_delay"})],
+)
+def test_a_lag_is_named_only_where_it_shows(hidden: str, seed: int, named: set[str]) -> None:
+    """A late drive and a late encoder of one axis are one delay."""
+    case = shared_case("axis_linear", hidden, seed)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=LATE, workers=1)
+    (effect,) = why.effects
+    assert effect.name in named
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("hidden", ["input_delay", "sensor_delay"])
+def test_a_part_of_a_sampling_interval_is_named_where_it_explains_most(hidden: str) -> None:
+    case = shared_case("axis_linear", hidden, 2003)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=LATE, workers=1)
+    assert [effect.name for effect in why.effects] == ["input_delay"]
+    late, truth = why.effects[0].parameters[0], case.truth.hidden[0].parameters["time"]
+    assert late.value < case.train[0].dt
+    assert late.value == pytest.approx(truth, rel=0.1)
+    assert why.verdict == "effect_found"
+
+
+@pytest.mark.nightly
+def test_a_delay_of_a_machine_that_sticks_is_named() -> None:
+    case = shared_case("axis_linear", "input_delay", 22)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=("input_delay",), workers=1)
+    assert [effect.name for effect in why.effects] == ["input_delay"]
+    truth = case.truth.hidden[0].parameters["time"]
+    assert why.effects[0].parameters[0].value == pytest.approx(truth, rel=0.1)

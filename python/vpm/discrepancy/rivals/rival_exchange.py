@@ -60,7 +60,7 @@ def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search
 def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresholds: Thresholds) -> float:
     """Standard deviations by which data prefer a rival for an exchange; 0 if not in every view."""
     if trial.probe.candidate.effect.late and entry.effect.late:
-        return 0.0  # their runs along the reference said which, and the residual knows less of it
+        return 0.0  # residual and simulation said which: the residual alone knows less of it
     if not alike(trial.probe.candidate, entry.trial.probe.candidate) or refuse_trial(trial, thresholds):
         return 0.0
     fitted, validation, simulated = _gains(final, trial.judged, data)

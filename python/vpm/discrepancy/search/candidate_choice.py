@@ -15,9 +15,7 @@ import numpy as np
 
 from vpm.catalogue import EFFECTS, EffectType
 from vpm.catalogue.kinds import Side
-from vpm.catalogue.traits import Late
 from vpm.discrepancy.confirmation.confirmation import Data, Trial
-from vpm.discrepancy.confirmation.reference_response import ODDS, Runs, compare_driven
 from vpm.discrepancy.confirmation.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, WORTH_A_NAME
 from vpm.discrepancy.screening.candidates import Candidate, Key
 from vpm.discrepancy.screening.compliance_and_stop_start import coupled
@@ -25,8 +23,6 @@ from vpm.identify import Gain, InverseDynamicsProblem, gain, segments
 from vpm.model import Model
 from vpm.numbers import Array
 
-#: Kinds of delay: pure delays, lags of drives, slow spools.
-KINDS: tuple[Late, ...] = ("delay", "lag", "spool")
 #: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
 SENSOR_SHARE = 0.25
 #: What leaves up to so many times as much as the best explains the data as well, if it is also little of the whole gap.
@@ -82,32 +78,8 @@ def choose(supported: Sequence[Trial], data: Data) -> Accepted:
     plain = [t for t in supported if _plainer(t, first)]
     first = min(plain, key=least) if plain else first
     equals = [t for t in supported if _as_good(t, first)]
-    chosen = _delay_or_lag(preferred_sensor(_first_named(equals), equals, data), supported, data)
+    chosen = preferred_sensor(_first_named(equals), equals, data)
     return Accepted(chosen, tuple(t.probe.candidate.label for t in equals if t is not chosen))
-
-
-def _delay_or_lag(chosen: Trial, supported: Sequence[Trial], data: Data) -> Trial:
-    """Choice among delay, lag and valve dynamics by the response to the reference.
-
-    A delay shifts in time; a lag also weakens high frequencies, which has to show. Without a result it is the delay.
-    """
-    if not _kind_of_delay(chosen):
-        return chosen
-    alike = [t for t in supported if _left(t) <= SAME * _left(chosen)]
-    kinds = [[t for t in alike if _kind_of_delay(t) == kind] for kind in KINDS]
-    rest = [min(kind, key=_evidence) for kind in kinds if kind]
-    best, runs = rest.pop(0), Runs(data)
-    for rival in rest:
-        response = compare_driven(rival.judged, best.judged, data, runs)
-        if response is None:
-            return chosen
-        if response.prefers_first(ODDS if _kind_of_delay(best) == "delay" else 1.0):
-            best = rival
-    return best
-
-
-def _kind_of_delay(trial: Trial) -> Late:
-    return trial.probe.candidate.effect.late
 
 
 def _first_named(equals: Sequence[Trial]) -> Trial:
