@@ -1,4 +1,4 @@
-"""Two effects that are missing at once: each alone is refused or imitated, both together are named."""
+"""Two effects that are missing at once: a law that imitates both is not named for them."""
 
 import pytest
 
@@ -11,7 +11,7 @@ def test_a_late_drive_and_friction_that_is_missing_are_named_for_the_law_that_im
     """Alone the lag takes four fifths of the training residual and predicts the validation record worse than none."""
     case = shared_case("axis_linear", ("actuator_lag", "viscous_friction"), 5004)
     tried = ["actuator_lag", "input_delay", "viscous_friction", "hysteresis"]
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, names="search", workers=1)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
     assert {(effect.name, effect.site) for effect in why.effects} == {
         ("actuator_lag", "drive"),
         ("viscous_friction", "axis"),
@@ -27,7 +27,7 @@ def test_a_late_drive_and_friction_that_is_missing_are_named_for_the_law_that_im
 def test_one_effect_alone_gets_no_partner() -> None:
     case = shared_case("axis_linear", "viscous_friction", 5004)
     tried = ["actuator_lag", "input_delay", "viscous_friction", "hysteresis"]
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, names="search", workers=1)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
     assert [(effect.name, effect.site) for effect in why.effects] == [("viscous_friction", "axis")]
 
 
@@ -35,7 +35,7 @@ def test_one_effect_alone_gets_no_partner() -> None:
 def test_a_spring_beside_a_hysteresis_is_fitted_where_the_tangent_at_its_start_does_not_lead() -> None:
     case = shared_case("axis_rotary", ("hysteresis", "joint_compliance"), 5002)
     tried = ["hysteresis", "joint_compliance"]
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, names="search", workers=1)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
     assert {(effect.name, effect.site) for effect in why.effects} == {
         ("hysteresis", "axis"),
         ("joint_compliance", "axis"),
