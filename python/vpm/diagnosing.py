@@ -28,7 +28,6 @@ from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
 from vpm.discrepancy.preparation import Records, data_of, nominal_of, recalibrated_of, records_of
 from vpm.discrepancy.provenance import own_settings, provenance
 from vpm.discrepancy.ranked_effects import tracker_gaps
-from vpm.discrepancy.recorded_calls import recorded
 from vpm.discrepancy.remainder.empirical_formula import beside
 from vpm.discrepancy.remainder.remainder import Remainder, remainder
 from vpm.discrepancy.rivals.ambiguity import Rivals, listed
@@ -455,3 +454,43 @@ def _rest(
         return None
     start = found.final if found.interrupted or not found.accepted else recalibrated
     return remainder(start, found.final, data, min(m.dt for m in data.training.motions), worker_count(each.workers))
+
+
+@dataclass(frozen=True)
+class RecordedDiagnosis:
+    """Diagnosis with its recorded calls of ``tell`` and ``progress``, each in their order."""
+
+    diagnosis: Diagnosis
+    sentences: tuple[str, ...]
+    steps: tuple[tuple[str, str, int, int], ...]
+
+    def repeat(self, tell: Callable[[str], None] | None, progress: Progress | None) -> Diagnosis:
+        """Repeat the recorded calls in this process and return the diagnosis.
+
+        Parameters
+        ----------
+        tell, progress : callable, optional
+        """
+        if tell is not None:
+            for sentence in self.sentences:
+                tell(sentence)
+        if progress is not None:
+            for step in self.steps:
+                progress(*step)
+        return self.diagnosis
+
+
+def recorded(diagnosed: Callable[..., Diagnosis], *given: object) -> RecordedDiagnosis:
+    """Diagnose with all calls of ``tell`` and ``progress`` recorded.
+
+    Parameters
+    ----------
+    diagnosed : callable
+        Takes ``tell`` and ``progress`` too.
+    *given
+        What else it takes.
+    """
+    sentences: list[str] = []
+    steps: list[tuple[str, str, int, int]] = []
+    diagnosis = diagnosed(*given, tell=sentences.append, progress=lambda *step: steps.append(step))
+    return RecordedDiagnosis(diagnosis, tuple(sentences), tuple(steps))

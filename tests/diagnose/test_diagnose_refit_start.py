@@ -7,8 +7,7 @@ from blind import Case
 from inverse_dynamics import inverse_dynamics_data
 from shared_cases import shared_case
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.confirmation.confirmation import confirm, judge
-from vpm.discrepancy.confirmation.refit_start import nearer_start
+from vpm.discrepancy.confirmation.confirmation import confirm, judge, nearer_start
 from vpm.discrepancy.screening.candidates import Candidate
 from vpm.discrepancy.screening.probe import probe
 from vpm.identify import InverseDynamicsProblem

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from vpm.discrepancy.confirmation.delay_in_motion import is_late, timed_in_motion
 from vpm.discrepancy.confirmation.low_frequency import has_impacts, low_frequency
-from vpm.discrepancy.confirmation.refit_start import nearer_start
 from vpm.discrepancy.screening.candidates import joint_at
 from vpm.discrepancy.screening.compliance_and_stop_start import ends_apart
 from vpm.discrepancy.screening.probe import ROUNDED, Alias, Baseline, Probe, size_is_clear
@@ -28,7 +27,8 @@ from vpm.identify import (
 )
 from vpm.identify.estimation import MOST_EVALUATIONS, standing
 from vpm.identify.identifiability import COPY_SHARE, Span, closest_column, is_alias
-from vpm.identify.response_along_motion import bends
+from vpm.identify.parts import moves_drives
+from vpm.identify.response_along_motion import bends, has_hidden, has_own_drives
 from vpm.identify.tangent import Tangent, drives_on_tangent, estimate_on_tangent, has_tangent
 from vpm.model import Model
 from vpm.numbers import Array
@@ -478,3 +478,38 @@ def is_clear(judged: Judged, own: tuple[str, ...]) -> bool:
         across = full[np.ix_(index, shape)]
         covariance = covariance - across @ np.linalg.pinv(full[np.ix_(shape, shape)], hermitian=True) @ across.T
     return size_is_clear(size, judged.fit.values[index], covariance)
+
+
+def nearer_start(start: Model, added: Sequence[str], known: Sequence[str], data: InverseDynamicsProblem) -> Model:
+    """Start of a refit: recalibrated, or with the ``known`` parameters of the model file if that fits better.
+
+    Without an effect of its command a drive with states can only be recalibrated to a weak one, with soft oil and a
+    small valve. From there the true values lie behind a ridge once the effect is present.
+    Where nothing of the drives changes, or they have no states, a fit is linear enough to end at one place from both.
+
+    Parameters
+    ----------
+    start : Model
+        With the candidate at its estimated values, and what is known as it was fitted without it.
+    added : sequence of str
+        Dotted names of the candidate's own parameters.
+    known : sequence of str
+        Free parameters of the model without the candidate.
+    data : InverseDynamicsProblem
+    """
+    if not has_own_drives(start) or any(has_hidden(start, m.joints) for m in data.motions):
+        return start
+    shared = {name: data.nominal.parameters[name].value for name in known if name in data.nominal.parameters}
+    if not shared or not any(moves_drives(start, name) for name in added):
+        return start
+    stated = start.with_parameters(shared)
+    return min((start, stated), key=lambda model: _left_at(model, data))
+
+
+def _left_at(model: Model, data: InverseDynamicsProblem) -> float:
+    """Sum of squares at a start of the refit; infinite where the model cannot follow the motion."""
+    try:
+        residual, _ = data.evaluate(model, model.theta)
+    except DivergedError:
+        return np.inf
+    return float(residual @ residual)
