@@ -99,10 +99,11 @@ class _Going:
         tell: Tell,
         each: ParallelCandidates,
     ) -> None:
-        self.found, self.data, self.effects, self.limit, self.tell, self.each = found, data, effects, limit, tell, each
-        self.stages, self.accepted, self.rounds = list(found.stages), list(found.accepted), list[Round]()
+        self.data, self.effects, self.limit, self.tell, self.each = data, effects, limit, tell, each
+        self.stages, self.accepted, self.ranking = list(found.stages), list(found.accepted), list(found.ranking)
         self.dropped = {(r.name, r.site): r.reason for r in found.refused if (r.name, r.site) in found.gone}
         self.last: Tried | None = None
+        self.round: Round | None = None
         self.number = max((candidate.round for candidate in found.ranking), default=0)
         # What a round would have accepted at other joints, too, and of how many candidates.
         self.waiting, self.tried = list[Key](), 0
@@ -119,7 +120,7 @@ class _Going:
         # In a round of a few, little else was tried.
         alone = best is None
         if best is None:
-            self.rounds.pop()
+            self.round = None
             outcome = self._begun()
             best = self._best(outcome)
             self.waiting, self.tried = [] if best is None else outcome.elsewhere(best), outcome.tried
@@ -135,20 +136,23 @@ class _Going:
 
     def outcome(self, *, interrupted: bool) -> Search:
         """Search as far as it went."""
-        refused = {**self.dropped, **(self.rounds[-1].refused if self.rounds else {})}
-        ranking = [candidate for outcome in self.rounds for candidate in outcome.ranked()]
+        refused = {**self.dropped, **({} if self.round is None else self.round.refused)}
+        ranked = [] if self.round is None else self.round.ranked()
         return Search(
             tuple(self.stages),
             tuple(self.accepted),
             tuple(RefusedEffect(*key, reason) for key, reason in refused.items()),
-            (*self.found.ranking, *ranking),
+            (*self.ranking, *ranked),
             interrupted,
             None if self.dropped else self.last,
         )
 
     def _begun(self, tried: int = 0) -> Round:
-        self.rounds.append(Round(self.stages[-1].judged, self.data, self.number, self.tell, self.each, tried))
-        return self.rounds[-1]
+        """Next round of the search; of the one before it, only the ranking is kept."""
+        if self.round is not None:
+            self.ranking += self.round.ranked()
+        self.round = Round(self.stages[-1].judged, self.data, self.number, self.tell, self.each, tried)
+        return self.round
 
     def _waited(self, outcome: Round) -> Accepted | None:
         """First candidate that still waits for the search and is accepted beside what came in meanwhile."""
