@@ -8,7 +8,7 @@ from shared_cases import shared_case
 
 @pytest.mark.nightly
 def test_a_force_and_a_tilt_that_a_balance_takes_for_each_other_are_told_apart() -> None:
-    """They differ by a cosine of the angle: 4 % of what the balance leaves, eighty deviations of the noise in runs."""
+    """They differ by a cosine of the angle: 4 % of what the balance leaves, in closed loop eighty deviations."""
     case = shared_case("axis_rotary", ("gravity_tilt", "stribeck_friction"), 102)
     tried = ["bias_force", "gravity_tilt", "stribeck_friction"]
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
@@ -24,7 +24,7 @@ def test_a_late_drive_is_named_for_a_force_where_one_reversal_outweighs_all_else
 
 
 @pytest.mark.nightly
-def test_an_effect_of_a_modest_part_is_named_if_runs_ask_for_all_of_it() -> None:
+def test_an_effect_of_a_modest_part_is_named() -> None:
     """A dead zone takes a quarter of what a ripple leaves of the balance: seven deviations of the ten it would need."""
     case = shared_case("axis_rotary", ("dead_zone", "torque_ripple"), 102)
     tried = ["dead_zone", "torque_ripple", "hysteresis"]
@@ -36,7 +36,7 @@ def test_an_effect_of_a_modest_part_is_named_if_runs_ask_for_all_of_it() -> None
 
 
 @pytest.mark.nightly
-def test_runs_ask_for_nothing_where_nothing_is_missing() -> None:
+def test_nothing_is_named_where_nothing_is_missing() -> None:
     case = shared_case("axis_rotary", "parameters", 100)
     tried = ["torque_ripple", "dead_zone", "stribeck_friction"]
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
