@@ -80,6 +80,5 @@ def test_no_candidate_is_credited_with_what_a_bound_forbids(problem: InverseDyna
     residual, jacobian = problem.evaluate(model, model.theta, [model.index("body.mass")])
     base = Baseline(model, ("body.mass",), residual, jacobian)
     constant = Candidate(EFFECTS["bias_force"], "axis", ({},))
-    assert probe(base, problem, constant).drop > 0.9  # a mass below zero explains all of it
-    assert probe(replace(base, pushed={"body.mass": -1}), problem, constant).drop < 0.01
-    assert probe(replace(base, pushed={"body.mass": 1}), problem, constant).drop > 0.9
+    for side in ({}, {"body.mass": -1}, {"body.mass": 1}):  # a mass below zero explains all of it
+        assert abs(probe(replace(base, pushed=side), problem, constant).drop) < 0.01

@@ -130,7 +130,7 @@ def test_low_frequencies_show_an_effect_that_impacts_cover_unless_they_alone_do(
 
 @pytest.mark.parametrize(("drop", "words"), [(-63.0, "larger"), (1e-3, "only 0.10 %")])
 def test_what_screening_promises_nothing_of_is_told_in_words_that_fit(drop: float, words: str) -> None:
-    promised = cast("Probe", SimpleNamespace(free=("axis.backlash.gap",), held=(), drop=drop))
+    promised = cast("Probe", SimpleNamespace(free=("axis.backlash.gap",), held=(), drop=drop, here=0.0))
     assert words in refuse_probe(promised)
 
 

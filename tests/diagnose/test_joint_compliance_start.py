@@ -9,6 +9,7 @@ from shared_cases import shared_case
 from vpm.discrepancy.screening.candidates import candidates
 from vpm.discrepancy.screening.compliance_and_stop_start import moved
 from vpm.discrepancy.screening.joint_compliance_start import best_start, is_searched
+from vpm.discrepancy.screening.probe import Baseline
 from vpm.identify import InverseDynamicsProblem, estimate
 
 PAIR = ("joint_compliance", "viscous_friction")
@@ -38,7 +39,8 @@ def test_a_start_is_as_near_as_springs_that_are_tried_and_none_where_nothing_win
         fitted = model.with_parameters(dict(zip(fit.names, map(float, fit.values), strict=True)))
         (spring,) = candidates(fitted, data, fit.residual, ["joint_compliance"])
         assert is_searched(fitted, data, spring)
-        start = best_start(fitted, fit.jacobian, data, spring)
+        known = Baseline(fitted, fit.names, fit.residual, fit.jacobian)
+        start = best_start(fitted, known.left, data, spring)
         if len(hidden) == 1:
             assert start is None
         else:

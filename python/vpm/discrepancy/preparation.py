@@ -25,7 +25,7 @@ from vpm.experiment.signal import UNDISTORTED_BAND
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
 from vpm.identify.comparison import relative_to_drives
 from vpm.identify.parallel import worker_count
-from vpm.identify.response_along_motion import bends, has_own_drives
+from vpm.identify.response_along_motion import answers_at_once
 from vpm.identify.sample_mask import STANDSTILL_SHARE
 from vpm.model import Model
 from vpm.simulate import Setup
@@ -167,7 +167,7 @@ def filters(
     """
     own = tuple(m.cutoff for m in training.motions)
     bands = tuple(UNDISTORTED_BAND * one for one in own)
-    if cutoff is not None or bends(model) or has_own_drives(model):
+    if cutoff is not None or not answers_at_once(model):
         return own, bands
     pairs = zip(training.experiments, training.motions, strict=True)
     highest = (quickest(record, m, training.joints) for record, m in pairs)

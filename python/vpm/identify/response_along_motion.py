@@ -54,6 +54,11 @@ def bends(model: Model) -> bool:
     return bool(model.core.n_elastic)
 
 
+def answers_at_once(model: Model) -> bool:
+    """Whether efforts follow from each sample of a motion: links are rigid, and drives have no states of their own."""
+    return not bends(model) and not has_own_drives(model)
+
+
 def has_hidden(model: Model, joints: Sequence[str]) -> bool:
     """Whether a model has motion beside the measured ``joints``: elastic links or unmeasured joints."""
     return bends(model) or tuple(model.joints) != tuple(joints)

@@ -9,7 +9,7 @@ import numpy as np
 
 from vpm.discrepancy.confirmation.delay_in_motion import is_late, timed_in_motion
 from vpm.discrepancy.confirmation.low_frequency import has_impacts, low_frequency
-from vpm.discrepancy.screening.candidates import joint_at
+from vpm.discrepancy.screening.candidates import acts_on
 from vpm.discrepancy.screening.compliance_and_stop_start import ends_apart
 from vpm.discrepancy.screening.probe import ROUNDED, Alias, Baseline, Probe, size_is_clear
 from vpm.errors import DivergedError
@@ -356,15 +356,6 @@ def _where_it_acts(current: Judged, validation: Array, problem: InverseDynamicsP
         return None
     here = acts_on(current.model, problem, site)
     return gain(here * current.validation, here * validation, segments(problem)) if np.any(here) else None
-
-
-def acts_on(model: Model, problem: InverseDynamicsProblem, site: str) -> Array:
-    """Samples of a residual (n,) to confirm an effect by: 1 in efforts of its joint, of all joints for a body."""
-    joint, samples = joint_at(model, site), np.zeros(max(block.samples.stop for block in problem.blocks))
-    for record in range(len(problem.motions)):
-        for name, block in zip(problem.joints, problem.efforts(record), strict=True):
-            samples[block.samples] = float(joint in {"", name})
-    return samples
 
 
 def simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:

@@ -38,7 +38,8 @@ MAGNIFIED = 4.0
 NORMAL_95_ONE_SIDED = 1.6448536269514722
 #: Samples that what builds up over a way has to last, to be seen to build up.
 SAMPLED = 2.0
-#: Drop of the training mean square below which a candidate is not refitted at all.
+#: Drop of the training mean square below which a candidate is not refitted at all, unless it promises to be worth its
+#: name at its own joint: errors of one joint say nothing of another one.
 LEAST_SCREENED = 0.005
 
 
@@ -74,7 +75,7 @@ def refuse_probe(probe: Probe) -> str:
         return "it has no influence on these data"
     if probe.drop < 0.0:
         return "it would make the training error larger wherever it was tried"
-    if probe.drop < LEAST_SCREENED:
+    if probe.drop < LEAST_SCREENED and probe.here < WORTH_A_NAME:
         return f"it would lower the training error by only {percent(probe.drop)} of its mean square"
     outside = impossible_values(probe)
     if outside:

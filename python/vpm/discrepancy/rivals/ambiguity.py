@@ -26,7 +26,7 @@ from vpm.discrepancy.search.search import Tried
 from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem, gain, segments
 from vpm.identify.identifiability import COPY_SHARE, Span
-from vpm.identify.response_along_motion import bends
+from vpm.identify.response_along_motion import answers_at_once, bends
 from vpm.model import Model
 from vpm.numbers import NORMAL_95
 
@@ -150,12 +150,15 @@ def _beside(last: Tried, entry: Accepted) -> list[Probe]:
 
 
 def _without(final: Judged, data: Data, known: Mapping[Key, Tried], entry: Accepted) -> Judged:
-    """Model without one accepted effect, all else fitted again; ambiguity is judged on it."""
+    """Model without one accepted effect, all else fitted again; ambiguity is judged on it.
+
+    Efforts that follow at once are linear in sizes, and nearly so in all else: one step does.
+    """
     if entry.key in known:
         return known[entry.key].without
     model = final.model.without_effect(*entry.key)
     free, bounds = final.kept_in(model)
-    return judge(model, free, data, bounds)
+    return judge(model, free, data, bounds, linear_only=answers_at_once(final.model))
 
 
 def _others(without: Judged, data: Data, entry: Accepted, effects: Sequence[str] | None) -> list[Candidate]:
@@ -261,7 +264,7 @@ def probe_beside(final: Judged, without: Judged, data: InverseDynamicsProblem, e
             **{name: start[name].value + float(size) for name, size in zip(names, sizes, strict=True)},
         },
         std={**dict.fromkeys(shapes, np.inf), **dict(zip(names, map(float, spread), strict=True))},
-        drop=1.0 - left / power if power > 0.0 else 0.0,
+        drop=1.0 - float(left @ left) / power if power > 0.0 else 0.0,
     )
 
 

@@ -21,7 +21,7 @@ from vpm.discrepancy.screening.compliance_and_stop_start import moved
 from vpm.errors import DivergedError
 from vpm.experiment import Motion
 from vpm.identify import InverseDynamicsProblem
-from vpm.identify.response_along_motion import bends, has_own_drives
+from vpm.identify.response_along_motion import answers_at_once
 from vpm.model import Model
 from vpm.model.splitting import name_behind
 from vpm.numbers import Array
@@ -64,7 +64,7 @@ class _Look:
 def is_read_off(model: Model, data: InverseDynamicsProblem, candidate: Candidate) -> bool:
     """Whether the width of a backlash can be searched as a start value: between ideal drives and rigid links."""
     measured = candidate.site in data.motions[0].joints
-    return candidate.effect.has_play and measured and not (bends(model) or has_own_drives(model))
+    return candidate.effect.has_play and measured and answers_at_once(model)
 
 
 def near_prior(model: Model, nominal: Model, free: Sequence[str]) -> Model:

@@ -259,6 +259,15 @@ def joint_at(model: Model, site: str) -> str:
     return next((owner for owner in read if owner in model.joints), "")
 
 
+def acts_on(model: Model, problem: InverseDynamicsProblem, site: str) -> Array:
+    """Samples of a residual (n,) by which a candidate shows: 1 in efforts of its joint, of all joints for a body."""
+    joint, samples = joint_at(model, site), np.zeros(max(block.samples.stop for block in problem.blocks))
+    for record in range(len(problem.motions)):
+        for name, block in zip(problem.joints, problem.efforts(record), strict=True):
+            samples[block.samples] = float(joint in {"", name})
+    return samples
+
+
 def shares_at(model: Model, site: str, joints: Sequence[str]) -> Array:
     """Share of each joint in the coordinate at a candidate's site, shape (n,).
 

@@ -9,7 +9,7 @@ are tried, and the refit begins at the one with the least residual.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -17,7 +17,7 @@ from vpm.discrepancy.screening.candidates import Candidate
 from vpm.discrepancy.screening.compliance_and_stop_start import moved
 from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem
-from vpm.identify.response_along_motion import bends, has_own_drives
+from vpm.identify.response_along_motion import answers_at_once
 from vpm.model import Model
 from vpm.numbers import Array
 
@@ -29,11 +29,11 @@ DAMPINGS = (0.1, 0.3)
 def is_searched(model: Model, data: InverseDynamicsProblem, candidate: Candidate) -> bool:
     """Whether the stiffness of a joint compliance is searched: between an ideal drive and rigid links."""
     measured = candidate.site in data.motions[0].joints
-    return candidate.effect.winds_up and measured and not (bends(model) or has_own_drives(model))
+    return candidate.effect.winds_up and measured and answers_at_once(model)
 
 
 def best_start(
-    model: Model, jacobian: Array, data: InverseDynamicsProblem, candidate: Candidate
+    model: Model, left_of: Callable[[Array], Array], data: InverseDynamicsProblem, candidate: Candidate
 ) -> Mapping[str, float] | None:
     """Start stiffness of a joint compliance with the least residual, or None if none improves it.
 
@@ -41,21 +41,19 @@ def best_start(
     ----------
     model : Model
         Without the spring.
-    jacobian : ndarray, shape (n, free)
-        Regressor of its free parameters.
+    left_of : callable
+        Part (n,) that its free parameters leave of a residual (n,).
     data : InverseDynamicsProblem
     candidate : Candidate
         A spring in series.
     """
-    lengths = np.linalg.norm(jacobian, axis=0)
-    known = np.linalg.qr(jacobian[:, lengths > 0.0] / lengths[lengths > 0.0])[0]
 
     def left(one: Model) -> float:
         try:
             residual, _ = data.evaluate(one, one.theta)
         except DivergedError:
             return math.inf
-        rest = residual - known @ (known.T @ residual)
+        rest = left_of(residual)
         power = float(rest @ rest)
         return power if math.isfinite(power) else math.inf
 

@@ -24,21 +24,21 @@ PLACED, ANYWHERE = 2, (-np.inf, np.inf)
 EVEN = 1e-6
 
 
-def linear_step(data: InverseDynamicsProblem, jacobian: Array, residual: Array) -> tuple[Array, Array, float]:
-    """Linear least-squares step, its standard deviations and the remaining sum of squares."""
+def linear_step(data: InverseDynamicsProblem, jacobian: Array, residual: Array) -> tuple[Array, Array, Array]:
+    """Linear least-squares step, its standard deviations and the remaining residual (n,)."""
     if jacobian.shape[1] == 0:
-        return np.zeros(0), np.zeros(0), float(residual @ residual)
+        return np.zeros(0), np.zeros(0), residual
     lengths = column_lengths(jacobian)
     scaled = jacobian / lengths
     step = np.linalg.lstsq(scaled, -residual, rcond=1e-10)[0]
     left = residual + scaled @ step
     std = np.sqrt(np.diag(robust_covariance(scaled, left, segments(data)))) / lengths
-    return step / lengths, std, float(left @ left)
+    return step / lengths, std, left
 
 
 def step_without(
     data: InverseDynamicsProblem, jacobian: Array, residual: Array, staying: Sequence[int]
-) -> tuple[Array, Array, float]:
+) -> tuple[Array, Array, Array]:
     """Linear step in which some parameters stay where they are, without deviation."""
     moves = [i for i in range(jacobian.shape[1]) if i not in staying]
     values, std = np.zeros(jacobian.shape[1]), np.zeros(jacobian.shape[1])

@@ -14,7 +14,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from vpm.discrepancy.screening.backlash_start import is_read_off, near_prior, read_off
-from vpm.discrepancy.screening.candidates import Candidate
+from vpm.discrepancy.screening.candidates import Candidate, acts_on
 from vpm.discrepancy.screening.compliance_and_stop_start import LOSSES, in_series
 from vpm.discrepancy.screening.joint_compliance_start import best_start, is_searched
 from vpm.discrepancy.screening.linear_step import free_location, is_outside, linear_step, softened, step_without
@@ -52,7 +52,8 @@ class Probe:
     #: Linearised estimate by dotted name, unbounded.
     values: Mapping[str, float]
     std: Mapping[str, float]
-    drop: float  #: Share of the training residual's mean square that would go.
+    drop: float  #: Share of the training residual's mean square that would go, beside what known parameters explain.
+    here: float = 0.0  #: The same of the effort at the joint where the effect acts, of several.
 
     @property
     def score(self) -> float:
@@ -95,6 +96,15 @@ class Baseline:
         if kept not in self._spans:
             self._spans[kept] = Span.of(self.jacobian[:, kept])
         return self._spans[kept]
+
+    def left(self, residual: Array) -> Array:
+        """Part of a probe's residual (n,) that a linear step in the known parameters alone leaves."""
+        return self.without_pushed(residual).rest(residual)
+
+    @cached_property
+    def unexplained(self) -> Array:
+        """Part of the residual (n,) that known parameters would leave; bounds may keep a fit from that."""
+        return self.left(self.residual)
 
     @cached_property
     def _spans(self) -> dict[tuple[bool, ...], Span]:
@@ -161,7 +171,7 @@ def _searched(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate
     """Probe of a joint compliance at its best start value; None where none lowers the residual."""
     if not is_searched(base.model, data, candidate):
         return None
-    start = best_start(base.model, base.jacobian, data, candidate)
+    start = best_start(base.model, base.left, data, candidate)
     found = None if start is None else _probe_start(base, data, candidate, start, still=True)
     return found if found is not None and found.free and found.drop > 0.0 else None
 
@@ -224,12 +234,10 @@ def _probe_start(
     start_values = model.theta[[columns[i] for i in keep]]
     values, std, left = _stepped(base, data, fresh[:, keep], residual, start_values, _losses(model, candidate, free))
     if still:
-        rest = base.span.rest(residual)
-        values, left = np.zeros_like(values), float(rest @ rest)
-    power = float(base.residual @ base.residual)
+        values, left = np.zeros_like(values), base.left(residual)
     estimates = dict(zip(free, (values + start_values).tolist(), strict=True))
     deviations = dict(zip(free, std.tolist(), strict=True))
-    drop = 1.0 - left / power if power > 0.0 and free else 0.0
+    drop, here = _lowered(base, data, candidate, left) if free else (0.0, 0.0)
     if place is not None and place.where in keep:
         size, where = added[place.size], added[place.where]
         if estimates[size] <= model.parameters[size].minimum:
@@ -243,12 +251,21 @@ def _probe_start(
             estimates[name], deviations[name] = softened(
                 model.parameters[name].value, estimates[name], deviations[name]
             )
-    return Probe(candidate, model, free, held, invisible, estimates, deviations, drop)
+    return Probe(candidate, model, free, held, invisible, estimates, deviations, drop, here)
+
+
+def _lowered(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, left: Array) -> tuple[float, float]:
+    """Shares of a probe's residual that would go: of all, and of the effort at the joint where its effect acts."""
+    before, whole = base.unexplained, float(base.residual @ base.residual)
+    drop = (float(before @ before) - float(left @ left)) / whole if whole > 0.0 else 0.0
+    here = acts_on(base.model, data, candidate.site)
+    own = float(here * before @ before)
+    return drop, 1.0 - float(here * left @ left) / own if own > 0.0 and not np.all(here) else 0.0
 
 
 def _stepped(
     base: Baseline, data: InverseDynamicsProblem, fresh: Array, residual: Array, start: Array, losses: Sequence[int]
-) -> tuple[Array, Array, float]:
+) -> tuple[Array, Array, Array]:
     """Linear step of a probe in new parameters beside the known ones, see `linear_step`; some of them stay.
 
     A negative loss of a spring in series stays at its ``start``. It depends on the square of the compliance, so a step

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge
-from vpm.discrepancy.confirmation.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED
-from vpm.discrepancy.screening.candidates import Key
+from vpm.discrepancy.confirmation.refusal import CLEAR_GAIN, LEAST_GAIN, NORMAL_95_ONE_SIDED
+from vpm.discrepancy.screening.candidates import Key, acts_on
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.errors import DivergedError, ModelError
-from vpm.identify import gain, segments
+from vpm.identify import Gain, gain, segments
 from vpm.identify.identifiability import Span, is_alias
+from vpm.identify.response_along_motion import answers_at_once
 from vpm.model import Model
 
 
@@ -33,7 +34,7 @@ def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dro
     is set free for the trial: a spring that may rest elsewhere needs no constant force beside it. One name for what two
     would say is the shorter answer. The same holds for a size, such as a difference of dry friction beside a constant
     force, which are one effect in motion. Where neither size has work to do beside it, these data do not tell, and both
-    names stay.
+    names stay. Where efforts follow at once, one step tells what does most of the work.
     """
     newest = accepted[-1]
     for entry in accepted[:-1]:
@@ -46,15 +47,29 @@ def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dro
             known = tuple(name for name in current.free if name in model.parameters)
             free = (*known, *sorted(name for name in freed - set(known) if name in model.parameters))
             bounds = {name: pair for name, pair in current.bounds.items() if name in free}
+            if answers_at_once(current.model):
+                near = judge(model, free, replace(data, simulation=None), bounds, linear_only=True)
+                if _work(entry, near, current, data).relative >= CLEAR_GAIN:
+                    continue
             reduced = judge(model, free, data, bounds)
         except (DivergedError, ModelError):
             continue  # without it the model cannot follow the validation data at all, or another effect cannot stand
-        loss = gain(reduced.validation, current.validation, segments(data.validation))
-        if loss.relative < LEAST_GAIN and (not renamed or _renamed(current, reduced, model, known, data)):
+        needless = _work(entry, reduced, current, data).relative < LEAST_GAIN
+        if needless and (not renamed or _renamed(current, reduced, model, known, data)):
             accepted.remove(entry)
             accepted[:] = [_released(other, freed) for other in accepted]
             stages.append(Stage("removed", *entry.key, reduced))
             dropped[entry.key] = f"it is not needed any more beside {newest.trial.probe.candidate.label}"
+
+
+def _work(entry: Accepted, reduced: Judged, current: Judged, data: Data) -> Gain:
+    """Validation gain of an effect before elimination over the model without it, of all or at its joint alone."""
+    here, pieces = acts_on(current.model, data.validation, entry.trial.probe.candidate.site), segments(data.validation)
+    whole = gain(reduced.validation, current.validation, pieces)
+    if not np.any(here):
+        return whole
+    own = gain(here * reduced.validation, here * current.validation, pieces)
+    return max(whole, own, key=lambda one: one.relative)
 
 
 def _renamed(current: Judged, reduced: Judged, model: Model, free: tuple[str, ...], data: Data) -> bool:

@@ -10,7 +10,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, acts_on, confirm, finished
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confirm, finished
 from vpm.discrepancy.confirmation.delay_in_motion import in_motion, is_late
 from vpm.discrepancy.confirmation.low_frequency import low_frequency
 from vpm.discrepancy.confirmation.refusal import (
@@ -29,12 +29,12 @@ from vpm.discrepancy.noise.residual_structure import structure
 from vpm.discrepancy.noise.sample_timing import InTime, in_time
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.discrepancy.screening.backlash_start import is_read_off, only_compliant
-from vpm.discrepancy.screening.candidates import Candidate, Key, candidates, joint_at, left_out
+from vpm.discrepancy.screening.candidates import Candidate, Key, acts_on, candidates, joint_at, left_out
 from vpm.discrepancy.screening.probe import Probe, prepare, probe, refit_effort, screening_effort
 from vpm.discrepancy.screening.short_list import SHORT_LIST, most_promising, same_models
 from vpm.discrepancy.search.candidate_choice import Accepted, choose
 from vpm.identify import gain, segments
-from vpm.identify.response_along_motion import bends, has_own_drives
+from vpm.identify.response_along_motion import answers_at_once, bends
 from vpm.identify.tangent import drives_on_tangent
 
 #: Where links bend already, the noise of the measured motion rings in them: another spring needs this predicted gain as
@@ -128,7 +128,7 @@ class Round:
 
     def _takes_long(self) -> bool:
         """Whether probes of candidates with a motion of their own take long in this round."""
-        return bends(self.current.model) or has_own_drives(self.current.model)
+        return not answers_at_once(self.current.model)
 
     def screen(
         self, effects: Sequence[str] | None, without: set[Key], *, heavy: bool, only: set[Key] | None = None

@@ -24,7 +24,7 @@ from vpm.discrepancy.search.search import Search
 from vpm.discrepancy.search.search_round import Tell
 from vpm.errors import VpmError
 from vpm.identify.identifiability import RANK_TOLERANCE, least_step
-from vpm.identify.response_along_motion import bends, has_own_drives
+from vpm.identify.response_along_motion import answers_at_once
 from vpm.model import Model
 
 
@@ -37,7 +37,7 @@ def with_usual_friction(
     to be predicted clearly worse where it acts. What does not do that leaves, of each joint the least first.
     """
     start = found.final
-    if bends(start.model) or has_own_drives(start.model):
+    if not answers_at_once(start.model):
         return found
     usual = [name for name, one in EFFECTS.items() if one.usual == "friction" and (effects is None or name in effects)]
     listed = [c for c in candidates(start.model, data.training, start.fit.residual, usual) if c.neutral]
