@@ -253,6 +253,7 @@ class Explainer:
                 continue
             predicted = partial(self._predicted, part=part, tangent=near)
             few = self._few(self.each("trying", predicted, corrections, self._words), left, known)
+            few = self._leaving_less_effort(few, part, left)
             fit = partial(self._fitted, part=part, tangent=near, left=left)
             fitted = [one for one in self.each("refining", fit, few, self._words) if not isinstance(one, Failure)]
             found += [one for one in fitted if abs(one.correction.delay) > least]

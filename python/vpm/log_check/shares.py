@@ -15,7 +15,7 @@ from vpm.catalogue import EFFECTS
 from vpm.catalogue.effects import BUILT_IN
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
-from vpm.identify.response_along_motion import bends, has_own_drives
+from vpm.identify.response_along_motion import answers_at_once
 from vpm.initial import initial_state
 from vpm.log_check.correction import Correction
 from vpm.log_check.delay import Delayed, with_delay, without_delay
@@ -128,15 +128,10 @@ class Judge:
 
     def efforts_left(self, record: Experiment) -> Mapping[str, float]:
         """Inverse-dynamics residual of the effort at each position as a share; see `Shares.efforts`."""
-        if not self._at_once:
+        if not answers_at_once(self.model):
             return {}
         near = self._regressed(record, self._structure(record))
         return {} if near is None else near.efforts
-
-    @cached_property
-    def _at_once(self) -> bool:
-        """Whether efforts follow from each sample of an error share alone, without states of links and drives."""
-        return not bends(self.model) and not has_own_drives(self.model)
 
     def guessed(self, record: Experiment) -> Shares:
         """Shares where a fit would begin, whichever leaves least: at the values of the model, with friction or without.
@@ -212,7 +207,7 @@ class Judge:
         try:
             problem = InverseDynamicsProblem(self.model, [record])
             found = regressed(replace(structure, priors=priors), problem)
-            left = _left_of_efforts(problem, self.model, found.theta) if self._at_once else {}
+            left = _left_of_efforts(problem, self.model, found.theta) if answers_at_once(self.model) else {}
             return _Regressed(found.theta, left)
         except ASTRAY:
             return None
