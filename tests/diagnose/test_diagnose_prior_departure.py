@@ -60,3 +60,28 @@ def test_a_spring_that_turns_a_pendulum_upside_down_is_no_explanation() -> None:
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=["spring", "bias_force"], workers=1)
     assert why.verdict == "unexplained"
     assert "body.center_of_mass.z" in why.summary
+
+
+def test_a_recalibration_that_a_known_moment_of_inertia_stops_says_so() -> None:
+    """The motion turns about y alone; a known moment about x that is too large for a slender body forbids its value."""
+    arm = vpm.Model.from_toml("""
+name = "arm"
+gravity = [0.0, 0.0, 0.0]
+bodies.arm = { mass = 1.0, inertia = [0.5, { value = 0.55, uncertainty = 0.3 }, 0.1, 0, 0, 0] }
+joints.axis = { type = "revolute", parent = "world", child = "arm", axis = [0, 1, 0] }
+actuators.drive = { joint = "axis", gain = 1.0, command_unit = "N m" }
+""")
+    time = np.arange(1500) / 300.0
+    speeds = np.array([3.1, 5.3, 7.9])
+
+    def record(seed: int) -> vpm.Experiment:
+        random = np.random.default_rng(seed)
+        phases = speeds * time[:, None] + random.uniform(0.0, 6.0, 3)
+        torque = -0.2 * np.sum(np.sin(phases) * speeds**2, axis=1)  # of an inertia of 0.2 kg m^2
+        angle = np.sum(np.sin(phases), axis=1) + random.normal(0.0, 1e-5, len(time))
+        return vpm.Experiment.from_arrays(time, {"axis.position": angle, "drive.command": torque}, model=arm)
+
+    why = vpm.diagnose(arm, [record(1)], [record(2)], names="search", effects=["bias_force"], check=False, workers=1)
+    (note,) = [note for note in why.notes if "stopped at" in note]
+    assert "arm.inertia.yy" in note
+    assert "the moment xx, 0.5 kg m^2" in note

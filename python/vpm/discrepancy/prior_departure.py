@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Judged
+from vpm.identify.moments import on_the_border
 from vpm.model import Model, Parameter
 from vpm.numbers import NORMAL_95, short
 
@@ -19,7 +20,7 @@ FAR = 3.0
 
 
 def moved_far(model: Model, recalibrated: Judged) -> list[str]:
-    """Notes on parameters that a recalibration clearly moved far from their prior, alone or together."""
+    """Notes on parameters that a recalibration moved far from their prior, alone or together, or to a border."""
     notes = []
     for name, std in zip(recalibrated.free, recalibrated.fit.std, strict=True):
         before, after = model.parameters[name], recalibrated.model.parameters[name]
@@ -36,7 +37,9 @@ def moved_far(model: Model, recalibrated: Judged) -> list[str]:
             f"model file than {max(together.values()):.1f} times their stated uncertainties: question the file, or "
             "look for what it lacks there, such as a load"
         )
-    return notes
+    known = [names for names, _ in on_the_border(model, recalibrated.free)]
+    found = on_the_border(recalibrated.model, recalibrated.free)
+    return notes + [f"recalibration stopped at {sentence}" for names, sentence in found if names not in known]
 
 
 def _least_departures(model: Model, recalibrated: Judged) -> dict[str, float]:
