@@ -311,7 +311,7 @@ def _measured(
     say("comparing the nominal model with the data")
     nominal = nominal_of(model, data, notes)
     say("recalibrating the nominal parameters")
-    recalibrated = recalibrated_of(model, data, notes, each)
+    recalibrated = recalibrated_of(model, data, notes, each, None if ranking is None else ranking.recalibrated)
     found, ambiguous, late = named(ranking, recalibrated, data, by, say, each, notes)
     known = _Known(model, records, data, nominal, recalibrated, ranking, ambiguous, late, may_drift)
     so_far = partial(of_search, model, records, recalibrated, found, data.training)

@@ -1,4 +1,4 @@
-"""Recalibration of a pendulum that carries more than its file says; torques are those of a closed form."""
+"""Recalibration of a pendulum that carries more than its file says, and of a spring; torques are of closed forms."""
 
 import numpy as np
 import pytest
@@ -70,3 +70,47 @@ def test_bodies_become_what_the_records_show_of_them(load: float, place: tuple[f
     # The load's first moment is 1.6 kg m, and one stated uncertainty of mass or of place makes 0.15 kg m.
     assert any("link.center_of_mass.x" in note and "stated uncertainties" in note for note in why.notes) == (load > 1.0)
     assert found["link.inertia.yy"] + mass * (x**2 + z**2) == pytest.approx(about_pin, rel=0.01)
+
+
+#: A motor and what it turns by a spring, without gravity.
+ROTOR, SHANK, STIFFNESS = 0.3, 0.25, 250.0
+ELASTIC = f"""
+name = "series elastic actuator"
+gravity = [0.0, 0.0, 0.0]
+bodies.rotor = {{ mass = 1.0, inertia = [{ROTOR}, {ROTOR}, {ROTOR}, 0, 0, 0] }}
+joints.motor = {{ type = "revolute", parent = "world", child = "rotor", axis = [0, 1, 0] }}
+bodies.shank = {{ mass = 1.0, inertia = [{SHANK}, {SHANK}, {SHANK}, 0, 0, 0] }}
+joints.coil = {{ type = "revolute", parent = "rotor", child = "shank", axis = [0, 1, 0] }}
+actuators.drive = {{ joint = "motor", gain = 1.0, command_unit = "N m" }}
+
+[[effects]]
+type = "spring"
+at = "coil"
+stiffness = {{ value = 200.0, unit = "N m/rad", uncertainty = 50.0 }}
+"""
+
+
+def shaken(seed: int) -> vpm.Experiment:
+    """Record in which the shank moves by ``q``: the spring gives ``-I q''/k``, and the motor what both bodies need."""
+    rng, time = np.random.default_rng(seed), np.arange(0.0, SECONDS, 1.0 / 200.0)
+    phases, pulsations = rng.uniform(0.0, 2.0 * np.pi, 3), 2.0 * np.pi * np.array([0.6, 1.4, 2.3])
+    waves = np.array([0.4, 0.15, 0.06])[:, None] * np.sin(np.outer(pulsations, time) + phases[:, None])
+    q, a, jerked = waves.sum(axis=0), -(pulsations**2 @ waves), pulsations**4 @ waves
+    spring = -SHANK * a / STIFFNESS
+    motor = q - spring
+    torque = ROTOR * (a + SHANK * jerked / STIFFNESS) + SHANK * a
+    noise = rng.normal(0.0, (1e-5, 1e-4, 0.01), (time.size, 3)).T
+    columns = {
+        "motor.position": motor + noise[0],
+        "coil.position": spring + noise[1],
+        "drive.command": torque + noise[2],
+    }
+    return vpm.Experiment.from_arrays(time, columns, model=vpm.Model.from_toml(ELASTIC))
+
+
+def test_a_spring_that_no_effort_of_a_drive_shows_has_the_stiffness_that_its_deflection_shows() -> None:
+    why = vpm.diagnose(
+        vpm.Model.from_toml(ELASTIC), shaken(1), shaken(2), effects=["bias_force"], setup=SMOOTH, workers=1
+    )
+    assert why.verdict == "parameters_only"
+    assert why.model.parameters["coil.spring.stiffness"].value == pytest.approx(STIFFNESS, rel=0.01)

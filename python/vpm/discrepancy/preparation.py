@@ -103,8 +103,13 @@ def nominal_of(model: Model, data: Data, notes: list[str]) -> Judged:
     return nominal
 
 
-def recalibrated_of(model: Model, data: Data, notes: list[str], each: ParallelCandidates) -> Judged:
-    """Prepare the recalibrated model: uncertain parameters fitted, judged by the residual if it cannot simulate."""
+def recalibrated_of(
+    model: Model, data: Data, notes: list[str], each: ParallelCandidates, ranked: Model | None = None
+) -> Judged:
+    """Prepare the recalibrated model: uncertain parameters fitted, judged by the residual if it cannot simulate.
+
+    What the residual does not show, such as a spring behind which no drive acts, has its value in the ``ranked`` model.
+    """
     free = model.adjustable
     if not free:
         notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
@@ -113,6 +118,10 @@ def recalibrated_of(model: Model, data: Data, notes: list[str], each: ParallelCa
     # This fit has all cores for its records; candidates share them from here on.
     alone = replace(data, training=data.training.side_by_side(worker_count(each.workers)))
     recalibrated, stopped = judged_anyhow(model, (*free, *transitions), alone, bounds)
+    unseen = {name for one in recalibrated.fit.unseen for name in one.names}
+    if ranked is not None and unseen:
+        start = recalibrated.model.with_parameters({name: ranked.parameters[name].value for name in unseen})
+        recalibrated, stopped = judged_anyhow(start, (*free, *transitions), alone, bounds)
     if stopped:
         notes.append(f"the recalibrated model could not simulate the validation records: {stopped}")
     notes.extend(moved_far(model, recalibrated))
