@@ -90,19 +90,27 @@ stiffness = {{ value = 200.0, unit = "N m/rad", uncertainty = 50.0 }}
 """
 
 
-def shaken(seed: int) -> vpm.Experiment:
-    """Record in which the shank moves by ``q``: the spring gives ``-I q''/k``, and the motor what both bodies need."""
+def shaken(seed: int, cubic: float = 0.0) -> vpm.Experiment:
+    """Record in which the shank moves by ``q``, its spring by ``d``, and the motor gives what both bodies need.
+
+    Of ``k d + cubic d^3 = -I q''`` derivatives by time follow, and of the motor ``q - d``.
+    """
     rng, time = np.random.default_rng(seed), np.arange(0.0, SECONDS, 1.0 / 200.0)
     phases, pulsations = rng.uniform(0.0, 2.0 * np.pi, 3), 2.0 * np.pi * np.array([0.6, 1.4, 2.3])
-    waves = np.array([0.4, 0.15, 0.06])[:, None] * np.sin(np.outer(pulsations, time) + phases[:, None])
-    q, a, jerked = waves.sum(axis=0), -(pulsations**2 @ waves), pulsations**4 @ waves
-    spring = -SHANK * a / STIFFNESS
-    motor = q - spring
-    torque = ROTOR * (a + SHANK * jerked / STIFFNESS) + SHANK * a
+    angles, size = np.outer(pulsations, time) + phases[:, None], np.array([0.4, 0.15, 0.06])
+    q, a = size @ np.sin(angles), -(size * pulsations**2) @ np.sin(angles)
+    load, rate = -SHANK * a, SHANK * (size * pulsations**3) @ np.cos(angles)
+    curvature = -SHANK * (size * pulsations**4) @ np.sin(angles)
+    d = load / STIFFNESS
+    for _ in range(20):  # Newton's method
+        d -= (STIFFNESS * d + cubic * d**3 - load) / (STIFFNESS + 3.0 * cubic * d**2)
+    slope = STIFFNESS + 3.0 * cubic * d**2
+    bend = (curvature - 6.0 * cubic * d * (rate / slope) ** 2) / slope
+    torque = ROTOR * (a - bend) + SHANK * a
     noise = rng.normal(0.0, (1e-5, 1e-4, 0.01), (time.size, 3)).T
     columns = {
-        "motor.position": motor + noise[0],
-        "coil.position": spring + noise[1],
+        "motor.position": q - d + noise[0],
+        "coil.position": d + noise[1],
         "drive.command": torque + noise[2],
     }
     return vpm.Experiment.from_arrays(time, columns, model=vpm.Model.from_toml(ELASTIC))
@@ -114,3 +122,30 @@ def test_a_spring_that_no_effort_of_a_drive_shows_has_the_stiffness_that_its_def
     )
     assert why.verdict == "parameters_only"
     assert why.model.parameters["coil.spring.stiffness"].value == pytest.approx(STIFFNESS, rel=0.01)
+
+
+def test_a_spring_that_hardens_between_a_motor_and_its_load_is_no_ripple() -> None:
+    """The spring moves 3 hundredths of a radian where the motor moves 0.6: what may act on it has the spring's size."""
+    cubic, effects = 3e4, ["cubic_spring", "torque_ripple"]
+    records = (shaken(seed, cubic) for seed in (1, 2))
+    why = vpm.diagnose(vpm.Model.from_toml(ELASTIC), *records, effects=effects, setup=SMOOTH, check=False, workers=1)
+    assert [(one.name, one.site) for one in why.effects] == [("cubic_spring", "coil")]
+    assert "does not show it" in why.effects[0].notes[0]  # no effort of the motor does
+    assert why.model.parameters["coil.cubic_spring.stiffness"].value == pytest.approx(cubic, rel=0.05)
+    assert why.model.parameters["coil.spring.stiffness"].value == pytest.approx(STIFFNESS, rel=0.02)
+
+
+def test_a_late_reading_of_what_a_motor_and_its_spring_turn_together_is_not_nothing() -> None:
+    """Both readings before it are right, so that no effort is wrong: 5 ms late is 2.5 % of its motion."""
+    content = ELASTIC.replace("stiffness = { value = 200.0", "stiffness = { value = 250.0")
+    model = vpm.Model.from_toml(content + "[transmissions.knee]\nratios = { motor = 1.0, coil = 1.0 }\n")
+    late = [
+        record.with_channel("knee.position", shifted, "rad")
+        for record in (shaken(1), shaken(2))
+        for whole in [record["motor.position"] + record["coil.position"]]
+        for shifted in [np.concatenate([whole[:1], whole[:-1]])]
+    ]
+    why = vpm.diagnose(model, *late, effects=["bias_force"], setup=SMOOTH, check=False, workers=1)
+    assert why.verdict == "unexplained"
+    assert why.gap["knee.position (observed)"].after > 10.0 * why.gap["knee.position (observed)"].noise_floor
+    assert any("no offset, gain or delay of" in note for note in why.notes)

@@ -132,7 +132,7 @@ def _signal(problem: InverseDynamicsProblem | OutputErrorProblem, channel: str) 
 
 def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
     """Field of a diagnosis: an accepted effect with its estimates in the final model, and its evidence."""
-    candidate = entry.trial.probe.candidate
+    probe, candidate = entry.trial.probe, entry.trial.probe.candidate
     effect = final.model.effect(*candidate.key, entry.side)
     estimates = []
     for short, dotted in effect.parameter_names.items():
@@ -141,7 +141,9 @@ def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
         estimates.append(EffectParameterEstimate(short, dotted, parameter.value, parameter.unit, std))
     texts = {e.name: f"{e.value:.4g} {e.unit}" for e in estimates}
     notes = [f"{alias.parameter} held: not discriminated from {alias.partner}" for alias in entry.trial.held]
-    if not entry.ranked and not is_clear(final, tuple(e.dotted for e in estimates if e.std > 0.0)):
+    if entry.ranked and probe.invisible and not (probe.free or probe.held):
+        notes.append("that is a share of the inverse-dynamics residual, which does not show it; see the observed gaps")
+    elif not entry.ranked and not is_clear(final, tuple(e.dotted for e in estimates if e.std > 0.0)):
         notes.append("beside the effects that came later, its interval covers zero: one of them may be enough")
     return AcceptedEffect(
         candidate.effect.name,

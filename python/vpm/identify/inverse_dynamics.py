@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Self
@@ -92,8 +92,8 @@ class InverseDynamicsProblem(BegunAnywhere):
         # The parallel filter passes over whole records: where one begins and ends at rest there is nothing to settle.
         self._whole = tuple(replace(m, edge=0) for m in self.motions)
         measured = self.motions[0].joints
-        moved = model.driven_joints
-        self._joints = [place for place, joint in enumerate(measured) if joint in moved] or list(range(len(measured)))
+        told = self._shown_joints(model)
+        self._joints = [place for place, joint in enumerate(measured) if joint in told] or list(range(len(measured)))
         self.joints = tuple(measured[place] for place in self._joints)
         #: Channels beside the efforts that are compared too: what shows inside of drives, strains of links.
         self.shown = shown_channels(model, measured, experiments)
@@ -104,6 +104,10 @@ class InverseDynamicsProblem(BegunAnywhere):
         self.blocks = self._lay_out(model)
         #: What is left at the true values, as far as that is known; see `vpm.identify.closed_loop_prediction`.
         self.expected: Array | float = 0.0
+
+    def _shown_joints(self, model: Model) -> Collection[str]:
+        """Joints at which inverse dynamics compares efforts: driven ones, or all that are measured without a drive."""
+        return model.driven_joints
 
     def _motions(self, experiments: Sequence[Experiment], cutoffs: Sequence[float | None]) -> tuple[Motion, ...]:
         return tuple(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 
@@ -37,11 +37,21 @@ def shown(model: Model, tracked: TrackedRecords) -> InverseDynamicsProblem:
     return (
         SubstituteProblem(model, tracked)
         if why_unbalanced(model, tracked.experiments)
-        else InverseDynamicsProblem(model, tracked.experiments)
+        else ProblemOfAllJoints(model, tracked.experiments)
     )
 
 
-class SubstituteProblem(InverseDynamicsProblem):
+class ProblemOfAllJoints(InverseDynamicsProblem):
+    """Problem of all measured joints, for a tracker sees effects at those without a drive too.
+
+    A spring between a motor and its load moves a hundredth of what both do: it has sizes and start values of its own.
+    """
+
+    def _shown_joints(self, model: Model) -> Collection[str]:
+        return model.joints
+
+
+class SubstituteProblem(ProblemOfAllJoints):
     """Problem on substitute records: loops opened, all joints measured, sampled drives without effort.
 
     Motions are those of the machine, and efforts as large as its inertia needs. That is enough for natural sizes and
