@@ -79,9 +79,11 @@ def free_joints(model: Model) -> tuple[str, ...]:
 def tracker_gaps(ranking: Ranking, balanced: Sequence[str] | None) -> dict[str, ChannelGap]:
     """Errors of the ranking's tracker on validation records at joints without an inverse-dynamics residual.
 
-    Of all channels where there is no such residual, and so no joint of which the efforts are ``balanced``.
+    So of shafts that turn with such a joint. Of all channels where there is no such residual, and so no joint of which
+    the efforts are ``balanced``.
     """
-    joints = set(ranking.recalibrated.joints) - set(balanced or ())
+    model, joints = ranking.recalibrated, set(ranking.recalibrated.joints) - set(balanced or ())
+    joints |= {shaft for shaft in model.transmissions if joints & set(model.ratios(shaft))}
     return {
         f"{channel} ({OBSERVED})": ChannelGap(
             gap.before, gap.recalibrated, gap.after, gap.noise, gap.unit, gap.signal, OBSERVED
