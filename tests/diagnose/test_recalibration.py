@@ -149,3 +149,13 @@ def test_a_late_reading_of_what_a_motor_and_its_spring_turn_together_is_not_noth
     assert why.verdict == "unexplained"
     assert why.gap["knee.position (observed)"].after > 10.0 * why.gap["knee.position (observed)"].noise_floor
     assert any("no offset, gain or delay of" in note for note in why.notes)
+
+
+def test_a_fit_of_efforts_that_cannot_see_a_spring_says_which_mode_does() -> None:
+    model, record = vpm.Model.from_toml(ELASTIC), shaken(1)
+    fit = vpm.identify(model, record)
+    assert fit.unidentifiable
+    assert any("no effort at coil was compared" in sentence for sentence in fit.warnings)
+    other = vpm.identify(model, record, mode="restarts", setup=SMOOTH)
+    assert other["coil.spring.stiffness"] == pytest.approx(STIFFNESS, rel=0.01)
+    assert not any("was compared" in sentence for sentence in other.warnings)

@@ -118,6 +118,20 @@ def _collinear(names: Sequence[str], correlation: Array, blind: Collection[str])
     return told
 
 
+def joints_not_compared(fit: Fit, model: Model, records: Sequence[Experiment], blocks: Sequence[Block]) -> list[str]:
+    """Diagnostic sentence on logged joints without a drive, at which inverse dynamics compares nothing."""
+    if fit.mode != "inverse_dynamics" or not fit.unidentifiable:
+        return []
+    compared = {block.channel for block in blocks}
+    logged = [joint for joint in model.joints if all(f"{joint}.position" in record for record in records)]
+    blind = [joint for joint in logged if f"{joint}.effort" not in compared]
+    if not blind:
+        return []
+    return [
+        f"no effort at {', '.join(blind)} was compared, for no drive acts there: the mode restarts compares its motion"
+    ]
+
+
 def constant_channels(model: Model, records: Sequence[Experiment], blocks: Sequence[Block]) -> list[str]:
     """Diagnostics of compared channels and inputs of a record that never change."""
     compared = list(dict.fromkeys((b.experiment, b.channel) for b in blocks))

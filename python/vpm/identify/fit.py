@@ -11,7 +11,14 @@ from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, as_records, joints_from_sensors
 from vpm.identify.closed_loop_prediction import Own
 from vpm.identify.comparison import comparison
-from vpm.identify.diagnostics import constant_channels, contradictions, lost_channels, remarks, resting
+from vpm.identify.diagnostics import (
+    constant_channels,
+    contradictions,
+    joints_not_compared,
+    lost_channels,
+    remarks,
+    resting,
+)
 from vpm.identify.engine import Found, fit_problem
 from vpm.identify.estimation import Estimate, Progress, blinded, estimate, limits
 from vpm.identify.fit_result import Fit, fit_of
@@ -264,6 +271,7 @@ def _told(model: Model, records: Sequence[Experiment], data: Problem, fit: Fit, 
         told += contradictions(model, fit, checks)
     others = len(fit.states) + len(offset_blocks(data))
     told += remarks(fit, held, data.blocks, others, taken_by_offsets(fit, data))
+    told += joints_not_compared(fit, model, records, data.blocks)
     told += [sentence for _, sentence in border]
     told += constant_channels(model, records, data.blocks)
     told += lost_channels(fit)
