@@ -56,8 +56,9 @@ SETTINGS = Settings()
 def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
     """Why names do not come from a ranking, or "": it covers up to three joints, rigid links, and drives without oil.
 
-    It covers oil where a joint has no drive, for no search sees that. A deflection that a log holds is compared by a
-    ranking, but on a log of a real arm a search names its friction more plausibly.
+    It covers oil where a joint has no drive, for no search sees that. A bending that a log holds is compared by a
+    ranking, but on a log of a real arm a search names its friction more plausibly. Where a second encoder shows how far
+    a load stays behind its drive, friction bends what is between, if it acts on the load: only a ranking tries that.
     """
     if bends(model):
         return "links bend"
@@ -67,7 +68,8 @@ def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
     own = set(model.joints) - set(model.added_joints)
     if len(own) > SETTINGS.joints:
         return f"there are {len(own)} joints, more than {SETTINGS.joints}"
-    held = [channel for channel in model.deflections if any(channel in record for record in experiments)]
+    bent = [f"{body}_bending.position" for body in model.bodies]
+    held = [channel for channel in bent if any(channel in record for record in experiments)]
     return f"records hold {held[0]}" if held else ""
 
 

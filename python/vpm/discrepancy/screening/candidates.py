@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
@@ -132,11 +133,12 @@ def candidates(
     effects : sequence of str, optional
         Restrict the search to these; to those that a diagnosis tries if not given.
     simulated : bool
-        Whether motion that no channel measures is simulated with the memories of effects.
+        Whether motion that no channel measures is simulated with the memories of effects. Then both sides of a joint
+        that is split may have the same effect, each its own.
     """
     return tuple(
         _candidate(effect, site, model, data, residual)
-        for effect, site in _absent(model, effects)
+        for effect, site in _absent(model, effects, either_side=simulated)
         if not beyond(effect, site, model, data.joints, simulated=simulated)
     )
 
@@ -149,9 +151,9 @@ def left_out(model: Model, data: InverseDynamicsProblem, effects: Sequence[str] 
     return {key: reason for key, reason in reasons.items() if reason}
 
 
-def _absent(model: Model, effects: Sequence[str] | None) -> list[tuple[EffectType, str]]:
+def _absent(model: Model, effects: Sequence[str] | None, *, either_side: bool = False) -> list[tuple[EffectType, str]]:
     """Effects of the catalogue that ``model`` does not have, with each possible site, before they become candidates."""
-    present, by_key = {(effect.name, effect.at) for effect in model.effects}, {effect.key for effect in model.effects}
+    present, by_key = Counter((effect.name, effect.at) for effect in model.effects), {e.key for e in model.effects}
     tried = {effect.name for effect in EFFECTS.values() if effect.screened} if effects is None else set(effects)
     found = []
     for effect in EFFECTS.values():
@@ -159,7 +161,8 @@ def _absent(model: Model, effects: Sequence[str] | None) -> list[tuple[EffectTyp
             continue
         for site in sites_worth_trying(effect, model):
             needed = effect.requires is None or (effect.requires, site) in by_key
-            if (effect.name, site) not in present and needed:
+            sides = 2 if either_side and effect.has_sides and model.joint_behind(site) else 1
+            if present[effect.name, site] < sides and needed:
                 found.append((effect, site))
     return found
 

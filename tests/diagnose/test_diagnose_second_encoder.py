@@ -1,0 +1,89 @@
+"""Axes whose load has an encoder of its own: the way between both is logged as a deflection."""
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import vpm
+
+#: Masses before and behind the screw (kg), its stiffness (N/m) and damping (N s/m), friction of both sides (N).
+MOTOR, TABLE, STIFFNESS, DAMPING = 20.0, 10.0, 2e5, 60.0
+#: Speed within which dry friction turns round, m/s, and the rate of the log, Hz.
+ROUND, RATE, SECONDS = 1e-3, 500.0, 5.0
+AXIS = f"""
+name = "feed axis"
+gravity = [0.0, 0.0, -9.81]
+bodies.table = {{ mass = {{ value = 9.0, unit = "kg", uncertainty = 1.5 }} }}
+
+[joints.axis]
+type = "prismatic"
+parent = "world"
+child = "table"
+axis = [1.0, 0.0, 0.0]
+rotor_inertia = {MOTOR}
+
+[actuators.drive]
+joint = "axis"
+gain = 1.0
+command_unit = "N"
+
+[[effects]]
+type = "coulomb_friction"
+at = "axis"
+coulomb = {{ value = 25.0, unit = "N", uncertainty = 15.0 }}
+"""
+
+
+def logged(seed: int, before: float, behind: float) -> vpm.Experiment:
+    """Record of two masses with a spring between, and dry friction on either; equations of Newton, by scipy."""
+    random = np.random.default_rng(seed)
+    rates, phases = 2.0 * np.pi * np.array([0.35, 0.9, 1.7]), random.uniform(0.0, 6.0, 3)
+    sizes = np.array([0.06, 0.02, 0.008])
+
+    def reference(t: float) -> tuple[float, float]:
+        return float(sizes @ np.sin(rates * t + phases)), float(sizes * rates @ np.cos(rates * t + phases))
+
+    def force(t: float, x: float, v: float) -> float:
+        where, speed = reference(t)
+        return 2e4 * (where - x) + 1.2e3 * (speed - v)
+
+    def moved(t: float, state: np.ndarray) -> list[float]:
+        x, v, y, w = state
+        spring = STIFFNESS * (x - y) + DAMPING * (v - w)
+        a = (force(t, x, v) - before * np.tanh(v / ROUND) - spring) / MOTOR
+        return [v, a, w, (spring - behind * np.tanh(w / ROUND)) / TABLE]
+
+    time = np.arange(0.0, SECONDS, 1.0 / RATE)
+    where, speed = reference(0.0)
+    start = [where, speed, where, speed]
+    x, v, y, _ = solve_ivp(moved, (0.0, SECONDS), start, "LSODA", time, rtol=1e-8, atol=1e-10, max_step=2e-3).y
+    pushed = np.array([force(*row) for row in zip(time, x, v, strict=True)])
+    columns = {
+        "axis.position": x + random.normal(0.0, 1e-6, time.size),
+        "axis_deflection.position": y - x + random.normal(0.0, 1e-6, time.size),
+        "drive.command": pushed + random.normal(0.0, 0.3, time.size),
+    }
+    return vpm.Experiment.from_arrays(time, columns, model=vpm.Model.from_toml(AXIS))
+
+
+def test_a_screw_bent_by_friction_of_the_table_is_compliant() -> None:
+    """All friction acts behind the screw: what it bends by follows the direction of motion."""
+    records = (logged(seed, 0.0, 30.0) for seed in (1, 2))
+    why = vpm.diagnose(vpm.Model.from_toml(AXIS), *records, effects=["joint_compliance", "hysteresis"], workers=1)
+    assert why.verdict == "effect_found"
+    assert [(one.name, one.site) for one in why.effects] == [("joint_compliance", "axis")]
+    assert why.model.parameters["axis.compliance.stiffness"].value == pytest.approx(STIFFNESS, rel=0.05)
+    assert why.model.parameters["axis.link.friction.coulomb"].value == pytest.approx(30.0, rel=0.02)
+
+
+def test_friction_on_either_side_of_a_screw_is_told_apart() -> None:
+    """The file knows one friction: it is that of the table, and that of the motor is missing beside the screw."""
+    records = (logged(seed, 12.0, 30.0) for seed in (3, 4))
+    effects = ["joint_compliance", "coulomb_friction"]
+    why = vpm.diagnose(vpm.Model.from_toml(AXIS), *records, effects=effects, workers=1)
+    assert why.verdict == "effect_found"
+    assert {(one.name, one.site) for one in why.effects} == {(name, "axis") for name in effects}
+    values = {name: parameter.value for name, parameter in why.model.parameters.items()}
+    assert values["axis.compliance.stiffness"] == pytest.approx(STIFFNESS, rel=0.05)
+    assert values["axis.link.friction.coulomb"] == pytest.approx(30.0, rel=0.03)
+    assert values["axis.friction.coulomb"] == pytest.approx(12.0, rel=0.1)
