@@ -20,6 +20,7 @@ from vpm.ranking.fit import ASTRAY, Fitter, Followed, View
 from vpm.ranking.look import Look
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.settings import Settings
+from vpm.ranking.short_waves import with_short_waves
 from vpm.ranking.start_values import started
 from vpm.ranking.structure_extensions import Extensions, sides_of
 
@@ -55,14 +56,14 @@ def proposals(
     extensions: Extensions,
     each: ParallelCandidates,
     effects: Sequence[str],
+    bands: Sequence[InverseDynamicsProblem] = (),
 ) -> list[Proposal]:
     """Best few proposals of effects beside a structure that are worth a fit under its tracker."""
     found = look.fitted.structure.repaired
     bare = invertible(found, data.joints)
     residual = data.evaluate(bare, bare.theta)[0]
-    listed = [
-        started(one, found, extensions.sizes) for one in candidates(found, data, residual, effects, simulated=True)
-    ]
+    listed = with_short_waves(candidates(found, data, residual, effects, simulated=True), found, bands)
+    listed = [started(one, found, extensions.sizes) for one in listed]
     extended = _extended(look.fitted.structure, listed, extensions)
     groups = _side_by_side([one for one in extended if one.candidate.neutral], look)
     hopeful = _hopeful([one for one in extended if not one.candidate.neutral], look, fitter, each)

@@ -27,6 +27,7 @@ from vpm.ranking.proposals import proposals
 from vpm.ranking.result import Gap, Ranked, Ranking
 from vpm.ranking.settings import Settings
 from vpm.ranking.several_places import alike
+from vpm.ranking.short_waves import wider_bands
 from vpm.ranking.structure_extensions import Extensions
 from vpm.ranking.substitute_records import shown, why_unbalanced
 from vpm.ranking.tracked_records import TrackedRecords, Tracker
@@ -56,6 +57,7 @@ class Search:
         self.names, self.settings, self.each, self.say = names, settings, each, say
         self.fitter = Fitter(TrackedRecords(model, records, settings, setup), settings)
         self.data = shown(model, self.fitter.tracked)
+        self.bands = () if why_unbalanced(model, records) else wider_bands(model, self.data)
         self.sizes = Sizes(model, self.data)
         self.extensions = Extensions(self.sizes)
         firsts = self.fitter.tracked.firsts.priors
@@ -271,7 +273,7 @@ class Search:
 
     def _tried(self, look: Look) -> list[Trial]:
         """Most promising effects of a search round, fitted under one tracker."""
-        chosen = proposals(look, self.fitter, self.data, self.extensions, self.each, self.names)
+        chosen = proposals(look, self.fitter, self.data, self.extensions, self.each, self.names, self.bands)
         return [Trial.of(fitted, look, ended=False) for fitted in raced(chosen, look, self.fitter, self.each)]
 
     def _finished(self, tried: Sequence[Trial]) -> list[Trial]:
