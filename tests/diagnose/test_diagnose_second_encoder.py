@@ -34,7 +34,7 @@ coulomb = {{ value = 25.0, unit = "N", uncertainty = 15.0 }}
 """
 
 
-def logged(seed: int, before: float, behind: float) -> vpm.Experiment:
+def logged(seed: int, before: float, behind: float, stiffness: float = STIFFNESS) -> vpm.Experiment:
     """Record of two masses with a spring between, and dry friction on either; equations of Newton, by scipy."""
     random = np.random.default_rng(seed)
     rates, phases = 2.0 * np.pi * np.array([0.35, 0.9, 1.7]), random.uniform(0.0, 6.0, 3)
@@ -49,7 +49,7 @@ def logged(seed: int, before: float, behind: float) -> vpm.Experiment:
 
     def moved(t: float, state: np.ndarray) -> list[float]:
         x, v, y, w = state
-        spring = STIFFNESS * (x - y) + DAMPING * (v - w)
+        spring = stiffness * (x - y) + DAMPING * (v - w)
         a = (force(t, x, v) - before * np.tanh(v / ROUND) - spring) / MOTOR
         return [v, a, w, (spring - behind * np.tanh(w / ROUND)) / TABLE]
 
@@ -60,19 +60,23 @@ def logged(seed: int, before: float, behind: float) -> vpm.Experiment:
     pushed = np.array([force(*row) for row in zip(time, x, v, strict=True)])
     columns = {
         "axis.position": x + random.normal(0.0, 1e-6, time.size),
-        "axis_deflection.position": y - x + random.normal(0.0, 1e-6, time.size),
+        "axis_deflection.position": y - x + random.normal(0.0, 0.2 / stiffness, time.size),
         "drive.command": pushed + random.normal(0.0, 0.3, time.size),
     }
     return vpm.Experiment.from_arrays(time, columns, model=vpm.Model.from_toml(AXIS))
 
 
-def test_a_screw_bent_by_friction_of_the_table_is_compliant() -> None:
-    """All friction acts behind the screw: what it bends by follows the direction of motion."""
-    records = (logged(seed, 0.0, 30.0) for seed in (1, 2))
+@pytest.mark.parametrize("stiffness", [STIFFNESS, 100.0 * STIFFNESS])
+def test_a_screw_bent_by_friction_of_the_table_is_compliant(stiffness: float) -> None:
+    """All friction acts behind the screw: what it bends by follows the direction of motion.
+
+    The stiffer one rings at 276 Hz, beyond what the log resolves, and bends by 3e-6 m at the most.
+    """
+    records = (logged(seed, 0.0, 30.0, stiffness) for seed in (1, 2))
     why = vpm.diagnose(vpm.Model.from_toml(AXIS), *records, effects=["joint_compliance", "hysteresis"], workers=1)
     assert why.verdict == "effect_found"
     assert [(one.name, one.site) for one in why.effects] == [("joint_compliance", "axis")]
-    assert why.model.parameters["axis.compliance.stiffness"].value == pytest.approx(STIFFNESS, rel=0.05)
+    assert why.model.parameters["axis.compliance.stiffness"].value == pytest.approx(stiffness, rel=0.05)
     assert why.model.parameters["axis.link.friction.coulomb"].value == pytest.approx(30.0, rel=0.02)
 
 

@@ -423,10 +423,12 @@ def test_more_or_less_of_an_effect_promises_what_it_would_gain() -> None:
     for share in (-0.5, 0.5, 1.0):
         pulls = replace(structure_of(model.with_effect("bias_force", "way", force=share * 0.5 * GAIN)), priors={})
         left[share] = fitter.followed(pulls, Tracker(1.0).coarse, ()).residual
-    whole = look.gain_along(left[1.0])
+    whole, _ = look.gain_along(left[1.0])
     assert whole > 100.0 * look.promising
-    assert look.gain_along(left[0.5]) == pytest.approx(whole, rel=0.05)
-    assert look.gain_along(left[-0.5]) < 0.0
+    half, share = look.gain_along(left[0.5])
+    assert half == pytest.approx(whole, rel=0.05)
+    assert share == pytest.approx(2.0, rel=0.05)
+    assert look.gain_along(left[-0.5])[0] < 0.0
 
 
 #: Two sledges that have nothing to do with each other.

@@ -70,8 +70,8 @@ class Look:
         """
         return self._gain(self._after_a_step(other.structure, *self.view.errors(other, self._fitter.tracked.parts)))
 
-    def gain_along(self, residual: Array) -> float:
-        """Gain that a look predicts for another structure if its change is scaled, nats.
+    def gain_along(self, residual: Array) -> tuple[float, float]:
+        """Gain that a look predicts for another structure if its change is scaled, nats, and the best scale.
 
         All that is unknown without it gives way, and stays within what is known of it.
         """
@@ -83,7 +83,7 @@ class Look:
         normal = columns.T @ columns + np.diag([*np.ones(len(z)), 1e-9 * size])
         move = -np.linalg.solve(normal, columns.T @ before + np.append(z, 0.0))
         moved = before + columns @ move if move[-1] > 0.0 else after
-        return self._gain(min(after, moved, key=noise.cost))
+        return self._gain(min(after, moved, key=noise.cost)), float(move[-1])
 
     def _gain(self, left: Array) -> float:
         noise, alone = self.view.noise, self._alone

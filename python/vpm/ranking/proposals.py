@@ -66,7 +66,7 @@ def proposals(
     listed = [started(one, found, extensions.sizes) for one in listed]
     extended = _extended(look.fitted.structure, listed, extensions)
     groups = _side_by_side([one for one in extended if one.candidate.neutral], look)
-    hopeful = _hopeful([one for one in extended if not one.candidate.neutral], look, fitter, each)
+    hopeful = _hopeful([one for one in extended if not one.candidate.neutral], look, fitter, extensions, each)
     groups += [_Pass([one], [one]) for one in hopeful]
     screened = each(
         "screening",
@@ -118,21 +118,33 @@ def _extended(structure: Structure, listed: Sequence[Candidate], extensions: Ext
     return found
 
 
-def _hopeful(several: Sequence[_Extended], look: Look, fitter: Fitter, each: ParallelCandidates) -> list[_Extended]:
+def _hopeful(
+    several: Sequence[_Extended], look: Look, fitter: Fitter, extensions: Extensions, each: ParallelCandidates
+) -> list[_Extended]:
     """Best few starts of each proposal that does something at its start, by predicted gain.
 
-    This asks for no derivatives, which cost many times what a pass does where a joint is split.
+    This asks for no derivatives, which cost many times what a pass does where a joint is split. Far below its resonance
+    a spring gives way by its load over its stiffness: where a part of that does best, the spring is stiffer.
     """
 
-    def promised(one: _Extended) -> float:
-        residual = fitter.followed(one.structure, look.fitted.tracker.coarse, ()).residual
-        return look.gain_along(residual)
+    def promised(one: _Extended) -> list[tuple[float, _Extended]]:
+        gain, share = look.gain_along(fitter.followed(one.structure, look.fitted.tracker.coarse, ()).residual)
+        found = [(gain, one)]
+        if one.candidate.effect.splits and "stiffness" in one.start and 0.0 < share < 1.0:
+            start = {**one.start, "stiffness": one.start["stiffness"] / share}
+            with contextlib.suppress(*ASTRAY):
+                other = extensions.extended(look.fitted.structure, one.candidate, start, one.side)
+                stiffer = replace(one, structure=other, start=start)
+                left = fitter.followed(other, look.fitted.tracker.coarse, ()).residual
+                found.append((look.gain_along(left)[0], stiffer))
+        return found
 
     gains = each("trying", promised, several, lambda one: f"{one.candidate.label}, {look.fitted.tracker.label}")
     hopes: dict[Key, list[tuple[float, _Extended]]] = defaultdict(list)
-    for one, gain in zip(several, gains, strict=True):
-        if not isinstance(gain, Failure) and gain >= look.promising:
-            hopes[one.candidate.key].append((gain, one))
+    for found in gains:
+        for gain, one in [] if isinstance(found, Failure) else found:
+            if gain >= look.promising:
+                hopes[one.candidate.key].append((gain, one))
     ordered = [sorted(found, key=lambda pair: -pair[0]) for found in hopes.values()]
     return [one for found in ordered for _, one in found[: fitter.settings.starts]]
 
