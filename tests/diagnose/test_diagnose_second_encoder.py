@@ -91,3 +91,27 @@ def test_friction_on_either_side_of_a_screw_is_told_apart() -> None:
     assert values["axis.compliance.stiffness"] == pytest.approx(STIFFNESS, rel=0.05)
     assert values["axis.link.friction.coulomb"] == pytest.approx(30.0, rel=0.03)
     assert values["axis.friction.coulomb"] == pytest.approx(12.0, rel=0.1)
+
+
+def test_a_deflection_of_noise_alone_hides_no_recalibration() -> None:
+    """A stiff axis: the second encoder repeats the first one, and the mass of the file is wrong by a tenth."""
+
+    def stiff(seed: int) -> vpm.Experiment:
+        random, time = np.random.default_rng(seed), np.arange(0.0, SECONDS, 1.0 / RATE)
+        rates, sizes = 2.0 * np.pi * np.array([0.35, 0.9, 1.7]), np.array([0.06, 0.02, 0.008])
+        angles = rates * time[:, None] + random.uniform(0.0, 6.0, 3)
+        force = -(MOTOR + TABLE) * np.sin(angles) @ (sizes * rates**2)
+        force += 30.0 * np.tanh(np.cos(angles) @ (sizes * rates) / ROUND)
+        columns = {
+            "axis.position": np.sin(angles) @ sizes + random.normal(0.0, 1e-6, time.size),
+            "axis_deflection.position": random.normal(0.0, 1e-6, time.size),
+            "drive.command": force + random.normal(0.0, 0.3, time.size),
+        }
+        return vpm.Experiment.from_arrays(time, columns, model=vpm.Model.from_toml(AXIS))
+
+    records, setup = (stiff(seed) for seed in (1, 2)), vpm.Setup(hold="first_order")
+    effects = ["joint_compliance", "hysteresis"]
+    why = vpm.diagnose(vpm.Model.from_toml(AXIS), *records, effects=effects, setup=setup, workers=1)
+    assert (why.verdict, why.effects) == ("parameters_only", ())
+    effort = why.gap["axis.effort"]
+    assert f"{100.0 * effort.before / effort.signal:.2f} % before" in why.summary

@@ -119,7 +119,8 @@ class _Errors:
         clear = _above([g for g in main if not _is_nothing(g)]) > FLOOR_FACTOR
         structured = left is not None and left.present and clear
         remaining = structured or (rest is not None and rest.repeats and not is_negligible(gap)) or bool(still)
-        worst = max(beside if beside and _is_unmeasured(found, data) else main + beside, key=_clear_of_noise)
+        judged = beside if beside and _is_unmeasured(found, data) else main + beside
+        worst = max([g for g in judged if not _is_noise(g)] or judged, key=_clear_of_noise)
         above = _above(main + still or beside)
         return cls(main, beside, still, above, structured, remaining and not found.within_laws, worst)
 
@@ -195,6 +196,11 @@ def _joints(found: Search) -> set[str]:
     return {model.joint_of_body(site) if site in model.bodies else joint_at(model, site) for site in sites}
 
 
+def _is_noise(gap: ChannelGap) -> bool:
+    """Whether a channel holds noise alone, such as a deflection of what does not bend: its error says nothing."""
+    return gap.signal <= FLOOR_FACTOR * gap.noise_floor
+
+
 def _clear_of_noise(gap: ChannelGap) -> float:
     """Error before effects that is clear of noise, as a share of the signal, for the verdict."""
     floor = gap.noise_floor if np.isfinite(gap.noise_floor) else 0.0
@@ -236,7 +242,7 @@ def _nothing_missing(
     small = max((g.before / g.signal if g.signal > 0.0 else 0.0 for g in main), default=0.0) <= NEGLIGIBLE
     agrees = small or max((g.before / g.noise_floor if g.noise_floor > 0.0 else np.inf) for g in main) <= FLOOR_FACTOR
     balanced = data is not None and not agrees and _is_better(nominal, recalibrated, data)
-    if balanced or any(_was_closed(g) for g in beside):
+    if balanced or any(_was_closed(g) for g in main + beside):
         closed = max(main + beside, key=_closed)
         if _closed(worst) < 0.0 < _closed(closed):
             numbers = f"{_stages(closed)}; in another channel it grew, {numbers}"
