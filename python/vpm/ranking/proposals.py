@@ -130,7 +130,8 @@ def _hopeful(
     def promised(one: _Extended) -> list[tuple[float, _Extended]]:
         gain, share = look.gain_along(fitter.followed(one.structure, look.fitted.tracker.coarse, ()).residual)
         found = [(gain, one)]
-        if one.candidate.effect.splits and "stiffness" in one.start and 0.0 < share < 1.0:
+        effect = one.candidate.effect  # within a gap the load tells no way
+        if effect.splits and not effect.has_play and "stiffness" in one.start and 0.0 < share < 1.0:
             start = {**one.start, "stiffness": one.start["stiffness"] / share}
             with contextlib.suppress(*ASTRAY):
                 other = extensions.extended(look.fitted.structure, one.candidate, start, one.side)
