@@ -83,13 +83,7 @@ def write_text(path: str | PathLike[str], text: str) -> Path:
 
 
 def make_folder(path: str | PathLike[str]) -> Path:
-    """Make a folder for files, and those above it, where they are not there.
-
-    Raises
-    ------
-    FileError
-        It cannot be made, or a file is in its place.
-    """
+    """Make a folder for files, and those above it, where they are not there."""
     try:
         _linked(path).mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -98,13 +92,7 @@ def make_folder(path: str | PathLike[str]) -> Path:
 
 
 def probe_file(path: str | PathLike[str]) -> None:
-    """Complain, before work begins, about a file that could not be written after it.
-
-    Raises
-    ------
-    FileError
-        Its folder is not there or not writable, its disk is full, or something else than a file is in its place.
-    """
+    """Complain, before work begins, about a file that could not be written after it."""
     try:
         target = _linked(path)
         _check_place(target)
@@ -118,13 +106,7 @@ def probe_file(path: str | PathLike[str]) -> None:
 
 
 def probe_folder(path: str | PathLike[str]) -> None:
-    """Refuse, before work begins, a folder for files that could not be made or filled after it.
-
-    Raises
-    ------
-    FileError
-        As `probe_file`.
-    """
+    """Refuse, before work begins, a folder for files that could not be made or filled after it."""
     try:
         target = _linked(path)
         there = next(folder for folder in (target, *target.parents) if folder.exists())

@@ -55,11 +55,6 @@ def ranking_of(
     Validation records only say, at the end, how much of their error what was found leaves.
 
     ``by`` says where names come from, of which effects, and how many at most. What keeps it from that is noted.
-
-    Raises
-    ------
-    VpmError
-        Neither a ranking nor a search covers the machine.
     """
     names, effects, limit = by
     training, validation = records

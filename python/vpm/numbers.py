@@ -24,11 +24,6 @@ def array_of(given: ArrayLike, what: str, error: type[VpmError] = VpmError) -> A
     ----------
     what : str
         Name for messages, as the beginning of a sentence.
-
-    Raises
-    ------
-    VpmError
-        It holds something else than real numbers, or its rows differ in length.
     """
     try:
         array = np.asanyarray(given)
@@ -41,13 +36,7 @@ def array_of(given: ArrayLike, what: str, error: type[VpmError] = VpmError) -> A
 
 
 def number_of(given: object, what: str, error: type[VpmError] = VpmError) -> float:
-    """A single number.
-
-    Raises
-    ------
-    VpmError
-        It is none.
-    """
+    """A single number."""
     try:
         return float(given)  # type: ignore[arg-type]  # whatever float takes is right
     except (TypeError, ValueError, OverflowError) as reason:

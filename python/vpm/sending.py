@@ -41,11 +41,6 @@ def packed(work: Callable[[], object]) -> bytes:
     ----------
     work : callable
         A function of a module, or a `functools.partial` of one.
-
-    Raises
-    ------
-    ExecutorError
-        Something in it cannot be pickled.
     """
     return pickle.dumps((registered(), _sendable(work)))
 

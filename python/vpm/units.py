@@ -206,11 +206,6 @@ def parse_unit(text: str) -> Unit:
     ----------
     text : str
         For example ``"N s/m"``; ``""`` and ``"1"`` mean no unit.
-
-    Raises
-    ------
-    UnitError
-        A symbol is not known (the message names near ones) or the expression cannot be read.
     """
     if not text.strip():
         return Unit(text, 1.0, _DIMENSIONLESS, ())
@@ -232,24 +227,12 @@ def parse_unit(text: str) -> Unit:
 
 
 def factor_to_si(unit: str) -> float:
-    """SI value of a difference of one `unit`: 0.001 for ``"mm"``.
-
-    Raises
-    ------
-    UnitError
-        The unit cannot be read.
-    """
+    """SI value of a difference of one `unit`: 0.001 for ``"mm"``."""
     return parse_unit(unit).factor
 
 
 def si_unit(unit: str) -> str:
-    """SI unit of the same build as `unit`: ``"m^3/s"`` for ``"l/min"``, ``"1"`` for ``"%"``.
-
-    Raises
-    ------
-    UnitError
-        The unit cannot be read.
-    """
+    """SI unit of the same build as `unit`: ``"m^3/s"`` for ``"l/min"``, ``"1"`` for ``"%"``."""
     return parse_unit(unit).si
 
 

@@ -50,11 +50,6 @@ def effect_type(name: str) -> EffectType:
     ----------
     name : str
         For example ``"coulomb_friction"``.
-
-    Raises
-    ------
-    ModelError
-        The name is not in the catalogue; the message names near ones.
     """
     try:
         return EFFECTS[name]
@@ -84,11 +79,6 @@ def effects_for_site(kind: str) -> tuple[EffectType, ...]:
     Parameters
     ----------
     kind : {"joint", "body", "link", "beam", "actuator", "cylinder", "supply", "sensor", "world"}
-
-    Raises
-    ------
-    ModelError
-        There is no such kind of site.
     """
     if kind not in SITE_KINDS:
         raise ModelError(f'effects do not sit at a "{kind}"; {near_match(kind, SITE_KINDS)}', where=kind)

@@ -193,13 +193,7 @@ class EffectType(Traits):
         return words.replace("coulomb", "Coulomb").replace("stribeck", "Stribeck").replace("lugre", "LuGre")
 
     def parameter(self, name: str) -> EffectParameter:
-        """Parameter of a kind of effect by its short name.
-
-        Raises
-        ------
-        ModelError
-            The effect has no such parameter; the message names near ones.
-        """
+        """Parameter of a kind of effect by its short name."""
         for parameter in self.parameters:
             if parameter.name == name:
                 return parameter

@@ -30,13 +30,6 @@ def write_mcap(comparison: Comparison, path: str | PathLike[str]) -> tuple[Path,
     Returns
     -------
     mcap, layout : pathlib.Path
-
-    Raises
-    ------
-    MissingExtraError
-        The package mcap is not installed.
-    FileError
-        A file cannot be written.
     """
     with needs("mcap", "mcap"):
         from mcap.writer import Writer

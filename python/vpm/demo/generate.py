@@ -172,13 +172,6 @@ def generate(folder: Path, hidden: str = DEFAULT, seed: int = SEED) -> None:
         Where to write; made if it is not there.
     hidden
         The effect that the machine has and the model does not: a name in `HIDDEN`.
-
-    Raises
-    ------
-    ValueError
-        If `hidden` is not a name in `HIDDEN`.
-    OSError
-        A file cannot be written; what was there is there still.
     """
     if hidden not in HIDDEN:
         raise ValueError(f"'{hidden}' is no effect that the demo can hide; take one of: {', '.join(HIDDEN)}.")

@@ -46,11 +46,6 @@ def run_demo(
     ----------
     hide : str, optional
         Another effect to hide, of `vpm.demo.hidden.LISTED`; its log is made first, into the folder ``log`` in ``out``.
-
-    Raises
-    ------
-    DiagnosisError
-        ``hide`` cannot be hidden here.
     """
 
     def say(text: str = "") -> None:

@@ -69,11 +69,6 @@ def choose_cutoff(
     CutoffChoice
         One frequency for all joints: the highest whose expected errors, each relative to the best for that joint, have
         a sum near the least.
-
-    Raises
-    ------
-    ExperimentError
-        Fewer than 60 samples.
     """
     n = len(position)
     if n < FEWEST_SAMPLES:

@@ -57,11 +57,6 @@ def read_dialect(path: str | PathLike[str]) -> Dialect:
     Remarks and blank lines may stand above the names, and the names may be a remark themselves, as ``numpy.savetxt``
     writes them. Blanks separate where the names hold no other separator. Commas are decimal ones where another
     separator is there, and no number has a point; dates are no numbers.
-
-    Raises
-    ------
-    ExperimentError
-        The file does not exist, is no text, is empty, or has no names of columns.
     """
     content = _content(path)
     encoding = _encoding(path, content)

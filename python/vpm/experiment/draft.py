@@ -209,13 +209,7 @@ def plain_draft(log: Log) -> Draft:
 
 
 def plain_table(path: str | PathLike[str], model: Model) -> dict[str, ChannelEntry]:
-    """Draft of a channel table for a log without one; columns that the model does not know stay out.
-
-    Raises
-    ------
-    ExperimentError
-        The file cannot be read, or has no clock.
-    """
+    """Draft of a channel table for a log without one; columns that the model does not know stay out."""
     from vpm.model import ChannelEntry
 
     names, clock = _plain_columns(open_log(path))

@@ -55,13 +55,7 @@ class Source:
 
 
 def check_finite(values: Array, time: Array, what: str, source: Source, *, channel: str | None = None) -> None:
-    """Refuse NaN, infinity and what no machine can be at, on the grid.
-
-    Raises
-    ------
-    ExperimentError
-        Names the first place, its time, and how many there are.
-    """
+    """Refuse NaN, infinity and what no machine can be at, on the grid."""
     bad = np.flatnonzero(~(np.abs(values) <= LARGEST))  # nor NaN
     if bad.size:
         first = int(bad[0])
@@ -76,12 +70,7 @@ def check_finite(values: Array, time: Array, what: str, source: Source, *, chann
 
 
 def check_increasing(time: Array, source: Source) -> None:
-    """Refuse a grid that is too short, or whose time stands still or goes back.
-
-    Raises
-    ------
-    ExperimentError
-    """
+    """Refuse a grid that is too short, or whose time stands still or goes back."""
     if time.size < FEWEST_SAMPLES:
         raise source.error(
             f"{source.name} has {time.size} of at least {FEWEST_SAMPLES} samples that are needed; record longer"
@@ -170,11 +159,6 @@ def make_uniform(
     data : ndarray, shape (M, C)
     sentence : str
         For the history.
-
-    Raises
-    ------
-    ExperimentError
-        The grid would have many times the samples of the record, as after one wrong stamp.
     """
     steps = np.diff(time)
     median = float(np.median(steps))
@@ -197,12 +181,7 @@ def make_uniform(
 
 
 def check_grid(time: Array, step: float, growth: float, source: Source) -> None:
-    """Refuse a grid that has many times the samples of the record.
-
-    Raises
-    ------
-    ExperimentError
-    """
+    """Refuse a grid that has many times the samples of the record."""
     count = float(time[-1] - time[0]) / step if step > 0.0 else np.inf
     if count > growth * time.size:
         steps = np.diff(time)

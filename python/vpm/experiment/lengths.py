@@ -42,11 +42,6 @@ def joints_from_lengths(
         Values of the parameters, errors of sensors among them; by default those of the model.
     free : collection of str
         Parameters that are to be fitted to the result.
-
-    Raises
-    ------
-    ExperimentError
-        A length is outside of what the line can have there, or errors of its sensor are to be fitted or are a delay.
     """
     lacking = [joint for joint in model.joints if f"{joint}.position" not in experiment]
     logged = [line for line in model.lines if f"{line}.length" in experiment]

@@ -255,11 +255,6 @@ def common_cutoff(experiments: Iterable[Experiment], model: Machine) -> float:
     -------
     float
         Hz.
-
-    Raises
-    ------
-    ExperimentError
-        There is no record, a channel is missing, or a record is too short.
     """
     cutoffs = [_choice(each, model).cutoff for each in experiments]
     if not cutoffs:

@@ -47,11 +47,6 @@ def noise_std(values: Array, retained: float = 1.0) -> float:
     -------
     float
         Unit of the channel; zero for a constant channel.
-
-    Raises
-    ------
-    ExperimentError
-        Fewer than 20 samples.
     """
     if values.size < FEWEST_SAMPLES:
         raise ExperimentError(

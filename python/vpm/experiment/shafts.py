@@ -28,12 +28,6 @@ def joints_from_shafts(
         Values of the parameters, the ratios among them; by default those of the model.
     free : collection of str
         Parameters that are to be fitted to the result.
-
-    Raises
-    ------
-    ExperimentError
-        The shafts in the record do not tell the joints that it lacks; or their ratios, or errors of their sensors, are
-        to be fitted to what would follow from these; or a sensor is late.
     """
     values = model.theta if theta is None else theta
     held = [joint for joint in model.joints if f"{joint}.position" in experiment]

@@ -48,12 +48,6 @@ def lowpass(values: Array, rate: float, cutoff: float, order: int = MOTION_FILTE
     Returns
     -------
     ndarray, shape of `values`
-
-    Raises
-    ------
-    ExperimentError
-        The cut-off frequency is not between zero and half of the rate, or far too low for the record, the order is
-        none that can be computed, or there are fewer than four samples.
     """
     if not 1 <= order <= HIGHEST_ORDER:
         raise ExperimentError(f"a filter of order {order} cannot be had; choose an order from 1 to {HIGHEST_ORDER}")

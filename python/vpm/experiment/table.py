@@ -30,13 +30,7 @@ class Table:
 
 
 def read_header(path: str | PathLike[str]) -> Dialect:
-    """Names of the columns of a file, and how it writes its table.
-
-    Raises
-    ------
-    ExperimentError
-        See `vpm.experiment.dialect.read_dialect`, or a column has no name, or that of another.
-    """
+    """Names of the columns of a file, and how it writes its table."""
     dialect = read_dialect(path)
     header, where = dialect.header, f"{path}, line {dialect.named}"
     for at, cell in enumerate(header):

@@ -43,11 +43,6 @@ def problem(
 
     ``channels`` are the compared outputs of simulated modes, ``offsets`` those of them that are off by a constant in
     each record, ``workers`` the records that are simulated at a time.
-
-    Raises
-    ------
-    IdentificationError, SimulationError
-        There is no record, the mode is unknown, or it does not go with this machine and these records.
     """
     if not experiments:
         raise IdentificationError("no experiment was given; pass at least one")

@@ -92,11 +92,6 @@ def write_fit(fit: Fit, folder: Path, lines: Sequence[str] = ()) -> list[Path]:
     -------
     list of Path
         What was written.
-
-    Raises
-    ------
-    FileError
-        The folder cannot be made or written to.
     """
     make_folder(folder)
     write_text(folder / "report.md", _report(fit, lines))

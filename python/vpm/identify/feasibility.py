@@ -144,11 +144,6 @@ def nearest(columns: Array, right: Array, distance: Distance) -> Array:
     """Nearest feasible parameters (p,): ``|columns p - right|^2 / 2 + WEIGHT distance`` is least.
 
     Newton's method from the nominal values, with weights of the distance that fall by tens down to the last.
-
-    Raises
-    ------
-    IdentificationError
-        A round does not settle.
     """
     values = distance.start.copy()
     first = max(0.5 * float(np.sum((columns @ values - right) ** 2)), WEIGHT)

@@ -141,13 +141,6 @@ def inertial_regression(
         Parameters beside those of bodies, such as ``shoulder.friction.viscous``; by default all with an uncertainty.
     cutoff : float, optional
         Hz, of the motion filter.
-
-    Raises
-    ------
-    IdentificationError
-        A joint never moves, a parameter is unknown, or the effort is not linear in it.
-    SimulationError
-        The model has elastic coordinates or actuators that are not ideal.
     """
     given = as_records(records)
     if not given:

@@ -23,11 +23,6 @@ def parse_channel_table(content: Mapping[str, object], *, path: str | None = Non
         Channel names (and ``"time"``) to tables; or all of that under the key ``channels``.
     path : str, optional
         File that it comes from, for messages.
-
-    Raises
-    ------
-    ModelError
-        A key is unknown or missing, or a value is of the wrong kind.
     """
     table = content.get("channels", content) if set(content) == {"channels"} else content
     try:
@@ -37,11 +32,5 @@ def parse_channel_table(content: Mapping[str, object], *, path: str | None = Non
 
 
 def load_channel_table(path: str | PathLike[str]) -> Mapping[str, ChannelEntry]:
-    """Read a channel table from a TOML file of its own.
-
-    Raises
-    ------
-    ModelError
-        The file cannot be read, is no TOML, or is not a channel table.
-    """
+    """Read a channel table from a TOML file of its own."""
     return parse_channel_table(read_toml(path), path=str(path))

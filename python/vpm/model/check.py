@@ -39,11 +39,6 @@ def check_document(content: Mapping[str, object], path: str | None = None) -> Ch
     ----------
     content : mapping
         As `tomllib` gives it.
-
-    Raises
-    ------
-    ModelError
-        One sentence about the first problem, and how many more the stage found.
     """
     check_plain(content, path)
     try:

@@ -119,15 +119,7 @@ def _body(axis: Axis, index: Index) -> Described:
 
 
 def core_of(structure: str, theta: NDArray[np.float64]) -> System:
-    """Compiled system of a structure, as `structure_text` gives it, for the parameters ``theta``.
-
-    Raises
-    ------
-    CoreError
-        The core refuses the description.
-    VpmError
-        There is no core.
-    """
+    """Compiled system of a structure, as `structure_text` gives it, for the parameters ``theta``."""
     try:
         from vpm._core import System
     except ImportError as error:

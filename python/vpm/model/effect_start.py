@@ -31,11 +31,6 @@ def starting_values(
         Joint that it splits, if it splits one.
     values : mapping of str to float
         SI values by short name, as far as they are given.
-
-    Raises
-    ------
-    ModelError
-        The effect has no such parameter, or a value is no number.
     """
     for short in values:
         effect.parameter(short)

@@ -58,13 +58,7 @@ def _imported(plugin: Plugin, path: str | PathLike[str]) -> dict[str, Any]:
 
 
 def check_plain(content: Mapping[str, object], path: str | None = None) -> None:
-    """Refuse tables of tables without end and impossible numbers when reading a model file.
-
-    Raises
-    ------
-    ModelError
-        A table is nested deeper than `DEEPEST`, an integer has more than the 64 bits of TOML, or a number is huge.
-    """
+    """Refuse tables of tables without end and impossible numbers when reading a model file."""
     left: list[tuple[tuple[str | int, ...], object]] = [((), content)]
     while left:
         way, value = left.pop()

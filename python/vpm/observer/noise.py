@@ -105,11 +105,6 @@ def likely_noise(
     Unknown are the deviation of each reading of which the model file states no noise, and one measure of all forces:
     they bring the same energy into every coordinate, ``s_i^2 / M_ii`` being the same for all. Where nothing is stated
     the common scale follows from the innovations themselves; the ratios are found one after the other.
-
-    Raises
-    ------
-    DivergedError
-        The model runs away from every record.
     """
     pieces = [record.stretch(SAMPLES) for record in records]
     noise = first_guess(model, pieces)

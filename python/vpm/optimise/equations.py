@@ -26,13 +26,7 @@ _IGNORED = re.compile(r"\s+\(void\)\w+;|\s*")
 
 
 def casadi() -> ModuleType:
-    """CasADi library, for equations.
-
-    Raises
-    ------
-    MissingExtraError
-        It is not installed.
-    """
+    """CasADi library, for equations."""
     with needs("casadi", "optimise"):
         import casadi as library
     return library  # type: ignore[no-any-return, unused-ignore]
@@ -58,15 +52,7 @@ class Equations:
 
 
 def equations(model: Model) -> Equations:
-    """Equations of a model as CasADi expressions, from its C source.
-
-    Raises
-    ------
-    OptimisationError
-        The model has a law that is no list of operations.
-    SimulationError
-        The equations of the model cannot be written out.
-    """
+    """Equations of a model as CasADi expressions, from its C source."""
     ca = casadi()
     source = c_source(model, name=_NAME).source
     x, u = ca.SX.sym("x", len(model.state_names)), ca.SX.sym("u", len(model.inputs))

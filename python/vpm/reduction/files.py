@@ -101,13 +101,7 @@ def reduce(path: str | PathLike[str], modes: int = 8) -> Reduction:
 
 
 def read_structure(path: str | PathLike[str]) -> Structure:
-    """Matrices of what a file describes.
-
-    Raises
-    ------
-    ReductionError
-        As `reduce`.
-    """
+    """Matrices of what a file describes."""
     path = Path(path)
     if path.suffix.lower() == ".npz":
         return _from_archive(path)

@@ -55,11 +55,6 @@ def read_labelled(path: Path, initial: str) -> Labelled | None:
     ----------
     initial : str
         Letter with which the name of the matrix begins, where a file holds several: K or M.
-
-    Raises
-    ------
-    ReductionError
-        The file cannot be read, or its matrix is not real, or none of nodes.
     """
     text = _text(path)
     if re.search(r"^DMIG[*, ]", text, re.MULTILINE):

@@ -15,13 +15,7 @@ from vpm.reduction.structure import Interface, Structure
 
 
 def finite_elements(module: str = "skfem") -> ModuleType:
-    """Library for finite elements: scikit-fem, a module of it, or meshio.
-
-    Raises
-    ------
-    MissingExtraError
-        It is not installed.
-    """
+    """Library for finite elements: scikit-fem, a module of it, or meshio."""
     with needs("meshio" if module == "meshio" else "scikit-fem", "fem"):
         return import_module(module)
 

@@ -66,11 +66,6 @@ def render_html(diagnosis: Diagnosis, ladder: Ladder | None = None) -> str:
     -------
     str
         A complete HTML document, which is well-formed XML too.
-
-    Raises
-    ------
-    MissingExtraError
-        jinja2 or matplotlib is not installed.
     """
     with needs("jinja2", "report"):
         from jinja2 import Environment

@@ -137,13 +137,7 @@ def _afloat(robot: Robot) -> Robot:
 
 
 def drafted(robot: Robot, spread: Spread) -> tuple[Tree, Draft]:
-    """Moving links of an imported robot, and the content of its model but for the ties.
-
-    Raises
-    ------
-    ModelError
-        The links are no tree.
-    """
+    """Moving links of an imported robot, and the content of its model but for the ties."""
     tree = gather(robot)
     standing = [
         link for link, (carrier, _) in tree.places.items() if carrier == WORLD and robot.links[link] is not None

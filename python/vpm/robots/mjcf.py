@@ -23,15 +23,7 @@ _KINDS: tuple[JointType, ...] = ("free", "spherical", "prismatic", "revolute")  
 
 
 def read_mjcf(markup: Markup) -> Robot:
-    """Parts of a robot of an MJCF file.
-
-    Raises
-    ------
-    ModelError
-        MuJoCo does not take it, or it has what a model cannot have.
-    MissingExtraError
-        MuJoCo is not there.
-    """
+    """Parts of a robot of an MJCF file."""
     with needs("mujoco", "robots"):
         import mujoco
     path = Path(markup.path)

@@ -34,13 +34,7 @@ _READ_OF_JOINT = {"origin", "parent", "child", "axis", "limit", "dynamics", "mim
 
 
 def read_urdf(markup: Markup) -> Robot:
-    """Parts of a robot of a URDF.
-
-    Raises
-    ------
-    ModelError
-        Something in it cannot be right; one sentence with the line.
-    """
+    """Parts of a robot of a URDF."""
     root = markup.root
     robot = Robot(clean(root.attributes.get("name", "").strip()) or "robot", markup.path)
     for link in root.all("link"):

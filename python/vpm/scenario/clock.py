@@ -39,13 +39,7 @@ class Clock:
 
 
 def clock_of(document: Document) -> Clock:
-    """Clock of a scenario.
-
-    Raises
-    ------
-    ScenarioError
-        A time is not positive, or the duration is no whole number of steps.
-    """
+    """Clock of a scenario."""
     duration = si_value(document.duration, "s", ("duration",))
     time_step = si_value(document.time_step, "s", ("time_step",))
     for name, value in (("duration", duration), ("time_step", time_step)):
@@ -63,13 +57,7 @@ def clock_of(document: Document) -> Clock:
 
 
 def check_numbers(clock: Clock, models: Collection[Model]) -> None:
-    """Refuse a clock with runs that no memory holds.
-
-    Raises
-    ------
-    ScenarioError
-        The runs would make too many numbers together.
-    """
+    """Refuse a clock with runs that no memory holds."""
     each = sum(len(model.state_names) + len(model.output_channels) for model in models)
     if clock.steps * each > MOST_NUMBERS:
         rest = f"makes {clock.steps} samples of {each} numbers in all runs, and {MOST_NUMBERS} numbers fit together"

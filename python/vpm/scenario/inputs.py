@@ -15,13 +15,7 @@ from vpm.units import parse_unit
 
 
 def given_inputs(document: Document, owner: str, model: Model, clock: Clock) -> Mapping[str, Array]:
-    """Input samples of every channel that the scenario drives, by channel of the model.
-
-    Raises
-    ------
-    ScenarioError
-        A signal drives what is not there, or what something else drives; a unit or a frequency is wrong.
-    """
+    """Input samples of every channel that the scenario drives, by channel of the model."""
     return {
         channel: sampled(signal, keys, model.channel_unit(channel), clock)
         for channel, keys, signal in _driven(document, owner, model)

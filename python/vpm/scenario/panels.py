@@ -20,11 +20,6 @@ def checked_panels(document: Document, models: Mapping[str, Model]) -> Panels:
     """Panels of a scenario; by default positions of joints and forces of actuators, those of one unit together.
 
     A channel has to be there in one of the runs; others go without.
-
-    Raises
-    ------
-    ScenarioError
-        A channel is in no run, or a panel mixes units.
     """
     units = {channel: unit for model in models.values() for channel, unit in shown_channels(model).items()}
     if document.plot is None:
@@ -42,13 +37,7 @@ def checked_panels(document: Document, models: Mapping[str, Model]) -> Panels:
 
 
 def checked_columns(document: Document, models: Mapping[str, Model]) -> Mapping[str, tuple[str, ...]]:
-    """Runs of each column of panels, by its heading; empty where all runs share one.
-
-    Raises
-    ------
-    ScenarioError
-        A run is unknown.
-    """
+    """Runs of each column of panels, by its heading; empty where all runs share one."""
     columns = {} if document.plot is None else document.plot.columns
     for heading, names in columns.items():
         for entry, name in enumerate(names):

@@ -129,13 +129,7 @@ INPUTS = ("references", "commands", "supplies")
 
 
 def si_value(given: Given, unit: str, keys: Keys) -> float:
-    """SI value of a number that should be in a unit of this kind.
-
-    Raises
-    ------
-    ScenarioError
-        It has a unit of another kind.
-    """
+    """SI value of a number that should be in a unit of this kind."""
     if given.unit is None:
         return given.value
     try:

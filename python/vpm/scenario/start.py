@@ -27,11 +27,6 @@ def start_state(document: Document, owner: str, model: Model, inputs: Mapping[st
         What to call the machine in messages.
     inputs : mapping of str to ndarray
         What the scenario gives, by channel.
-
-    Raises
-    ------
-    ScenarioError
-        A name is no state of the machine, a unit is wrong, or there is no equilibrium.
     """
     names = model.state_names
     state = np.zeros(len(names))

@@ -34,11 +34,6 @@ def simpler(model: Model, drive: str, change: str) -> Model:
     ----------
     change : str
         One of `SIMPLER`.
-
-    Raises
-    ------
-    ModelError
-        An effect needs what is left out.
     """
     content = model.to_dict()
     entry = content["actuators"][drive]

@@ -83,13 +83,7 @@ class Reduction(Storable):
         )
 
     def applied(self, model: Model) -> Model:
-        """Model with one reduction done.
-
-        Raises
-        ------
-        ModelError
-            The change contradicts something else in the model.
-        """
+        """Model with one reduction done."""
         match self.kind:
             case "effect":
                 return model.without_effect(self.name, self.at, self.side)

@@ -47,11 +47,6 @@ def replaced(model: Model, drive: str, entry: str) -> Model:
     ----------
     entry : str
         The other drive as JSON, without the joint or line that it acts on.
-
-    Raises
-    ------
-    ModelError
-        A controller that should go commands other drives as well, or something else refers to what is gone.
     """
     content, other = model.to_dict(), json.loads(entry)
     place = {key: value for key, value in content["actuators"][drive].items() if key in ("joint", "line")}

@@ -118,11 +118,6 @@ def motions(model: Model, records: Sequence[Experiment], mode: str, setup: Setup
     records : sequence of Experiment
         Their commands or references drive the model.
     mode : {"free_run", "closed_loop"}
-
-    Raises
-    ------
-    SimulationError
-        The model cannot be simulated in these steps.
     """
     return [_motion(model, record, mode, setup) for record in records]
 

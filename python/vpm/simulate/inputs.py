@@ -18,13 +18,7 @@ def held_inputs(model: Model, experiment: Experiment, mode: str) -> Array:
 
 
 def simulation_inputs(model: Model, experiment: Experiment) -> Array:
-    """What a free run holds between samples, shape (N, inputs): commands and pressures of logged supplies.
-
-    Raises
-    ------
-    ExperimentError
-        The log lacks a command.
-    """
+    """What a free run holds between samples, shape (N, inputs): commands and pressures of logged supplies."""
     return held_inputs(model, experiment, "free_run")
 
 
@@ -45,13 +39,7 @@ def references_of(model: Model, experiment: Experiment, mode: str) -> tuple[Arra
 
 
 def restart_grid(experiment: Experiment, horizon: float) -> tuple[NDArray[np.int64], int]:
-    """Rows of the inputs at which pieces of a horizon (s) begin, and the samples of each.
-
-    Raises
-    ------
-    SimulationError
-        The horizon is longer than the log.
-    """
+    """Rows of the inputs at which pieces of a horizon (s) begin, and the samples of each."""
     length = max(2, round(horizon / experiment.dt) + 1)
     if length > len(experiment):
         raise SimulationError(

@@ -230,11 +230,6 @@ def check_balance(model: Model) -> None:
 
     Nobody measures elastic coordinates, and the effort of a drive with a life of its own does not follow from its
     command.
-
-    Raises
-    ------
-    SimulationError
-        A flexible link has elastic coordinates, or an actuator is not ideal.
     """
     for name in model.actuators:
         kind = model.actuator_type(name)

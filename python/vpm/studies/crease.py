@@ -76,11 +76,6 @@ def elastica(angle: float, stiffness: float, lever: float, model: Model) -> floa
     The finger is a smooth plane through the crease, turned by `angle` against the rest of the carton, and touches the
     panel at the arc length `lever`. With the slope p of the panel against that plane and the force F normal to it:
     ``E I p'' = F cos p``, ``E I p'(0) = -K (angle - p(0))`` at the crease, and at the end no moment and no distance.
-
-    Raises
-    ------
-    VpmError
-        No balance is found.
     """
     from scipy.integrate import solve_bvp
 

@@ -66,11 +66,6 @@ def press(
         False for the penalty alone, which lets the body overlap.
     after : Pressed, optional
         Where to go on.
-
-    Raises
-    ------
-    VpmError
-        No balance is found, not even by small steps.
     """
     state, reached = (after.state, after.indentation) if after else (body.rest(), 0.0)
     results = []

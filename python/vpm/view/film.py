@@ -124,13 +124,6 @@ def write_film(
         MP4, MKV or GIF, by its ending.
     speed : float, optional
         Seconds of the machine in a second of film; by default 1, or as slow that a short motion takes `SHORT` seconds.
-
-    Raises
-    ------
-    VpmError
-        The ending is unknown, nothing moves, or the film would be longer than `LONGEST`.
-    MissingExtraError
-        imageio with its ffmpeg, or matplotlib, is not installed.
     """
     target = Path(path)
     if target.suffix.lower() not in ENDINGS:

@@ -81,13 +81,7 @@ def log_share(lower: float, upper: float) -> float:
 
 
 def priors_of(model: Model, data: PredictionErrorProblem) -> dict[str, Prior]:
-    """Priors of each adjustable parameter before the records.
-
-    Raises
-    ------
-    IdentificationError
-        Nothing is known of one, and the records give it no size.
-    """
+    """Priors of each adjustable parameter before the records."""
     unknown = {p.name for p in model.parameters.values() if p.adjustable and not np.isfinite(p.uncertainty or np.inf)}
     owners = {name: (effect, short) for effect in model.effects for short, name in effect.parameter_names.items()}
     sizes = _Sizes(model, data) if unknown else None

@@ -46,13 +46,6 @@ def open_log(path: str | PathLike[str]) -> Log:
         ``.he5``; ``.bag`` (ROS 1), ``.db3`` and ``.mcap`` and folders with a ``metadata.yaml`` (ROS 2) need the extra
         ``ros``; ``.mf4`` and ``.mdf`` the extra ``mdf``, ``.tdms`` of LabVIEW ``tdms``, ``.ulg`` of PX4 ``ulog``;
         folders of LeRobot, and ``FOLDER/episode_000003`` in them, ``parquet``. Other packages may bring more.
-
-    Raises
-    ------
-    ExperimentError
-        There is no such file, or its content is not what its ending says.
-    MissingExtraError
-        The library that reads this format is not installed.
     """
     if reason := unreadable(path):
         raise ExperimentError(reason, path=str(path))

@@ -32,13 +32,7 @@ def is_episode(path: str | PathLike[str]) -> bool:
 
 
 def episodes_of(folder: str | PathLike[str]) -> list[Path]:
-    """Paths of the episodes of a LeRobot data set, in their order.
-
-    Raises
-    ------
-    ExperimentError
-        It has none.
-    """
+    """Paths of the episodes of a LeRobot data set, in their order."""
     numbers = _table(Path(folder), [EPISODE]).column(EPISODE).unique().to_pylist()
     return [Path(folder) / f"episode_{number:06d}" for number in sorted(n for n in numbers if n is not None)]
 

@@ -277,13 +277,7 @@ class Beam(Component):
     # ---- what the model and the core are told ------------------------------------------------------------------------
 
     def with_solid(self, folder: Path) -> Beam:
-        """The beam with the numbers of its reduced solid, if it is one; those of a file take the place of its name.
-
-        Raises
-        ------
-        VpmError
-            The file is not there, or the numbers are damaged.
-        """
+        """The beam with the numbers of its reduced solid, if it is one; those of a file take the place of its name."""
         own = self.reduced is None or self.reduced.startswith(EMBEDDED)
         read = self if own else self.model_copy(update={"reduced": embedded(read_bytes(folder / str(self.reduced)))})
         _ = read.solid  # damaged ones are told here

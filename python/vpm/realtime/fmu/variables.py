@@ -57,11 +57,6 @@ def variables(model: Model, written: CSource, start: NDArray[np.float64]) -> Var
     ----------
     start : ndarray, shape (nx,)
         State to begin in.
-
-    Raises
-    ------
-    SimulationError
-        Two variables have one name.
     """
     nu, nx, ny = len(model.inputs), len(model.state_names), len(model.output_channels)
     first_state = 1 + nu

@@ -187,13 +187,7 @@ class Leg:
         return self._rows(self._core.accelerations, angles, rates, torques)
 
     def cylinder_forces(self, angles: ArrayLike, torques: ArrayLike) -> Array:
-        """Cylinder forces (N) of the leg that give joint torques (N m), ``F = tau / (ds/dq)``.
-
-        Raises
-        ------
-        ModelError
-            A cylinder has no lever at these angles, so that no force gives a torque.
-        """
+        """Cylinder forces (N) of the leg that give joint torques (N m), ``F = tau / (ds/dq)``."""
         forces = self._rows(self._core.cylinder_forces, angles, torques)
         lost = np.argwhere(~np.isfinite(np.atleast_2d(forces)))
         if lost.size:

@@ -21,11 +21,6 @@ def static_regressors(force: ArrayLike, length: ArrayLike, step: float) -> tuple
     -------
     columns : ndarray, shape (N - 2, 3)
     forces : ndarray, shape (N - 2,)
-
-    Raises
-    ------
-    IdentificationError
-        Fewer than three samples, or arrays of different length.
     """
     f, s = _pair(force, length)
     return np.column_stack([s[1:-1], f[:-2] / (2.0 * step), np.ones(f.size - 2)]), f[2:]

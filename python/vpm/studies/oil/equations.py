@@ -124,11 +124,6 @@ def pressures_from_force(
     -------
     pressure_a, pressure_b : ndarray, shape (N,)
         Pa.
-
-    Raises
-    ------
-    IdentificationError
-        The rule is unknown.
     """
     if rule not in RULES:
         raise IdentificationError(f'the pressure rule "{rule}" is unknown; {near_match(rule, RULES)}')
