@@ -111,32 +111,20 @@ class Fitting(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Checks(Storable):
-    """Thresholds at which a fit warns that it may be wrong.
+    """Thresholds at which a fit warns that it may be wrong."""
 
-    Attributes
-    ----------
-    level : float
-        Probability of a false warning that an effect is missing, in one fit whose model is right.
-    visible : float
-        Root mean square that the motion explains of a residual, as a share of the measured signal, below which nothing
-        is said.
-    far : float
-        Deviations, stated and estimated together, beyond which an estimate contradicts the model file.
-    clear : float
-        Times that an effort at other times has to be larger than the noise, in each direction, to be asked whether it
-        explains a residual.
-    waves, waves_each : int
-        Waves that laws of position have over its range, and how many are asked at a time: ripple of motors and teeth.
-    begun : float
-        Probability that first states are taken as unknown although those that the log suggests are right.
-    """
-
-    level: float = 1e-6
+    level: float = 1e-6  #: Probability of a false warning that an effect is missing, in one fit whose model is right.
+    #: Root mean square that the motion explains of a residual, as a share of the measured signal, below which nothing
+    #: is said.
     visible: float = 2e-3
-    far: float = 3.0
+    far: float = 3.0  #: Deviations, stated and estimated together, beyond which an estimate contradicts the model file.
+    #: Times that an effort at other times has to be larger than the noise, in each direction, to be asked whether it
+    #: explains a residual.
     clear: float = 5.0
+    #: Waves that laws of position have over its range: ripple of motors and teeth.
     waves: int = 32
-    waves_each: int = 4
+    waves_each: int = 4  #: How many of them are asked at a time.
+    #: Probability that first states are taken as unknown although those that the log suggests are right.
     begun: float = 0.05
 
     def __post_init__(self) -> None:

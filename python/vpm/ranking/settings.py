@@ -66,95 +66,52 @@ OCTAVE = 2.0
 
 @dataclass(frozen=True, kw_only=True)
 class Settings:
-    """Settings that decide in a ranking.
+    """Settings that decide in a ranking."""
 
-    Attributes
-    ----------
-    bands : tuple of float
-        Bandwidths of the trackers, Hz: a slow one, whose error is wide and easy to rank, and one that keeps a load
-        behind a backlash in step.
-    exact : float
-        Error of a step where structures are compared, relative to each state and its natural size: it must not pass
-        for an effect.
-    settling : float
-        Time at the beginning of each record that is left out, s: what a tracker makes of the first state.
-    pieces : int
-        Pieces of the held-back stretches between which an effect has to repeat.
-    inexact : float
-        By how much a law differs from the machine, as a share of the amplitude that it explains. Another effect over
-        the same states at the same place has to do more than that. A richer one has to do better by it than a plainer
-        one. Between effects over other states evidence decides.
-    slight : float
-        An effect that does less than this share of the amplitude of all effects of the model is none. Those whose law
-        is exact do not count here, see `EffectType.exact`.
-    second : float
-        The same of the amplitude of effects that were added, of whose laws less is known.
-    clear : float
-        Share of the error power above which an effect counts beside those all the same. Errors of laws do not have the
-        shape of another law by chance.
-    worth : float
-        Share of the error power that another effect has to remove, of fitted and of held-back stretches.
-    score : float
-        Standard deviations between pieces by which that differs from nothing.
-    seats : int
-        Effects that do nothing at their start, that are fitted under each tracker.
-    starts : int
-        Start values that are fitted, of those that were screened, of each effect.
-    finished : float
-        Effects that leave up to so many times the error power of the best, or no more than laws are wrong by, are
-        fitted to the end.
-    turns : int
-        Fits that follow each other until nothing is gained any more.
-    iterations : int
-        Steps of a fit.
-    patience : float
-        By how much more than a step predicts a fit may still gain before it is given up.
-    share : float
-        Of the cost that the most promising fit of a look saves: another one that cannot save as much is given up.
-    tolerance : float
-        Gain of a step, nats, below which a fit ends.
-    reach : float
-        Deviations of its prior that a parameter may move in a step.
-    order : int
-        Length of the autoregression that whitens the error of a channel where evidence is told, samples.
-    odds : float
-        Evidence, nats, at which an effect is as probable as none. Chance makes more of an effect that is not there once
-        in exp(odds) times at most (A. Markov's inequality): one in a hundred is named if a hundred are tried.
-    tempering : float
-        Power of evidence in probabilities: no model is exact. As it was fitted to cases of which the truth is known.
-    astray : float
-        How often evidence leads astray, likewise: then all that was tried, and what was not, is as probable.
-    same : float
-        Effects between which the records decide by fewer nats than this, in the mean, are rivals.
-    sure : float
-        The most probable effects that are as probable together are rivals, too.
-    effects : int
-        Most effects of a structure.
-    """
-
+    #: Bandwidths of the trackers, Hz: a slow one, whose error is wide and easy to rank, and one that keeps a load
+    #: behind a backlash in step.
     bands: tuple[float, ...] = (1.0, 10.0)
+    #: Error of a step where structures are compared, relative to each state and its natural size: it must not pass for
+    #: an effect.
     exact: float = 3e-5
+    #: Time at the beginning of each record that is left out, s: what a tracker makes of the first state.
     settling: float = 0.5
-    pieces: int = 20
+    pieces: int = 20  #: Pieces of the held-back stretches between which an effect has to repeat.
+    #: By how much a law differs from the machine, as a share of the amplitude that it explains. Another effect over the
+    #: same states at the same place has to do more than that. A richer one has to do better by it than a plainer one.
+    #: Between effects over other states evidence decides.
     inexact: float = 0.01
+    #: An effect that does less than this share of the amplitude of all effects of the model is none. Those whose law is
+    #: exact do not count here, see `EffectType.exact`.
     slight: float = 0.003
-    second: float = 0.05
+    second: float = 0.05  #: The same of the amplitude of effects that were added, of whose laws less is known.
+    #: Share of the error power above which an effect counts beside those all the same. Errors of laws do not have the
+    #: shape of another law by chance.
     clear: float = 0.85
+    #: Share of the error power that another effect has to remove, of fitted and of held-back stretches.
     worth: float = 0.06
-    score: float = 3.0
-    seats: int = 8
-    starts: int = 3
+    score: float = 3.0  #: Standard deviations between pieces by which that differs from nothing.
+    seats: int = 8  #: Effects that do nothing at their start, that are fitted under each tracker.
+    starts: int = 3  #: Start values that are fitted, of those that were screened, of each effect.
+    #: Effects that leave up to so many times the error power of the best, or no more than laws are wrong by, are fitted
+    #: to the end.
     finished: float = 2.5
-    turns: int = 3
-    iterations: int = 8
-    patience: float = 3.0
+    turns: int = 3  #: Fits that follow each other until nothing is gained any more.
+    iterations: int = 8  #: Steps of a fit.
+    patience: float = 3.0  #: By how much more than a step predicts a fit may still gain before it is given up.
+    #: Of the cost that the most promising fit of a look saves: another one that cannot save as much is given up.
     share: float = 0.5
-    tolerance: float = 0.5
-    reach: float = 6.0
+    tolerance: float = 0.5  #: Gain of a step, nats, below which a fit ends.
+    reach: float = 6.0  #: Deviations of its prior that a parameter may move in a step.
+    #: Length of the autoregression that whitens the error of a channel where evidence is told, samples.
     order: int = 12
+    #: Evidence, nats, at which an effect is as probable as none. Chance makes more of an effect that is not there once
+    #: in exp(odds) times at most (A. Markov's inequality): one in a hundred is named if a hundred are tried.
     odds: float = 9.2
+    #: Power of evidence in probabilities: no model is exact. As it was fitted to cases of which the truth is known.
     tempering: float = field(default_factory=lambda: shipped().tempering)
+    #: How often evidence leads astray, likewise: then all that was tried, and what was not, is as probable.
     astray: float = field(default_factory=lambda: shipped().astray)
-    same: float = 1.0
-    sure: float = 0.95
-    effects: int = 4
+    same: float = 1.0  #: Effects between which the records decide by fewer nats than this, in the mean, are rivals.
+    sure: float = 0.95  #: The most probable effects that are as probable together are rivals, too.
+    effects: int = 4  #: Most effects of a structure.
