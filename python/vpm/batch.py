@@ -111,17 +111,8 @@ def side_by_side(
 ) -> list[Run | VpmError]:
     """Simulations on threads, as `simulate_batch` does them, of machines that may differ.
 
-    Parameters
-    ----------
-    jobs : sequence of callable
-        Each gives a run.
-    workers, progress
-        As in `simulate_batch`.
-
-    Returns
-    -------
-    list of Run or VpmError
-        In the order of the jobs; one that fails is an error in the list.
+    ``jobs``: each gives a run; ``workers``, ``progress``: as in `simulate_batch`.
+    Result: in the order of the jobs; one that fails is an error in the list.
 
     Raises
     ------

@@ -121,10 +121,7 @@ def in_lines() -> bool:
 def speak(run: Callable[[bool], object], options: OutputOptions) -> object:
     """Run a command with its output options.
 
-    Parameters
-    ----------
-    run : callable
-        Takes whether an error of usage is told, and ends the program, at once; gives the exit code.
+    ``run``: takes whether an error of usage is told, and ends the program, at once; gives the exit code.
     """
     global _now  # noqa: PLW0603  # one command runs at a time
     _now = options

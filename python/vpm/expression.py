@@ -31,10 +31,7 @@ class Quantity(NamedTuple):
 def unwrap(angle: Array, period: Array) -> Array:
     """Expression's angle or count without jumps at the ends of its range.
 
-    Parameters
-    ----------
-    angle, period : ndarray, shape (N,) and ()
-        Two samples must be less than half a period apart.
+    ``angle``, ``period``: shape (N,) and (), two samples must be less than half a period apart.
     """
     return np.asarray(np.unwrap(angle, period=float(period)), dtype=np.float64)
 
@@ -42,10 +39,8 @@ def unwrap(angle: Array, period: Array) -> Array:
 def zeroed(count: Array, index: Array) -> Array:
     """Expression's encoder count from its index pulse on, less the first one.
 
-    Parameters
-    ----------
-    count, index : ndarray, shape (N,)
-        The pulse is high above half of its range. One that is high at the first sample began before.
+    ``count``, ``index``: shape (N,), the pulse is high above half of its range. One that is high at the first sample
+    began before.
 
     Raises
     ------
@@ -132,10 +127,7 @@ class Expression:
 def read_expression(text: str) -> Expression:
     """Read an expression over columns of a log.
 
-    Parameters
-    ----------
-    text : str
-        Names of columns, numbers and ``pi`` with ``+ - * /``, constant powers (``x**2``) and functions.
+    ``text``: names of columns, numbers and ``pi`` with ``+ - * /``, constant powers (``x**2``) and functions.
     """
     if len(text) > LONGEST:
         raise VpmError(f'"{text[:30]}..." has {len(text)} characters, but {LONGEST} are the most; write it shorter')

@@ -26,10 +26,7 @@ def misfit(value: object) -> str:
 def fits(value: object, hint: object) -> bool:
     """Whether a field's value is of a type; a whole number is a number.
 
-    Parameters
-    ----------
-    hint : type or other annotation
-        What is not known here fits.
+    ``hint``: what is not known here fits.
     """
     origin, inner = get_origin(hint), get_args(hint)
     if origin in (Union, types.UnionType):

@@ -36,10 +36,7 @@ class FileError(VpmError):
 def replacing(path: str | PathLike[str]) -> Iterator[Path]:
     """Place beside a file to write to: it becomes the file when the block ends well, and is removed when it does not.
 
-    Parameters
-    ----------
-    path : path-like
-        A link stays a link, and a device such as ``/dev/null`` is written to where it is.
+    ``path``: a link stays a link, and a device such as ``/dev/null`` is written to where it is.
 
     Yields
     ------

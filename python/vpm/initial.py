@@ -185,10 +185,7 @@ def _without_memories(model: Model, kept: tuple[str, ...] = ()) -> tuple[Model, 
 def invertible(model: Model, measured: Sequence[str]) -> Model:
     """Machine with known inverse dynamics, for initial states: without memories at unmeasured joints.
 
-    Parameters
-    ----------
-    measured : sequence of str
-        Joints whose motion is known.
+    ``measured``: joints whose motion is known.
     """
     return model if set(model.joints) == set(measured) else _without_memories(model)[0]
 

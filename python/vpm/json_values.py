@@ -11,15 +11,8 @@ import numpy as np
 def plain(value: object) -> object:
     """JSON values: numbers, text, lists and tables of a Python value.
 
-    Parameters
-    ----------
-    value : object
-        What knows its own form says it by ``to_dict``; other dataclasses give their fields.
-
-    Returns
-    -------
-    object
-        NaN and infinity, which JSON has no word for, are None: not known. A complex number is its two parts.
+    ``value``: what knows its own form says it by ``to_dict``; other dataclasses give their fields.
+    Result: NaN and infinity, which JSON has no word for, are None: not known. A complex number is its two parts.
     """
     match value:
         case np.ndarray() | np.generic():

@@ -20,10 +20,7 @@ UNKNOWN = "–"
 def array_of(given: ArrayLike, what: str, error: type[VpmError] = VpmError) -> Array:
     """Array of numbers.
 
-    Parameters
-    ----------
-    what : str
-        Name for messages, as the beginning of a sentence.
+    ``what``: name for messages, as the beginning of a sentence.
     """
     try:
         array = np.asanyarray(given)

@@ -37,10 +37,7 @@ Ending = Literal["value", "error", "refused", "interrupted"]
 def packed(work: Callable[[], object]) -> bytes:
     """Work to send as bytes for `run_packed`, with effects that this program added to the catalogue.
 
-    Parameters
-    ----------
-    work : callable
-        A function of a module, or a `functools.partial` of one.
+    ``work``: a function of a module, or a `functools.partial` of one.
     """
     return pickle.dumps((registered(), _sendable(work)))
 
@@ -50,14 +47,10 @@ def run_packed(their_version: str, folders: Sequence[str], content: bytes, attem
 
     Linear algebra has one thread here: cores are for tasks side by side.
 
-    Parameters
-    ----------
-    their_version : str
-        Of vpm where the work was packed.
-    folders : sequence of str
-        Folders of modules that the work is made of, beside those that are installed.
-    attempt : int
-        So that an executor that remembers answers to the same call does not answer another attempt by an old one.
+    - ``their_version``: of vpm where the work was packed
+    - ``folders``: folders of modules that the work is made of, beside those that are installed
+    - ``attempt``: so that an executor that remembers answers to the same call does not answer another attempt by an old
+      one
 
     Returns
     -------

@@ -145,12 +145,8 @@ class Tasks(Generic[K]):
     def add(self, key: K, job: Callable[[], object], name: str = "") -> None:
         """Add a task to those that wait for a worker.
 
-        Parameters
-        ----------
-        key : object
-            By which its end is told.
-        job : callable
-            A function of a module or a `functools.partial` of one, unless it runs on threads.
+        - ``key``: by which its end is told
+        - ``job``: a function of a module or a `functools.partial` of one, unless it runs on threads
         """
         self._ready.append(_Task(key, job, name or f"task {key}"))
 
@@ -288,10 +284,7 @@ def outcomes(
     Of jobs that Ctrl-C kept from an end there is None. Those that run on threads see ``KeyboardInterrupt`` in the core
     and may still give what they have.
 
-    Parameters
-    ----------
-    heard : callable, optional
-        Called in this thread with what has ended since, as it comes.
+    ``heard``: called in this thread with what has ended since, as it comes.
     """
     found: list[Done[int] | None] = [None] * len(jobs)
     with Tasks[int](where, say) as tasks:

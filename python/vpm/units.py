@@ -202,10 +202,7 @@ _DIMENSIONLESS: tuple[Power, ...] = (0,) * len(BASE_UNITS)
 def parse_unit(text: str) -> Unit:
     """Read a unit from text such as ``N m/rad``.
 
-    Parameters
-    ----------
-    text : str
-        For example ``"N s/m"``; ``""`` and ``"1"`` mean no unit.
+    ``text``: for example ``"N s/m"``; ``""`` and ``"1"`` mean no unit.
     """
     if not text.strip():
         return Unit(text, 1.0, _DIMENSIONLESS, ())
@@ -239,10 +236,7 @@ def si_unit(unit: str) -> str:
 def require_dimension(unit: str, expected: str) -> None:
     """Refuse a unit of the wrong kind.
 
-    Parameters
-    ----------
-    expected : str
-        A unit of the right kind, which the message suggests.
+    ``expected``: a unit of the right kind, which the message suggests.
     """
     given, wanted = parse_unit(unit), parse_unit(expected)
     if given.dimension != wanted.dimension:

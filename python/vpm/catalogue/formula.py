@@ -67,13 +67,9 @@ class Formula:
 def compile_formula(text: str, names: Sequence[str]) -> Formula:
     """Compile a user's formula into a postfix program.
 
-    Parameters
-    ----------
-    text : str
-        Python expression in ``q``, ``v``, ``pi``, numbers and parameters, with ``+ - * /``, whole powers, and the
-        functions abs, sqrt, exp, tanh, sin and cos.
-    names : sequence of str
-        Parameters, in the order of the core.
+    - ``text``: Python expression in ``q``, ``v``, ``pi``, numbers and parameters, with ``+ - * /``, whole powers, and
+      the functions abs, sqrt, exp, tanh, sin and cos
+    - ``names``: parameters, in the order of the core
     """
     if len(names) > MOST_NUMBERS:
         raise ModelError(f'the law "{text}" has {len(names)} parameters, but {MOST_NUMBERS} are the most; use fewer')

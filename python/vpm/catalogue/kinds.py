@@ -121,9 +121,7 @@ class EffectParameter:
     def default(self, kind: JointKind | None = None) -> float | None:
         """Value when none is given (SI), at a site on a joint of this kind; None if it has to be given.
 
-        Parameters
-        ----------
-        kind : {"prismatic", "revolute", "helical"}, optional
+        ``kind``: one of "prismatic", "revolute", "helical".
         """
         if isinstance(self.start, tuple):
             return self.start[1] if kind in {"revolute", "helical"} else self.start[0]

@@ -45,13 +45,7 @@ def autocorrelation(residual: Array, pieces: Sequence[slice], dt: float, channel
 
     The band ``1.96 / sqrt(N)`` is that of white noise (G. Box and G. Jenkins, *Time Series Analysis*, 1976).
 
-    Parameters
-    ----------
-    residual : ndarray, shape (N,)
-    pieces : sequence of slice
-        Contiguous in time.
-    dt : float
-        s.
+    ``residual``: shape (N,); ``pieces``: contiguous in time; ``dt``: s.
     """
     values = _normalised(residual, residual, pieces, _lags(pieces))[1:]
     half = values.size // 2
@@ -64,12 +58,7 @@ def autocorrelation(residual: Array, pieces: Sequence[slice], dt: float, channel
 def gapped_autocorrelation(residual: Array, dt: float) -> tuple[Array, Array, Array]:
     """Correlation of a residual with its own past over gaps: of the pairs of samples that are both there.
 
-    Parameters
-    ----------
-    residual : ndarray, shape (N,)
-        NaN where there is a gap.
-    dt : float
-        s.
+    ``residual``: shape (N,), NaN where there is a gap; ``dt``: s.
 
     Returns
     -------
@@ -98,11 +87,7 @@ def cross_correlation(residual: Array, signal: Array, pieces: Sequence[slice], d
     Two signals that both vary slowly resemble each other by chance, so that the band widens with the product of their
     autocorrelations: ``1.96 sqrt(sum_k rho_x(k) rho_y(k) / N)`` (M. Bartlett, *J. Royal Statistical Society* 98, 1935).
 
-    Parameters
-    ----------
-    residual, signal : ndarray, shape (N,)
-    name : str
-        The input.
+    ``residual``, ``signal``: shape (N,); ``name``: the input.
     """
     most = _lags(pieces)
     values = _normalised(residual, signal, pieces, most)
@@ -118,14 +103,8 @@ def effective_samples(residual: Array, pieces: Sequence[slice]) -> float:
     The sum ends where two neighbouring correlations together are no longer positive (C. Geyer, *Statistical Science* 7,
     1992).
 
-    Parameters
-    ----------
-    residual : ndarray, shape (N,)
-
-    Returns
-    -------
-    float
-        Between 1 and N.
+    ``residual``: shape (N,).
+    Result: between 1 and N.
     """
     longest = max(piece.stop - piece.start for piece in pieces)
     most = max(0, longest // 2)

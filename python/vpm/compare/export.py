@@ -22,10 +22,7 @@ def write_mcap(comparison: Comparison, path: str | PathLike[str]) -> tuple[Path,
 
     Each channel ``axis.position`` is a topic ``/axis/position`` of JSON messages, whose schema says the unit.
 
-    Parameters
-    ----------
-    path : path-like
-        Of the MCAP file; a layout for Foxglove is written beside it, ``NAME.layout.json``.
+    ``path``: of the MCAP file; a layout for Foxglove is written beside it, ``NAME.layout.json``.
 
     Returns
     -------

@@ -135,13 +135,9 @@ def state_regions(
 ) -> list[Region]:
     """Regions by a joint's state: shares over speed, velocity, acceleration and position.
 
-    Parameters
-    ----------
-    residual : ndarray, shape (N,)
-    state : mapping of str to ndarray, shape (N,)
-        Some of ``position``, ``velocity``, ``acceleration``.
-    unit : str
-        Of the position.
+    - ``residual``: shape (N,)
+    - ``state``: each of shape (N,), some of ``position``, ``velocity``, ``acceleration``
+    - ``unit``: of the position
     """
     makers: tuple[tuple[str, Callable[[], Region]], ...] = (
         ("velocity", lambda: _speed_region(residual, joint, state["velocity"], unit)),

@@ -28,14 +28,10 @@ def poses(
 
     Law: ``M(q) a + h(q, v) = B(q) u`` and ``y(q) = y_d`` for given ``v`` and ``a``.
 
-    Parameters
-    ----------
-    wanted : ndarray, shape (N, m)
-    guess : ndarray, shape (N, n)
-    loads : tuple of two ndarray, shape (N, n), optional
-        Velocities and accelerations; by default the machine is at rest.
-    stiff : bool
-        Keep flexible links straight; their own balance is then left out.
+    - ``wanted``: shape (N, m)
+    - ``guess``: shape (N, n)
+    - ``loads``: each of shape (N, n), velocities and accelerations; by default the machine is at rest
+    - ``stiff``: keep flexible links straight; their own balance is then left out
 
     Returns
     -------

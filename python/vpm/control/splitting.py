@@ -52,14 +52,9 @@ def solve(rates: Rates, times: Array, guess: Array, ends: tuple[Array, Array]) -
     decaying solutions alike, which is what makes the inversion stable (S. Devasia, D. Chen, B. Paden, IEEE Trans.
     Automatic Control 41(7), 1996; in the iterated form each of Newton's steps is a linear time-varying inversion).
 
-    Parameters
-    ----------
-    times : ndarray, shape (N,)
-        Evenly spaced, s.
-    guess : ndarray, shape (N, nx)
-        From rest to rest; its ends are the states of rest.
-    ends : tuple of two ndarray
-        Derivatives of the rates at both states of rest.
+    - ``times``: shape (N,), evenly spaced, s
+    - ``guess``: shape (N, nx), from rest to rest; its ends are the states of rest
+    - ``ends``: derivatives of the rates at both states of rest
 
     Raises
     ------

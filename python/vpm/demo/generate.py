@@ -26,15 +26,8 @@ COLUMNS = ("time_s", "q_rad", "u_A", "qref_rad")
 def train_reference(time: float) -> float:
     """Generate the reference of the training record: five sines that never repeat, faded in.
 
-    Parameters
-    ----------
-    time
-        Time since the start of the record [s].
-
-    Returns
-    -------
-    float
-        Reference angle [rad].
+    ``time``: time since the start of the record [s].
+    Result: reference angle [rad].
     """
     sines = ((0.62, 1.3, 0.0), (0.38, 2.9, 1.9), (0.22, 5.3, 0.6), (0.10, 9.1, 2.4), (0.05, 15.7, 4.0))
     fade = _smooth_step(time)
@@ -44,15 +37,8 @@ def train_reference(time: float) -> float:
 def validation_reference(time: float) -> float:
     """Generate the reference of the validation record: moves from angle to angle, with short rests.
 
-    Parameters
-    ----------
-    time
-        Time since the start of the record [s].
-
-    Returns
-    -------
-    float
-        Reference angle [rad].
+    ``time``: time since the start of the record [s].
+    Result: reference angle [rad].
     """
     angles = (0.0, 0.9, 0.3, -1.1, -0.5, 0.6, 1.2, -0.2, -0.9, 0.4, 1.0, -0.6, 0.0)
     move, rest = 0.7, 0.1
@@ -76,17 +62,8 @@ def record(
     The controller reads the encoder at a sample, computes ``u = kv (kp (r - y) - dy)`` within its limit, and holds it
     until the next; ``dy`` is the backward difference of the mean of the last two readings.
 
-    Parameters
-    ----------
-    reference
-        Reference angle [rad] over time [s].
-    duration
-        Length of the record [s].
-
-    Returns
-    -------
-    numpy.ndarray
-        One row per sample, shape (samples, 4), in the order of `COLUMNS`.
+    ``reference``: reference angle [rad] over time [s]; ``duration``: length of the record [s].
+    Result: one row per sample, shape (samples, 4), in the order of `COLUMNS`.
     """
     samples = round(duration / SAMPLE_TIME) + 1
     rows = np.empty((samples, len(COLUMNS)))
@@ -134,10 +111,7 @@ def _write(path: Path, text: str) -> None:
 def truth(hidden: str) -> str:
     """Generate the text of ``truth.toml``: the hidden effect and the true values.
 
-    Parameters
-    ----------
-    hidden
-        A name in `HIDDEN`.
+    ``hidden``: a name in `HIDDEN`.
     """
     entry = HIDDEN[hidden]
     machine = entry.machine
@@ -166,12 +140,8 @@ def truth(hidden: str) -> str:
 def generate(folder: Path, hidden: str = DEFAULT, seed: int = SEED) -> None:
     """Generate the demo's files: ``train.csv``, ``validation.csv``, ``truth.toml`` and ``model.toml``.
 
-    Parameters
-    ----------
-    folder
-        Where to write; made if it is not there.
-    hidden
-        The effect that the machine has and the model does not: a name in `HIDDEN`.
+    - ``folder``: where to write; made if it is not there
+    - ``hidden``: the effect that the machine has and the model does not: a name in `HIDDEN`
     """
     if hidden not in HIDDEN:
         raise ValueError(f"'{hidden}' is no effect that the demo can hide; take one of: {', '.join(HIDDEN)}.")

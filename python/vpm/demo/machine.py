@@ -147,10 +147,7 @@ class State:
 def advance(machine: Machine, state: State, commands: Sequence[float]) -> None:
     """Move the machine from the sample of the last command to the next one.
 
-    Parameters
-    ----------
-    commands
-        All commands up to now [A].
+    ``commands``: all commands up to now [A].
     """
     along, across = machine.payload_place
     inertia = machine.inertia + machine.mass * machine.center_of_mass**2 + machine.payload * (along**2 + across**2)

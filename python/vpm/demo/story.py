@@ -42,10 +42,8 @@ def run_demo(
 ) -> Diagnosis:
     """Diagnose the demo's log, tell the story, write the report, and only then show what was hidden.
 
-    Parameters
-    ----------
-    hide : str, optional
-        Another effect to hide, of `vpm.demo.hidden.LISTED`; its log is made first, into the folder ``log`` in ``out``.
+    ``hide``: another effect to hide, of `vpm.demo.hidden.LISTED`; its log is made first, into the folder ``log`` in
+    ``out``.
     """
 
     def say(text: str = "") -> None:
@@ -92,10 +90,7 @@ def check_hidden(name: str) -> None:
 def print_list(console: Console) -> list[dict[str, str]]:
     """Print what the demo's story can hide, a line each, with site and law.
 
-    Returns
-    -------
-    list of dict
-        Name, site and law of each.
+    Result: name, site and law of each.
     """
     rows = []
     for name in LISTED:

@@ -53,22 +53,12 @@ def choose_cutoff(
 ) -> CutoffChoice:
     """Cut-off frequency for deriving velocity and acceleration from measured positions.
 
-    Parameters
-    ----------
-    position : ndarray, shape (N, n)
-        One column per joint.
-    rate : float
-        Hz.
-    read : sequence of float, optional
-        Rate at which each joint's position was read, Hz, where its samples in between are interpolated.
-    retained : sequence of float, optional
-        Frequency above which a filter took noise from each joint's position, Hz.
-
-    Returns
-    -------
-    CutoffChoice
-        One frequency for all joints: the highest whose expected errors, each relative to the best for that joint, have
-        a sum near the least.
+    - ``position``: shape (N, n), one column per joint
+    - ``rate``: Hz
+    - ``read``: rate at which each joint's position was read, Hz, where its samples in between are interpolated
+    - ``retained``: frequency above which a filter took noise from each joint's position, Hz
+    - result: one frequency for all joints: the highest whose expected errors, each relative to the best for that joint,
+      have a sum near the least
     """
     n = len(position)
     if n < FEWEST_SAMPLES:
@@ -101,15 +91,10 @@ def position_spectrum(
     Welch's method on second differences, divided by their gain ``(2 - 2 cos w)^2``: positions fall so steeply with
     frequency that without this the leakage of the slow motion would drown all the rest.
 
-    Parameters
-    ----------
-    position : ndarray, shape (N,)
-    rate : float
-        Hz.
-    read : float, optional
-        Rate at which the position was read, Hz. What is interpolated says nothing of noise above half of it.
-    retained : float
-        Frequency above which a filter took the noise, Hz.
+    - ``position``: shape (N,)
+    - ``rate``: Hz
+    - ``read``: rate at which the position was read, Hz. What is interpolated says nothing of noise above half of it.
+    - ``retained``: frequency above which a filter took the noise, Hz
 
     Returns
     -------

@@ -99,10 +99,7 @@ def check_increasing(time: Array, source: Source) -> None:
 def check_uniform(time: Array, source: Source) -> str:
     """Refuse gaps and uneven steps of a grid.
 
-    Returns
-    -------
-    str
-        Sentence on the grid for the history.
+    Result: sentence on the grid for the history.
 
     Raises
     ------
@@ -143,15 +140,11 @@ def make_uniform(
 ) -> tuple[Array, Array, str]:
     """Interpolate a record onto a uniform grid.
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        Increasing, s.
-    data : ndarray, shape (N, C)
-    channels : tuple of str
-        Positions, velocities and accelerations are interpolated by cubic splines, all others by straight lines.
-    rate : float or None
-        Hz; None takes the median step.
+    - ``time``: shape (N,), increasing, s
+    - ``data``: shape (N, C)
+    - ``channels``: positions, velocities and accelerations are interpolated by cubic splines, all others by straight
+      lines
+    - ``rate``: Hz; None takes the median step
 
     Returns
     -------

@@ -208,17 +208,10 @@ def fresh_samples(time: Array, values: Array) -> NDArray[np.int64] | None:
     one of them does so in its neighbours, too. So values were repeated that jump, and never in two samples running.
     One lost row may bring two jumps together.
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        Increasing, s.
-    values : ndarray, shape (N,)
-        A position, velocity, length or pressure: what cannot jump.
-
-    Returns
-    -------
-    ndarray of int, or None
-        None where values were not repeated, or too few changed to tell. A stretch at rest is read as often as others.
+    - ``time``: shape (N,), increasing, s
+    - ``values``: shape (N,), a position, velocity, length or pressure: what cannot jump
+    - result: None where values were not repeated, or too few changed to tell. A stretch at rest is read as often as
+      others.
     """
     moved = np.abs(np.diff(values))
     changes = np.flatnonzero(moved) + 1
@@ -246,18 +239,10 @@ def held_error(time: Array, values: Array, fresh: NDArray[np.int64]) -> float:
 
     Noise of two readings is in the way between them, too, and no part of the error.
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        s.
-    values : ndarray, shape (N,)
-    fresh : ndarray of int
-        Samples at which the motion was read, see `fresh_samples`.
-
-    Returns
-    -------
-    float
-        Unit of the values.
+    - ``time``: shape (N,), s
+    - ``values``: shape (N,)
+    - ``fresh``: samples at which the motion was read, see `fresh_samples`
+    - result: unit of the values
     """
     held = time - time[np.maximum.accumulate(np.where(np.isin(np.arange(time.size), fresh), np.arange(time.size), 0))]
     speeds = np.diff(values[fresh]) / np.diff(time[fresh])

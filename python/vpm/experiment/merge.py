@@ -25,16 +25,10 @@ def merge_clocks(
 ) -> tuple[Array, dict[str, Array], list[str]]:
     """Bring columns that have clocks of their own to the grid of the record.
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        Clock of the record, s.
-    columns : mapping of str to ndarray
-        Each as long as its clock.
-    clocks : mapping of str to ndarray
-        Own clocks of some channels, s, counted from the same instant; equal ones change nothing.
-    irregular : {"error", "interpolate"}
-        Whether interpolation is allowed.
+    - ``time``: shape (N,), clock of the record, s
+    - ``columns``: each as long as its clock
+    - ``clocks``: own clocks of some channels, s, counted from the same instant; equal ones change nothing
+    - ``irregular``: one of "error", "interpolate", whether interpolation is allowed
 
     Returns
     -------

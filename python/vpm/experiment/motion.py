@@ -128,14 +128,8 @@ class Motion(Result):
         An end at rest is filtered with the rest: there is nothing to settle. At an end in motion the derivatives within
         `edge` are wrong, and what they make of a balance would ring on inside; it is cut off before.
 
-        Parameters
-        ----------
-        values : ndarray, shape (N,) or (N, k)
-
-        Returns
-        -------
-        ndarray, shape (n,) or (n, k)
-            One row for each of `retained`.
+        ``values``: shape (N,) or (N, k).
+        Result: shape (n,) or (n, k), one row for each of `retained`.
         """
         retained = self.retained
         begin = 0 if self._rests(slice(None, self.edge)) else int(retained[0])
@@ -246,15 +240,8 @@ def common_cutoff(experiments: Iterable[Experiment], model: Machine) -> float:
     Residuals of two records say the same only in the same band; a record that was filtered before it was stored would
     otherwise be judged in a wider one than the record that the parameters were fitted to.
 
-    Parameters
-    ----------
-    experiments : iterable of Experiment
-        At least one, each with the position of every joint.
-
-    Returns
-    -------
-    float
-        Hz.
+    ``experiments``: at least one, each with the position of every joint.
+    Result: Hz.
     """
     cutoffs = [_choice(each, model).cutoff for each in experiments]
     if not cutoffs:

@@ -37,16 +37,8 @@ def noise_std(values: Array, retained: float = 1.0) -> float:
 
     Noise that was filtered before it was recorded is underestimated, unless the filter is known.
 
-    Parameters
-    ----------
-    values : ndarray, shape (N,)
-    retained : float
-        Share of half of the rate up to which a filter has left the noise.
-
-    Returns
-    -------
-    float
-        Unit of the channel; zero for a constant channel.
+    ``values``: shape (N,); ``retained``: share of half of the rate up to which a filter has left the noise.
+    Result: unit of the channel; zero for a constant channel.
     """
     if values.size < FEWEST_SAMPLES:
         raise ExperimentError(
@@ -68,10 +60,7 @@ def instrument_noise(record: Experiment, channel: str) -> float:
     A record that was cut does not say which of its samples these were. Between them there is less noise: interpolation
     takes means of them.
 
-    Returns
-    -------
-    float
-        Unit of the channel.
+    Result: unit of the channel.
     """
     every, retained = _samples_a_reading(record, channel), _retained(record, channel)
     return max(noise_std(record[channel][first::every], retained) for first in range(every))
@@ -126,15 +115,9 @@ def quantisation_step(values: Array) -> float | None:
 
     The greatest common measure of the differences between neighbours (Euclid's algorithm with a tolerance).
 
-    Parameters
-    ----------
-    values : ndarray, shape (N,)
-
-    Returns
-    -------
-    float or None
-        None where the values lie on no grid coarser than a billionth of their range, or take fewer than
-        five levels.
+    ``values``: shape (N,).
+    Result: None where the values lie on no grid coarser than a billionth of their range, or take fewer than five
+    levels.
     """
     if np.unique(values).size < 5:
         return None

@@ -62,10 +62,7 @@ def lowpass(values: Array, rate: float, cutoff: float, order: int = MOTION_FILTE
 def check_cutoff(cutoff: float, rate: float, samples: int) -> None:
     """Refuse a cut-off frequency that a signal cannot have.
 
-    Parameters
-    ----------
-    cutoff, rate : float
-        Hz, and samples per second.
+    ``cutoff``, ``rate``: Hz, and samples per second.
     """
     if not 0.0 < cutoff < 0.5 * rate:
         raise ExperimentError(
@@ -141,17 +138,9 @@ def parallel_filter(values: Array, decimation: int) -> Array:
     Filtering both sides of a linear regression alike leaves its solution unbiased and its residual uncorrelated
     above the retained band (M. Gautier, "Dynamic identification of robots with power model", ICRA 1997).
 
-    Parameters
-    ----------
-    values : ndarray, shape (N,) or (N, k)
-        Uniformly sampled columns.
-    decimation : int
-        1 keeps every sample and filters nothing.
-
-    Returns
-    -------
-    ndarray, shape (ceil(N / decimation),) or (ceil(N / decimation), k)
-        Sample ``j`` stands at the time of sample ``j * decimation``.
+    - ``values``: shape (N,) or (N, k), uniformly sampled columns
+    - ``decimation``: 1 keeps every sample and filters nothing
+    - result: ``ceil(N / decimation)`` rows; row ``j`` stands at the time of sample ``j * decimation``
 
     Raises
     ------
@@ -204,19 +193,11 @@ def interpolation_gain(share: Array, *, smooth: bool) -> Array:
 def interpolate(time: Array, values: Array, at: Array, *, smooth: bool) -> Array:
     """Values of a signal at other times of the record.
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        Increasing, s.
-    values : ndarray, shape (N,) or (N, C)
-    at : ndarray, shape (M,)
-        s, within `time`.
-    smooth : bool
-        Cubic spline through all samples (motion); otherwise straight lines (commands, which jump).
-
-    Returns
-    -------
-    ndarray, shape (M,) or (M, C)
+    - ``time``: shape (N,), increasing, s
+    - ``values``: shape (N,) or (N, C)
+    - ``at``: shape (M,), s, within `time`
+    - ``smooth``: cubic spline through all samples (motion); otherwise straight lines (commands, which jump)
+    - result: shape (M,) or (M, C)
     """
     from scipy.interpolate import make_interp_spline
 

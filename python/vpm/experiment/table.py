@@ -48,14 +48,9 @@ def read_header(path: str | PathLike[str]) -> Dialect:
 def read_table(path: str | PathLike[str], dialect: Dialect, wanted: Sequence[str], clock: str) -> Table:
     """Read columns of numbers of a text file.
 
-    Parameters
-    ----------
-    path : path-like
-        Text: a line of column names, then numbers. Blank lines do not count.
-    wanted : sequence of str
-        Columns to read; others may hold anything.
-    clock : str
-        Column of the time among them: numbers, or dates.
+    - ``path``: text: a line of column names, then numbers. Blank lines do not count.
+    - ``wanted``: columns to read; others may hold anything
+    - ``clock``: column of the time among them: numbers, or dates
 
     Raises
     ------

@@ -55,11 +55,8 @@ def own_residual(
 ) -> Own | None:
     """Closed-loop predictions' residual: what ``data`` leaves of simulations of ``model`` itself.
 
-    Returns
-    -------
-    Own or None
-        None where the model does not stay by its records, where cylinders stand beside other drives, or drives with
-        states of their own beside joints that nobody measured.
+    Result: None where the model does not stay by its records, where cylinders stand beside other drives, or drives with
+    states of their own beside joints that nobody measured.
     """
     how = settings or OwnSimulation()
     hidden = any(tuple(model.joints) != tuple(m.joints) for m in data.motions)
@@ -258,10 +255,8 @@ def noise_of(
 ) -> Noise:
     """Noise of the records for closed-loop predictions, as a fitted model understands them.
 
-    Parameters
-    ----------
-    quiet : sequence of Experiment
-        The records as the model would have written them without noise: what these leave no drive is to blame for.
+    ``quiet``: the records as the model would have written them without noise: what these leave no drive is to blame
+    for.
     """
     same, names = data.on(data.experiments), compared(data)
     instruments = np.array(

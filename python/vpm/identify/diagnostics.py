@@ -65,14 +65,9 @@ def remarks(
 ) -> list[str]:
     """Diagnostics of a fit's parameters, as sentences.
 
-    Parameters
-    ----------
-    limits : mapping
-        Bounds of the parameters that rest on one.
-    others : int
-        Unknowns beside the parameters, such as first states.
-    reasons : mapping of str to str, optional
-        Why data see nothing of a parameter, where more is known than that.
+    - ``limits``: bounds of the parameters that rest on one
+    - ``others``: unknowns beside the parameters, such as first states
+    - ``reasons``: why data see nothing of a parameter, where more is known than that
     """
     names, correlation = fit.names, fit.correlation
     told = []

@@ -64,14 +64,9 @@ def fit_problem(
 ) -> Found:
     """Engine of a fit: free parameters, and first states if the problem has them.
 
-    Parameters
-    ----------
-    tolerance : float
-        Relative change of parameters or cost at which to stop.
-    begin : ndarray, shape (p,), optional
-        Parameters to begin with, in place of the starts of ``fitting``.
-    executor : Executor or callable, optional
-        Descends from the starts, see `vpm.tasks.Tasks`; threads do if not given.
+    - ``tolerance``: relative change of parameters or cost at which to stop
+    - ``begin``: shape (p,), parameters to begin with, in place of the starts of ``fitting``
+    - ``executor``: descends from the starts, see `vpm.tasks.Tasks`; threads do if not given
     """
     bounds = limits(model, free, fitting.bounds)
     objective = Objective(model, data, free, bounds, fitting, progress)
@@ -176,10 +171,7 @@ def onward(
 ) -> Descent:
     """Descend with the engine from a point of ``objective``, or of ``evaluate``, with coordinate scales.
 
-    Parameters
-    ----------
-    evaluate : callable, optional
-        Gives the points in place of the objective.
+    ``evaluate``: gives the points in place of the objective.
     """
     p = len(objective.columns)
     lengths = column_lengths(first.jacobian)

@@ -81,17 +81,8 @@ def told_intervals(found: Sequence[Profile | Bootstrap]) -> list[str]:
 def write_fit(fit: Fit, folder: Path, lines: Sequence[str] = ()) -> list[Path]:
     """Export ``model.toml``, ``parameters.csv``, ``report.md``, ``fit.npz`` and, with extra ``plot``, ``fit.png``.
 
-    Parameters
-    ----------
-    folder : Path
-        Made if it is not there.
-    lines : sequence of str
-        What was told of the fit, for the report.
-
-    Returns
-    -------
-    list of Path
-        What was written.
+    ``folder``: made if it is not there; ``lines``: what was told of the fit, for the report.
+    Result: what was written.
     """
     make_folder(folder)
     write_text(folder / "report.md", _report(fit, lines))

@@ -177,15 +177,10 @@ def _residual(model: Model, data: BegunAnywhere, rows: Rows | bool = True) -> Ar
 def matters(model: Model, data: BegunAnywhere, residual: Array, jacobian: Array, checks: Checks) -> bool:
     """Whether first states other than the supposed ones explain what no parameter does, and enough of it to be seen.
 
-    Parameters
-    ----------
-    model : Model
-        As fitted.
-    residual : ndarray, shape (n,)
-    jacobian : ndarray, shape (n, p)
-        By the parameters.
-    checks : Checks
-        ``begun`` is the probability of a yes where the supposed ones are right.
+    - ``model``: as fitted
+    - ``residual``: shape (n,)
+    - ``jacobian``: shape (n, p), by the parameters
+    - ``checks``: ``begun`` is the probability of a yes where the supposed ones are right
     """
     slopes = first_state_derivative(model, data)
     if not slopes.shape[1] or not np.all(np.isfinite(residual)):
@@ -204,17 +199,8 @@ def first_state_slopes(
 ) -> dict[int, Array]:
     """Derivative of the first state by parameters, for those that move it.
 
-    Parameters
-    ----------
-    begin : callable
-        First state (nx,) at parameters.
-    fixed : sequence of int
-        States that nothing moves, because they are known or fitted.
-
-    Returns
-    -------
-    dict
-        ``{place in columns: derivative (nx,)}``.
+    ``begin``: first state (nx,) at parameters; ``fixed``: states that nothing moves, because they are known or fitted.
+    Result: ``{place in columns: derivative (nx,)}``.
     """
     found = {}
     for k, column in enumerate(columns):
@@ -233,13 +219,9 @@ def add_first_state(
 ) -> None:
     """Add what the first state does to outputs (n, channels) to their derivative (n, channels, k), in place.
 
-    Parameters
-    ----------
-    state : ndarray, shape (nx,)
-    slopes : dict
-        Of `first_state_slopes`.
-    theta : ndarray, shape (k,)
-        Parameters in question, for the size of the difference.
+    - ``state``: shape (nx,)
+    - ``slopes``: of `first_state_slopes`
+    - ``theta``: shape (k,), parameters in question, for the size of the difference
     """
     for k, slope in slopes.items():
         step = OF_PARAMETER * (abs(theta[k]) or 1.0)

@@ -168,12 +168,8 @@ def fit_of(
 ) -> Fit:
     """Fit result of an estimate, with names, units and records.
 
-    Parameters
-    ----------
-    before : ndarray
-        Residual of the model that the fit is to be compared with.
-    ties : mapping of str to str, optional
-        Parameters that take the value of another.
+    - ``before``: residual of the model that the fit is to be compared with
+    - ``ties``: parameters that take the value of another
     """
     values = dict(zip(result.names, map(float, result.values), strict=True))
     shared = {follower: values.get(leader, model.parameters[leader].value) for follower, leader in (ties or {}).items()}

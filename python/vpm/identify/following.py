@@ -135,16 +135,10 @@ class Following:
     ) -> Pair:
         """Filtered values (n, k) of a following part and their derivative (n, k, columns).
 
-        Parameters
-        ----------
-        theta : ndarray, shape (P,)
-            Of the whole machine.
-        columns : sequence of int
-            Its parameters to differentiate by.
-        more : hashable, optional
-            All else that the answer depends on.
-        origin : ndarray, shape (P,), optional
-            The answer is taken from the tangent at these values, not worked out at ``theta``.
+        - ``theta``: shape (P,), of the whole machine
+        - ``columns``: its parameters to differentiate by
+        - ``more``: all else that the answer depends on
+        - ``origin``: shape (P,), the answer is taken from the tangent at these values, not worked out at ``theta``
         """
         values, names = theta[part.places], part.model.parameter_names
         start = values if origin is None else np.where(part.felt, origin[part.places], values)
@@ -210,15 +204,8 @@ def gauge_gains(model: Model, experiments: Sequence[Experiment], position: Array
     With the joints held, a gauge sees the modes by their shares of its compliance, ``(C phi)^2 / omega^2`` at shapes of
     modal mass one. Alone it gives the one with the largest share the damping ratio `DAMPING_RATIO`.
 
-    Parameters
-    ----------
-    position : ndarray, shape (joints,)
-        Of all joints, m or rad.
-
-    Returns
-    -------
-    dict
-        Gains in J s by gauge.
+    ``position``: shape (joints,), of all joints, m or rad.
+    Result: gains in J s by gauge.
     """
     logged = [name for name in model.gauges if all(f"{name}.strain" in e for e in experiments)]
     joints, count = len(model.joints), len(model.coordinates)

@@ -70,10 +70,7 @@ def column_lengths(jacobian: Array) -> Array:
 def least_step(jacobian: Array, residual: Array, tolerance: float = 1e-10) -> Array:
     """Step of least squares (p,) along what is identifiable: relative singular values above ``tolerance``.
 
-    Parameters
-    ----------
-    jacobian : ndarray, shape (n, p)
-    residual : ndarray, shape (n,)
+    ``jacobian``: shape (n, p); ``residual``: shape (n,).
     """
     if not jacobian.shape[1]:
         return np.zeros(0)
@@ -86,11 +83,7 @@ def unseen_combinations(
 ) -> tuple[Combination, ...]:
     """Unidentifiable directions of the parameters: relative singular values below ``tolerance``.
 
-    Parameters
-    ----------
-    jacobian : ndarray, shape (n, p)
-    names : sequence of str
-        One for each column.
+    ``jacobian``: shape (n, p); ``names``: one for each column.
     """
     if jacobian.shape[1] == 0:
         return ()
@@ -142,11 +135,7 @@ def is_alias(column: Array, others: Span, residual: Array) -> bool:
     A constant load and a weight that hardly turns are nearly the same column; what differs may still be just what the
     residual asks for, and then they are two effects.
 
-    Parameters
-    ----------
-    column : ndarray, shape (n,)
-    residual : ndarray, shape (n,)
-        What is left to explain.
+    ``column``: shape (n,); ``residual``: shape (n,), what is left to explain.
     """
     share = others.share(column)
     if share <= ALIAS_SHARE or others.basis.shape[1] == 0:
@@ -219,14 +208,10 @@ class Base:
 def find_base(columns: Array, *, tolerance: float = RANK_TOLERANCE, prefer: Sequence[int] = ()) -> Base:
     """Identifiable base of a regressor: rank by singular values, independent columns by QR factorisation.
 
-    Parameters
-    ----------
-    columns : ndarray, shape (n, p)
-    tolerance : float
-        Relative singular value, with columns of equal length, below which a direction counts as none.
-    prefer : sequence of int
-        Columns to be kept where there is a choice, the first of them first; without it those that are least like
-        each other (QR with column pivoting: G. Golub and C. Van Loan, *Matrix Computations*, 4th ed., 5.4).
+    - ``columns``: shape (n, p)
+    - ``tolerance``: relative singular value, with columns of equal length, below which a direction counts as none
+    - ``prefer``: columns to be kept where there is a choice, the first of them first; without it those that are least
+      like each other (QR with column pivoting: G. Golub and C. Van Loan, *Matrix Computations*, 4th ed., 5.4).
     """
     lengths = column_lengths(columns)
     norms = np.linalg.norm(columns, axis=0)

@@ -109,12 +109,9 @@ def score_covariance(regressor: Array, residual: Array, records: Sequence[slice]
     Yule-Walker equations; the innovations of the channels may resemble each other. Its spectra weigh the regressor's
     Fourier transform, ``sum_f X(f)^H S(f) X(f)`` (P. Stoica, R. Moses, *Spectral Analysis of Signals*, 2005, 3.4).
 
-    Parameters
-    ----------
-    regressor : ndarray, shape (N, n, k)
-    residual : ndarray, shape (N, n)
-    records : sequence of slice
-        Correlation is not carried over from one to the next.
+    - ``regressor``: shape (N, n, k)
+    - ``residual``: shape (N, n)
+    - ``records``: correlation is not carried over from one to the next
     """
     channels = residual.shape[1]
     models = [autoregression(residual[:, c], records) for c in range(channels)]
@@ -147,10 +144,7 @@ def score_covariance(regressor: Array, residual: Array, records: Sequence[slice]
 def effective_samples(white: Array, robust: Array, rows: int) -> float:
     """Effective number of equations in an inertial solution under autocorrelated noise.
 
-    Parameters
-    ----------
-    white, robust : ndarray, shape (k,)
-        Variances of the estimates, were the noise independent, and as they are.
+    ``white``, ``robust``: shape (k,), variances of the estimates, were the noise independent, and as they are.
     """
     ratio = np.where(robust > 0.0, white / np.where(robust > 0.0, robust, 1.0), 1.0)
     return float(rows * min(1.0, np.exp(np.mean(np.log(np.maximum(ratio, 1e-12)))))) if ratio.size else float(rows)

@@ -240,10 +240,8 @@ class InverseDynamicsProblem(BegunAnywhere):
     def added(self, efforts: Sequence[Array]) -> Array:
         """Part of the inverse-dynamics residual (n, k) that given efforts add.
 
-        Parameters
-        ----------
-        efforts : sequence of ndarray, shape (N, joints, k)
-            At the measured joints along each record, applied minus required; k of them side by side.
+        ``efforts``: each of shape (N, joints, k), at the measured joints along each record, applied minus required; k
+        of them side by side.
         """
         records = []
         for m, values in zip(self.motions, efforts, strict=True):

@@ -56,10 +56,7 @@ class Coordinates:
 def real_bodies(model: Model, free: Sequence[str], low: Array, high: Array) -> tuple[Coordinates, Array, Array]:
     """Coordinates of free parameters in a box, with those of moments of inertia inside what bodies can have.
 
-    Parameters
-    ----------
-    low, high : ndarray, shape (p,)
-        Bounds of the parameters.
+    ``low``, ``high``: shape (p,), bounds of the parameters.
 
     Returns
     -------

@@ -141,12 +141,9 @@ class Objective:
 def losses_and_weights(residual: Array, loss: str, scale: float) -> tuple[Array, Array]:
     """Loss of each residual in the objective, in units of noise, and its weight.
 
-    Parameters
-    ----------
-    residual : ndarray, shape (n,)
-    loss : {"squares", "huber", "soft_l1"}
-    scale : float
-        Residual beyond which the loss grows more slowly than the square.
+    - ``residual``: shape (n,)
+    - ``loss``: one of "squares", "huber", "soft_l1"
+    - ``scale``: residual beyond which the loss grows more slowly than the square
     """
     if loss == "squares":
         return residual**2, np.ones_like(residual)

@@ -239,10 +239,7 @@ def offset_blocks(data: Problem) -> tuple[Block, ...]:
 def with_offsets(fit: Fit, data: Problem, weights: Array) -> Fit:
     """Output-error fit with sensor offsets and their deviations.
 
-    Parameters
-    ----------
-    weights : ndarray, shape (n,)
-        With which rows went into the fit.
+    ``weights``: shape (n,), with which rows went into the fit.
     """
     off = offset_blocks(data)
     if not off:

@@ -134,10 +134,7 @@ def tied(data: Problem, ties: Mapping[str, str]) -> Problem:
 def check_ties(model: Model, ties: Mapping[str, str], free: Sequence[str]) -> None:
     """Refuse ties of a problem that have no single meaning.
 
-    Parameters
-    ----------
-    ties : mapping of str to str
-        Following parameter to the one whose value it takes.
+    ``ties``: following parameter to the one whose value it takes.
     """
     for follower, leader in ties.items():
         for name in (follower, leader):

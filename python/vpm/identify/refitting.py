@@ -33,11 +33,7 @@ UNKNOWN, UNSETTLED = "unknown", "unsettled"
 def beside_first_states(model: Model, data: Problem, ties: Mapping[str, str]) -> Problem:
     """Problem to refit beside first states of unmeasured motion; others as they are.
 
-    Parameters
-    ----------
-    model : Model
-        At whose values these are the likeliest.
-    ties : mapping of str to str
+    ``model``: at whose values these are the likeliest.
     """
     plain = untied(data)
     if not isinstance(plain, InverseDynamicsProblem) or not np.any(plain.open_states(model)[0]):

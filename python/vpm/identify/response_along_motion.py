@@ -128,20 +128,14 @@ def respond(
 ) -> Response:
     """Response of a machine to a measured motion and to its commands.
 
-    Parameters
-    ----------
-    model : Model
-        May have joints that ``m`` does not hold: nobody measured them, and they move freely.
-    theta : ndarray, shape (P,)
-    experiment : Experiment
-        Tells what drives held at the beginning.
-    channels : sequence of str
-        Outputs to give, see `shown_channels`; the same in all calls with one ``known``.
-    known : Following, optional
-        How the record is followed, and what was answered to it before. With it, all is given as it is compared:
-        filtered, and only at the samples that the filter retains.
-    origin : ndarray, shape (P,), optional
-        How links bend or what drives do is taken from the tangent at these values, not worked out at ``theta``.
+    - ``model``: may have joints that ``m`` does not hold: nobody measured them, and they move freely
+    - ``theta``: shape (P,)
+    - ``experiment``: tells what drives held at the beginning
+    - ``channels``: outputs to give, see `shown_channels`; the same in all calls with one ``known``
+    - ``known``: how the record is followed, and what was answered to it before. With it, all is given as it is
+      compared: filtered, and only at the samples that the filter retains.
+    - ``origin``: shape (P,), how links bend or what drives do is taken from the tangent at these values, not worked out
+      at ``theta``
     """
     from vpm._core import Diverged
 

@@ -129,12 +129,7 @@ def _widened(standing: NDArray[np.bool_], m: Motion) -> NDArray[np.bool_]:
 def at_stops(model: Model, experiment: Experiment, m: Motion) -> Mapping[str, NDArray[np.bool_]]:
     """Sample mask (N,) for each hydraulic actuator: where its piston is at an end of its stroke or beyond.
 
-    Parameters
-    ----------
-    experiment : Experiment
-        Holds the position of every joint as it was read.
-    m : Motion
-        The same, filtered.
+    ``experiment``: holds the position of every joint as it was read; ``m``: the same, filtered.
     """
     found = {}
     for name, measured, filtered in _lengths(model, experiment, m):

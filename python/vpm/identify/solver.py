@@ -71,14 +71,9 @@ def descend(
 ) -> Descent:
     """Solver: least sum of losses inside a box.
 
-    Parameters
-    ----------
-    evaluate : callable
-        The point at coordinates (n,); its cost is infinite where there is none.
-    tolerance : float
-        Relative change of the coordinates or of the cost at which to stop.
-    cost : callable, optional
-        The cost alone, where that takes less time than a point: points are then evaluated where it falls.
+    - ``evaluate``: the point at coordinates (n,); its cost is infinite where there is none
+    - ``tolerance``: relative change of the coordinates or of the cost at which to stop
+    - ``cost``: the cost alone, where that takes less time than a point: points are then evaluated where it falls
     """
     at, count, damping, ended = start, 0, DAMPING, "evaluations"
     try:

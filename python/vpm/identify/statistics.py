@@ -32,9 +32,7 @@ def correlation_length(residual: Array) -> int:
 
     The first lag at which the autocorrelation stays below the 95 % band of white noise, at most a tenth of the record.
 
-    Parameters
-    ----------
-    residual : ndarray, shape (n,)
+    ``residual``: shape (n,).
     """
     n = residual.size
     centred = residual - residual.mean()
@@ -57,17 +55,10 @@ def robust_covariance(jacobian: Array, residual: Array, segments: Iterable[slice
     The sandwich ``B S B`` with ``B = (J'J)^-1`` and ``S`` the Bartlett-weighted sum of the score autocovariances
     (W. Newey and K. West, *Econometrica* 55, 1987), summed over the records of the fit.
 
-    Parameters
-    ----------
-    jacobian : ndarray, shape (n, p)
-        Derivative of the residual by the parameters, of full column rank.
-    residual : ndarray, shape (n,)
-    segments : iterable of slice
-        One contiguous record each; correlation is not carried over from one to the next.
-
-    Returns
-    -------
-    ndarray, shape (p, p)
+    - ``jacobian``: shape (n, p), derivative of the residual by the parameters, of full column rank
+    - ``residual``: shape (n,)
+    - ``segments``: one contiguous record each; correlation is not carried over from one to the next
+    - result: shape (p, p)
     """
     bread = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
     meat = np.zeros_like(bread)
@@ -128,11 +119,7 @@ def gain(before: Array, after: Array, segments: Sequence[slice]) -> Gain:
     ``before = weight (before - after) + rest``: the test of forecast encompassing (D. Harvey, S. Leybourne, P. Newbold,
     *J. Business & Economic Statistics* 16, 1998), with the standard deviation of :func:`robust_covariance`.
 
-    Parameters
-    ----------
-    before, after : ndarray, shape (n,)
-    segments : sequence of slice
-        The records, in the order of the samples.
+    ``before``, ``after``: shape (n,); ``segments``: the records, in the order of the samples.
     """
     change = before - after
     power = float(change @ change)
@@ -170,18 +157,11 @@ def sandwich(jacobian: Array, residual: Array, groups: Sequence[Sequence[slice]]
     and J. Monahan, *Econometrica* 60, 1992). Residuals are divided by the share that the fit leaves of each (HC3: J.
     MacKinnon and H. White, *J. Econometrics* 29, 1985).
 
-    Parameters
-    ----------
-    jacobian : ndarray, shape (n, p)
-    residual : ndarray, shape (n,)
-    groups : sequence of sequence of slice
-        Slices of one length each whose rows belong to the same times; see `record_groups`.
-    exact : sequence of int
-        Rows that are as large as their deviation says: independent, and not corrected.
-
-    Returns
-    -------
-    ndarray, shape (p, p)
+    - ``jacobian``: shape (n, p)
+    - ``residual``: shape (n,)
+    - ``groups``: slices of one length each whose rows belong to the same times; see `record_groups`
+    - ``exact``: rows that are as large as their deviation says: independent, and not corrected
+    - result: shape (p, p)
     """
     lengths = column_lengths(jacobian)
     bread, scores = _bread_and_scores(jacobian / lengths, residual, exact)
@@ -246,14 +226,9 @@ def pooled(variance: Array, freedom: Array, drawn: Array, level: float) -> tuple
     freedom, unless Fisher's test says that the log was disturbed by more than the noise: then the sandwich is right (T.
     Bancroft, *Annals of Mathematical Statistics* 15, 1944).
 
-    Parameters
-    ----------
-    variance, freedom : ndarray, shape (p,)
-        Of the sandwich.
-    drawn : ndarray, shape (draws, p)
-        Errors of the estimates.
-    level : float
-        Of the test.
+    - ``variance``, ``freedom``: shape (p,), of the sandwich
+    - ``drawn``: shape (draws, p), errors of the estimates
+    - ``level``: of the test
     """
     draws, by_noise = len(drawn), np.mean(drawn**2, axis=0)
     more = variance > by_noise * fdtri(freedom, draws, 1.0 - level)

@@ -59,13 +59,8 @@ def estimate_on_tangent(
 ) -> Estimate:
     """A fit on one tangent after the other, until where it ends the tangent still holds.
 
-    Parameters
-    ----------
-    origin : ndarray, shape (P,)
-        Where the tangent touches.
-    bounds : mapping
-    worth : Worth, optional
-        A fit of drives that has not reached it after a whole step, nor was to by the tangent, ends there.
+    - ``origin``: shape (P,), where the tangent touches
+    - ``worth``: a fit of drives that has not reached it after a whole step, nor was to by the tangent, ends there
     """
     residual, _ = data.evaluate(model, model.theta)
     cost, at, columns = float(residual @ residual), model, [model.index(name) for name in free]

@@ -69,11 +69,7 @@ def ljung_box(residual: Array, lags: int) -> float:
     ``Q = n (n + 2) sum_k r_k^2 / (n - k)`` is chi-square with ``lags`` degrees of freedom for white noise (G. Ljung and
     G. Box, *Biometrika* 65, 1978).
 
-    Parameters
-    ----------
-    residual : ndarray, shape (n,)
-    lags : int
-        Less than n.
+    ``residual``: shape (n,); ``lags``: less than n.
     """
     n, centred = residual.size, residual - residual.mean()
     power = float(centred @ centred)
@@ -89,14 +85,10 @@ def explained_by(residual: Array, fitted: Array, added: Array, counts: NDArray[n
 
     Residual and regressors pass the whitening filter of the residual's own autoregression before they are compared.
 
-    Parameters
-    ----------
-    residual : ndarray, shape (n,)
-    fitted : ndarray, shape (n, p)
-        Derivative of the residual by what was fitted: what it explains is not counted.
-    added : ndarray, shape (n, k)
-    counts : ndarray of bool, shape (n,)
-        Samples that count.
+    - ``residual``: shape (n,)
+    - ``fitted``: shape (n, p), derivative of the residual by what was fitted: what it explains is not counted
+    - ``added``: shape (n, k)
+    - ``counts``: shape (n,), samples that count
     """
     old = basis(np.where(counts[:, None], fitted, 0.0))
     new = basis(np.where(counts[:, None], added, 0.0), old)
@@ -175,20 +167,13 @@ def heard(late: Array, residual: Array, fitted: Array, counts: NDArray[np.bool_]
     to which its controller answers. It is the sum of forces that were fitted and of that. Where the rest of it is
     quiet, a few shifts of it would leave just that, and explain any residual by themselves.
 
-    Parameters
-    ----------
-    late : ndarray, shape (n, shifts)
-    residual : ndarray, shape (n,)
-    fitted : ndarray, shape (n, p)
-        Derivative of the residual by what was fitted.
-    counts : ndarray of bool, shape (n,)
-    clear : float
-        How many times larger a direction has to be than what those that are leave, per size of the residual's channel.
-
-    Returns
-    -------
-    ndarray, shape (n, k)
-        Without what was fitted.
+    - ``late``: shape (n, shifts)
+    - ``residual``: shape (n,)
+    - ``fitted``: shape (n, p), derivative of the residual by what was fitted
+    - ``counts``: shape (n,)
+    - ``clear``: how many times larger a direction has to be than what those that are leave, per size of the residual's
+      channel
+    - result: shape (n, k), without what was fitted
     """
     old, columns = basis(fitted * counts[:, None]), late * counts[:, None]
     directions, sizes, _ = svd(columns - old @ (old.T @ columns), full_matrices=False)

@@ -17,12 +17,8 @@ _TABLE = TypeAdapter(dict[str, ChannelEntry])
 def parse_channel_table(content: Mapping[str, object], *, path: str | None = None) -> Mapping[str, ChannelEntry]:
     """Check a channel table that was parsed from TOML.
 
-    Parameters
-    ----------
-    content : mapping
-        Channel names (and ``"time"``) to tables; or all of that under the key ``channels``.
-    path : str, optional
-        File that it comes from, for messages.
+    - ``content``: channel names (and ``"time"``) to tables; or all of that under the key ``channels``
+    - ``path``: file that it comes from, for messages
     """
     table = content.get("channels", content) if set(content) == {"channels"} else content
     try:

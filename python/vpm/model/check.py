@@ -35,10 +35,7 @@ def check_document(content: Mapping[str, object], path: str | None = None) -> Ch
 
     The checks come in stages, each of which relies on the ones before: form, tree, references, values.
 
-    Parameters
-    ----------
-    content : mapping
-        As `tomllib` gives it.
+    ``content``: as `tomllib` gives it.
     """
     check_plain(content, path)
     try:
@@ -69,15 +66,8 @@ def check_document(content: Mapping[str, object], path: str | None = None) -> Ch
 def check_effect(checked: Checked, content: Mapping[str, object]) -> Checked | None:
     """Check one effect more of a checked document, and of the rest what reads effects.
 
-    Parameters
-    ----------
-    content : mapping
-        Of the effect, as `tomllib` gives it.
-
-    Returns
-    -------
-    Checked or None
-        None where the effect divides the machine, or where something is wrong: `check_document` tells what.
+    ``content``: of the effect, as `tomllib` gives it.
+    Result: None where the effect divides the machine, or where something is wrong: `check_document` tells what.
     """
     try:
         check_plain(content)

@@ -46,10 +46,7 @@ def described(structure: str, theta: NDArray[np.float64]) -> str:
 def structure_text(checked: Checked) -> str:
     """Compiled description of a model without parameter values, as JSON text.
 
-    Returns
-    -------
-    str
-        Everything that is a parameter is an index into ``parameters``; all numbers are SI.
+    Result: everything that is a parameter is an index into ``parameters``; all numbers are SI.
     """
     index = {name: i for i, name in enumerate(checked.parameters)}
     structure, document = checked.structure, checked.document

@@ -23,14 +23,9 @@ def starting_values(
 ) -> dict[str, Any]:
     """Values of an effect in the content of a model file.
 
-    Parameters
-    ----------
-    at : str
-        Component that it sits at.
-    joint : str
-        Joint that it splits, if it splits one.
-    values : mapping of str to float
-        SI values by short name, as far as they are given.
+    - ``at``: component that it sits at
+    - ``joint``: joint that it splits, if it splits one
+    - ``values``: SI values by short name, as far as they are given
     """
     for short in values:
         effect.parameter(short)

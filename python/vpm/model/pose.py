@@ -72,10 +72,7 @@ def rotation_matrix(roll: float, pitch: float, yaw: float) -> tuple[float, ...]:
 
     Turns about the fixed axes x, y, z in this order (J. Craig, "Introduction to Robotics", 3rd edition, equation 2.64).
 
-    Parameters
-    ----------
-    roll, pitch, yaw : float
-        rad.
+    ``roll``, ``pitch``, ``yaw``: rad.
     """
     cr, sr, cp, sp, cy, sy = (f(angle) for angle in (roll, pitch, yaw) for f in (math.cos, math.sin))
     return (

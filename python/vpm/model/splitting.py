@@ -68,10 +68,7 @@ def flexed(document: Document) -> Document:
 def splitting_problems(document: Document, names: Mapping[str, str]) -> Iterator[Problem]:
     """Two effects that split the same joint, names that are taken, and a motor side without inertia.
 
-    Parameters
-    ----------
-    names : mapping of str to str
-        Last coordinate of the joint of each body that its joint turns.
+    ``names``: last coordinate of the joint of each body that its joint turns.
     """
     split: dict[str, int] = {}
     for position, entry in enumerate(document.effects):

@@ -15,10 +15,7 @@ from vpm.model.schema import Document
 def content_of(document: Document, *, complete: bool = False) -> dict[str, Any]:
     """Content to write that reads back as the same document.
 
-    Parameters
-    ----------
-    complete : bool
-        Keep what stands at its default; else it is left out.
+    ``complete``: keep what stands at its default; else it is left out.
     """
     return _table(document, complete)
 
@@ -60,12 +57,7 @@ WIDEST = 120
 def toml_of(document: Document, remarks: Remarks = MappingProxyType({}), head: Iterable[str] = ()) -> str:
     """Write the text of a model file: one table per component, one line per key.
 
-    Parameters
-    ----------
-    remarks : mapping of tuple of str to str
-        One line each, by place.
-    head : iterable of str
-        Lines that stand above all, as comments.
+    ``remarks``: one line each, by place; ``head``: lines that stand above all, as comments.
     """
     lines = [f"# {line}".rstrip() for line in head]
     return "\n".join([*lines, *_lines(content_of(document), remarks)]) + "\n"

@@ -118,12 +118,7 @@ class OutputErrors:
     def search(self, x: Array, ratios: Array) -> Array:
         """Search of a Maxwell problem over relaxation times, with the best k1 of each; the maps stay.
 
-        Parameters
-        ----------
-        x : ndarray
-            k1 and tau in it are not used.
-        ratios : ndarray
-            ``tau / h`` to be tried.
+        ``x``: k1 and tau in it are not used; ``ratios``: ``tau / h`` to be tried.
         """
         step, best, least = self.records[0].step, x.copy(), np.inf
         for ratio in ratios:

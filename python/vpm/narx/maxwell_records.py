@@ -49,13 +49,9 @@ def element_samples(
 ) -> list[Samples]:
     """Records of an element as arrays.
 
-    Parameters
-    ----------
-    records : Experiment, or mapping of str to array-like, shape (N,), or a sequence of them
-    step : float, optional
-        Time between samples of mappings, which have no clock, s.
-    least : int
-        Fewest samples of a record.
+    - ``records``: each of shape (N,)
+    - ``step``: time between samples of mappings, which have no clock, s
+    - ``least``: fewest samples of a record
     """
     found = [_samples(record, signals, step, f"record {at}", least) for at, record in enumerate(as_list(records))]
     if not found:

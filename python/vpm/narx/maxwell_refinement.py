@@ -77,12 +77,8 @@ def refined(
 ) -> MaxwellFit:
     """Fit of all coefficients over wider bases where it is better than the one it begins from.
 
-    Parameters
-    ----------
-    bases : tuple of two Basis
-        Of k0 and s0, with the terms to fit.
-    degree : int, optional
-        Of both maps; by default the terms of the bases.
+    - ``bases``: of k0 and s0, with the terms to fit
+    - ``degree``: of both maps; by default the terms of the bases
     """
     wide, dropped = widened(samples, bases, signals, degree)
     wide, more_dropped = identifiable_bases(begun.staged, samples, wide)

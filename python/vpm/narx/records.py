@@ -29,11 +29,7 @@ class Series:
 def series(record: RecordLike, output: str, inputs: Sequence[str], name: str = "record") -> Series:
     """Output and inputs of a record by the names of their channels.
 
-    Parameters
-    ----------
-    record : Experiment or mapping of str to array-like, shape (N,)
-    name : str
-        Of a record without a name.
+    ``record``: each of shape (N,); ``name``: of a record without a name.
     """
     names = [output, *inputs]
     known = record.channels if isinstance(record, Experiment) else tuple(record)

@@ -55,18 +55,10 @@ def spread(mesh: Array) -> Array:
 def at_times(mesh: Array, states: Array, times: Array) -> tuple[Array, Array]:
     """States and rates at some times by the collocation polynomials of each interval.
 
-    Parameters
-    ----------
-    mesh : ndarray, shape (K + 1,)
-        s.
-    states : ndarray, shape (STAGES * K + 1, nx)
-        At `spread` of the mesh.
-    times : ndarray, shape (N,)
-        s.
-
-    Returns
-    -------
-    tuple of ndarray, shapes (N, nx)
+    - ``mesh``: shape (K + 1,), s
+    - ``states``: shape (STAGES * K + 1, nx), at `spread` of the mesh
+    - ``times``: shape (N,), s
+    - result: each of shape (N, nx)
     """
     interval = np.clip(np.searchsorted(mesh, times, side="right") - 1, 0, mesh.size - 2)
     width = np.diff(mesh)[interval]

@@ -30,10 +30,7 @@ def plot_parameters(
 ) -> Figure:
     """Draw bars of parameters relative to their start, with 95 % intervals and numbers.
 
-    Parameters
-    ----------
-    values, std, start : array-like, shape (p,)
-        SI. Where a start is zero, the axis shows the value over its own size.
+    ``values``, ``std``, ``start``: shape (p,), SI. Where a start is zero, the axis shows the value over its own size.
     """
     value, sigma, begin = (np.asarray(each, dtype=np.float64) for each in (values, std, start))
     scale = np.where(begin == 0.0, np.where(value == 0.0, 1.0, np.abs(value)), np.abs(begin))
@@ -90,10 +87,7 @@ def plot_gap(gaps: Mapping[str, ChannelGap]) -> Figure:
 def plot_candidates(candidates: Sequence[RankedCandidate]) -> Figure:
     """Draw bars of what candidates of the first round would explain, and did after a refit.
 
-    Parameters
-    ----------
-    candidates : sequence of RankedCandidate
-        The best sixteen are drawn; an accepted one in whichever round it was.
+    ``candidates``: the best sixteen are drawn; an accepted one in whichever round it was.
     """
     from matplotlib.patches import Patch
 
@@ -140,20 +134,12 @@ def plot_ladder(
 ) -> Figure:
     """Draw errors over step times of a simplification, the chosen model marked, logarithmically.
 
-    Parameters
-    ----------
-    seconds : sequence of float
-        s per step.
-    errors : sequence of float
-        Shares of the signal.
-    chosen : int
-        Index of the rung to take.
-    front : sequence of int
-        Indices of those that no other one beats.
-    allowed : float
-        Share of the period that a step may take, s.
-    limit : float
-        Largest error that is allowed.
+    - ``seconds``: s per step
+    - ``errors``: shares of the signal
+    - ``chosen``: index of the rung to take
+    - ``front``: indices of those that no other one beats
+    - ``allowed``: share of the period that a step may take, s
+    - ``limit``: largest error that is allowed
     """
     figure, axes = panels(1, height=3.0)
     axis = axes[0][0]
@@ -179,12 +165,7 @@ def plot_ladder(
 def plot_step_cost(quantiles: Mapping[str, float], period: float) -> Figure:
     """Draw bars of step-time quantiles against the period, on a logarithmic axis.
 
-    Parameters
-    ----------
-    quantiles : mapping of str to float
-        Name of the quantile to seconds.
-    period : float
-        s.
+    ``quantiles``: name of the quantile to seconds; ``period``: s.
     """
     figure, axes = panels(1, height=0.5 + 0.4 * max(1, len(quantiles)))
     axis = axes[0][0]
@@ -219,12 +200,7 @@ def _name_rows(axis: Axes, names: Sequence[str]) -> None:
 def plot_climb(levels: Sequence[Level], top: str) -> Figure:
     """Draw bars of validation errors over the level of detail, and below how each parameter moved.
 
-    Parameters
-    ----------
-    levels : sequence of Level
-        Simplest first.
-    top : str
-        Name of the level at which detail stops to pay.
+    ``levels``: simplest first; ``top``: name of the level at which detail stops to pay.
     """
     figure, axes = panels(2, height=2.4, share_x=True)
     above, below = axes[0][0], axes[1][0]

@@ -29,10 +29,7 @@ BAND = 1.96
 def plot_evidence(evidence: Evidence) -> Figure:
     """Draw the evidence of an effect: the residual without it, the fitted law, and the residual with it.
 
-    Parameters
-    ----------
-    evidence : Evidence
-        Over frequency, both residuals stand in one panel as amplitude densities.
+    ``evidence``: over frequency, both residuals stand in one panel as amplitude densities.
     """
     if evidence.axis == "frequency":
         return _spectra(evidence)
@@ -85,10 +82,7 @@ def law_line(values: Array, law: Array) -> tuple[Array, Array, float]:
 
     No bin reaches over zero, where friction steps: its mean would be a level that the law never has.
 
-    Parameters
-    ----------
-    values, law : ndarray, shape (n,)
-        In the order of ``values``.
+    ``values``, ``law``: shape (n,), in the order of ``values``.
 
     Returns
     -------

@@ -48,10 +48,7 @@ def plot_traces(traces: Sequence[Trace]) -> Figure:
 def plot_joint_over_time(picture: Picture, stages: Mapping[str, Array]) -> Figure:
     """Draw findings at a joint over time: efforts, measured and needed, and residuals below.
 
-    Parameters
-    ----------
-    stages : mapping of str to ndarray, shape (n,)
-        Residuals; NaN, where a sample does not count, leaves a gap.
+    ``stages``: each of shape (n,), residuals; NaN, where a sample does not count, leaves a gap.
     """
     figure, axes = panels(2, height=2.2, share_x=True)
     above, below = axes[0][0], axes[1][0]
@@ -72,9 +69,7 @@ def plot_joint_over_time(picture: Picture, stages: Mapping[str, Array]) -> Figur
 def plot_joint_over_state(picture: Picture, stages: Mapping[str, Array]) -> Figure:
     """Draw findings at a joint: the residual against velocity and position.
 
-    Parameters
-    ----------
-    stages : mapping of str to ndarray, shape (n,)
+    ``stages``: each of shape (n,).
     """
     figure, axes = panels(1, 2, height=3.2, width=11.0)
     unit = picture.coordinate_unit
@@ -96,16 +91,10 @@ def plot_joint_noise(
 ) -> Figure:
     """Draw the findings' remaining noise: correlation with its 95 % band, and spectra of all stages.
 
-    Parameters
-    ----------
-    stages : mapping of str to ndarray, shape (n,)
-        NaN where a sample does not count.
-    correlation : (ndarray, ndarray, ndarray)
-        Lags in s, values, and half the width of the band at each.
-    rate : float
-        Hz.
-    unit : str
-        Of the residual.
+    - ``stages``: each of shape (n,), NaN where a sample does not count
+    - ``correlation``: lags in s, values, and half the width of the band at each
+    - ``rate``: Hz
+    - ``unit``: of the residual
     """
     figure, axes = panels(1, 2, height=3.0, width=11.0)
     draw_correlation(axes[0][0], *correlation, "correlation with its own past")
@@ -126,9 +115,7 @@ def plot_joint_noise(
 def plot_parameter_correlation(names: Sequence[str], correlation: Array) -> Figure:
     """Draw the correlation matrix of fitted parameters among findings.
 
-    Parameters
-    ----------
-    correlation : ndarray, shape (p, p)
+    ``correlation``: shape (p, p).
     """
     figure, axes = panels(1, height=0.8 + 0.34 * len(names), width=min(11.0, 4.4 + 0.55 * len(names)))
     axis = axes[0][0]

@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 def plot_poles(poles: Complex) -> Figure:
     """Draw poles of a linear model in the complex plane; those that grow stand out.
 
-    Parameters
-    ----------
-    poles : ndarray, shape (nx,)
-        1/s.
+    ``poles``: shape (nx,), 1/s.
     """
     figure, ((axes,),) = panels(1, height=3.5)
     grows = poles.real > 0.0
@@ -41,13 +38,9 @@ def plot_poles(poles: Complex) -> Figure:
 def plot_bode(frequencies: Array, response: Complex, inputs: Sequence[str], outputs: Sequence[str]) -> Figure:
     """Draw gain and phase of a linear model over frequency, a line per pair of input and output.
 
-    Parameters
-    ----------
-    frequencies : ndarray, shape (F,)
-        Hz.
-    response : ndarray, shape (F, ny, nu)
-    inputs, outputs : sequence of str
-        Names of the last two axes of `response`.
+    - ``frequencies``: shape (F,), Hz
+    - ``response``: shape (F, ny, nu)
+    - ``inputs``, ``outputs``: names of the last two axes of `response`
     """
     figure, ((upper,), (lower,)) = panels(2, height=2.6, share_x=True)
     pairs = [(row, column) for row in range(len(outputs)) for column in range(len(inputs))]

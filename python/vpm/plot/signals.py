@@ -32,11 +32,7 @@ def plot_channels(
 ) -> Figure:
     """Draw signals: each channel over time in a panel of its own.
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        s.
-    data : ndarray, shape (N, C)
+    ``time``: shape (N,), s; ``data``: shape (N, C).
     """
     figure, axes = panels(max(1, len(channels)), height=1.6, share_x=True)
     for at, (channel, unit) in enumerate(zip(channels, units, strict=True)):
@@ -54,12 +50,7 @@ def plot_innovations(
 ) -> Figure:
     """Draw innovation signals between the bounds that should hold 95 % of them.
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        s.
-    innovations, expected : ndarray, shape (N, C)
-        And their standard deviation.
+    ``time``: shape (N,), s; ``innovations``, ``expected``: shape (N, C), and their standard deviation.
     """
     figure, axes = panels(max(1, len(channels)), height=1.6, share_x=True)
     for at, (channel, unit) in enumerate(zip(channels, units, strict=True)):
@@ -124,13 +115,7 @@ def amplitude_density(values: Array, rate: float, most: int | None = None) -> tu
 def plot_correlation(lags: Array, values: Array, band: float, name: str) -> Figure:
     """Draw a signal's correlation over lags with its 95 % band.
 
-    Parameters
-    ----------
-    lags : ndarray, shape (L,)
-        s.
-    values : ndarray, shape (L,)
-    name : str
-        What is correlated.
+    ``lags``: shape (L,), s; ``values``: shape (L,); ``name``: what is correlated.
     """
     figure, axes = panels(1, height=2.4)
     draw_correlation(axes[0][0], lags, values, band, name)

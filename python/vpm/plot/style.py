@@ -162,15 +162,9 @@ def figure_to_svg(figure: Figure, words: str = "") -> str:
     Figures that are made alike give the same text. Letters are drawn as shapes, so that they look alike everywhere; on
     a page, where there are words beside them, they are letters, which takes a third of the room.
 
-    Parameters
-    ----------
-    words : str
-        What is to be seen, for those who do not see it.
-
-    Returns
-    -------
-    str
-        ``<svg ...> ... </svg>`` without the XML declaration; names inside are told apart from those of other figures.
+    ``words``: what is to be seen, for those who do not see it.
+    Result: ``<svg ...> ... </svg>`` without the XML declaration; names inside are told apart from those of other
+    figures.
     """
     from matplotlib import rc_context
 
@@ -191,11 +185,9 @@ def figure_to_svg(figure: Figure, words: str = "") -> str:
 def thinned(time: Array, *columns: Array) -> tuple[Array, ...]:
     """Thinned points in the common style: the least and the largest of each stretch.
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-    *columns : ndarray, shape (N,)
-        Thinned alike, each stretch at the extremes of each of the columns; a gap, NaN, stays one.
+    - ``time``: shape (N,)
+    - ``*columns``: shape (N,), thinned alike, each stretch at the extremes of each of the columns; a gap, NaN, stays
+      one
     """
     if time.size <= MOST_POINTS or not columns:
         return (time, *columns)

@@ -34,10 +34,7 @@ class CSource:
     def entries(self, what: str, by: str) -> list[tuple[int, int]]:
         """Nonzero entries of a derivative in the C source, column by column.
 
-        Parameters
-        ----------
-        what : {"rates", "outputs"}
-        by : {"x", "u", "p"}
+        ``what``: one of "rates", "outputs"; ``by``: one of "x", "u", "p".
         """
         # The tables are CasADi's: rows, columns, where each column begins and the last ends, the row of each entry.
         table = re.search(rf"{self.name}_{what}_by_{by}\[\] = \{{([^}}]*)\}};", self.source)

@@ -89,10 +89,7 @@ def reduce_structure(structure: Structure, modes: int = 8) -> Reduction:
     All constraint modes of the interfaces and as many fixed-interface modes as are asked for make the basis; of its own
     modes, with the root held, the slowest are kept.
 
-    Parameters
-    ----------
-    modes : int
-        How many modes to keep, 1 to 64.
+    ``modes``: how many modes to keep, 1 to 64.
 
     Raises
     ------

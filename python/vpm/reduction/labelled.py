@@ -51,10 +51,7 @@ class Labelled:
 def read_labelled(path: Path, initial: str) -> Labelled | None:
     """Read a labelled matrix, or None where a file has no labels.
 
-    Parameters
-    ----------
-    initial : str
-        Letter with which the name of the matrix begins, where a file holds several: K or M.
+    ``initial``: letter with which the name of the matrix begins, where a file holds several: K or M.
     """
     text = _text(path)
     if re.search(r"^DMIG[*, ]", text, re.MULTILINE):

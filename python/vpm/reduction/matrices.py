@@ -15,13 +15,9 @@ from vpm.reduction.structure import Matrix
 def read_matrix(path: Path, *, triangle: bool = False) -> Matrix:
     """Read a sparse matrix of finite elements from a file.
 
-    Parameters
-    ----------
-    path : pathlib.Path
-        MatrixMarket (``.mtx``), ``.npz`` of `scipy.sparse.save_npz`, ``.npy``, or lines ``row column value`` from 1 on,
-        as Abaqus (``FORMAT=COORDINATE``) and CalculiX (``.sti``, ``.mas``) write them.
-    triangle : bool
-        Only one triangle of a symmetric matrix is in the file.
+    - ``path``: MatrixMarket (``.mtx``), ``.npz`` of `scipy.sparse.save_npz`, ``.npy``, or lines ``row column value``
+      from 1 on, as Abaqus (``FORMAT=COORDINATE``) and CalculiX (``.sti``, ``.mas``) write them
+    - ``triangle``: only one triangle of a symmetric matrix is in the file
     """
     try:
         matrix = _read(path)

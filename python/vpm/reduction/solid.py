@@ -33,12 +33,7 @@ _LARGEST = 200_000
 def box_mesh(size: tuple[float, ...], elements: tuple[int, ...]) -> Mesh:
     """Mesh of a box-shaped solid: hexahedra from x, y = -half to half its sizes, and from z = 0.
 
-    Parameters
-    ----------
-    size : tuple of float
-        Along x, y and z (m).
-    elements : tuple of int
-        Along x, y and z.
+    ``size``: along x, y and z (m); ``elements``: along x, y and z.
     """
     fem = finite_elements()
     (width, height, length), (a, b, c) = size, elements
@@ -53,10 +48,7 @@ def box_mesh(size: tuple[float, ...], elements: tuple[int, ...]) -> Mesh:
 def read_mesh(path: Path, scale: float) -> Mesh:
     """Mesh of a solid from a file that meshio reads: Abaqus and CalculiX, Nastran, Gmsh, VTK.
 
-    Parameters
-    ----------
-    scale : float
-        Length of its unit (m).
+    ``scale``: length of its unit (m).
     """
     fem, _ = finite_elements(), finite_elements("meshio")
     if not path.is_file():
@@ -82,14 +74,9 @@ def solid(
 ) -> Structure:
     """Matrices of a solid, with quadratic displacements in its elements.
 
-    Parameters
-    ----------
-    mesh : skfem.Mesh
-        Tetrahedra or hexahedra, in m.
-    interfaces : callable
-        From the places of the nodes, shape (N, 3), to the interfaces.
-    young, poisson, density : float
-        SI.
+    - ``mesh``: tetrahedra or hexahedra, in m
+    - ``interfaces``: from the places of the nodes, shape (N, 3), to the interfaces
+    - ``young``, ``poisson``, ``density``: SI
     """
     fem, tensors = finite_elements(), finite_elements("skfem.helpers")
     element = fem.ElementHex2() if isinstance(mesh, fem.MeshHex1) else fem.ElementTetP2()

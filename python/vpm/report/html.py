@@ -62,10 +62,7 @@ def report(diagnosis: Diagnosis, ladder: Ladder | None = None) -> Report:
 def render_html(diagnosis: Diagnosis, ladder: Ladder | None = None) -> str:
     """Render the report as one HTML page.
 
-    Returns
-    -------
-    str
-        A complete HTML document, which is well-formed XML too.
+    Result: a complete HTML document, which is well-formed XML too.
     """
     with needs("jinja2", "report"):
         from jinja2 import Environment

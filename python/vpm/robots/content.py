@@ -271,12 +271,8 @@ def put_ties(draft: Draft, tree: Tree, moved_by: Mapping[str, float], frequency:
     spring k and a damper d let an inertia m swing at w = sqrt(k/m), with the damping ratio d/(2 m w): 1 here
     (L. Meirovitch, "Fundamentals of Vibrations", 2001, section 2.2).
 
-    Parameters
-    ----------
-    moved_by : mapping of str to float
-        What each shaft moves where all coordinates are zero (kg m^2), by follower.
-    frequency : float
-        At which a tie swings, Hz.
+    - ``moved_by``: what each shaft moves where all coordinates are zero (kg m^2), by follower
+    - ``frequency``: at which a tie swings, Hz
     """
     for joint, mimic in followers(tree):
         tie, rate = draft.joints[f"{joint.name} tie"], 2.0 * math.pi * frequency

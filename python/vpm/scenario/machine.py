@@ -17,10 +17,7 @@ from vpm.scenario.schema import Given, RunEntry, si_value
 def machines(entries: tuple[RunEntry, ...], folder: Path) -> Mapping[str, Model]:
     """Model of each run, by the name of the run; a file that several runs name is read once.
 
-    Parameters
-    ----------
-    folder : pathlib.Path
-        Folder of the scenario file, from where the paths of model files lead.
+    ``folder``: folder of the scenario file, from where the paths of model files lead.
 
     Raises
     ------

@@ -16,22 +16,12 @@ SLACK = 1e-6
 def sine(time: Array, mean: float, amplitude: float, frequency: float, phase: float = 0.0, start: float = 0.0) -> Array:
     """Signal ``mean + amplitude sin(2 pi frequency (t - start) + phase)``; before ``start`` as at ``start``.
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        s.
-    mean, amplitude : float
-        In the unit of the channel.
-    frequency : float
-        Hz.
-    phase : float
-        rad.
-    start : float
-        s.
-
-    Returns
-    -------
-    ndarray, shape (N,)
+    - ``time``: shape (N,), s
+    - ``mean``, ``amplitude``: in the unit of the channel
+    - ``frequency``: Hz
+    - ``phase``: rad
+    - ``start``: s
+    - result: shape (N,)
     """
     running = np.maximum(time - start, 0.0)
     return np.asarray(mean + amplitude * np.sin(2.0 * np.pi * frequency * running + phase))
@@ -65,19 +55,11 @@ def points(time: Array, at: Array, value: Array, time_step: float) -> Array:
     Points at the same time are a jump; the value behind it holds from there on, also for a sample that misses the
     jump by rounding.
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        s.
-    at : ndarray, shape (P,)
-        Times of the points, not decreasing, s.
-    value : ndarray, shape (P,)
-    time_step : float
-        Time between samples, s.
-
-    Returns
-    -------
-    ndarray, shape (N,)
+    - ``time``: shape (N,), s
+    - ``at``: shape (P,), times of the points, not decreasing, s
+    - ``value``: shape (P,)
+    - ``time_step``: time between samples, s
+    - result: shape (N,)
     """
     after = np.searchsorted(at, time + SLACK * time_step, side="right")
     before = np.clip(after - 1, 0, len(at) - 1)

@@ -21,12 +21,7 @@ def start_state(document: Document, owner: str, model: Model, inputs: Mapping[st
     deflected as in their equilibrium there, and drives are as in a machine that has stood there without commands, its
     logged supplies at their first pressure.
 
-    Parameters
-    ----------
-    owner : str
-        What to call the machine in messages.
-    inputs : mapping of str to ndarray
-        What the scenario gives, by channel.
+    ``owner``: what to call the machine in messages; ``inputs``: what the scenario gives, by channel.
     """
     names = model.state_names
     state = np.zeros(len(names))
@@ -73,10 +68,7 @@ def held_inputs(model: Model, state: Array, given: Collection[str]) -> Mapping[s
 
     A reference holds what its controller measures at the beginning, a pressure is that of the model file.
 
-    Returns
-    -------
-    mapping of str to (float, str)
-        Channel to its value (SI) and to a sentence that says so.
+    Result: channel to its value (SI) and to a sentence that says so.
     """
     return {**_held_references(model, state, given), **_kept_pressures(model, given)}
 

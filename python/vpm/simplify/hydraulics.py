@@ -30,10 +30,7 @@ def possible_changes(model: Model, drive: str) -> tuple[str, ...]:
 def simpler(model: Model, drive: str, change: str) -> Model:
     """Model with a simpler hydraulic servo-cylinder that has fewer states.
 
-    Parameters
-    ----------
-    change : str
-        One of `SIMPLER`.
+    ``change``: one of `SIMPLER`.
     """
     content = model.to_dict()
     entry = content["actuators"][drive]

@@ -105,10 +105,7 @@ class Judge:
 def steps_per_sample(records: Sequence[Experiment], rate: float) -> int:
     """Steps of the controller between two samples of the records that judge.
 
-    Parameters
-    ----------
-    rate : float
-        Hz.
+    ``rate``: Hz.
     """
     counts = {round(record.dt * rate, 6) for record in records}
     for record in records:
@@ -124,13 +121,9 @@ def steps_per_sample(records: Sequence[Experiment], rate: float) -> int:
 def by_the_model(model: Model, experiment: Experiment, mode: str, rate: float, channels: Sequence[str]) -> Experiment:
     """Record to judge by, with what the full model does in the place of what was measured.
 
-    Parameters
-    ----------
-    experiment : Experiment
-        Its commands or references count.
-    mode : {"free_run", "closed_loop"}
-    rate : float
-        Hz; the full model takes twice as many steps, at least.
+    - ``experiment``: its commands or references count
+    - ``mode``: one of "free_run", "closed_loop"
+    - ``rate``: Hz; the full model takes twice as many steps, at least
     """
     if mode not in ("free_run", "closed_loop"):
         raise SimulationError(
@@ -155,9 +148,7 @@ def shown(model: Model) -> tuple[str, ...]:
 def reference_mode(model: Model, experiments: Sequence[Experiment], against: str, mode: str | None) -> str:
     """Mode to judge in: what was asked for, or the one that says most.
 
-    Parameters
-    ----------
-    against : {"data", "model"}
+    ``against``: one of "data", "model".
     """
     if mode is not None:
         return mode

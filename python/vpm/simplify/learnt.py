@@ -46,11 +46,7 @@ FAILED = 1e2
 def maxwell_entry(records: Sequence[Record], step: float) -> Entry | None:
     """Learnt Maxwell NARX element as an actuator; None where no degree gives one.
 
-    Parameters
-    ----------
-    records : sequence of mapping of str to ndarray, shape (N,)
-    step : float
-        Between samples, s.
+    ``records``: each of shape (N,); ``step``: between samples, s.
     """
     found = _chosen(records, MAXWELL_DEGREES, lambda some, degree: _maxwell(some, step, degree), _maxwell_gap)
     if found is None:
@@ -62,13 +58,9 @@ def maxwell_entry(records: Sequence[Record], step: float) -> Entry | None:
 def narx_entry(records: Sequence[Record], step: float, channels: Mapping[str, str]) -> Entry | None:
     """Learnt polynomial NARX model as an actuator; None where no degree gives one.
 
-    Parameters
-    ----------
-    records : sequence of mapping of str to ndarray, shape (N,)
-    step : float
-        Between samples, s.
-    channels : mapping of str to str
-        Channel of the model file for ``drive``, ``length`` and ``rate``.
+    - ``records``: each of shape (N,)
+    - ``step``: between samples, s
+    - ``channels``: channel of the model file for ``drive``, ``length`` and ``rate``
     """
     found = _chosen([_pushing(each) for each in records], NARX_DEGREES, _narx, _narx_gap)
     if found is None:
@@ -173,13 +165,10 @@ def trained(
 ) -> Replacement:
     """Learnt element with coefficients with which the machine moves most like the full one.
 
-    Parameters
-    ----------
-    element : Replacement
-        A NARX model, where the search begins; it stays what it is where the machine cannot be simulated with it.
-    mode : {"free_run", "closed_loop"}
-    channels : sequence of str, optional
-        What is compared; by default all that the records hold.
+    - ``element``: a NARX model, where the search begins; it stays what it is where the machine cannot be simulated with
+      it
+    - ``mode``: one of "free_run", "closed_loop"
+    - ``channels``: what is compared; by default all that the records hold
     """
     entry: dict[str, Any] = json.loads(element.entry)
     names, start = list(entry["terms"]), np.array(list(entry["terms"].values()))

@@ -106,15 +106,8 @@ VELOCITY_TERMS, COUPLING_TERMS = (Reduction("terms", name, MACHINE) for name in 
 def reductions(model: Model, learnt: Sequence[Reduction] = ()) -> dict[tuple[str, str], tuple[Reduction, ...]]:
     """Reductions of a model that are possible, by site.
 
-    Parameters
-    ----------
-    learnt : sequence of Reduction
-        More of them, which records tell: `vpm.simplify.surrogates`.
-
-    Returns
-    -------
-    dict
-        Those of which the reduced model is a valid one. Levels of a link come finest first.
+    ``learnt``: more of them, which records tell: `vpm.simplify.surrogates`.
+    Result: those of which the reduced model is a valid one. Levels of a link come finest first.
     """
     found: dict[tuple[str, str], tuple[Reduction, ...]] = {}
     for reduction in (*_imaginable(model), *learnt):
@@ -126,10 +119,7 @@ def reductions(model: Model, learnt: Sequence[Reduction] = ()) -> dict[tuple[str
 def reduced(model: Model, changes: Sequence[Reduction]) -> Model:
     """Model with several reductions done.
 
-    Parameters
-    ----------
-    changes : sequence of Reduction
-        At most one of each site.
+    ``changes``: at most one of each site.
 
     Raises
     ------

@@ -43,10 +43,7 @@ def replaced(model: Model, drive: str, entry: str) -> Model:
     A table gets the commands of the controller. What is no table stands for the controller too, and its command is the
     reference.
 
-    Parameters
-    ----------
-    entry : str
-        The other drive as JSON, without the joint or line that it acts on.
+    ``entry``: the other drive as JSON, without the joint or line that it acts on.
     """
     content, other = model.to_dict(), json.loads(entry)
     place = {key: value for key, value in content["actuators"][drive].items() if key in ("joint", "line")}

@@ -45,14 +45,9 @@ def surrogates(
 ) -> tuple[Reduction, ...]:
     """Elements and a table for each servo-cylinder that they can be found for.
 
-    Parameters
-    ----------
-    mode : str
-        Sampled drives run in free runs and closed loops only.
-    rate : float
-        Samples of the element in a second, Hz.
-    channels : sequence of str, optional
-        What is to come out right; by default all that the records hold.
+    - ``mode``: sampled drives run in free runs and closed loops only
+    - ``rate``: samples of the element in a second, Hz
+    - ``channels``: what is to come out right; by default all that the records hold
     """
     drives = hydraulic_drives(model)
     if not drives or mode not in ("free_run", "closed_loop"):
@@ -117,12 +112,8 @@ def tables(
 
     Where its valve has no clearance, that one is taken with which the quasi-static drive moves most like the full one.
 
-    Parameters
-    ----------
-    taught : sequence of mapping of str to ndarray, shape (N,)
-        What it does on the records to learn from.
-    runs : callable
-        What another model does on these.
+    - ``taught``: each of shape (N,), what it does on the records to learn from
+    - ``runs``: what another model does on these
     """
     return tuple(_read(model, taught, runs))
 
@@ -187,17 +178,8 @@ def _axis(reach: float, count: int) -> Array:
 def force_map(model: Model, drive: str, commands: Array, velocities: Array) -> Array:
     """Force table of a servo-cylinder with a static spool and quasi-static pressures at mid-stroke.
 
-    Parameters
-    ----------
-    commands : ndarray, shape (n,)
-        SI.
-    velocities : ndarray, shape (m,)
-        m/s.
-
-    Returns
-    -------
-    ndarray, shape (n, m)
-        N, the friction of the seals in it.
+    ``commands``: shape (n,), SI; ``velocities``: shape (m,), m/s.
+    Result: shape (n, m), N, the friction of the seals in it.
     """
     rig = _rig(model, drive)
     grid = np.array([(u, v) for u in commands for v in velocities])

@@ -58,11 +58,7 @@ def removable(model: Model) -> Iterator[tuple[str, str]]:
 def without_terms(model: Model, name: str, at: str) -> Model:
     """Model without some of its terms.
 
-    Parameters
-    ----------
-    name : {"velocity", "coupling", "second-order"}
-    at : str
-        Parts with commas between them, or `MACHINE`.
+    ``name``: one of "velocity", "coupling", "second-order"; ``at``: parts with commas between them, or `MACHINE`.
     """
     content = model.to_dict()
     parts = at.split(", ")
@@ -113,11 +109,7 @@ def _moving(content: Mapping[str, Any]) -> dict[str, Any]:
 def motions(model: Model, records: Sequence[Experiment], mode: str, setup: Setup) -> list[Motion]:
     """Motions of a model along records, over which shares of terms are computed.
 
-    Parameters
-    ----------
-    records : sequence of Experiment
-        Their commands or references drive the model.
-    mode : {"free_run", "closed_loop"}
+    ``records``: their commands or references drive the model; ``mode``: one of "free_run", "closed_loop".
     """
     return [_motion(model, record, mode, setup) for record in records]
 
@@ -129,15 +121,8 @@ def effort_share(model: Model, reduced: Model, along: Sequence[Motion]) -> float
     out, V the Coriolis and centrifugal terms, I inertia times acceleration, R weight, effects and what elastic links
     take. Along a motion the share of single states says little: it is all wherever accelerations change sign.
 
-    Parameters
-    ----------
-    model, reduced : Model
-        Of the same coordinates.
-
-    Returns
-    -------
-    float
-        Between 0 and 1 for a part of V or I.
+    ``model``, ``reduced``: of the same coordinates.
+    Result: between 0 and 1 for a part of V or I.
     """
     joints, found = len(model.joints), []
     for motion in along:
@@ -171,19 +156,11 @@ def ranked(
 ) -> tuple[tuple[Reduction, ...], float]:
     """Sets of parts to do without the same terms: the part that needs them least first, then the next one as well.
 
-    Parameters
-    ----------
-    changes : sequence of Reduction
-        Of single parts, the last of the whole machine.
-    share : callable
-        Of a reduced model.
-    limit : float
-        Largest share that is worth a trial.
-
-    Returns
-    -------
-    tuple of Reduction, float
-        The sets within the limit, the smallest first, none if the machine has no such terms; the share of the machine.
+    - ``changes``: of single parts, the last of the whole machine
+    - ``share``: of a reduced model
+    - ``limit``: largest share that is worth a trial
+    - result: the sets within the limit, the smallest first, none if the machine has no such terms; the share of the
+      machine
     """
     *single, whole = changes
     of_machine = share(whole.applied(model))
@@ -206,10 +183,7 @@ def parts(model: Model, q: Array, v: Array, a: Array) -> Array:
 
     Joints that move along a line are weighed as if a metre were a radian.
 
-    Parameters
-    ----------
-    q, v, a : ndarray, shape (N, n)
-        Coordinates, rates and accelerations.
+    ``q``, ``v``, ``a``: shape (N, n), coordinates, rates and accelerations.
     """
     joints = len(model.joints)
     rest = _efforts(without_terms(model, "velocity", MACHINE), (q, v, a))[:, :joints]

@@ -114,10 +114,7 @@ class Trials:
         None where the changes contradict each other, where no fit can simulate the model, or where no way is quick
         enough to matter.
 
-        Parameters
-        ----------
-        below : float
-            Coarse time of a period (s) from which on the model is not fitted.
+        ``below``: coarse time of a period (s) from which on the model is not fitted.
         """
         key, changes = frozenset(changes), _in_order(changes)
         if key not in self._rungs:
@@ -142,10 +139,7 @@ class Trials:
 
         All end before anything is timed. A trial takes such a fit if its own would begin with the same values.
 
-        Parameters
-        ----------
-        below : float
-            As for `attempt`.
+        ``below``: as for `attempt`.
         """
         if self._executor is None:
             return

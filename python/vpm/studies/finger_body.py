@@ -39,12 +39,8 @@ class Finger:
     def body(self, fineness: int, *, pole: float = 0.0) -> SoftBody:
         """Finger as a body of finite elements.
 
-        Parameters
-        ----------
-        fineness : int
-            Layers of elements through the epidermis; 12 times as many lie around the quarter.
-        pole : float
-            From 0 (even) to below 1: how much smaller elements get towards the pole.
+        - ``fineness``: layers of elements through the epidermis; 12 times as many lie around the quarter
+        - ``pole``: from 0 (even) to below 1: how much smaller elements get towards the pole
         """
         cuts = [self.bone, self.radius - self.epidermis - self.dermis, self.radius - self.epidermis, self.radius]
         if min(np.diff(cuts)) <= 0.0 or self.bone <= 0.0:
@@ -90,14 +86,9 @@ def _quarter(depth: Array, angle: Array, cuts: Array, materials: Sequence[Materi
 def block(height: float, contact: float, material: Material, fineness: int) -> SoftBody:
     """Flat layer to compare with the finger's body, elements small where it is touched.
 
-    Parameters
-    ----------
-    height : float
-        m; three times as wide.
-    contact : float
-        Radius in which elements are smallest, m.
-    fineness : int
-        Quarter of the elements within `contact`.
+    - ``height``: m; three times as wide
+    - ``contact``: radius in which elements are smallest, m
+    - ``fineness``: quarter of the elements within `contact`
     """
     skfem = finite_elements()
     check_fineness(fineness)

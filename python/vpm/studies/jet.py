@@ -48,9 +48,7 @@ class Jet:
 def variables(values: Array) -> list[Jet]:
     """Variables as jets, whose own derivatives are one and whose second ones are zero.
 
-    Parameters
-    ----------
-    values : ndarray, shape (n, ...)
+    ``values``: shape (n, ...).
     """
     count, shape = len(values), values.shape[1:]
     unit = np.eye(count).reshape(count, count, *(1,) * len(shape))

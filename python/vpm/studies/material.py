@@ -58,10 +58,7 @@ class Material:
     def isochoric(self, strain: Array) -> Jet:
         """Energy of shape of a material, with derivatives.
 
-        Parameters
-        ----------
-        strain : ndarray, shape (5, ...)
-            a, b, c, d and e of the gradient.
+        ``strain``: shape (5, ...), a, b, c, d and e of the gradient.
         """
         first, second, volume = invariants(strain)
         x = first * volume.power(-2.0 / 3.0) - 3.0

@@ -24,12 +24,7 @@ def curves(
 ) -> Figure:
     """Picture of curves over one axis.
 
-    Parameters
-    ----------
-    x, y : (str, str)
-        Quantity and unit.
-    logarithmic : bool
-        Both axes.
+    ``x``, ``y``: quantity and unit; ``logarithmic``: both axes.
     """
     figure, ((axes,),) = panels(1, height=3.4)
     for number, (name, across, up, mark) in enumerate(lines):
@@ -47,15 +42,10 @@ def field(
 ) -> Figure:
     """Picture of values on the faces of a mesh in a plane.
 
-    Parameters
-    ----------
-    corners : ndarray, shape (2, N)
-        mm.
-    faces : ndarray of int, shape (4, M)
-        Corners of each quadrilateral, in turn.
-    values : ndarray, shape (M,)
-    axes : (str, str)
-        Names of the two directions.
+    - ``corners``: shape (2, N), mm
+    - ``faces``: shape (4, M), corners of each quadrilateral, in turn
+    - ``values``: shape (M,)
+    - ``axes``: names of the two directions
     """
     from matplotlib.collections import PolyCollection
 

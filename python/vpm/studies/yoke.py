@@ -84,10 +84,7 @@ class Yoke:
     def mesh(self, fineness: int) -> tuple[MeshHex2, Any, Any]:
         """Mesh of the yoke: bricks, held faces, and those under the pad.
 
-        Parameters
-        ----------
-        fineness : int
-            Bricks through the thickness.
+        ``fineness``: bricks through the thickness.
         """
         ends, counts = self.lengths(), np.array([4, 4, 1, 2]) * fineness
         half = np.concatenate([np.linspace(a, b, n + 1)[:-1] for a, b, n in zip(ends, ends[1:], counts, strict=False)])

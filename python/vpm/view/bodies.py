@@ -23,12 +23,7 @@ def box_of(mass: float, inertia: Array) -> tuple[Array, Array] | None:
     A box of sides a, b, c has ``I_a = m (b^2 + c^2)/12`` about the direction of a, so ``a^2 = 6 (I_b + I_c - I_a)/m``.
     A side that vanishes, as of a thin rod, gets the thickness of as much aluminium as weighs the mass.
 
-    Parameters
-    ----------
-    mass : float
-        kg.
-    inertia : ndarray, shape (3, 3)
-        About the centre of mass (kg m^2).
+    ``mass``: kg; ``inertia``: shape (3, 3), about the centre of mass (kg m^2).
 
     Returns
     -------

@@ -37,13 +37,9 @@ class Course:
 def course_of(model: Model, source: Run | ScenarioRun | Experiment | None, mode: str | None = None) -> Course:
     """Course of a run, or of a log after a simulation; without either the machine at zero.
 
-    Parameters
-    ----------
-    source : Run, ScenarioRun, Experiment or None
-        Of a scenario the first run whose model it is.
-    mode : str, optional
-        How a log is simulated: by default ``free_run`` on its commands, ``closed_loop`` on references,
-        or ``prescribed_motion`` with neither.
+    - ``source``: of a scenario the first run whose model it is
+    - ``mode``: how a log is simulated: by default ``free_run`` on its commands, ``closed_loop`` on references, or
+      ``prescribed_motion`` with neither
 
     Raises
     ------

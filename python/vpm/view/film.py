@@ -41,10 +41,7 @@ SHORT = 5.0
 def draw(scene: Scene, sample: int, *, dark: bool = False, size: tuple[int, int] = (WIDTH, HEIGHT)) -> Figure:
     """Draw one picture of a film.
 
-    Parameters
-    ----------
-    size : tuple of int
-        Pixels across and up.
+    ``size``: pixels across and up.
 
     Raises
     ------
@@ -118,12 +115,9 @@ def write_film(
 ) -> Path:
     """Write the film of a scene.
 
-    Parameters
-    ----------
-    path : path-like
-        MP4, MKV or GIF, by its ending.
-    speed : float, optional
-        Seconds of the machine in a second of film; by default 1, or as slow that a short motion takes `SHORT` seconds.
+    - ``path``: MP4, MKV or GIF, by its ending
+    - ``speed``: seconds of the machine in a second of film; by default 1, or as slow that a short motion takes `SHORT`
+      seconds
     """
     target = Path(path)
     if target.suffix.lower() not in ENDINGS:

@@ -53,10 +53,7 @@ class Frames:
     def poses(self, coordinates: Array) -> tuple[Array, Array]:
         """Origins and axes of all drawn frames along a motion.
 
-        Parameters
-        ----------
-        coordinates : ndarray, shape (N, n)
-            Of joints and flexible links.
+        ``coordinates``: shape (N, n), of joints and flexible links.
 
         Returns
         -------

@@ -38,15 +38,8 @@ class Camera:
     def project(self, points: Array) -> Array:
         """Places of points in the picture of a camera.
 
-        Parameters
-        ----------
-        points : ndarray, shape (..., 3)
-            m, in the world.
-
-        Returns
-        -------
-        ndarray, shape (..., 3)
-            From -1 at the left and at the bottom to 1, and the distance before the eye (m).
+        ``points``: shape (..., 3), m, in the world.
+        Result: shape (..., 3), from -1 at the left and at the bottom to 1, and the distance before the eye (m).
         """
         seen = (points - self.eye) @ self.axes.T
         depth = np.maximum(-seen[..., 2], 1e-9)
@@ -162,12 +155,8 @@ class Scene:
     def camera(self, aspect: float, *, room: float = 1.0) -> Camera:
         """First camera of a scene.
 
-        Parameters
-        ----------
-        aspect : float
-            Width of the picture over its height.
-        room : float
-            Share of the picture's height that the machine may fill, the rest being for words.
+        - ``aspect``: width of the picture over its height
+        - ``room``: share of the picture's height that the machine may fill, the rest being for words
         """
         centre, radius = self.bounds
         return Camera.about(centre, radius, self.front, self.up, aspect, room)

@@ -64,12 +64,8 @@ def _send(out: BinaryIO, answer: Answer) -> None:
 def serve(module: str, name: str, path: str, seconds: int, space: int) -> None:
     """Answer requests in the child process until there are no more.
 
-    Parameters
-    ----------
-    module, name : str
-        Class of the reader.
-    seconds, space : int
-        Limits of processor time, s, and of address space, bytes.
+    - ``module``, ``name``: class of the reader
+    - ``seconds``, ``space``: limits of processor time, s, and of address space, bytes
     """
     # What libraries print goes nowhere; answers have the pipe for themselves.
     out = os.fdopen(os.dup(1), "wb")

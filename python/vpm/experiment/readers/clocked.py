@@ -92,10 +92,7 @@ def readable_unit(unit: str) -> bool:
 def broken(path: str | PathLike[str], kind: str, error: Exception | str) -> ExperimentError:
     """Error for a file of clocked groups that its parser does not take.
 
-    Parameters
-    ----------
-    kind : str
-        As ``"a TDMS file"``.
+    ``kind``: as ``"a TDMS file"``.
     """
     told = str(error).strip().splitlines()
     reason = (told[0] if told else type(error).__name__)[:200]

@@ -184,10 +184,7 @@ def _check_records(file: MDF) -> None:
 def _without_formulas(file: MDF) -> dict[_Place, Any]:
     """MDF channels without formulas: the library may run what they say as Python.
 
-    Returns
-    -------
-    dict
-        The conversion of each channel that has one, itself or within a table.
+    Result: the conversion of each channel that has one, itself or within a table.
     """
     found = {}
     groups: list[Any] = list(file.groups)

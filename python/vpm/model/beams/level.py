@@ -97,11 +97,7 @@ class Level:
 def parse_level(text: str) -> Level:
     """Level of detail of a beam from its text.
 
-    Parameters
-    ----------
-    text : str
-        ``"rigid"``, or a name with a number: ``"bezier(3)"``.
-
+    ``text``: ``"rigid"``, or a name with a number: ``"bezier(3)"``.
     """
     found = _WRITTEN.fullmatch(text)
     name = found["name"] if found else text.partition("(")[0].strip()

@@ -43,15 +43,10 @@ def rest(model: Evaluations, theta: Array, coordinates: Array) -> Array:
 def follow(model: Evaluations, theta: Array, internal: Array, inputs: Array, velocity: Array) -> None:
     """Let states of lags, spools and currents settle on held commands, in place.
 
-    Parameters
-    ----------
-    theta : ndarray, shape (P,)
-    internal : ndarray
-        In the order of ``model.internal_names``.
-    inputs : ndarray, shape (nu,)
-        In the order of ``model.inputs``.
-    velocity : ndarray, shape (joints,)
-        m/s or rad/s.
+    - ``theta``: shape (P,)
+    - ``internal``: in the order of ``model.internal_names``
+    - ``inputs``: shape (nu,), in the order of ``model.inputs``
+    - ``velocity``: shape (joints,), m/s or rad/s
     """
 
     def value(name: str) -> float:
@@ -84,18 +79,8 @@ def _turning(model: Evaluations, theta: Array, motor: str, velocity: Array) -> f
 def commanded_states(model: Evaluations, theta: Array, inputs: Array, dt: float) -> dict[str, Array]:
     """States of lags and spools at every sample of a record, which begins with them settled.
 
-    Parameters
-    ----------
-    theta : ndarray, shape (P,)
-    inputs : ndarray, shape (N, nu)
-        In the order of ``model.inputs``.
-    dt : float
-        s.
-
-    Returns
-    -------
-    dict of str to ndarray, shape (N,)
-        By name of the state, as in ``model.internal_names``.
+    ``theta``: shape (P,); ``inputs``: shape (N, nu), in the order of ``model.inputs``; ``dt``: s.
+    Result: each of shape (N,), by name of the state, as in ``model.internal_names``.
     """
 
     def value(name: str, missing: float) -> float:

@@ -65,11 +65,7 @@ class Table(Drive):
 def beyond(name: str, axis: tuple[float, ...], values: Array, unit: str, time: Array) -> str | None:
     """Sentence on where a run left an axis of a table, if it did.
 
-    Parameters
-    ----------
-    name : str
-        Channel.
-    values, time : ndarray, shape (N,)
+    ``name``: channel; ``values``, ``time``: shape (N,).
     """
     outside = np.maximum(axis[0] - values, values - axis[-1])
     worst = int(np.argmax(outside))

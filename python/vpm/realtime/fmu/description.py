@@ -21,12 +21,9 @@ def model_description(
 ) -> str:
     """``modelDescription.xml``, by the standard FMI 3.0.2, section 2.4.
 
-    Parameters
-    ----------
-    name, identifier, token, tool : str
-        Names of the model and of its files, the hash of all that the FMU computes, and what wrote it.
-    period, step : float
-        Time between communication points that the FMU suggests, and the longest of its own steps, s.
+    - ``name``, ``identifier``, ``token``, ``tool``: names of the model and of its files, the hash of all that the FMU
+      computes, and what wrote it
+    - ``period``, ``step``: time between communication points that the FMU suggests, and the longest of its own steps, s
     """
     root = ET.Element(
         "fmiModelDescription",

@@ -53,10 +53,7 @@ class Variables:
 def variables(model: Model, written: CSource, start: NDArray[np.float64]) -> Variables:
     """List the variables of a model that was written in C.
 
-    Parameters
-    ----------
-    start : ndarray, shape (nx,)
-        State to begin in.
+    ``start``: shape (nx,), state to begin in.
     """
     nu, nx, ny = len(model.inputs), len(model.state_names), len(model.output_channels)
     first_state = 1 + nu

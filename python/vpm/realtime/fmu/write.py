@@ -239,12 +239,7 @@ def platform_name() -> tuple[str, str] | None:
 def shared_library(sources: dict[str, str], files: list[str]) -> bytes:
     """Compile sources into an FMU's binary, a shared library.
 
-    Parameters
-    ----------
-    sources : dict of str to str
-        Texts by file name.
-    files : list of str
-        Which of them are compiled.
+    ``sources``: texts by file name; ``files``: which of them are compiled.
     """
     command = compiler()
     if command is None:

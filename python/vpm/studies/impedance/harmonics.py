@@ -26,15 +26,7 @@ def basis(time: Array, frequency: float, count: int) -> Array:
 def fourier(time: Array, values: Array, frequency: float, count: int, drift: int) -> Series:
     """Harmonics of a periodic channel: a Fourier series fitted beside a polynomial drift.
 
-    Parameters
-    ----------
-    time, values : ndarray, shape (N,)
-    frequency : float
-        Hz.
-    count : int
-        Harmonics.
-    drift : int
-        Degree of the polynomial.
+    ``time``, ``values``: shape (N,); ``frequency``: Hz; ``count``: harmonics; ``drift``: degree of the polynomial.
     """
     waves = basis(time, frequency, count)
     scaled = 2.0 * (time - time[0]) / (time[-1] - time[0]) - 1.0

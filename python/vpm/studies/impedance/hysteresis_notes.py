@@ -19,16 +19,10 @@ WORTH = 0.05
 def loop_notes(loop: Loop, displacement: Array, step: float, delay_std: float, explained: float) -> tuple[str, ...]:
     """Notes on a hysteresis loop, to know before its numbers are trusted.
 
-    Parameters
-    ----------
-    displacement : ndarray, shape (N,)
-        As recorded, m.
-    step : float
-        Time between samples, s.
-    delay_std : float
-        s; zero if nothing was said about it.
-    explained : float
-        Share of the displacement's variance that the Fourier series has.
+    - ``displacement``: shape (N,), as recorded, m
+    - ``step``: time between samples, s
+    - ``delay_std``: s; zero if nothing was said about it
+    - ``explained``: share of the displacement's variance that the Fourier series has
     """
     notes = []
     if loop.stiffness < 0.0 and loop.energy < 0.0:

@@ -12,16 +12,9 @@ from vpm.numbers import Array
 def rowwise(question: Callable[..., Array], *tables: ArrayLike, what: str) -> Array:
     """Ask the core about arrays of two numbers a row; a single row gives a single answer.
 
-    Parameters
-    ----------
-    question : callable
-        Takes as many tables (N, 2) as are given.
-    *tables : array_like, shape (2,) or (N, 2)
-        Single rows are repeated where others are tables.
-
-    Returns
-    -------
-    ndarray, shape (...) or (N, ...)
+    - ``question``: takes as many tables (N, 2) as are given
+    - ``*tables``: shape (2,) or (N, 2), single rows are repeated where others are tables
+    - result: shape (...) or (N, ...)
     """
     arrays = [np.asarray(table, dtype=float) for table in tables]
     for array in arrays:

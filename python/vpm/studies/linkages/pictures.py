@@ -18,10 +18,7 @@ if TYPE_CHECKING:
 def plot_limbs(elbows: Array, tips: Array, names: Sequence[str]) -> Figure:
     """Draw linkages with two bodies as lines from the origin.
 
-    Parameters
-    ----------
-    elbows, tips : ndarray, shape (N, 2)
-        In m.
+    ``elbows``, ``tips``: shape (N, 2), in m.
     """
     figure, [[axes]] = panels(1, height=4.5, width=6.0)
     for elbow, tip, name in zip(elbows, tips, names, strict=True):
@@ -40,14 +37,9 @@ def plot_stroke_workspace(
 ) -> Figure:
     """Draw a linkage's reach by two strokes, and its angles and transmission to the singular strokes.
 
-    Parameters
-    ----------
-    strokes : (ndarray, ndarray), shape (N,) and (M,)
-        In m.
-    angles, tips, transmission : ndarray, shape (N, M, 2)
-        In rad, m and rad/m.
-    singular : sequence of ndarray
-        Singular strokes of each actuator (m).
+    - ``strokes``: shape (N,) and (M,), in m
+    - ``angles``, ``tips``, ``transmission``: shape (N, M, 2), in rad, m and rad/m
+    - ``singular``: singular strokes of each actuator (m)
     """
     figure, rows = panels(1, 3, height=3.6, width=13.0)
     reach, turn, ratio = rows[0]
@@ -86,10 +78,7 @@ def _filled(table: Array) -> int:
 def plot_strokes(angles: Array, strokes: Array, levers: Array, names: Sequence[str]) -> Figure:
     """Draw lengths and lever arms of a linkage's cylinders over joint angles.
 
-    Parameters
-    ----------
-    angles, strokes, levers : ndarray, shape (N, K)
-        In rad, m and m/rad.
+    ``angles``, ``strokes``, ``levers``: shape (N, K), in rad, m and m/rad.
     """
     figure, rows = panels(2, len(names), width=9.0, share_x=True)
     for k, name in enumerate(names):
@@ -107,12 +96,7 @@ def plot_strokes(angles: Array, strokes: Array, levers: Array, names: Sequence[s
 def plot_shares(first: Array, second: Array, maps: Mapping[str, Array], title: str) -> Figure:
     """Draw shares of the effort in a linkage over two joint angles.
 
-    Parameters
-    ----------
-    first, second : ndarray, shape (R,) and (C,)
-        Joint angles (rad).
-    maps : mapping of str to ndarray, shape (R, C)
-        Fractions.
+    ``first``, ``second``: shape (R,) and (C,), joint angles (rad); ``maps``: each of shape (R, C), fractions.
     """
     figure, rows = panels(1, len(maps), height=3.4, width=12.0)
     for axes, (name, table) in zip(rows[0], maps.items(), strict=True):

@@ -10,12 +10,7 @@ from vpm.numbers import Array
 def static_regressors(force: ArrayLike, length: ArrayLike, step: float) -> tuple[Array, Array]:
     """Printed regressors ``s[k], F[k-1] / (2 h), 1`` and forces ``F[k+1]`` of D'Imperio (2016), eq 5.56.
 
-    Parameters
-    ----------
-    force, length : array-like, shape (N,)
-        N and m.
-    step : float
-        h, s.
+    ``force``, ``length``: shape (N,), N and m; ``step``: h, s.
 
     Returns
     -------

@@ -14,10 +14,7 @@ def smoothed(one: Samples, cutoff: float | None) -> Samples:
     The length is the input of the element: its noise, times ``k0 + k1``, is not white noise of the force, and makes k1
     too small. The force is left as it is, so that its own noise stays white.
 
-    Parameters
-    ----------
-    cutoff : float, optional
-        Hz, well above the motion.
+    ``cutoff``: Hz, well above the motion.
     """
     if cutoff is None:
         return one

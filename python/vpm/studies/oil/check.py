@@ -64,12 +64,8 @@ def check_choices(both: bool, force: bool, balance: str, estimator: str, extra: 
 def check_record(time: ArrayLike, geometry: CylinderGeometry, channels: Mapping[str, ArrayLike]) -> Channels:
     """Check an oil record's columns: one length, or one sentence about the first that cannot be right.
 
-    Parameters
-    ----------
-    time : array-like, shape (N,)
-        s.
-    channels : mapping of str to array-like
-        Numbers stand for constant channels; SI.
+    - ``time``: shape (N,), s
+    - ``channels``: numbers stand for constant channels; SI
     """
     instants = np.asarray(time, dtype=np.float64).ravel()
     if instants.size < FEWEST:

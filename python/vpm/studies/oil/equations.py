@@ -109,16 +109,11 @@ def pressures_from_force(
 ) -> tuple[Array, Array]:
     """Both oil pressures of a cylinder from its force and a rule that the valve is thought to keep.
 
-    Parameters
-    ----------
-    force, opening : ndarray, shape (N,)
-        N; opening of the valve in any unit, of which the sign counts.
-    supply, tank : ndarray, shape (N,)
-        Pa.
-    rule : {"steady", "symmetric"}
-        ``"steady"``: the flow into one side drives the flow out of the other, in the ratio of the areas, so that
-        ``pa + pb/alpha^2 = ps + pt/alpha^2`` outwards and ``pa alpha^2 + pb = ps + pt alpha^2`` inwards.
-        ``"symmetric"``: ``pa + pb = ps + pt``, D'Imperio (2016), 5.41, which is so only for equal areas.
+    - ``force``, ``opening``: shape (N,), N; opening of the valve in any unit, of which the sign counts
+    - ``supply``, ``tank``: shape (N,), Pa
+    - ``rule``: ``"steady"``: the flow into one side drives the flow out of the other, in the ratio of the areas, so
+      that ``pa + pb/alpha^2 = ps + pt/alpha^2`` outwards and ``pa alpha^2 + pb = ps + pt alpha^2`` inwards.
+      ``"symmetric"``: ``pa + pb = ps + pt``, D'Imperio (2016), 5.41, which is so only for equal areas.
 
     Returns
     -------
@@ -165,14 +160,9 @@ def balances(
 ) -> tuple[Equation, ...]:
     """Oil balances of both chambers, or that of the force.
 
-    Parameters
-    ----------
-    position, opening : ndarray, shape (N,)
-        m from mid-stroke; unit of the command.
-    pressures, ports : tuple of two ndarray, shape (N,)
-        Of sides a and b, and of supply and tank, Pa.
-    force : ndarray, shape (N,), optional
-        N; with it the one balance of the force, without it those of both chambers.
+    - ``position``, ``opening``: shape (N,), m from mid-stroke; unit of the command
+    - ``pressures``, ``ports``: each of shape (N,), of sides a and b, and of supply and tank, Pa
+    - ``force``: shape (N,), N; with it the one balance of the force, without it those of both chambers
     """
     (pa, pb), (ps, pt), alpha = pressures, ports, geometry.area_ratio
     va, vb = geometry.volumes(position)
@@ -209,16 +199,11 @@ def _air(pressure: Array) -> Array:
 def through_spool(command: Array, dt: float, spool: tuple[float, float], *, held: bool = False) -> Array:
     """Spool place behind its command by second-order equations, exactly.
 
-    Parameters
-    ----------
-    command : ndarray, shape (N,)
-    dt : float
-        s.
-    spool : tuple of float
-        Natural frequency (rad/s) and damping ratio.
-    held : bool
-        Whether each sample is held until the next, as a digital controller does; else they are joined by straight
-        lines.
+    - ``command``: shape (N,)
+    - ``dt``: s
+    - ``spool``: natural frequency (rad/s) and damping ratio
+    - ``held``: whether each sample is held until the next, as a digital controller does; else they are joined by
+      straight lines
     """
     from scipy.signal import cont2discrete, lfilter, lfilter_zi
 
