@@ -92,13 +92,9 @@ _OUTER = _Outer()
 class Tasks(Generic[K]):
     """Tasks that are done side by side, in the order in which they end; leaving the block ends what still runs.
 
-    Parameters
-    ----------
-    where : int, Executor or callable
-        A pool of processes that breaks, as all do of which a worker is killed, takes no more tasks: as many new
-        processes take its place, or what the function makes. An executor that a function made ends with the block.
-    say : callable, optional
-        Called with a sentence where a task died or a pool broke; a `RuntimeWarning` says it if not given.
+    - ``where``: a pool of processes that breaks, as all do of which a worker is killed, takes no more tasks: as many
+      new processes take its place, or what the function makes. An executor that a function made ends with the block.
+    - ``say``: called with a sentence where a task died or a pool broke; a `RuntimeWarning` says it if not given
 
     Raises
     ------

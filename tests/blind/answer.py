@@ -135,12 +135,7 @@ def answered(case: Case, kind: str, request: Sequence[str], strengths: Sequence[
 
     A diagnosis that takes too long is interrupted as by Ctrl-C, and counts with what it knows until then.
 
-    Parameters
-    ----------
-    strengths : sequence of float
-        Of each hidden effect.
-    limit : float
-        Longest time of the processor for it [s].
+    ``strengths``: of each hidden effect; ``limit``: longest time of the processor for it [s].
     """
     known = all(h.known for h in case.truth.hidden)
     hidden = hidden_in(case)

@@ -96,19 +96,13 @@ def make_cases(
 ) -> list[Case]:
     """Cases of one machine.
 
-    Parameters
-    ----------
-    machine : str
-        One of ``MACHINES``.
-    requests : iterable of (hidden, seed)
-        What to hide: ``"none"`` (the nominal model is exact), ``"parameters"`` (it has wrong parameters, no more), the
-        name of an effect, or several. ``"coulomb_friction@elbow"`` says where; otherwise the seed does.
-    noise_level : float
-        Factor of the noise of all sensors and drives; the counts of encoders stay.
-    recalibrate : bool
-        Whether the oracle allows for other values of the calibratable parameters. That takes a column for each of them,
-        which makes machines with many parameters three times as slow; without it, its recalibrated gap is the plain
-        one.
+    - ``machine``: one of ``MACHINES``
+    - ``requests``: what to hide: ``"none"`` (the nominal model is exact), ``"parameters"`` (it has wrong parameters, no
+      more), the name of an effect, or several. ``"coulomb_friction@elbow"`` says where; otherwise the seed does.
+    - ``noise_level``: factor of the noise of all sensors and drives; the counts of encoders stay
+    - ``recalibrate``: whether the oracle allows for other values of the calibratable parameters. That takes a column
+      for each of them, which makes machines with many parameters three times as slow; without it, its recalibrated gap
+      is the plain one.
 
     Raises
     ------
@@ -140,15 +134,8 @@ def strengths_beside(
 ) -> list[float]:
     """How far one effect stands clear of the noise where another one is there, whose parameters nobody knows either.
 
-    Parameters
-    ----------
-    requests : iterable of (hidden, name, seed)
-        The two that are hidden, and which of them is judged.
-
-    Returns
-    -------
-    list of float
-        As `Oracle.strength`, NaN where the simulation does not stay finite.
+    ``requests``: the two that are hidden, and which of them is judged.
+    Result: as `Oracle.strength`, NaN where the simulation does not stay finite.
     """
     plans = [_plan(MACHINES[machine], hidden, seed, noise_level, judged=name) for hidden, name, seed in requests]
     return [case.oracle.strength if isinstance(case, Case) else np.nan for case in _cases(plans)]

@@ -62,22 +62,14 @@ def judge(
 ) -> Oracle:
     """Oracle of a case.
 
-    Parameters
-    ----------
-    channels : sequence of str
-        Sensed channels, then commands.
-    sensed : ndarray, shape (sensors,)
-        Standard deviations of the sensors.
-    pieces : sequence of ndarray, shape (samples, channels, 3 + parameters)
-        As measured, without noise, without the effect, and that with each parameter ``nudge`` larger.
-    training : sequence of bool
-        Which pieces a calibration may use.
-    nudge : float
-        Relative change of the parameters.
-    dt : float
-        Sampling interval [s].
-    mixed : mapping of str to mapping
-        Further channels as weighted sums.
+    - ``channels``: sensed channels, then commands
+    - ``sensed``: shape (sensors,), standard deviations of the sensors
+    - ``pieces``: each of shape (samples, channels, 3 + parameters), as measured, without noise, without the effect, and
+      that with each parameter ``nudge`` larger
+    - ``training``: which pieces a calibration may use
+    - ``nudge``: relative change of the parameters
+    - ``dt``: sampling interval [s]
+    - ``mixed``: further channels as weighted sums
     """
     judged = [*channels, *mixed]
     weights = np.vstack([np.eye(len(channels)), *([[w.get(c, 0.0) for c in channels]] for w in mixed.values())])

@@ -58,12 +58,8 @@ def jobs(
 ) -> list[Job]:
     """Cases of a run: each effect of each machine ``each`` times, with seeds that are dealt out in turn.
 
-    Parameters
-    ----------
-    machines, effects : sequence of str
-        All if empty.
-    each : int
-        Cases of each effect and machine; of no effect four times as many, and five times as many pairs.
+    - ``machines``, ``effects``: all if empty
+    - ``each``: cases of each effect and machine; of no effect four times as many, and five times as many pairs
 
     Raises
     ------
@@ -130,16 +126,10 @@ def answers(
 ) -> Iterator[Answer]:
     """Answers in the order in which they come; Ctrl-C ends what runs and the iteration.
 
-    Parameters
-    ----------
-    workers : int
-        Processes; 0 takes one for each core, 1 works here.
-    limit : float
-        Longest time of one diagnosis on the processor [s].
-    tell : callable, optional
-        Called with a line for each case, and for each task that died.
-    executor : Executor or callable, optional
-        Works in the place of processes of this machine, see `vpm.tasks.Tasks`.
+    - ``workers``: processes; 0 takes one for each core, 1 works here
+    - ``limit``: longest time of one diagnosis on the processor [s]
+    - ``tell``: called with a line for each case, and for each task that died
+    - ``executor``: works in the place of processes of this machine, see `vpm.tasks.Tasks`
     """
     count = workers or os.cpu_count() or 1
     say = tell or (lambda _: None)

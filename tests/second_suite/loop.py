@@ -147,14 +147,9 @@ def simulated(
 ) -> Signals:
     """All columns in closed loop, or open where the controller is off.
 
-    Parameters
-    ----------
-    machine, values, hidden
-        One structure, numbers by column.
-    noisy : ndarray of bool, shape (columns,)
-        Which columns have noise and counts.
-    rng : Generator
-        Of the noise.
+    - ``machine``, ``values``, ``hidden``: one structure, numbers by column
+    - ``noisy``: shape (columns,), which columns have noise and counts
+    - ``rng``: of the noise
     """
     samples, n, columns = inputs.reference.shape
     step = 1.0 / machine.rate / machine.substeps

@@ -108,10 +108,7 @@ class RelativeProblem(InverseDynamicsProblem):
     *Numerical Optimization*, 2nd ed., 10.4, for errors of what was measured; G. Seber and C. Wild, *Nonlinear
     Regression*, 2003, 2.8, for the determinant that a change of variables brings).
 
-    Parameters
-    ----------
-    drives : sequence of str
-        Drives whose parameters change what they deliver.
+    ``drives``: drives whose parameters change what they deliver.
     """
 
     def __init__(self, data: InverseDynamicsProblem, drives: Sequence[str]) -> None:

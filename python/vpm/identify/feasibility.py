@@ -72,10 +72,7 @@ class Distance:
     A sum of D for each body, of its scalar form ``-log(p/p0) + p/p0 - 1`` for other positive parameters, and of squared
     relative differences for the rest.
 
-    Parameters
-    ----------
-    regression : InertialRegression
-        With feasible nominal values.
+    ``regression``: with feasible nominal values.
     """
 
     def __init__(self, regression: InertialRegression) -> None:

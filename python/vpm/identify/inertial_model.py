@@ -57,10 +57,7 @@ class InertialModel:
     "Estimation of inertial parameters of manipulator loads and links", *Int. J. Robotics Research* 5, 1986). So the
     core is asked at bodies with their centres in their origins.
 
-    Parameters
-    ----------
-    others : sequence of str
-        Further parameters that are sought.
+    ``others``: further parameters that are sought.
     """
 
     def __init__(self, model: Model, others: Sequence[str]) -> None:

@@ -60,18 +60,12 @@ class _Stretches:
 class InputErrorProblem:
     """Logged commands minus those that would have led to what was measured.
 
-    Parameters
-    ----------
-    experiments : sequence of Experiment
-        Each with the position of every joint, the command of every actuator, and both pressures of hydraulic drives.
-    channels : sequence of str, optional
-        Outputs that the model is turned round by; by default all that are measured.
-    setup : Setup, optional
-        Integrator, substeps, and as the horizon the length of a stretch.
-    cutoff : float, optional
-        Of the motion filter that the states are found with, Hz.
-    workers : int
-        Records that are simulated at a time.
+    - ``experiments``: each with the position of every joint, the command of every actuator, and both pressures of
+      hydraulic drives
+    - ``channels``: outputs that the model is turned round by; by default all that are measured
+    - ``setup``: integrator, substeps, and as the horizon the length of a stretch
+    - ``cutoff``: of the motion filter that the states are found with, Hz
+    - ``workers``: records that are simulated at a time
 
     Raises
     ------

@@ -53,20 +53,14 @@ class InverseDynamicsProblem(BegunAnywhere):
     Samples at which a joint stands still do not count, as long as half of them remain: friction at rest takes whatever
     value holds the joint, which nothing here can predict. Nor do those at which a piston touches an end of its stroke.
 
-    Parameters
-    ----------
-    model : Model
-        Names the joints and actuators; its parameters do not enter the residual.
-    experiments : sequence of Experiment
-        Each with the position of every joint that moves by an actuator, and the command of every actuator.
-    cutoff : float or sequence of float, optional
-        Cut-off frequency of the motion filter, for all or for each record, Hz; chosen from each record if not given.
-    band : float or sequence of float, optional
-        Highest frequency that is compared, Hz; without it what the motion filter leaves alone.
-    integrator : str
-        How drives with states of their own are run along the motion, as `vpm.simulate.Setup` names it.
-    hold : str
-        What inputs do between samples, as the same names it.
+    - ``model``: names the joints and actuators; its parameters do not enter the residual
+    - ``experiments``: each with the position of every joint that moves by an actuator, and the command of every
+      actuator
+    - ``cutoff``: cut-off frequency of the motion filter, for all or for each record, Hz; chosen from each record if not
+      given
+    - ``band``: highest frequency that is compared, Hz; without it what the motion filter leaves alone
+    - ``integrator``: how drives with states of their own are run along the motion, as `vpm.simulate.Setup` names it
+    - ``hold``: what inputs do between samples, as the same names it
     """
 
     mode = "inverse_dynamics"

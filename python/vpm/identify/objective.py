@@ -23,14 +23,9 @@ HUGE = 1e100
 class Objective:
     """Residuals of a problem at coordinates: parameters or their logarithms, then first states in units of their size.
 
-    Parameters
-    ----------
-    model : Model
-        Values at which parameters that are not free stay, and what is known of the others.
-    bounds : tuple of ndarray
-        Least and largest parameters.
-    progress : callable, optional
-        Told the number of evaluations and the root mean square of the weighted residual; from any thread.
+    - ``model``: values at which parameters that are not free stay, and what is known of the others
+    - ``bounds``: least and largest parameters
+    - ``progress``: told the number of evaluations and the root mean square of the weighted residual; from any thread
     """
 
     def __init__(

@@ -37,19 +37,12 @@ WHOLE = ("free_run", "closed_loop")
 class OutputErrorProblem(BegunAnywhere):
     """Measured minus simulated outputs in free run, restarts, closed loop or on a prescribed motion.
 
-    Parameters
-    ----------
-    mode : {"free_run", "restarts", "closed_loop", "prescribed_motion"}
-    channels : sequence of str, optional
-        Compared outputs; by default all measured ones that the simulation does not prescribe.
-    setup : Setup, optional
-        Integrator, substeps and horizon.
-    cutoff : float, optional
-        Of the motion that the joints follow, Hz.
-    workers : int
-        Records that are simulated at a time; the residual does not depend on it.
-    offsets : sequence of str
-        Compared channels that are off by a constant in each record, which is taken off their residual.
+    - ``mode``: one of "free_run", "restarts", "closed_loop", "prescribed_motion"
+    - ``channels``: compared outputs; by default all measured ones that the simulation does not prescribe
+    - ``setup``: integrator, substeps and horizon
+    - ``cutoff``: of the motion that the joints follow, Hz
+    - ``workers``: records that are simulated at a time; the residual does not depend on it
+    - ``offsets``: compared channels that are off by a constant in each record, which is taken off their residual
     """
 
     def __init__(

@@ -25,16 +25,10 @@ class PredictionErrorProblem:
     *Automatica* 35, 1999). The gains are those of an extended Kalman filter at the parameters with which the problem
     was set up; `renewed` gives the problem with those of other parameters.
 
-    Parameters
-    ----------
-    channels : sequence of str, optional
-        Outputs that are compared; by default all that each log holds.
-    setup : Setup, optional
-        Integrator, substeps and hold.
-    noise : Noise, optional
-        By default that which makes the records most likely.
-    workers : int
-        Records that are followed at a time.
+    - ``channels``: outputs that are compared; by default all that each log holds
+    - ``setup``: integrator, substeps and hold
+    - ``noise``: by default that which makes the records most likely
+    - ``workers``: records that are followed at a time
     """
 
     mode = "prediction_error"

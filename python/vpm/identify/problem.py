@@ -90,10 +90,7 @@ def gaps(problem: Problem, residual: Array) -> Gaps:
 class TiedProblem:
     """A problem in which parameters follow others.
 
-    Parameters
-    ----------
-    ties : mapping of str to str
-        Following parameter to the one whose value it takes; see `check_ties`.
+    ``ties``: following parameter to the one whose value it takes; see `check_ties`.
     """
 
     def __init__(self, data: Problem, ties: Mapping[str, str]) -> None:

@@ -43,15 +43,10 @@ class Pieces:
 class ShootingProblem(OutputErrorProblem):
     """Measured minus simulated outputs from first states that are unknown, and the gaps between pieces.
 
-    Parameters
-    ----------
-    mode : {"free_run", "closed_loop"}
-        Pieces need a free run.
-    fitting : Fitting
-        Its first states, pieces and compared channels. With pieces, by default all states that an output shows are
-        fitted; known ones are those of whole records.
-    setup, workers
-        As for `OutputErrorProblem`.
+    - ``mode``: one of "free_run", "closed_loop", pieces need a free run
+    - ``fitting``: its first states, pieces and compared channels. With pieces, by default all states that an output
+      shows are fitted; known ones are those of whole records.
+    - ``setup``, ``workers``: as for `OutputErrorProblem`
     """
 
     def __init__(

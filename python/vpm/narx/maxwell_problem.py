@@ -44,11 +44,7 @@ class OutputErrors:
     are replaced by their best values, and the derivatives by what those leave of them (variable projection: G. Golub
     and V. Pereyra, Inverse Problems 19, 2003; derivatives after L. Kaufman, BIT 15, 1975).
 
-    Parameters
-    ----------
-    scheme : {"trapezoidal", "printed", "central_mean"}
-    k0, s0 : Basis
-        Of the maps.
+    ``scheme``: one of "trapezoidal", "printed", "central_mean"; ``k0``, ``s0``: of the maps.
     """
 
     def __init__(self, records: Sequence[Samples], scheme: Scheme, k0: Basis, s0: Basis) -> None:

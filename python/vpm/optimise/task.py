@@ -87,10 +87,7 @@ class Fitted:
 class Task:
     """What a motion shall do: from where to where, within which limits, and what is made least.
 
-    Parameters
-    ----------
-    content : mapping
-        As a task file has it, see docs/optimisation.md.
+    ``content``: as a task file has it, see docs/optimisation.md.
 
     Raises
     ------

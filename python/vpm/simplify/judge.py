@@ -24,16 +24,10 @@ FIT_TOLERANCE, FIT_EVALUATIONS = 1e-3, 20
 class Judge:
     """Errors of models on records, in steps of the controller.
 
-    Parameters
-    ----------
-    model : Model
-        The full one.
-    records, validation : sequence of Experiment
-        To fit on, and to judge on.
-    rate : float
-        Steps per second, Hz.
-    channels : sequence of str, optional
-        What is compared; by default all that can be.
+    - ``model``: the full one
+    - ``records``, ``validation``: to fit on, and to judge on
+    - ``rate``: steps per second, Hz
+    - ``channels``: what is compared; by default all that can be
     """
 
     def __init__(

@@ -49,16 +49,10 @@ class Trials:
     What is much slower by a coarse timing than something that loses next to nothing is not fitted: it can neither be
     chosen nor be a choice that anybody would take instead.
 
-    Parameters
-    ----------
-    refit : Callable
-        Says of changes whether the parameters are fitted again.
-    tell : callable
-        Called with a sentence for each trial.
-    tolerance : float
-        Largest loss that is allowed.
-    executor : Executor or callable, optional
-        Does fits that `ahead` asks for, see `vpm.tasks.Tasks`.
+    - ``refit``: says of changes whether the parameters are fitted again
+    - ``tell``: called with a sentence for each trial
+    - ``tolerance``: largest loss that is allowed
+    - ``executor``: does fits that `ahead` asks for, see `vpm.tasks.Tasks`
     """
 
     def __init__(

@@ -36,12 +36,8 @@ class Resolution(Storable):
     drive or a command is farthest out, for there it may rub most. All of it is worked out when somebody looks: a batch
     pays for no run that nobody asks.
 
-    Parameters
-    ----------
-    step : float
-        s.
-    modes : callable
-        Gives the modes; called once, or never.
+    - ``step``: s
+    - ``modes``: gives the modes; called once, or never
     """
 
     def __init__(self, integrator: str, step: float, modes: Callable[[], Modes]) -> None:

@@ -77,12 +77,8 @@ class Stage:
 class Page:
     """A page in the browser.
 
-    Parameters
-    ----------
-    course : Course
-        A single sample has sliders for the joints, more have a time line.
-    port : int, optional
-        By default the first free one.
+    - ``course``: a single sample has sliders for the joints, more have a time line
+    - ``port``: by default the first free one
     """
 
     def __init__(self, model: Model, course: Course, *, port: int | None = None, dark: bool = False) -> None:

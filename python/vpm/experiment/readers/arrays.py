@@ -22,12 +22,8 @@ MOST_COLUMNS = 64
 class ArrayLog(Log):
     """A log in a file of arrays, such as MAT or HDF5.
 
-    Parameters
-    ----------
-    shapes : mapping of str to tuple of int
-        Each array of numbers; a vector has one dimension, also where the file stores it as a row or a column.
-    refused, units
-        As in `Log`.
+    - ``shapes``: each array of numbers; a vector has one dimension, also where the file stores it as a row or a column
+    - ``refused``, ``units``: as in `Log`
     """
 
     def __init__(

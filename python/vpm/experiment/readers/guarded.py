@@ -39,10 +39,7 @@ SPACE, SPACE_PER_BYTE = 4 << 30, 50
 class GuardedLog(Log):
     """A log whose reader works in another process.
 
-    Parameters
-    ----------
-    reader : type
-        The class that reads the file.
+    ``reader``: the class that reads the file.
 
     Raises
     ------

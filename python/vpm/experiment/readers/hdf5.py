@@ -23,10 +23,8 @@ UNIT_ATTRIBUTES = ("unit", "units")
 class Hdf5Log(ArrayLog):
     """Data sets of an HDF5 file: ``group/dataset``, and ``group/table.field`` for tables of compound type.
 
-    Parameters
-    ----------
-    matlab : bool
-        The file was written by MATLAB 7.3: names are those of variables, ``log.q``, and arrays are stored transposed.
+    ``matlab``: the file was written by MATLAB 7.3: names are those of variables, ``log.q``, and arrays are stored
+    transposed.
     """
 
     def __init__(self, path: str | PathLike[str], *, matlab: bool = False) -> None:

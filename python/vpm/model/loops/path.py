@@ -43,10 +43,7 @@ class Path:
     Followed by predictor and corrector along the tangent (E. Allgower, K. Georg, "Introduction to Numerical
     Continuation Methods", 2003, chapter 2).
 
-    Parameters
-    ----------
-    fixed : sequence of int
-        Places of those that are held.
+    ``fixed``: places of those that are held.
     """
 
     def __init__(self, loops: Loops, names: Sequence[str], fixed: Sequence[int]) -> None:
