@@ -5,7 +5,7 @@ The sentence says which (path, name, channel, time), the failing condition, the 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from difflib import SequenceMatcher, get_close_matches
 
@@ -304,6 +304,22 @@ def near_match(name: str, candidates: Iterable[str], *, what: str = "the choices
     shown = known[:12]
     rest = f" and {len(known) - len(shown)} more" if len(known) > len(shown) else ""
     return f"{what} " + ", ".join(shown) + rest
+
+
+def check_known(
+    names: Iterable[str],
+    known: Collection[str],
+    error: type[VpmError],
+    before: str,
+    after: str = "",
+    *,
+    what: str = "the choices are",
+) -> None:
+    """Error for the first unknown name: what stands ``before`` and ``after`` it in the sentence, and near ones."""
+    for name in names:
+        if name not in known:
+            sentence = f'{before} "{name}" {after}'.strip()
+            raise error(f"{sentence}; {near_match(name, known, what=what)}")
 
 
 def _likeness(left: str, right: str) -> float:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import SimulationError, near_match, needs
+from vpm.errors import SimulationError, check_known, needs
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.simulate import AUTOMATIC
@@ -83,11 +83,11 @@ class VectorEnvironment(VectorEnv[Array, Array, Any]):
             )
         joints = [f"{joint}.{end}" for joint in model.joints for end in ("position", "velocity")]
         self.model, self.channels = model, tuple(joints if channels is None else channels)
-        _known(self.channels, model.output_channels, "channels")
-        _known(bounds or {}, self.channels, "bounds")
-        _known(spread or {}, model.state_names, "spread")
-        _known(commands, model.inputs, "commands")
-        _known(model.inputs, tuple(commands), "commands lack")
+        check_known(self.channels, model.output_channels, SimulationError, "channels:", "is not there")
+        check_known(bounds or {}, self.channels, SimulationError, "bounds:", "is not there")
+        check_known(spread or {}, model.state_names, SimulationError, "spread:", "is not there")
+        check_known(commands, model.inputs, SimulationError, "commands:", "is not there")
+        check_known(model.inputs, tuple(commands), SimulationError, "commands lack:", "is not there")
         limits = np.array([(bounds or {}).get(name, (-np.inf, np.inf)) for name in self.channels])
         ranges = np.array([commands[name] for name in model.inputs], dtype=np.float64)
         for name, (low, high) in zip((*self.channels, *model.inputs), (*limits, *ranges), strict=True):
@@ -184,9 +184,3 @@ class Environment(gymnasium.Env[Array, Array]):
         """Step the gymnasium environment: hold an action (nu,) over the samples of a step."""
         seen, rewards, terminated, truncated, told = self._one.step(np.asarray(action)[None])
         return seen[0], float(rewards[0]), bool(terminated[0]), bool(truncated[0]), told
-
-
-def _known(names: Sequence[str] | Mapping[str, Any], known: Sequence[str], what: str) -> None:
-    for name in names:
-        if name not in known:
-            raise SimulationError(f'{what}: "{name}" is not there; {near_match(name, known)}')

@@ -27,7 +27,7 @@ from vpm.command import (
     writable,
 )
 from vpm.command_output import give, wrote
-from vpm.errors import IdentificationError, near_match
+from vpm.errors import IdentificationError, check_known
 
 if TYPE_CHECKING:
     from vpm.experiment import Experiment
@@ -197,9 +197,7 @@ def _without(model: Model, free: list[str] | None, fixed: list[str] | None) -> l
     if not fixed:
         return free
     given = free if free is not None else list(model.adjustable)
-    for name in fixed:
-        if name not in given:
-            raise IdentificationError(f'--fix: "{name}" is not among the free parameters; {near_match(name, given)}')
+    check_known(fixed, given, IdentificationError, "--fix:", "is not among the free parameters")
     return [name for name in given if name not in fixed]
 
 

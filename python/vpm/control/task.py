@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from vpm.control.target import TargetMotion
-from vpm.errors import SimulationError, near_match
+from vpm.errors import SimulationError, check_known
 from vpm.model import Model
 from vpm.numbers import Array
 
@@ -37,9 +37,7 @@ class Task:
     def __post_init__(self) -> None:
         """Check the names of an inversion task."""
         known = self.model.inputs
-        for name in self.inputs:
-            if name not in known:
-                raise SimulationError(f'inputs: "{name}" is unknown; {near_match(name, known)}')
+        check_known(self.inputs, known, SimulationError, "inputs:", "is unknown")
         if len(self.inputs) != len(self.outputs):
             raise SimulationError(
                 f"{len(self.outputs)} outputs ({', '.join(self.outputs)}) cannot be prescribed with "
@@ -47,9 +45,7 @@ class Task:
             )
         possible = [f"{joint}.position" for joint in self.model.joints]
         possible += [f"{marker}.{axis}" for marker in self.model.markers for axis in AXES]
-        for name in self.outputs:
-            if name not in possible:
-                raise SimulationError(f'output: "{name}" cannot be prescribed; {near_match(name, possible)}')
+        check_known(self.outputs, possible, SimulationError, "output:", "cannot be prescribed")
         if self.model.core.n_states != 2 * len(self.model.coordinates):
             held = ", ".join(self.model.internal_names)
             raise SimulationError(

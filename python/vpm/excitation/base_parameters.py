@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vpm.errors import ExcitationError, near_match
+from vpm.errors import ExcitationError, check_known
 from vpm.identify.identifiability import find_base
 from vpm.model import Model
 from vpm.numbers import Array
@@ -68,9 +68,7 @@ def free_names(model: Model, free: Sequence[str] | None) -> tuple[str, ...]:
     """Named parameters, or those with an uncertainty; refuses unknown names and models without inverse dynamics."""
     check_balance(model)
     names = tuple(free) if free is not None else model.adjustable
-    for name in names:
-        if name not in model.parameters:
-            raise ExcitationError(f'{model.name} has no parameter "{name}"; {near_match(name, model.parameters)}')
+    check_known(names, model.parameters, ExcitationError, f"{model.name} has no parameter")
     if not names:
         raise ExcitationError(
             f"{model.name}: no parameter is free; give some an uncertainty in the model file or name them in free="

@@ -7,7 +7,7 @@ from typing import Literal
 
 import numpy as np
 
-from vpm.errors import ExcitationError, near_match
+from vpm.errors import ExcitationError, check_known
 from vpm.excitation.base_parameters import base_parameters, free_names, parameter_scales, regressor
 from vpm.excitation.excitation import check_positive, clock
 from vpm.excitation.fourier import FourierTrajectory, at_rest, bound_grid, motion_at, within_limits
@@ -190,9 +190,7 @@ def _within_effort(search: Worth, offset: Array, cosine: Array, sine: Array) -> 
 
 
 def _limits_of(model: Model, limits: Mapping[str, JointLimits]) -> list[JointLimits]:
-    for joint in limits:
-        if joint not in model.joints:
-            raise ExcitationError(f'{model.name} has no joint "{joint}"; {near_match(joint, model.joints)}')
+    check_known(limits, model.joints, ExcitationError, f"{model.name} has no joint")
     for joint in model.joints:
         if joint not in limits:
             raise ExcitationError(f'the joint "{joint}" has no limits; give its range, speed and acceleration')

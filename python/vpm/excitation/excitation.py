@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vpm.errors import ExcitationError, near_match
+from vpm.errors import ExcitationError, check_known
 from vpm.experiment import Experiment
 from vpm.files import replacing
 from vpm.numbers import Array
@@ -68,10 +68,7 @@ class Excitation(Result):
 
     def __getitem__(self, channel: str) -> Array:
         """Values of an excitation's channel, shape (N,)."""
-        if channel not in self.channels:
-            raise ExcitationError(
-                f'{self.name} has no channel "{channel}"; {near_match(channel, self.channels, what="it has")}'
-            )
+        check_known([channel], self.channels, ExcitationError, f"{self.name} has no channel", what="it has")
         return self.data[:, self.channels.index(channel)]
 
     def unit(self, channel: str) -> str:

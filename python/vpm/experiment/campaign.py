@@ -11,7 +11,7 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal, Self, overload
 
-from vpm.errors import ExperimentError, near_match
+from vpm.errors import ExperimentError, check_known, near_match
 from vpm.experiment.readers.base import reading
 from vpm.experiment.readers.lerobot import episodes_of, is_data_set
 from vpm.experiment.record import Experiment
@@ -227,9 +227,7 @@ class Campaign(Result, Sequence[Experiment]):
         return [name for name in self.names if name in chosen]
 
     def _place(self, name: str) -> int:
-        if name not in self.names:
-            repair = near_match(name, self.names, what="there are")
-            raise ExperimentError(f'the campaign has no record "{name}"; {repair}')
+        check_known([name], self.names, ExperimentError, "the campaign has no record", what="there are")
         return self.names.index(name)
 
     def _headline(self) -> Mapping[str, object]:

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from scipy.special import stdtrit
 
-from vpm.errors import IdentificationError, near_match
+from vpm.errors import IdentificationError, check_known
 from vpm.experiment import Experiment
 from vpm.identify.feasibility import faults
 from vpm.identify.identifiability import Base, find_base, least_step, unseen_combinations
@@ -149,11 +149,7 @@ def _prior(regression: InertialRegression, prior: float | Mapping[str, float] | 
     if prior is None:
         return None
     if isinstance(prior, Mapping):
-        for name in prior:
-            if name not in regression.names:
-                raise IdentificationError(
-                    f'prior: there is no parameter "{name}"; {near_match(name, regression.names)}'
-                )
+        check_known(prior, regression.names, IdentificationError, "prior: there is no parameter")
         deviations = np.array([float(prior.get(name, np.inf)) for name in regression.names])
     else:
         deviations = float(prior) * np.abs(regression.nominal)

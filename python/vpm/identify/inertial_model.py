@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from vpm.errors import IdentificationError, near_match
+from vpm.errors import IdentificationError, check_known
 from vpm.experiment import Experiment, as_records
 from vpm.identify.feasibility import fault
 from vpm.identify.inertial_regression import InertialRegression
@@ -41,11 +41,7 @@ def repaired(model: Model, values: Mapping[str, float]) -> Model:
                 f"{body}: no body has the values of this fit, {wrong}; fit with physical=True, or record more"
             )
         changed |= {f"{body}.{end}": float(x) for end, x in zip(OF_FILE, of_file(numbers), strict=True)}
-    for name in changed:
-        if name not in model.parameters:
-            raise IdentificationError(
-                f'{model.name} has no parameter "{name}" of this fit; {near_match(name, model.parameters)}'
-            )
+    check_known(changed, model.parameters, IdentificationError, f"{model.name} has no parameter", "of this fit")
     return model.with_parameters(changed)
 
 
@@ -65,11 +61,8 @@ class InertialModel:
         self.bodies = model.standard_bodies
         self.others = tuple(others)
         own = {f"{body}.{end}" for body in self.bodies for end in OF_FILE}
+        check_known(self.others, model.parameters, IdentificationError, f"{model.name} has no parameter")
         for name in self.others:
-            if name not in model.parameters:
-                raise IdentificationError(
-                    f'{model.name} has no parameter "{name}"; {near_match(name, model.parameters)}'
-                )
             if name in own:
                 raise IdentificationError(
                     f"{name} belongs to a body, and all ten parameters of every body are sought anyway; name others"

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vpm.errors import IdentificationError, near_match
+from vpm.errors import IdentificationError, check_known
 from vpm.numbers import Array
 from vpm.results import Storable
 
@@ -156,9 +156,7 @@ class InertialRegression(Storable):
                     f"{given} {what} do not fit, {count} are needed; give one for each, all distinct"
                 )
         tens = [name for ten in self.bodies.values() for name in ten]
-        for name in (*tens, *self.positive, *self.prefer):
-            if name not in self.names:
-                raise IdentificationError(f'there is no parameter "{name}"; {near_match(name, self.names)}')
+        check_known([*tens, *self.positive, *self.prefer], self.names, IdentificationError, "there is no parameter")
         for body, ten in self.bodies.items():
             if len(ten) != 10:
                 raise IdentificationError(

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import IdentificationError, near_match
+from vpm.errors import IdentificationError, check_known
 from vpm.experiment import Experiment, Motion
 from vpm.identify.first_states import BegunAnywhere, add_first_state, first_state_slopes
 from vpm.identify.identifiability import RANK_TOLERANCE, column_lengths
@@ -164,10 +164,8 @@ class OutputErrorProblem(BegunAnywhere):
 
     def _check_offsets(self) -> None:
         """Refuse offsets of outputs that are not compared."""
-        for channel in self.offsets:
-            if channel not in self._channels:
-                repair = near_match(channel, self._channels)
-                raise IdentificationError(f"offsets: \"{channel}\" is not compared in mode '{self.mode}'; {repair}")
+        rest = f"is not compared in mode '{self.mode}'"
+        check_known(self.offsets, self._channels, IdentificationError, "offsets:", rest)
 
     def _scale(self, channel: str, measured: Array) -> float:
         """Size of a measured output, without an unknown offset."""
@@ -211,10 +209,8 @@ def _compared(model: Model, experiments: Sequence[Experiment], mode: str) -> tup
 
 def _check_channels(model: Model, experiments: Sequence[Experiment], channels: Sequence[str]) -> None:
     """Refuse compared outputs that the model does not give or a log does not hold."""
+    check_known(channels, model.output_channels, IdentificationError, f"channels: {model.name} has no output")
     for channel in channels:
-        if channel not in model.output_channels:
-            repair = near_match(channel, model.output_channels)
-            raise IdentificationError(f'channels: {model.name} has no output "{channel}"; {repair}')
         for experiment in experiments:
             if channel not in experiment:
                 raise IdentificationError(

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-from vpm.errors import IdentificationError, near_match
+from vpm.errors import IdentificationError, check_known
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.units import parse_unit
@@ -134,10 +134,7 @@ def check_ties(model: Model, ties: Mapping[str, str], free: Sequence[str]) -> No
     ``ties``: following parameter to the one whose value it takes.
     """
     for follower, leader in ties.items():
-        for name in (follower, leader):
-            if name not in model.parameters:
-                repair = near_match(name, model.parameters)
-                raise IdentificationError(f'ties: {model.name} has no parameter "{name}"; {repair}')
+        check_known((follower, leader), model.parameters, IdentificationError, f"ties: {model.name} has no parameter")
         if follower in free or leader in ties:
             reason = f'"{follower}" is free' if follower in free else f'"{leader}" follows "{ties[leader]}" itself'
             repair = "take it out of free=" if follower in free else f'tie "{follower}" to "{ties[leader]}"'

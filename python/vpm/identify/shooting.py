@@ -13,7 +13,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import IdentificationError, near_match
+from vpm.errors import IdentificationError, check_known
 from vpm.experiment import Experiment
 from vpm.identify.first_states import OF_STATE, add_first_state, difference, first_state_slopes
 from vpm.identify.output_error import OutputErrorProblem
@@ -65,11 +65,7 @@ class ShootingProblem(OutputErrorProblem):
                 f"first states are fitted in the modes free_run and closed_loop, pieces in free_run, not in '{mode}'; "
                 "choose another mode or leave states and piece out"
             )
-        for name in (*states, *known):
-            if name not in model.state_names:
-                raise IdentificationError(
-                    f'states: {model.name} has no state "{name}"; {near_match(name, model.state_names)}'
-                )
+        check_known([*states, *known], model.state_names, IdentificationError, f"states: {model.name} has no state")
         if piece > 0.0 and not states:
             states = tuple(name for name in model.state_names if state_channel(model, name) is not None)
         self.states = states

@@ -7,7 +7,7 @@ from typing import overload
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vpm.errors import IdentificationError, near_match
+from vpm.errors import IdentificationError, check_known
 from vpm.experiment import Experiment
 from vpm.numbers import Array
 
@@ -34,10 +34,7 @@ def series(record: RecordLike, output: str, inputs: Sequence[str], name: str = "
     names = [output, *inputs]
     known = record.channels if isinstance(record, Experiment) else tuple(record)
     title = record.name if isinstance(record, Experiment) else name
-    for channel in names:
-        if channel not in known:
-            near = near_match(channel, known, what="it has")
-            raise IdentificationError(f'record {title} has no channel "{channel}"; {near}')
+    check_known(names, known, IdentificationError, f"record {title} has no channel", what="it has")
     try:
         columns = [np.asarray(record[channel], dtype=np.float64) for channel in names]
     except (TypeError, ValueError) as error:

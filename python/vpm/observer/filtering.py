@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vpm.errors import DivergedError, ExperimentError, SimulationError, near_match
+from vpm.errors import DivergedError, ExperimentError, SimulationError, check_known
 from vpm.experiment import Experiment
 from vpm.initial import initial_state
 from vpm.model import Model
@@ -51,9 +51,8 @@ class Record:
                 f"{experiment.name}: an observer compares measured outputs, and the log holds none of "
                 f"{model.name}; log a position"
             )
+        check_known(names, model.output_channels, SimulationError, "channels:", "is unknown")
         for name in names:
-            if name not in model.output_channels:
-                raise SimulationError(f'channels: "{name}" is unknown; {near_match(name, model.output_channels)}')
             if name not in experiment:
                 raise ExperimentError(
                     f'channels: "{name}" is not in {experiment.name}, which holds {", ".join(experiment.channels)}'

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vpm.errors import DivergedError, SimulationError, near_match
+from vpm.errors import DivergedError, SimulationError, check_known
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.observer.filtering import Record, filtered, first_deviations
@@ -88,9 +88,7 @@ class Noise(Storable):
 
 
 def _placed(kind: str, values: Mapping[str, float], names: Sequence[str]) -> Array:
-    for name in values:
-        if name not in names:
-            raise SimulationError(f'noise of {kind}: "{name}" is unknown; {near_match(name, names)}')
+    check_known(values, names, SimulationError, f"noise of {kind}:", "is unknown")
     return np.array([values.get(name, 0.0) for name in names])
 
 

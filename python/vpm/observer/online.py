@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vpm.errors import DivergedError, SimulationError, near_match
+from vpm.errors import DivergedError, SimulationError, check_known
 from vpm.model import Model
 from vpm.numbers import Array, array_of
 from vpm.observer.filtering import first_deviations
@@ -84,9 +84,7 @@ class Observer:
         self.model, self.channels = model, tuple(channels)
         if not self.channels:
             raise SimulationError("an observer needs readings; name at least one channel")
-        for name in self.channels:
-            if name not in model.output_channels:
-                raise SimulationError(f'channels: "{name}" is unknown; {near_match(name, model.output_channels)}')
+        check_known(self.channels, model.output_channels, SimulationError, "channels:", "is unknown")
         first = model.state(state)
         spread = first_deviations(model, first) if deviations is None else deviations
         self._first, self._deviations = first, array_of(spread, "the deviations of the first state", SimulationError)

@@ -1,18 +1,15 @@
 """Records as this package reads them: a clock and some channels, checked once."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vpm.errors import ExperimentError, IdentificationError, near_match
+from vpm.errors import ExperimentError, IdentificationError, check_known
 from vpm.experiment import Experiment
+from vpm.narx.records import RecordLike
 from vpm.numbers import Array
-
-#: A log, or arrays by name with their clock under ``"time"``.
-RecordLike = Experiment | Mapping[str, ArrayLike]
 
 #: ``"applied"``: the force that moves the part, ``F = k x + c dx/dt``. ``"reaction"``: what the part answers with, as a
 #: cylinder's force that pushes its ends apart, ``F = k (x0 - x) - c dx/dt``.
@@ -41,9 +38,9 @@ def columns(record: RecordLike, names: tuple[str, ...], fewest: int) -> Columns:
     is_log = isinstance(record, Experiment)
     title = record.name if isinstance(record, Experiment) else "record"
     known = record.channels if isinstance(record, Experiment) else tuple(record)
-    for name in names if is_log else ("time", *names):
-        if name not in known:
-            raise IdentificationError(f'{title} has no channel "{name}"; {near_match(name, known, what="it has")}')
+    check_known(
+        names if is_log else ("time", *names), known, IdentificationError, f"{title} has no channel", what="it has"
+    )
     clock = record.time if isinstance(record, Experiment) else _numbers(title, "time", record["time"])
     values = tuple(_numbers(title, name, record[name]) for name in names)
     for name, column in zip(names, values, strict=True):

@@ -10,9 +10,10 @@ import numpy as np
 
 from vpm.errors import IdentificationError
 from vpm.experiment import noise_std
+from vpm.narx.records import RecordLike
 from vpm.numbers import Array
 from vpm.results import Result
-from vpm.studies.impedance.channels import RecordLike, check_moves, columns
+from vpm.studies.impedance.channels import check_moves, columns
 
 if TYPE_CHECKING:
     from scipy.optimize import OptimizeResult

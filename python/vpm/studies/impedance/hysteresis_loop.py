@@ -22,9 +22,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vpm.errors import IdentificationError
+from vpm.narx.records import RecordLike
 from vpm.numbers import Array, Complex
 from vpm.results import Result
-from vpm.studies.impedance.channels import RecordLike, Sense, check_moves, check_sense, columns
+from vpm.studies.impedance.channels import Sense, check_moves, check_sense, columns
 from vpm.studies.impedance.cycles import FEWEST_PER_CYCLE, Sums, parts, visible, whole_cycles
 from vpm.studies.impedance.harmonics import evaluate, fourier
 from vpm.studies.impedance.hysteresis_notes import loop_notes

@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from vpm.errors import IdentificationError
+from vpm.narx.records import RecordLike
 from vpm.results import Result
-from vpm.studies.impedance.channels import RecordLike, columns
+from vpm.studies.impedance.channels import columns
 
 #: Farther from a quarter or half sine than this share, and the damping is worth a warning.
 OFF = 0.1

@@ -14,9 +14,10 @@ import numpy as np
 
 from vpm.errors import ExperimentError, IdentificationError
 from vpm.experiment import noise_std
+from vpm.narx.records import RecordLike
 from vpm.numbers import Array
 from vpm.results import Result
-from vpm.studies.impedance.channels import RecordLike, Sense, check_moves, check_sense, columns
+from vpm.studies.impedance.channels import Sense, check_moves, check_sense, columns
 
 
 @dataclass(frozen=True, repr=False, eq=False)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vpm.errors import IdentificationError, near_match
+from vpm.errors import IdentificationError, check_known, near_match
 from vpm.numbers import NORMAL_95, Array
 from vpm.studies.oil.equations import CylinderGeometry
 from vpm.studies.oil.solve import Rows, unexplained
@@ -42,9 +42,7 @@ def check_choices(both: bool, force: bool, balance: str, estimator: str, extra: 
     for word, known, what in ((balance, BALANCES, "balance"), (estimator, ESTIMATORS, "estimator")):
         if word not in known:
             raise IdentificationError(f'the {what} "{word}" is unknown; {near_match(word, known)}')
-    for name in extra:
-        if name not in EXTRA:
-            raise IdentificationError(f'the extra column "{name}" is unknown; {near_match(name, EXTRA)}')
+    check_known(extra, EXTRA, IdentificationError, "the extra column", "is unknown")
     if len(set(extra)) < len(extra):
         raise IdentificationError(f"an extra column is named twice in {', '.join(extra)}; name each once")
     if not both and not force:
