@@ -1,6 +1,5 @@
 """The measured TUDOR arm: its record where it is at hand, and the whole way on a simulated one."""
 
-import importlib.util
 import json
 import sys
 from importlib import import_module
@@ -11,7 +10,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
-from places import EXAMPLES, ROOT
+from places import EXAMPLES, ROOT, script
 from vpm.experiment import Experiment
 from vpm.identify import identify
 from vpm.model import Model
@@ -31,15 +30,9 @@ def merit() -> ModuleType:
     folder = EXAMPLES / "tudor"
     sys.path.insert(0, str(folder))
     try:
-        spec = importlib.util.spec_from_file_location("merit", folder / "merit.py")
-        assert spec is not None
-        assert spec.loader is not None
-        module = importlib.util.module_from_spec(spec)
-        sys.modules["merit"] = module
-        spec.loader.exec_module(module)
+        return script(folder / "merit.py")
     finally:
         sys.path.remove(str(folder))
-    return module
 
 
 @pytest.mark.nightly

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 
 import vpm
 from brick import bar_archive, bricks, write_archive
+from runge_kutta import ahead
 from vpm.errors import ModelError, ReductionError
 from vpm.model.beams.reduced import ReducedLink
 from vpm.numbers import Array
@@ -199,11 +200,7 @@ def test_free_motion_keeps_energy_and_momentum() -> None:
     first = energy(state), momentum(state)
     step = 0.02 / (2.0 * np.pi * reduced().frequencies[-1])
     for _ in range(400):
-        a = rates(state)
-        b = rates(state + 0.5 * step * a)
-        c = rates(state + 0.5 * step * b)
-        d = rates(state + step * c)
-        state = state + step / 6.0 * (a + 2.0 * b + 2.0 * c + d)
+        state = ahead(rates, state, step)
     assert energy(state) == pytest.approx(first[0], rel=1e-8)
     assert momentum(state) == pytest.approx(first[1], rel=1e-9)
 

@@ -8,6 +8,7 @@ import pytest
 import two_link_arm
 from drive_texts import RIG
 from model_texts import TWO_LINKS, changed, described, on_rail, refused
+from quotients import quotient
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -274,14 +275,12 @@ def test_derivatives_through_the_loop_are_those_of_differences() -> None:
     names = ("knee_force.force_gain", "knee_force.proportional", "hip_pd.derivative", "shank.mass")
     columns = [list(model.parameters).index(name) for name in names]
     exact = simulate_arrays(model, log, "closed_loop", columns=columns, initial_state=initial).jacobian
+
+    def outputs(theta: np.ndarray) -> np.ndarray:
+        return simulate_arrays(model, log, "closed_loop", theta=theta, initial_state=initial).outputs
+
     for i, column in enumerate(columns):
-        step = 1e-4 * model.theta[column]
-        ends = []
-        for side in (1.0, -1.0):
-            theta = model.theta.copy()
-            theta[column] += side * step
-            ends.append(simulate_arrays(model, log, "closed_loop", theta=theta, initial_state=initial).outputs)
-        slopes = (ends[0] - ends[1]) / (2.0 * step)
+        slopes = quotient(outputs, model.theta, column, 1e-4 * model.theta[column])
         np.testing.assert_allclose(exact[:, :, i], slopes, atol=1e-6 * np.max(np.abs(slopes)))
 
 

@@ -7,6 +7,7 @@ from functools import cache
 import numpy as np
 
 import vpm
+from runge_kutta import ahead
 from vpm.experiment import Experiment
 
 STEP, SLOW, COUNT = 0.01, 5, 2997  # s; samples between two readings of the angle; samples
@@ -59,11 +60,7 @@ def driven() -> tuple[Experiment, ...]:
     for k in range(COUNT):
         force = 900.0 * (speeds[k] - state[2]) + 900.0 * (wanted[k] - state[0])
         states[k], forces[k] = state, force
-        first = rates(state, force)
-        second = rates(state + 0.5 * STEP * first, force)
-        third = rates(state + 0.5 * STEP * second, force)
-        fourth = rates(state + STEP * third, force)
-        state = state + STEP / 6.0 * (first + 2.0 * second + 2.0 * third + fourth)
+        state = ahead(rates, state, STEP, force)
     records = []
     for column in range(SEEDS):
         read = states[:, 1, column] + NOISE * random.standard_normal(COUNT)

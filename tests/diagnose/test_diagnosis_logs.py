@@ -4,14 +4,10 @@ Records: see docs/diagnosis_logs.md. Fitted are training records or first halves
 magneto-rheological damper have test files of their own: test_emps.py and tests/identify/test_friction_logs.py.
 """
 
-import importlib.util
-import sys
-from types import ModuleType
-
 import numpy as np
 import pytest
 
-from places import EXAMPLES, ROOT
+from places import EXAMPLES, ROOT, script
 from vpm.diagnosing import diagnose
 from vpm.discrepancy import Diagnosis
 from vpm.discrepancy.screening.candidates import candidates, left_out
@@ -48,17 +44,6 @@ def press(name: str, viscous: float, air: bool = False) -> Model:
         gain = {"value": -50.0, "unit": "N/bar", "uncertainty": 20.0}
         content["actuators"]["air"] = {"joint": "axis", "gain": gain, "command_unit": "bar"}  # type: ignore[index]
     return Model.from_dict(content)
-
-
-def script(folder: str) -> ModuleType:
-    """The script of an example as a module."""
-    spec = importlib.util.spec_from_file_location(folder, EXAMPLES / folder / "run.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[folder] = module
-    spec.loader.exec_module(module)
-    return module
 
 
 def percent(diagnosis: Diagnosis, channel: str) -> tuple[float, float]:
@@ -131,7 +116,7 @@ def test_a_friction_damper_with_play_stays_unexplained() -> None:
 
 def crane_with(load_known: bool) -> tuple[Diagnosis, float]:
     """Diagnosis of a cylinder with equal directions, and its error in free run on the validation half."""
-    crane = script("crane")
+    crane = script(EXAMPLES / "crane" / "run.py", "crane")
     record = crane.load(DATA / "hydraulic_crane_actuator" / "actuator.csv")
     half, second = crane.first(record, 512), record.trim(start=record.time[512])
     model = crane.VARIANTS["symmetric cylinder"].model()

@@ -1,7 +1,5 @@
 """Two measured hydraulic machines where their records are at hand, and the starts and loops that they rest on."""
 
-import importlib.util
-import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -10,7 +8,7 @@ import pytest
 
 from drive_texts import RIG
 from model_texts import changed
-from places import EXAMPLES, ROOT
+from places import EXAMPLES, ROOT, script
 from vpm.errors import SimulationError
 from vpm.experiment import Experiment
 from vpm.initial import initial_state
@@ -33,13 +31,7 @@ LOAD = 1500.0
 
 def example(name: str) -> ModuleType:
     """The script of an example as a module."""
-    spec = importlib.util.spec_from_file_location(name, EXAMPLES / name / "run.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    spec.loader.exec_module(module)
-    return module
+    return script(EXAMPLES / name / "run.py", name)
 
 
 # ---- the records -----------------------------------------------------------------------------------------------------

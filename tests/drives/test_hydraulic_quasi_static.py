@@ -10,6 +10,7 @@ import pytest
 
 import vpm
 from places import EXAMPLES
+from quotients import quotient
 from vpm.errors import ModelError
 from vpm.simplify.reductions import reductions
 from vpm.simplify.replacement import replaced
@@ -124,14 +125,12 @@ def test_sensitivities_are_those_of_differences() -> None:
     setup = Setup("guarded")
     place = model.output_channels.index("axis.position")
     exact = simulate_arrays(model, record, "free_run", columns=columns, setup=setup).jacobian[:, place]
+
+    def position(theta: np.ndarray) -> np.ndarray:
+        return simulate_arrays(model, record, "free_run", theta=theta, setup=setup).outputs[:, place]
+
     for number, column in enumerate(columns):
-        runs = []
-        step = 1e-4 * model.theta[column]
-        for sign in (1.0, -1.0):
-            theta = model.theta.copy()
-            theta[column] += sign * step
-            runs.append(simulate_arrays(model, record, "free_run", theta=theta, setup=setup).outputs[:, place])
-        slope = (runs[0] - runs[1]) / (2.0 * step)
+        slope = quotient(position, model.theta, column, 1e-4 * model.theta[column])
         assert np.max(np.abs(exact[:, number] - slope)) < 1e-2 * np.max(np.abs(slope))
 
 

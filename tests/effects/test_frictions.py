@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from places import EXAMPLES
+from quotients import of_residual
 from test_sides import TIMES, elastic, force
 from test_split_joints import commanded, slide
 from vpm import EFFECTS, Experiment, Model, simulate
@@ -79,12 +80,7 @@ def test_along_a_record_the_balance_vanishes_and_knows_its_slopes(name: str) -> 
     for place, column in enumerate(columns):
         # Few samples see a transition velocity: over a short step the difference would be rounding alone.
         share = 1e-3 if "transition" in truth.parameter_names[column] else 1e-5
-        ends, step = [], share * truth.theta[column]
-        for sign in (1.0, -1.0):
-            theta = truth.theta.copy()
-            theta[column] += sign * step
-            ends.append(data.evaluate(truth, theta)[0])
-        difference = (ends[0] - ends[1]) / (2.0 * step)
+        difference = of_residual(data, truth, column, share * truth.theta[column])
         assert np.linalg.norm(difference - slopes[:, place]) < 1e-4 * np.linalg.norm(difference)
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import vpm
+from quotients import quotient
 from vpm.errors import ModelError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -100,11 +101,7 @@ def test_balance_has_the_derivatives_of_differences() -> None:
 
     exact = model.core.inverse_dynamics(model.theta, position, velocity, still, still, 1.0 / RATE, columns)[2]
     for k, column in enumerate(columns):
-        step = 1e-5 * model.theta[column]
-        ahead, behind = model.theta.copy(), model.theta.copy()
-        ahead[column] += step
-        behind[column] -= step
-        difference = (required(ahead) - required(behind)) / (2.0 * step)
+        difference = quotient(required, model.theta, column, 1e-5 * model.theta[column])
         scale = np.abs(difference).max()
         assert scale > 0.0
         np.testing.assert_allclose(exact[:, :, k] / scale, difference / scale, atol=1e-5)

@@ -8,6 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from nightly import at_night
+from quotients import of_residual
 from test_split_joints import ARM, SPLITS, J, K, L, commanded, slide
 from vpm import Model
 from vpm.errors import ModelError
@@ -182,12 +183,7 @@ def test_along_a_measured_motion_the_balance_vanishes() -> None:
     without, _ = data.evaluate(slide(), slide().theta)
     assert np.linalg.norm(with_it) < 0.01 * np.linalg.norm(without)
     column = truth.index("axis.link.friction.coulomb")
-    ends = []
-    for sign in (1.0, -1.0):
-        theta = truth.theta.copy()
-        theta[column] += sign * 1e-4
-        ends.append(data.evaluate(truth, theta)[0])
-    difference = (ends[0] - ends[1]) / 2e-4
+    difference = of_residual(data, truth, column, 1e-4)
     assert np.linalg.norm(difference - slopes[:, column]) < 1e-4 * np.linalg.norm(difference)
 
 

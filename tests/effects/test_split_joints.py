@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from model_texts import on_rail, two_links
+from quotients import of_residual
 from vpm import Experiment, Model, simulate
 from vpm.diagnosing import diagnose
 from vpm.discrepancy.screening.compliance_and_stop_start import logged_swing
@@ -117,13 +118,7 @@ def test_the_balance_vanishes_with_the_effect_and_not_without(name: str) -> None
     assert np.linalg.norm(with_it) < 0.005 * np.linalg.norm(without)
     for parameter in ("stiffness", "damping", "inertia"):
         column = truth.index(f"axis.{truth.effects[0].type.group}.{parameter}")
-        step = 1e-5 * truth.theta[column]
-        ends = []
-        for sign in (1.0, -1.0):
-            theta = truth.theta.copy()
-            theta[column] += sign * step
-            ends.append(data.evaluate(truth, theta)[0])
-        difference = (ends[0] - ends[1]) / (2.0 * step)
+        difference = of_residual(data, truth, column, 1e-5 * truth.theta[column])
         assert np.linalg.norm(difference - slopes[:, column]) < 1e-4 * np.linalg.norm(difference)
 
 

@@ -10,6 +10,7 @@ from scipy.linalg import expm
 import vpm
 from fit_machines import Arm, Axis, records
 from nightly import at_night
+from quotients import quotient
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment
 from vpm.identify import Checks, Fit, gaps, identify, identify_inertial, ljung_box, problem
@@ -174,12 +175,7 @@ def test_the_derivative_of_a_relative_balance_matches_differences(noisy: Experim
     theta = model.theta * 1.1
     _, jacobian = data.evaluate(model, theta, columns)
     for place, column in enumerate(columns):
-        sides = []
-        for sign in (1.0, -1.0):
-            moved = theta.copy()
-            moved[column] += sign * 1e-4 * theta[column]
-            sides.append(data.evaluate(model, moved)[0])
-        expected = (sides[0] - sides[1]) / (2e-4 * theta[column])
+        expected = quotient(lambda at: data.evaluate(model, at)[0], theta, column, 1e-4 * theta[column])
         np.testing.assert_allclose(jacobian[:, place], expected, atol=1e-6 * np.max(np.abs(expected)))
 
 

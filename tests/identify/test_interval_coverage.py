@@ -1,10 +1,7 @@
 """Intervals and warnings of fits on the machines of `benches/coverage.py`, and the statistics that they rest on."""
 
-import importlib.util
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
-from types import ModuleType
 
 import numpy as np
 import pytest
@@ -12,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.stats import f as fisher
 
 from nightly import at_night
-from places import ROOT
+from places import ROOT, script
 from vpm.identify import Checks, Fit, InverseDynamicsProblem, identify
 from vpm.identify.closed_loop_prediction import own_residual
 from vpm.identify.problem import Block
@@ -26,17 +23,8 @@ MACHINES = ("axis", "flexible_arm", "leg", "cart")
 EACH = at_night(MACHINES, but=("axis",))
 
 
-def loaded(name: str) -> ModuleType:
-    spec = importlib.util.spec_from_file_location(name, BENCHES / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    sys.modules[name] = module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-machines = loaded("coverage_machines")
-study = loaded("coverage")
+machines = script(BENCHES / "coverage_machines.py")
+study = script(BENCHES / "coverage.py")
 
 
 def fits(machine: str, seeds: Sequence[int], lacking: int) -> list[tuple[Fit, NDArray[np.bool_]]]:

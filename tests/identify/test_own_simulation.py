@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from fit_machines import sines
+from runge_kutta import ahead
 from vpm import Experiment, Model, Setup, Simulation, identify
 from vpm.errors import SimulationError
 from vpm.identify import Fitting, InverseDynamicsProblem, gaps, profile_intervals
@@ -68,7 +69,7 @@ def logs(machines: int, seed: int, seconds: float = 12.0, motor: bool = False) -
         winding = ((command - TORQUE * v) / RESISTANCE - current) / WINDING if motor else np.zeros(machines)
         return np.array([v, (effort - WEIGHT * np.sin(q) - viscous * v - dry * np.tanh(v / TURN)) / inertia, winding])
 
-    state, h = np.zeros((3, machines)), DT / STEPS
+    state = np.zeros((3, machines))
     seen, commands = np.empty((samples, machines)), np.empty((samples, machines))
     for k in range(samples):
         seen[k] = state[0] + NOISE * random.standard_normal(machines)
@@ -76,10 +77,7 @@ def logs(machines: int, seed: int, seconds: float = 12.0, motor: bool = False) -
         command = 12.0 * (wanted[k] - seen[k]) - 0.05 * speed
         commands[k] = command = command * RESISTANCE / TORQUE if motor else command
         for _ in range(STEPS):
-            a = rates(state, command)
-            b = rates(state + 0.5 * h * a, command)
-            c = rates(state + 0.5 * h * b, command)
-            state = state + h / 6.0 * (a + 2.0 * b + 2.0 * c + rates(state + h * c, command))
+            state = ahead(rates, state, DT / STEPS, command)
     time, model = DT * np.arange(samples), WITH_MOTOR if motor else MODEL
     return [
         Experiment.from_arrays(

@@ -5,6 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from fit_machines import sines
+from runge_kutta import ahead
 from vpm import Experiment, Model, identify
 from vpm.identify import Fit, Fitting, judged_on, profile_intervals
 from vpm.numbers import Array
@@ -57,7 +58,7 @@ def logs(machines: int, seed: int, swing: float, angle: float = 0.0, spring: flo
         a, e = (turning * along + coupling * about), (coupling * along + (cart + bob) * about)
         return np.array([v, w, a / determinant, e / determinant])
 
-    state, h = np.zeros((4, machines)), DT / STEPS
+    state = np.zeros((4, machines))
     state[1] = angle + swing * random.standard_normal(machines)
     state[3] = swing * np.sqrt(bob * GRAVITY * LEVER / turning) * random.standard_normal(machines)
     seen, commands = np.empty((samples, machines)), np.empty((samples, machines))
@@ -66,10 +67,7 @@ def logs(machines: int, seed: int, swing: float, angle: float = 0.0, spring: flo
         speed = (seen[k] - seen[k - 1]) / DT if k else np.zeros(machines)
         commands[k] = command = 300.0 * (wanted[k] - seen[k]) - 12.0 * speed
         for _ in range(STEPS):
-            a = rates(state, command)
-            b = rates(state + 0.5 * h * a, command)
-            c = rates(state + 0.5 * h * b, command)
-            state = state + h / 6.0 * (a + 2.0 * b + 2.0 * c + rates(state + h * c, command))
+            state = ahead(rates, state, DT / STEPS, command)
     time = DT * np.arange(samples)
     return [
         Experiment.from_arrays(

@@ -14,6 +14,7 @@ from typer.testing import CliRunner
 
 from model_texts import two_links
 from places import EXAMPLES
+from quotients import quotient
 from vpm import linkages
 from vpm.cli import app
 from vpm.errors import CoreError, ModelError, VpmError
@@ -274,12 +275,7 @@ def test_derivatives_by_parameters_are_those_of_differences(parallelogram: Model
         return parallelogram.core.simulate(theta, x, inputs, 1e-3, 1, "rk4", list(by))
 
     _, _, jacobian = outputs(parallelogram.theta, [index])
-    h, ends = 1e-5, []
-    for sign in (1.0, -1.0):
-        theta = parallelogram.theta.copy()
-        theta[index] += sign * h
-        ends.append(outputs(theta)[0])
-    difference = (ends[0] - ends[1]) / (2.0 * h)
+    difference = quotient(lambda theta: outputs(theta)[0], parallelogram.theta, index, 1e-5)
     assert jacobian[:, :, 0] == pytest.approx(difference, abs=1e-6 * np.abs(difference).max())
 
 

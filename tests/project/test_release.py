@@ -1,6 +1,5 @@
 """Wheels from dist/: of these sources and for this machine, or none; recipes say what pyproject says."""
 
-import importlib.util
 import platform
 import re
 import sys
@@ -11,19 +10,14 @@ from types import ModuleType
 
 import pytest
 
-from places import ROOT
+from places import ROOT, script
 
 MACHINES = ("x86_64", "aarch64", "arm64", "amd64")
 
 
 @pytest.fixture(scope="module")
 def sources() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("release_sources", ROOT / "release" / "sources.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return script(ROOT / "release" / "sources.py", "release_sources")
 
 
 @pytest.fixture

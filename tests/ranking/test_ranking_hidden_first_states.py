@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import vpm
+from quotients import quotient
 from sledge import FINE, GAIN, MASS, OIL, READING, SLEDGE, STEP
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.screening.candidates import candidates
@@ -99,9 +100,7 @@ def test_derivatives_by_first_states_are_those_of_differences() -> None:
     columns = [*range(len(model.theta), len(theta)), 0]
     _, slopes = tracked.follow(model, theta, Tracker(1.0), columns)
     for place, column in enumerate(columns[:-1]):
-        ahead, behind = (theta + side * 1e-3 * (np.arange(len(theta)) == column) for side in (1.0, -1.0))
-        differences = [tracked.follow(model, one, Tracker(1.0))[0] for one in (ahead, behind)]
-        expected = (differences[0] - differences[1]) / 2e-3
+        expected = quotient(lambda at: tracked.follow(model, at, Tracker(1.0))[0], theta, column, 1e-3)
         assert np.abs(slopes[:, :, place] - expected).max() < 1e-6 * np.abs(expected).max()
         # A record knows nothing of where another one begins.
         other = slice(0, len(records()[0].time)) if place > 1 else slice(len(records()[0].time), None)

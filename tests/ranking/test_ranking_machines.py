@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import vpm
+from quotients import quotient
 from sledge import POLE, SAMPLED, SLEDGE, STIFFNESS, pushed, wound
 from slider_crank import OIL, SLIDER, SLIDER_CRANK, turned
 from vpm.model import Model
@@ -69,9 +70,8 @@ def test_derivatives_of_a_slider_crank_are_those_of_differences() -> None:
     _, slopes = tracked.follow(model, model.theta, Tracker(1.0), columns)
     for place, column in enumerate(columns):
         step = 1e-6 * max(1.0, abs(model.theta[column]))
-        ends = [model.theta + sign * step * (np.arange(len(model.theta)) == column) for sign in (1.0, -1.0)]
-        ahead, behind = (tracked.follow(model, theta, Tracker(1.0))[0] for theta in ends)
-        exact, difference = slopes[:, 0, place], (ahead - behind)[:, 0] / (2.0 * step)
+        followed = quotient(lambda theta: tracked.follow(model, theta, Tracker(1.0))[0], model.theta, column, step)
+        exact, difference = slopes[:, 0, place], followed[:, 0]
         assert np.max(np.abs(exact - difference)) < 1e-5 * np.max(np.abs(difference))
 
 

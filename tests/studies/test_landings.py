@@ -1,7 +1,5 @@
 """Stops, landings, free motion, decrements and impulses: closed forms, and motions by SciPy's DOP853."""
 
-import importlib.util
-import sys
 from pathlib import Path
 from types import ModuleType
 
@@ -12,7 +10,7 @@ from hypothesis import strategies as st
 from scipy.integrate import quad
 
 from impedance_records import C, K, M, free_motion, noisy
-from places import EXAMPLES
+from places import EXAMPLES, script
 from vpm import impedance
 
 # ---- impacts ---------------------------------------------------------------------------------------------------------
@@ -117,13 +115,7 @@ def test_the_impulse_of_a_landing_is_weight_and_momentum() -> None:
 
 @pytest.fixture(scope="module")
 def example() -> ModuleType:
-    spec = importlib.util.spec_from_file_location("hyl_impedance", EXAMPLES / "hyl" / "impedance.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules["hyl_impedance"] = module
-    spec.loader.exec_module(module)
-    return module
+    return script(EXAMPLES / "hyl" / "impedance.py", "hyl_impedance")
 
 
 def test_the_linkage_of_the_example_is_that_of_the_model(example: ModuleType) -> None:

@@ -4,12 +4,12 @@ A linear axis (one mass, or two with a spring or a gap between them) and a verti
 proportional-derivative controller that follows a sum of sines. Friction holds where it can, delays are queues.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 from scipy.signal import lfilter
 
+from runge_kutta import moved
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.numbers import Array
@@ -176,7 +176,7 @@ class Arm:
             positions[sample], commands[sample] = q, command
             for _ in range(FINE):
                 queue = [*queue[-late:], command] if late else [command]
-                q, v = _runge_kutta(self._acceleration, q, v, queue[0], h)
+                q, v = moved(self._acceleration, q, v, queue[0], h)
         return positions, commands
 
     def _weight(self, q: Array) -> Array:
@@ -198,17 +198,6 @@ class Arm:
         determinant = whole * own - mixed**2
         shoulder = (own * left[:, 0] - mixed * left[:, 1]) / determinant
         return np.stack([shoulder, (whole * left[:, 1] - mixed * left[:, 0]) / determinant], axis=-1)
-
-
-def _runge_kutta(
-    slope: Callable[[Array, Array, Array], Array], q: Array, v: Array, effort: Array, h: float
-) -> tuple[Array, Array]:
-    first = slope(q, v, effort)
-    second = slope(q + 0.5 * h * v, v + 0.5 * h * first, effort)
-    third = slope(q + 0.5 * h * v + 0.25 * h * h * first, v + 0.5 * h * second, effort)
-    last = slope(q + h * v + 0.5 * h * h * second, v + h * third, effort)
-    ahead = q + h * v + h * h / 6.0 * (first + second + third)
-    return ahead, v + h / 6.0 * (first + 2.0 * second + 2.0 * third + last)
 
 
 def records(machine: Axis | Arm, kind: str, count: int, seed: int, effort: float = 0.05) -> list[Experiment]:

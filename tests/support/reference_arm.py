@@ -17,7 +17,6 @@ Array = NDArray[np.float64]
 DATA = ROOT / "crates" / "vpm-core" / "tests" / "data" / "flexible_arm.json"
 REFERENCE = json.loads(DATA.read_text(encoding="utf-8"))
 P = REFERENCE["params"]
-MOTIONS = ("slow", "fast")
 DURATION = float(P["T_end"])
 
 
