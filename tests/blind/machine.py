@@ -84,6 +84,21 @@ class Machine(Protocol):
         """References of a record of the kind ``"train"`` or ``"validate"``, shape (actuators, samples)."""
 
 
+def rub(
+    joint: str,
+    coulomb: float | None,
+    values: dict[str, float],
+    calibratable: dict[str, float],
+    base: list[tuple[str, str]],
+) -> None:
+    """Note the frictions that the model file knows at a joint: viscous, and Coulomb's if it has any."""
+    base.append(("viscous_friction", joint))
+    if coulomb is not None:
+        base.append(("coulomb_friction", joint))
+        values[f"{joint}.coulomb_friction.coulomb"] = coulomb
+        calibratable[f"{joint}.coulomb_friction.coulomb"] = 0.2
+
+
 def number(value: float, unit: str, deviation: float | None = None) -> str:
     """A parameter of a model file; one with a deviation may be calibrated."""
     if deviation is None:
@@ -101,6 +116,43 @@ class Writer:
         value = float(self.values[key])
         share = self.calibratable.get(key)
         return number(value, unit, None if share is None else share * abs(value))
+
+    def motor(self, drive: str, joint: str, unit: str, command: str) -> str:
+        """Table of a drive whose effort is proportional to its command."""
+        gain = self(f"{drive}.gain", f"{unit}/{command}")
+        return f'[actuators.{drive}]\njoint = "{joint}"\ngain = {gain}\ncommand_unit = "{command}"'
+
+    def cylinder(self, drive: str, stroke: float) -> str:
+        """Tables of the valve and the cylinder of a hydraulic drive."""
+        return f"""[actuators.{drive}.valve]
+flow_gain = {self(f"{drive}.flow_gain", "m^3/(s A Pa^0.5)")}
+frequency = {{ value = 250.0, unit = "rev/s" }}
+damping = 0.7
+stroke = {self(f"{drive}.limit", "A")}
+
+[actuators.{drive}.cylinder]
+bore = {{ value = 16.0, unit = "mm" }}
+rod = {{ value = 10.0, unit = "mm" }}
+stroke = {stroke!r}
+line_a = {self(f"{drive}.line_a", "m^3")}
+line_b = {self(f"{drive}.line_b", "m^3")}"""
+
+    def pump(self) -> str:
+        """Table of a supply."""
+        return f"""[supplies.pump]
+pressure = {self("pump.pressure", "Pa")}
+tank_pressure = {self("pump.tank", "Pa")}
+oil = {{ bulk_modulus = {self("pump.modulus", "Pa")} }}"""
+
+    def cascade(self, servo: str, drive: str, joint: str, command: str, coordinate: str) -> str:
+        """Table of a controller of place and speed."""
+        return f"""[controllers.{servo}]
+type = "cascade"
+actuator = "{drive}"
+measures = "{joint}.position"
+position_gain = {self(f"{servo}.position_gain", "1/s")}
+velocity_gain = {self(f"{servo}.velocity_gain", f"{command} s/{coordinate}")}
+limit = {self(f"{servo}.limit", command)}"""
 
     def effects(self, base: Sequence[tuple[str, str]], kinds: Mapping[str, tuple[str, str]]) -> str:
         """Tables of the known joint frictions; ``kinds`` gives the units (effort, coordinate) of each joint."""

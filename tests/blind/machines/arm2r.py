@@ -14,7 +14,7 @@ from blind.driveline import Driven
 from blind.effects import Scale
 from blind.loads import Column, stack
 from blind.loop import Cascade
-from blind.machine import Draft, Layout, Signal, Writer
+from blind.machine import Draft, Layout, Signal, Writer, rub
 from blind.motion import moves, sines
 from blind.noise import encoder
 
@@ -107,11 +107,7 @@ class Arm2R:
                 **encoder(g, ENCODERS[k], (2e-5, 5e-5, 1e-4)),
             }
             calibratable |= {f"{body}.centre": 0.1, f"{body}.inertia": 0.2, f"{joint}.viscous_friction.viscous": 0.2}
-            base.append(("viscous_friction", joint))
-            if dry:
-                base.append(("coulomb_friction", joint))
-                values[f"{joint}.coulomb_friction.coulomb"] = coulomb
-                calibratable[f"{joint}.coulomb_friction.coulomb"] = 0.2
+            rub(joint, coulomb if dry else None, values, calibratable, base)
             lever = length if k == 0 else 0.3
             scale = Scale(effort, speed, way, own, effort / gain, masses[k], lever, coulomb, viscous)
             scales |= dict.fromkeys((joint, body, drive, ENCODERS[k], "world"), scale)
@@ -137,21 +133,12 @@ child = "{body}"
 axis = [0.0, 1.0, 0.0]
 {place}rotor_inertia = {show(f"{joint}.rotor", "kg m^2")}
 
-[actuators.{drive}]
-joint = "{joint}"
-gain = {show(f"{drive}.gain", "N m/A")}
-command_unit = "A"
+{show.motor(drive, joint, "N m", "A")}
 
 [sensors.{sensor}]
 measures = "{joint}.position"
 
-[controllers.{servo}]
-type = "cascade"
-actuator = "{drive}"
-measures = "{joint}.position"
-position_gain = {show(f"{servo}.position_gain", "1/s")}
-velocity_gain = {show(f"{servo}.velocity_gain", "A s/rad")}
-limit = {show(f"{servo}.limit", "A")}""")
+{show.cascade(servo, drive, joint, "A", "rad")}""")
         return "\n\n".join([*parts, show.effects(base, dict.fromkeys(JOINTS, ("N m", "rad")))])
 
     def plant(self, columns: Sequence[Column], step: float) -> Driven:

@@ -154,21 +154,12 @@ child = "body"
 axis = {axis}
 rotor_inertia = {show("axis.rotor", "kg m^2" if self.rotary else "kg")}
 
-[actuators.drive]
-joint = "axis"
-gain = {show("drive.gain", f"{effort}/{command}")}
-command_unit = "{command}"
+{show.motor("drive", "axis", effort, command)}
 
 [sensors.encoder]
 measures = "axis.position"
 
-[controllers.servo]
-type = "cascade"
-actuator = "drive"
-measures = "axis.position"
-position_gain = {show("servo.position_gain", "1/s")}
-velocity_gain = {show("servo.velocity_gain", f"{command} s/{coordinate}")}
-limit = {show("servo.limit", command)}
+{show.cascade("servo", "drive", "axis", command, coordinate)}
 
 {show.effects(base, {"axis": (effort, coordinate)})}"""
 

@@ -11,7 +11,7 @@ from blind.chain import JOINTS, LINKS, SEGMENTS, Chain
 from blind.effects import Scale
 from blind.loads import Column, stack
 from blind.loop import Cascade
-from blind.machine import Draft, Layout, Signal, Writer
+from blind.machine import Draft, Layout, Signal, Writer, rub
 from blind.motion import jumps, moves, sines
 from blind.noise import converter, encoder
 
@@ -112,11 +112,7 @@ class FlexibleArm:
             }
             calibratable |= {f"{link}.bending": 0.1, f"{joint}.viscous_friction.viscous": 0.2}
             calibratable |= {f"{link}.tip_mass": 0.1}
-            base.append(("viscous_friction", joint))
-            if dry:
-                base.append(("coulomb_friction", joint))
-                values[f"{joint}.coulomb_friction.coulomb"] = coulomb
-                calibratable[f"{joint}.coulomb_friction.coulomb"] = 0.2
+            rub(joint, coulomb if dry else None, values, calibratable, base)
             scale = Scale(effort, speed, way, felt[k], effort / gain, tips[k], lengths[k], coulomb, viscous)
             scales |= dict.fromkeys((joint, link, drive, ENCODERS[k], "world"), scale)
             scales |= {BRIDGES[k]: Scale(way=4e-4)}
@@ -169,10 +165,7 @@ beam = "{link}"
 at = {values[f"{link}.length"] / SEGMENTS!r}
 y = {-0.5 * thick!r}
 
-[actuators.{drive}]
-joint = "{joint}"
-gain = {show(f"{drive}.gain", "N m/A")}
-command_unit = "A"
+{show.motor(drive, joint, "N m", "A")}
 
 [sensors.{ENCODERS[k]}]
 measures = "{joint}.position"
@@ -180,13 +173,7 @@ measures = "{joint}.position"
 [sensors.{BRIDGES[k]}]
 measures = "{link}_root.strain"
 
-[controllers.{SERVOS[k]}]
-type = "cascade"
-actuator = "{drive}"
-measures = "{joint}.position"
-position_gain = {show(f"{SERVOS[k]}.position_gain", "1/s")}
-velocity_gain = {show(f"{SERVOS[k]}.velocity_gain", "A s/rad")}
-limit = {show(f"{SERVOS[k]}.limit", "A")}""")
+{show.cascade(SERVOS[k], drive, joint, "A", "rad")}""")
         return "\n\n".join([*parts, show.effects(base, dict.fromkeys(JOINTS, ("N m", "rad")))])
 
     def plant(self, columns: Sequence[Column], step: float) -> _Plant:

@@ -15,7 +15,7 @@ from blind.effects import Scale
 from blind.hydraulics import Cylinders
 from blind.loads import Column, stack
 from blind.loop import Proportional
-from blind.machine import Draft, Layout, Signal, Writer
+from blind.machine import Draft, Layout, Signal, Writer, rub
 from blind.machines.arm2r import GRAVITY, TwoLinks
 from blind.motion import moves, sines
 from blind.noise import converter, encoder
@@ -161,11 +161,7 @@ class HydraulicLeg:
                 f"{drive}.flow_gain": 0.1,
                 f"{joint}.viscous_friction.viscous": 0.2,
             }
-            base.append(("viscous_friction", joint))
-            if dry:
-                base.append(("coulomb_friction", joint))
-                values[f"{joint}.coulomb_friction.coulomb"] = coulomb
-                calibratable[f"{joint}.coulomb_friction.coulomb"] = 0.2
+            rub(joint, coulomb if dry else None, values, calibratable, base)
             scale = Scale(effort, speed, way, own[k], command, masses[k], LENGTH, coulomb, viscous, START[k])
             scales |= dict.fromkeys((joint, body, drive, f"{joint}_encoder", "world"), scale)
             scales |= dict.fromkeys((f"{joint}_gauge_a", f"{joint}_gauge_b"), Scale(way=20.0 * BAR))
@@ -177,10 +173,7 @@ class HydraulicLeg:
             f"""name = "{self.name}"
 gravity = [0.0, -9.81, 0.0]
 
-[supplies.pump]
-pressure = {show("pump.pressure", "Pa")}
-tank_pressure = {show("pump.tank", "Pa")}
-oil = {{ bulk_modulus = {show("pump.modulus", "Pa")} }}"""
+{show.pump()}"""
         ]
         ends = (("world", "upper", HIP_PINS), ("upper", "lower", KNEE_PINS))
         for k, (joint, body, drive) in enumerate(zip(JOINTS, BODIES, DRIVES, strict=True)):
@@ -210,18 +203,7 @@ supply = "pump"
 retracted_length = {RETRACTED!r}
 command_unit = "A"
 
-[actuators.{drive}.valve]
-flow_gain = {show(f"{drive}.flow_gain", "m^3/(s A Pa^0.5)")}
-frequency = {{ value = 250.0, unit = "rev/s" }}
-damping = 0.7
-stroke = {show(f"{drive}.limit", "A")}
-
-[actuators.{drive}.cylinder]
-bore = {{ value = 16.0, unit = "mm" }}
-rod = {{ value = 10.0, unit = "mm" }}
-stroke = {STROKE!r}
-line_a = {show(f"{drive}.line_a", "m^3")}
-line_b = {show(f"{drive}.line_b", "m^3")}
+{show.cylinder(drive, STROKE)}
 
 [sensors.{joint}_encoder]
 measures = "{joint}.position"

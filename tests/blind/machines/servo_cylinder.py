@@ -152,10 +152,7 @@ parent = "world"
 child = "slide"
 axis = [1.0, 0.0, 0.0]
 
-[supplies.pump]
-pressure = {show("pump.pressure", "Pa")}
-tank_pressure = {show("pump.tank", "Pa")}
-oil = {{ bulk_modulus = {show("pump.modulus", "Pa")} }}
+{show.pump()}
 
 [actuators.servo]
 type = "hydraulic"
@@ -163,18 +160,7 @@ joint = "axis"
 supply = "pump"
 retracted_length = {-0.5 * STROKE!r}
 
-[actuators.servo.valve]
-flow_gain = {show("servo.flow_gain", "m^3/(s A Pa^0.5)")}
-frequency = {{ value = 250.0, unit = "rev/s" }}
-damping = 0.7
-stroke = {show("servo.limit", "A")}
-
-[actuators.servo.cylinder]
-bore = {{ value = 16.0, unit = "mm" }}
-rod = {{ value = 10.0, unit = "mm" }}
-stroke = {STROKE!r}
-line_a = {show("servo.line_a", "m^3")}
-line_b = {show("servo.line_b", "m^3")}
+{show.cylinder("servo", STROKE)}
 
 [sensors.encoder]
 measures = "axis.position"
