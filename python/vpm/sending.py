@@ -52,11 +52,8 @@ def run_packed(their_version: str, folders: Sequence[str], content: bytes, attem
     - ``attempt``: so that an executor that remembers answers to the same call does not answer another attempt by an old
       one
 
-    Returns
-    -------
-    ending : {"value", "error", "refused", "interrupted"}
-    bytes or str
-        The value or the error for `unpacked`, or the sentence why the work was refused.
+    - result ``ending``: one of "value", "error", "refused", "interrupted"
+    - result ``bytes or str``: the value or the error for `unpacked`, or the sentence why the work was refused
     """
     del attempt
     if (refusal := _refusal(their_version, folders)) is not None:

@@ -60,11 +60,9 @@ def gapped_autocorrelation(residual: Array, dt: float) -> tuple[Array, Array, Ar
 
     ``residual``: shape (N,), NaN where there is a gap; ``dt``: s.
 
-    Returns
-    -------
-    lags, values, band : ndarray, shape (L,)
-        s; between -1 and 1; 95 % of the values of white noise are within ``1.96 / sqrt(pairs)`` from zero. Lags that
-        less than half of the samples have pairs for are left out; nothing without samples that vary.
+    - result ``lags``, ``values``, ``band``: shape (L,), s; between -1 and 1; 95 % of the values of white noise are
+      within ``1.96 / sqrt(pairs)`` from zero. Lags that less than half of the samples have pairs for are left out;
+      nothing without samples that vary.
     """
     there = np.isfinite(residual)
     centred = np.where(there, residual - residual[there].mean(), 0.0) if there.any() else np.zeros(0)

@@ -23,10 +23,6 @@ def write_mcap(comparison: Comparison, path: str | PathLike[str]) -> tuple[Path,
     Each channel ``axis.position`` is a topic ``/axis/position`` of JSON messages, whose schema says the unit.
 
     ``path``: of the MCAP file; a layout for Foxglove is written beside it, ``NAME.layout.json``.
-
-    Returns
-    -------
-    mcap, layout : pathlib.Path
     """
     with needs("mcap", "mcap"):
         from mcap.writer import Writer

@@ -33,9 +33,7 @@ def poses(
     - ``loads``: each of shape (N, n), velocities and accelerations; by default the machine is at rest
     - ``stiff``: keep flexible links straight; their own balance is then left out
 
-    Returns
-    -------
-    q, u : ndarray, shapes (N, n), (N, m)
+    - result ``q``, ``u``: shape (N, n), (N, m)
     """
     model, count, m = task.model, guess.shape[1], wanted.shape[1]
     free = np.arange(len(model.joints) if stiff else count)

@@ -96,15 +96,11 @@ def position_spectrum(
     - ``read``: rate at which the position was read, Hz. What is interpolated says nothing of noise above half of it.
     - ``retained``: frequency above which a filter took the noise, Hz
 
-    Returns
-    -------
-    frequency : ndarray, shape (F,)
-        Hz, without zero.
-    spectrum : ndarray, shape (F,)
-        Unit of the position squared per hertz.
-    floor : ndarray, shape (F,)
-        What white noise gives whose level is the median over the top fifth of the frequencies that were read and not
-        filtered, and at least that of the quantisation. Its lowest lines are raised by the window and the smoothing.
+    - result ``frequency``: shape (F,), Hz, without zero
+    - result ``spectrum``: shape (F,), unit of the position squared per hertz
+    - result ``floor``: shape (F,), what white noise gives whose level is the median over the top fifth of the
+      frequencies that were read and not filtered, and at least that of the quantisation. Its lowest lines are raised by
+      the window and the smoothing.
     """
     from scipy.signal import welch
 

@@ -146,12 +146,9 @@ def make_uniform(
       lines
     - ``rate``: Hz; None takes the median step
 
-    Returns
-    -------
-    time : ndarray, shape (M,)
-    data : ndarray, shape (M, C)
-    sentence : str
-        For the history.
+    - result ``time``: shape (M,)
+    - result ``data``: shape (M, C)
+    - result ``sentence``: for the history
     """
     steps = np.diff(time)
     median = float(np.median(steps))

@@ -30,13 +30,10 @@ def merge_clocks(
     - ``clocks``: own clocks of some channels, s, counted from the same instant; equal ones change nothing
     - ``irregular``: one of "error", "interpolate", whether interpolation is allowed
 
-    Returns
-    -------
-    time : ndarray, shape (M,)
-        With interpolation, uniform at the median step of the clock, over the time that all columns share.
-    columns : dict of str to ndarray, shape (M,)
-    sentences : list of str
-        For the history.
+    - result ``time``: shape (M,), with interpolation, uniform at the median step of the clock, over the time that all
+      columns share
+    - result ``columns``: each of shape (M,)
+    - result ``sentences``: for the history
     """
     others = [channel for channel, own in clocks.items() if not np.array_equal(own, time)]
     if not others:

@@ -58,12 +58,8 @@ def real_bodies(model: Model, free: Sequence[str], low: Array, high: Array) -> t
 
     ``low``, ``high``: shape (p,), bounds of the parameters.
 
-    Returns
-    -------
-    coordinates : Coordinates
-    low, high : ndarray, shape (p,)
-        Bounds of the coordinates. Moments that have bounds of their own, or products of inertia beside them, stay
-        coordinates.
+    - result ``low``, ``high``: shape (p,), bounds of the coordinates. Moments that have bounds of their own, or
+      products of inertia beside them, stay coordinates.
     """
     matrix, low, high = np.eye(len(free)), low.copy(), high.copy()
     for body in dict.fromkeys(name.rpartition(".inertia.")[0] for name in free if ".inertia." in name):

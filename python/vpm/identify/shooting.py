@@ -123,11 +123,8 @@ class ShootingProblem(OutputErrorProblem):
     ) -> tuple[Array, Array]:
         """Shooting residual and its derivative by parameters and first states; see :class:`Problem`.
 
-        Returns
-        -------
-        residual : ndarray, shape (n,)
-            Outputs, then gaps.
-        jacobian : ndarray, shape (n, len(columns) + len(first_states))
+        - result ``residual``: shape (n,), outputs, then gaps
+        - result ``jacobian``: shape (n, len(columns) + len(first_states))
         """
         unknown = self.first_states if unknown is None else unknown
         counts = [len(p.starts) * len(self.states) for p in self.pieces]

@@ -93,10 +93,6 @@ class DenavitHartenberg(Entry):
         (J. Denavit and R. Hartenberg, *Journal of Applied Mechanics* 22, 1955; B. Siciliano et al., "Robotics", 2009,
         equation 2.52). Modified: ``Rot_x(alpha) Trans_x(a) Rot_z(theta + q) Trans_z(d)``, the joint comes last
         (J. Craig, "Introduction to Robotics", 3rd edition, equation 3.6).
-
-        Returns
-        -------
-        before, after : Pose
         """
         along_x = Pose((self.a, 0.0, 0.0), rotation_matrix(self.alpha, 0.0, 0.0))
         along_z = Pose((0.0, 0.0, self.d), rotation_matrix(0.0, 0.0, self.theta))

@@ -84,11 +84,8 @@ def law_line(values: Array, law: Array) -> tuple[Array, Array, float]:
 
     ``values``, ``law``: shape (n,), in the order of ``values``.
 
-    Returns
-    -------
-    centers, means : ndarray, shape (bins,)
-    share : float
-        1 for a law that is a function of ``values``, 0 for one that does not depend on them.
+    - result ``centers``, ``means``: shape (bins,)
+    - result ``share``: 1 for a law that is a function of ``values``, 0 for one that does not depend on them
     """
     power = float(law @ law)
     sides = np.split(np.arange(values.size), np.searchsorted(values, [0.0]))

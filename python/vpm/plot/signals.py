@@ -212,10 +212,8 @@ MOST_ENDS = 60
 def running_mean(values: Array, residual: Array) -> tuple[Array, Array]:
     """Running mean of a residual signal in up to 40 bins of a state.
 
-    Returns
-    -------
-    centers, means : ndarray, shape (M,)
-        NaN between bins that are not neighbours, so that no line joins them; nothing without samples.
+    - result ``centers``, ``means``: shape (M,), NaN between bins that are not neighbours, so that no line joins them;
+      nothing without samples
     """
     counts = np.isfinite(residual)
     values, residual = values[counts], residual[counts]

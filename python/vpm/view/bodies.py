@@ -25,14 +25,9 @@ def box_of(mass: float, inertia: Array) -> tuple[Array, Array] | None:
 
     ``mass``: kg; ``inertia``: shape (3, 3), about the centre of mass (kg m^2).
 
-    Returns
-    -------
-    axes : ndarray, shape (3, 3)
-        Row i is the direction of side i in the body.
-    size : ndarray, shape (3,)
-        Lengths of the sides (m).
-    None
-        Where the body has no mass or no inertia, or the box were lighter than anything.
+    - result ``axes``: shape (3, 3), row i is the direction of side i in the body
+    - result ``size``: shape (3,), lengths of the sides (m)
+    - result ``None``: where the body has no mass or no inertia, or the box were lighter than anything
     """
     if mass <= 0.0 or not np.any(inertia):
         return None

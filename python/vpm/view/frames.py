@@ -55,12 +55,8 @@ class Frames:
 
         ``coordinates``: shape (N, n), of joints and flexible links.
 
-        Returns
-        -------
-        origins : ndarray, shape (N, F, 3)
-            m, in the world.
-        axes : ndarray, shape (N, F, 3, 3)
-            Row i is the direction of axis i in the world.
+        - result ``origins``: shape (N, F, 3), m, in the world
+        - result ``axes``: shape (N, F, 3, 3), row i is the direction of axis i in the world
         """
         poses = self._core().marker_poses(self._theta, coordinates)
         axes = poses[:, :, 3:].reshape(*poses.shape[:2], 3, 3)

@@ -17,12 +17,8 @@ SIDES, ROWS = 14, 9
 def mesh_of(shapes: Sequence[Shape], sample: int) -> tuple[Array, Whole]:
     """Mesh of some shapes at a sample, in triangles.
 
-    Returns
-    -------
-    corners : ndarray, shape (C, 3)
-        m, in the world.
-    faces : ndarray, shape (F, 3)
-        Numbers of the corners of each triangle, counter-clockwise seen from outside.
+    - result ``corners``: shape (C, 3), m, in the world
+    - result ``faces``: shape (F, 3), numbers of the corners of each triangle, counter-clockwise seen from outside
     """
     corners: list[Array] = [np.zeros((0, 3))]
     faces: list[Whole] = [np.zeros((0, 3), dtype=np.int64)]

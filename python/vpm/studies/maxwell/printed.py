@@ -12,10 +12,8 @@ def static_regressors(force: ArrayLike, length: ArrayLike, step: float) -> tuple
 
     ``force``, ``length``: shape (N,), N and m; ``step``: h, s.
 
-    Returns
-    -------
-    columns : ndarray, shape (N - 2, 3)
-    forces : ndarray, shape (N - 2,)
+    - result ``columns``: shape (N - 2, 3)
+    - result ``forces``: shape (N - 2,)
     """
     f, s = _pair(force, length)
     return np.column_stack([s[1:-1], f[:-2] / (2.0 * step), np.ones(f.size - 2)]), f[2:]

@@ -115,10 +115,7 @@ def pressures_from_force(
       that ``pa + pb/alpha^2 = ps + pt/alpha^2`` outwards and ``pa alpha^2 + pb = ps + pt alpha^2`` inwards.
       ``"symmetric"``: ``pa + pb = ps + pt``, D'Imperio (2016), 5.41, which is so only for equal areas.
 
-    Returns
-    -------
-    pressure_a, pressure_b : ndarray, shape (N,)
-        Pa.
+    - result ``pressure_a``, ``pressure_b``: shape (N,), Pa
     """
     if rule not in RULES:
         raise IdentificationError(f'the pressure rule "{rule}" is unknown; {near_match(rule, RULES)}')
