@@ -9,6 +9,9 @@
 | free | ``_x``, ``_y``, ``_z``, ``_rx``, ``_ry``, ``_rz`` | ways along x, y, z, then angles as spherical |
 | fixed | none | |
 
+A coordinate grows as the child turns about its direction by the right hand, or shifts along it. An axis has the same
+numbers in the frame of the joint and in that of the child.
+
 The lower pairs: F. Reuleaux, "Theoretische Kinematik", 1875; angles of the spherical joint as Cardan angles in J.
 Wittenburg, "Dynamics of Multibody Systems", 2008, section 2.1.2. These have a singularity at ``_y`` (``_ry``) = 90
 degrees. Whoever steps the machine in time turns spherical and free joints by unit quaternions, if nothing needs their
@@ -41,17 +44,22 @@ EFFORT_UNIT: Mapping[JointKind, str] = {"prismatic": "N", "revolute": "N m", "he
 #: Kind of joint that the shaft of a transmission is like: it turns, and its effort is a torque.
 TURNING: JointKind = "revolute"
 
-#: What the names of its coordinates add to that of a joint.
-SUFFIXES: Mapping[JointType, tuple[str, ...]] = {
-    "prismatic": ("",),
-    "revolute": ("",),
-    "helical": ("",),
-    "cylindrical": ("_rotation", "_translation"),
-    "planar": ("_x", "_y", "_rotation"),
-    "spherical": ("_x", "_y", "_z"),
-    "free": ("_x", "_y", "_z", "_rx", "_ry", "_rz"),
+#: Coordinates of each type, from the parent on: what their names add to that of the joint, their kinds, and the numbers
+#: of their directions among the axis, the two of its plane, and x, y, z of the joint frame.
+COORDINATES: Mapping[JointType, tuple[tuple[str, JointKind, int], ...]] = {
+    "prismatic": (("", "prismatic", 0),),
+    "revolute": (("", "revolute", 0),),
+    "helical": (("", "helical", 0),),
+    "cylindrical": (("_rotation", "revolute", 0), ("_translation", "prismatic", 0)),
+    "planar": (("_x", "prismatic", 1), ("_y", "prismatic", 2), ("_rotation", "revolute", 0)),
+    "spherical": (("_x", "revolute", 3), ("_y", "revolute", 4), ("_z", "revolute", 5)),
+    "free": (
+        *(("_x", "prismatic", 3), ("_y", "prismatic", 4), ("_z", "prismatic", 5)),
+        *(("_rx", "revolute", 3), ("_ry", "revolute", 4), ("_rz", "revolute", 5)),
+    ),
     "fixed": (),
 }
+SUFFIXES = {kind: tuple(suffix for suffix, _, _ in parts) for kind, parts in COORDINATES.items()}
 
 #: Joints that turn anyhow, by three angles.
 ANGULAR: tuple[JointType, ...] = ("spherical", "free")
@@ -126,26 +134,9 @@ class Joint(Component):
     def coordinates(self, name: str) -> tuple[Coordinate, ...]:
         """Coordinates of a checked joint, in their order from the parent on."""
         axis = unit(self.axis) if self.axis is not None else Z
-        names = self.coordinate_names(name)
-        match self.type:
-            case "prismatic" | "revolute" | "helical":
-                return (Coordinate(name, self.type, axis, self.pitch or 0.0),)
-            case "cylindrical":
-                return (Coordinate(names[0], "revolute", axis), Coordinate(names[1], "prismatic", axis))
-            case "planar":
-                first, second = plane(axis)
-                return (
-                    Coordinate(names[0], "prismatic", first),
-                    Coordinate(names[1], "prismatic", second),
-                    Coordinate(names[2], "revolute", axis),
-                )
-            case "spherical":
-                return tuple(Coordinate(n, "revolute", d) for n, d in zip(names, (X, Y, Z), strict=True))
-            case "free":
-                ways = tuple(Coordinate(n, "prismatic", d) for n, d in zip(names[:3], (X, Y, Z), strict=True))
-                return (*ways, *(Coordinate(n, "revolute", d) for n, d in zip(names[3:], (X, Y, Z), strict=True)))
-            case "fixed":
-                return ()
+        ways, pitch = (axis, *plane(axis), X, Y, Z), self.pitch or 0.0
+        parts = COORDINATES[self.type]
+        return tuple(Coordinate(f"{name}{suffix}", kind, ways[way], pitch) for suffix, kind, way in parts)
 
     def poses(self) -> tuple[Pose, Pose]:
         """Constant poses before and after a joint's motion."""
