@@ -149,7 +149,7 @@ class Structure:
         if kind == "joint":
             return site if site in self.joints else None
         if kind == "body":
-            return self._mover(site)
+            return next((self.joints[number] for number in self.way(self.frames[site].mount)), None)
         if kind in {"link", "beam", "world"}:
             return None
         if kind in {"actuator", "cylinder"}:
@@ -163,12 +163,14 @@ class Structure:
         link = self.document.beams[beam]
         return link.solid is None and any(component.startswith("bending") for component in link.deforms)
 
-    def _mover(self, site: str) -> str | None:
-        """Last joint of the structure on the way from the world to a body or a beam."""
-        mount = self.frames[site].mount
-        while mount.kind == "section":
-            mount = self.frames[self.beams[mount.index]].mount
-        return self.joints[mount.index] if mount.kind == "body" else None
+    def way(self, mount: Mount) -> Iterator[int]:
+        """Joints of the structure on the way from a mount to the world, by their numbers."""
+        while mount.kind != "world":
+            if mount.kind == "section":
+                mount = self.frames[self.beams[mount.index]].mount
+            else:
+                yield mount.index
+                mount = self.axes[mount.index].frame.mount
 
     @cached_property
     def balls(self) -> Mapping[str, tuple[tuple[int, ...], ...]]:

@@ -1,6 +1,6 @@
 """What a model answers about its drives and supplies, by name: types, what they move, inputs, states."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from functools import cached_property
 
 from vpm.catalogue import EFFECTS
@@ -9,8 +9,7 @@ from vpm.model.checked_document import Checked
 from vpm.model.drives.actuator import Actuator
 from vpm.model.drives.spring import Compliant
 from vpm.model.drives.table import Table, beyond
-from vpm.model.pose import Mount, Pose
-from vpm.model.structure import Structure
+from vpm.model.pose import Pose
 from vpm.numbers import Array
 
 
@@ -143,7 +142,7 @@ class DriveComponents:
             return entry.joints_turned(self._checked.document)
         structure, line = self._checked.structure, self._checked.document.lines[str(entry.line)]
         ends = [structure.mounted(end.parent, end.at, Pose()).mount for end in (line.start, line.end)]
-        ways = [set(_way(structure, end)) for end in ends]
+        ways = [set(structure.way(end)) for end in ends]
         return tuple(name for k, name in enumerate(structure.joints) if k in ways[0] ^ ways[1])
 
     def has_lag(self, actuator: str) -> bool:
@@ -181,13 +180,3 @@ class DriveComponents:
             model = self._checked.document.name
             raise ModelError(f'{model} has no {what} "{name}"; {near_match(name, names, what="it has")}', where=name)
         return name
-
-
-def _way(structure: Structure, mount: Mount) -> Iterator[int]:
-    """Joints on the way from a mount to the world, for answers about drives."""
-    while mount.kind != "world":
-        if mount.kind == "section":
-            mount = structure.frames[structure.beams[mount.index]].mount
-        else:
-            yield mount.index
-            mount = structure.axes[mount.index].frame.mount
