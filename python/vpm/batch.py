@@ -58,15 +58,12 @@ def simulate_batch(
 
     Parameters
     ----------
-    model : Model
-    trials : iterable of Trial or Experiment
     mode : str
         As in :func:`vpm.simulate`.
     workers : int, optional
         Trials at a time; by default one per core.
     progress : callable or bool
         Called as ``progress(done, total)`` in the calling thread after each trial; True draws a bar.
-    setup : Setup, optional
     cutoff : float, optional
         As in :func:`vpm.simulate`.
     executor : Executor or callable, optional

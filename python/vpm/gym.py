@@ -29,8 +29,6 @@ class VectorEnvironment(VectorEnv[Array, Array, Any]):
 
     Parameters
     ----------
-    model : Model
-    copies : int
     commands : mapping of str to (float, float)
         Least and largest command of each actuator, in command units.
     reward : callable
@@ -161,7 +159,6 @@ class Environment(gymnasium.Env[Array, Array]):
 
     Parameters
     ----------
-    model : Model
     **settings
         As `VectorEnvironment` takes them.
     """

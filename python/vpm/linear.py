@@ -27,7 +27,6 @@ class LinearModel(Result):
 
     Attributes
     ----------
-    model_name : str
     A, B, C, D : ndarray, shapes (nx, nx), (nx, nu), (ny, nx), (ny, nu)
         SI.
     states, inputs, outputs : tuple of str

@@ -20,8 +20,6 @@ class Case:
 
     Attributes
     ----------
-    model : Model
-    experiments : Experiment or sequence of Experiment
     validate : Experiment or sequence of Experiment, optional
         As for `vpm.diagnose`.
     name : str
@@ -56,7 +54,6 @@ def diagnose_many(
 
     Parameters
     ----------
-    cases : iterable of Case
     executor : Executor or callable, optional
         Does the diagnoses, one task each: any `concurrent.futures.Executor`, or a function that makes one, which is
         called again where a pool broke. One after the other in this process if not given.

@@ -249,10 +249,6 @@ class Result(Storable):
     def load(cls, path: str | PathLike[str]) -> Self:
         """Read a result that `save` wrote.
 
-        Parameters
-        ----------
-        path : path-like
-
         Raises
         ------
         VpmError

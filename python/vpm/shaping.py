@@ -24,7 +24,6 @@ class Shaper:
 
     Attributes
     ----------
-    kind : str
     frequencies, damping_ratios : ndarray, shape (modes,)
         Undamped frequencies in Hz, and damping ratios.
     """
@@ -134,7 +133,6 @@ def shaper(
 
     Parameters
     ----------
-    model : Model
     q : array_like, shape (joints,), optional
         Where the motion ends; by default all joints at zero.
     kind : {"zv", "zvd"}

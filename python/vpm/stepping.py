@@ -35,7 +35,6 @@ class Simulation:
 
     Parameters
     ----------
-    model : Model
     time_step : float
         Time between samples, s.
     integrator, substeps

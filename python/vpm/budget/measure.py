@@ -52,7 +52,6 @@ def budget(
 
     Parameters
     ----------
-    model : Model
     rate : float
         Steps per second that the controller asks for, Hz.
     share : float

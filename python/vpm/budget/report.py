@@ -21,7 +21,6 @@ class Stage(Storable):
 
     Attributes
     ----------
-    name : str
     seconds : float
         In one step, s.
     calls : float
@@ -39,7 +38,6 @@ class BudgetReport(Result):
 
     Attributes
     ----------
-    model_name, integrator : str
     rate : float
         Hz.
     steps : int
@@ -62,7 +60,6 @@ class BudgetReport(Result):
     latency : dict of str to float
         Time from a deadline to the wake-up of a periodic loop without work, s: the machine's part, in none of the other
         figures. Empty where it was not measured.
-    machine : str
     direct : str
         Why the steps were evaluated directly; empty where they ran as machine code.
     """

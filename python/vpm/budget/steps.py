@@ -48,11 +48,8 @@ def step_times(
 
     Parameters
     ----------
-    model : Model
     rate : float
         Hz.
-    setup : Setup
-    steps : int
     inputs : ndarray, shape (N, inputs)
         Repeated as often as needed.
     priority : int, optional
@@ -133,7 +130,6 @@ def commands(model: Model, rate: float, experiment: Experiment | None = None) ->
 
     Parameters
     ----------
-    model : Model
     rate : float
         Hz.
     experiment : Experiment, optional

@@ -20,7 +20,6 @@ class Level(Storable):
 
     Attributes
     ----------
-    name : str
     states : int
         Length of the state.
     freed : tuple of str

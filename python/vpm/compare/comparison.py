@@ -26,7 +26,6 @@ class ChannelComparison(Storable):
 
     Attributes
     ----------
-    channel, unit : str
     time, measured, simulated : ndarray, shape (N,)
         s, and the unit of the channel.
     rmse : float
@@ -41,7 +40,6 @@ class ChannelComparison(Storable):
         Mean residual.
     effective_samples : float
         How many independent samples the residual is worth.
-    autocorrelation : Correlation
     inputs : tuple of Correlation
         With each input that varies.
     where : Where
@@ -92,11 +90,8 @@ class Comparison(Result):
 
     Attributes
     ----------
-    model_name, experiment_name, mode : str
-    channels : tuple of ChannelComparison
     state : dict of str to ndarray, shape (N,)
         Motion of the joints on the same samples, for example ``"axis.velocity"``, SI.
-    state_units : dict of str to str
     skipped : tuple of str
         One sentence for each simulated channel that is not compared.
     """

@@ -27,7 +27,6 @@ def compare(run: Run, experiment: Experiment, channels: Sequence[str] | None = N
 
     Parameters
     ----------
-    run : Run
     experiment : Experiment
         The log that was simulated.
     channels : sequence of str, optional

@@ -58,10 +58,8 @@ class Region(Storable):
     quantity : str
         ``"time"``, ``"frequency"``, ``"time since restart"``, or ``"axis.speed"``, ``"axis.velocity"``,
         ``"axis.acceleration"``, ``"axis.position"``.
-    unit : str
     bins : tuple of Bin
         In increasing order.
-    sentence : str
     """
 
     quantity: str
@@ -77,12 +75,7 @@ class Region(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Where(Storable):
-    """All regions of one channel.
-
-    Attributes
-    ----------
-    regions : tuple of Region
-    """
+    """All regions of one channel."""
 
     regions: tuple[Region, ...]
 

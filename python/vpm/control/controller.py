@@ -31,7 +31,6 @@ class FlexibleController:
     ----------
     model : Model
         Of the controller, without delays.
-    feedforward : FlexibleFeedforward
     feedback : StateFeedback, optional
         Without it commands are the feed-forward alone.
     noise : Noise, optional

@@ -26,11 +26,8 @@ class StateFeedback(Result):
 
     Attributes
     ----------
-    model_name : str
     time_step : float
         s.
-    schedule : Schedule
-    inputs, states, integrated : tuple of str
     gains, integral_gains : ndarray, shapes (points, nu, nx), (points, nu, ni)
     outputs : ndarray, shape (points, ni, nx)
         Derivative of the integrated outputs by the state.

@@ -51,7 +51,6 @@ def flexible_feedforward(
     ----------
     model : Model
         With drives that deliver at once; delays are left to the feedback.
-    motion : TargetMotion
     output : str or sequence of str, optional
         A marker, whose three coordinates are meant, or names such as ``"tip.x"`` and ``"joint_1.position"``, as many
         as inputs; by default the joints.

@@ -25,10 +25,8 @@ class FlexibleFeedforward(Result):
 
     Attributes
     ----------
-    model_name, method : str
     time : ndarray, shape (N,)
         s; the target moves from zero to its duration, what comes before is the pre-actuation.
-    inputs, outputs, coordinates, strains : tuple of str
     commands : ndarray, shape (N, nu)
         Of all inputs of the model, each for the sample that begins there, SI; what is not at work has its usual value.
     target, reached : ndarray, shape (N, m)

@@ -64,7 +64,6 @@ def noise(
 
     Parameters
     ----------
-    channel, unit : str
     band : tuple of float
         Lowest and highest frequency, Hz.
     rms : float

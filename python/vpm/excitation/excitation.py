@@ -31,7 +31,6 @@ class Excitation(Result):
 
     Attributes
     ----------
-    name : str
     time : ndarray, shape (N,)
         s, from zero in equal steps.
     data : ndarray, shape (N, C)

@@ -34,10 +34,6 @@ class Campaign(Result, Sequence[Experiment]):
     It stands wherever a sequence of experiments does. All records have the same channels in the same units; rates and
     durations may differ.
 
-    Attributes
-    ----------
-    experiments : tuple of Experiment
-
     Raises
     ------
     ExperimentError

@@ -105,7 +105,6 @@ def channel_table(
 
     Parameters
     ----------
-    channels : mapping of str to ChannelEntry, or path-like, optional
     model : Model, optional
         Its own table counts where none is given.
     """

@@ -182,7 +182,6 @@ def motion(
     ----------
     experiment : Experiment
         With the position of every joint and the command of every actuator.
-    model : Model
     cutoff : float, optional
         Hz; without it `choose_cutoff` decides.
     measured : collection of {"velocity", "acceleration"}

@@ -58,14 +58,12 @@ class Experiment(Result):
 
     Attributes
     ----------
-    name : str
     time : ndarray, shape (N,)
         As logged, s.
     data : ndarray, shape (N, C)
         SI units.
     channels : tuple of str
         Names as in the model, for example ``"axis.position"``.
-    units : tuple of str
     history : tuple of str
         One sentence for each thing that was done to the numbers.
     unused_columns : tuple of str
@@ -141,7 +139,6 @@ class Experiment(Result):
 
         Parameters
         ----------
-        path : path-like
         channels : mapping of str to ChannelEntry, or path-like, optional
             Table, or TOML file of one; by default that of the model.
         model : Model, optional
@@ -203,7 +200,6 @@ class Experiment(Result):
         ----------
         frame : data frame
             One row per sample; an index with a name is a column as well.
-        name : str
         channels, model, irregular, resample
             As in `load`.
 
@@ -239,7 +235,6 @@ class Experiment(Result):
             One entry per channel.
         units : mapping of str to str, optional
             Unit in which each channel is given; by default that of the model, or ``"1"`` without one.
-        name : str
         model, irregular, resample
             As in `load`.
 
@@ -377,7 +372,6 @@ class Experiment(Result):
 
         Parameters
         ----------
-        channel : str
         name : str, optional
             By default ``J.velocity`` for ``J.position`` and ``J.acceleration`` for ``J.velocity``.
         """
@@ -401,7 +395,6 @@ class Experiment(Result):
 
         Parameters
         ----------
-        name : str
         values : array-like, shape (N,)
         unit : str
             In which the values are given; they are stored in SI.
@@ -451,12 +444,7 @@ class Experiment(Result):
         return self._changed(sentence, time=self.time[inside], data=data)
 
     def to_csv(self, path: str | PathLike[str]) -> Path:
-        """Write a record as a table, ``time [s]`` and each channel with its unit in brackets, for `load`.
-
-        Parameters
-        ----------
-        path : path-like
-        """
+        """Write a record as a table, ``time [s]`` and each channel with its unit in brackets, for `load`."""
         with replacing(path) as beside, beside.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file)
             writer.writerow(["time [s]", *(f"{channel} [{self.unit(channel)}]" for channel in self)])

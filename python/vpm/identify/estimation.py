@@ -86,7 +86,6 @@ def estimate(
     ----------
     model : Model
         Gives the structure, the start values and the bounds.
-    data : problem
     free : sequence of str
         Dotted parameter names.
     bounds : mapping, optional
@@ -95,7 +94,6 @@ def estimate(
         Relative change of parameters or of the sum of squares at which to stop.
     linear_only : bool
         Stop after the first step.
-    progress : callable, optional
     most_evaluations : int
         Where to stop in any case.
     worth : Worth, optional

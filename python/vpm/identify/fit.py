@@ -74,8 +74,6 @@ def identify(
 
     Parameters
     ----------
-    model : Model
-    experiments : Experiment or sequence of Experiment
     free : sequence of str, optional
         Dotted names; by default every parameter that the model file gives an uncertainty.
     mode : str

@@ -32,7 +32,6 @@ class Fit(Result):
     ----------
     mode : str
         Mode of comparison the residual came from.
-    names, units : tuple of str
     start, values, std : ndarray, shape (p,)
         Before, after, and one standard deviation (robust against autocorrelated and unequal residuals).
     correlation : ndarray, shape (p, p)

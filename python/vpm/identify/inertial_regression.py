@@ -72,11 +72,7 @@ class InertialRegression(Storable):
         ----------
         regressor : array_like, shape (N, n, p) or (N, p)
         effort : array_like, shape (N, n) or (N,)
-        names : sequence of str
         nominal : array_like, shape (p,), optional
-        units, channels : sequence of str, optional
-        bodies : mapping of str to tuple of str, optional
-        positive, prefer : sequence of str, optional
         records : sequence of int, optional
             By default one record of N samples.
 

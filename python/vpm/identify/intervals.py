@@ -42,7 +42,6 @@ class Profile(Result):
 
     Attributes
     ----------
-    name, unit : str
     value, low, high : float
         Estimate and 95 % interval, SI; infinite where the data set no end.
     values, costs : ndarray, shape (k,)
@@ -73,7 +72,6 @@ class Bootstrap(Result):
 
     Attributes
     ----------
-    names, units : tuple of str
     values : ndarray, shape (replicates, p)
         SI.
     drawn : str

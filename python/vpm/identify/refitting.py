@@ -149,10 +149,8 @@ def judged_on(
 
     Parameters
     ----------
-    fit : Fit
     model : Model
         As it was before the fit.
-    experiments : Experiment or sequence of Experiment
     cutoff : float, optional
         As for the fit.
 

@@ -31,7 +31,6 @@ class Fitting(Storable):
     loss : {"squares", "huber", "soft_l1"}
         Of the residual in units of its noise; the last two let outliers pull less, by weights that fall beyond
         ``loss_scale`` standard deviations (P. Huber and E. Ronchetti, *Robust Statistics*, 2nd ed., 7.8).
-    loss_scale : float
     priors : bool
         Add the uncertainties of the model file as measurements of the parameters themselves.
     starts : int

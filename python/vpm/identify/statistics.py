@@ -199,7 +199,6 @@ def freedom(jacobian: Array, blocks: Sequence[Block], unknowns: int) -> Array:
     ----------
     jacobian : ndarray, shape (n, p)
         Columns of similar length.
-    blocks : sequence of Block
     unknowns : int
         Parameters and first states.
     """

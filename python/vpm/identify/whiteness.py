@@ -41,7 +41,6 @@ class Whiteness(Storable):
 
     Attributes
     ----------
-    experiment, channel : str
     lags : int
         Of the test of whiteness.
     white : float

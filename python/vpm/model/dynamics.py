@@ -20,10 +20,6 @@ class Dynamics:
     second, N or N m. Wrong lengths and numbers that are not finite raise ``CoreError``.
     An object may be shared between threads, but one for each is faster.
 
-    Parameters
-    ----------
-    model : Model
-
     Examples
     --------
     >>> dynamics = Dynamics(model)

@@ -214,7 +214,6 @@ class Motions(Components):
 
         Parameters
         ----------
-        marker : str
         q : array_like, shape (..., n)
 
         Returns
@@ -236,7 +235,6 @@ class Motions(Components):
 
         Parameters
         ----------
-        marker : str
         q : array_like, shape (..., n)
 
         Returns

@@ -28,7 +28,6 @@ def standard_parameters(mass: float, center: Array, inertia: Array) -> Array:
 
     Parameters
     ----------
-    mass : float
     center : ndarray, shape (3,)
     inertia : ndarray, shape (6,)
         About the centre of mass: xx yy zz xy xz yz, entries of the matrix.

@@ -53,8 +53,6 @@ def identify(
     ----------
     records : Experiment, or mapping of str to array-like, or a sequence of them
         Training records; several count in one fit.
-    output : str
-    inputs : sequence of str
     output_lags : int or sequence of int
         A number n stands for 1 ... n.
     input_lags : int, sequence of int, or mapping of an input's name to one of these

@@ -42,7 +42,6 @@ def refine_maxwell(
         Where to start.
     records : Experiment, or mapping of str to array-like, shape (N,), or a sequence of them
         Training records, at rest and in motion.
-    signals : MaxwellSignals, optional
     degree : int, optional
         Of both maps; by default the terms that the element has.
 

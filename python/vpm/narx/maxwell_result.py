@@ -34,7 +34,6 @@ class MaxwellFit(Result):
     k0_std, s0_std : ndarray, shape (10,)
         Standard errors of the element's coefficients; zero where a term is not used, NaN where nothing is known because
         a given element was kept.
-    k1_std, c1_std : float
     drive_range, length_range : tuple of two floats
         Of the training records, beyond which the maps are guesses.
     evaluations : int

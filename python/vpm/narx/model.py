@@ -28,8 +28,6 @@ class Narx(Result):
 
     Attributes
     ----------
-    output : str
-    inputs : tuple of str
     terms : tuple of tuple of (int, int)
         Factors of each term: signal (0 is the output, then the inputs) and lag; a term without factors is the constant.
     coefficients : ndarray, shape (P,)

@@ -40,7 +40,6 @@ class ResidualTests(Result):
 
     Attributes
     ----------
-    own : Correlation
     inputs : tuple of Correlation
         One for each input.
     """
@@ -89,14 +88,10 @@ class NarxRun(Result):
     ----------
     kind : str
         ``"free run"`` (from its own past) or ``"one-step prediction"`` (from the measured past).
-    record : str
     output : str
         Name of the output.
-    unit : str
-    inputs : tuple of str
     time : ndarray, shape (N,)
         s, or samples where the record has no clock.
-    dt : float
     measured, values : ndarray, shape (N,)
     input_values : ndarray, shape (N, m)
     start : int

@@ -15,14 +15,12 @@ class NarxValidation(Result):
 
     Attributes
     ----------
-    records : tuple of str
     samples : tuple of int
         Samples that count: without the start.
     prediction_rmse, free_run_rmse : tuple of float
         Infinite where the free run diverged.
     prediction_fit, free_run_fit : tuple of float
         ``100 (1 - |y - yhat| / |y - mean y|)`` in %; minus infinity where the free run diverged.
-    free_run_max_error : tuple of float
     notes : tuple of str
         One sentence for each free run that diverged.
     """
@@ -60,7 +58,6 @@ def validate(model: Narx, records: RecordLike | Sequence[RecordLike]) -> NarxVal
 
     Parameters
     ----------
-    model : Narx
     records : Experiment, or mapping of str to array-like, or a sequence of them
         Records, or last parts of records (`split_in_time`), that were not used for the fit.
 

@@ -32,7 +32,6 @@ class Observation(Result):
     ----------
     time : ndarray, shape (N,)
         s.
-    channels, units : tuple of str
     innovations : ndarray, shape (N, m)
         What each reading says beyond the samples before it, SI.
     expected : ndarray, shape (N, m)
@@ -40,7 +39,6 @@ class Observation(Result):
     whitened : ndarray, shape (N, m)
         Innovations in units of these, without correlation among channels: white, of size 1, if model and noise are
         right.
-    state_names : tuple of str
     states, deviations : ndarray, shape (N, nx)
         What is in the machine, corrected by the readings up to then, and its standard deviation.
     log_likelihood : float
@@ -120,7 +118,6 @@ def observe(
 
     Parameters
     ----------
-    model : Model
     experiment : Experiment
         Holds the commands, and the position of a joint or another output.
     channels : sequence of str, optional

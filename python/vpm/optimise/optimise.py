@@ -46,7 +46,6 @@ def optimise(
 
     Parameters
     ----------
-    model : Model
     task : Task, mapping or path-like
         See docs/optimisation.md.
     start : Optimum, optional

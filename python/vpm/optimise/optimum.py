@@ -40,7 +40,6 @@ class Optimum(Result):
         Of the log, s; the machine moves from zero on, and stands before if it begins at rest.
     data : ndarray, shape (N, C)
         All outputs of the model; commands are those held until the next sample.
-    channels, units : tuple of str
     initial_state : ndarray, shape (nx,)
     mesh_time : ndarray, shape (Q,)
         Times of the collocation points, s.
@@ -52,14 +51,12 @@ class Optimum(Result):
         Names of the columns.
     error : float
         Largest error of an interval, in sizes of the states: what the polynomials miss of the equations between points.
-    intervals, rounds, iterations : int
     binding : tuple of str
         Limits that hold the motion back.
     played : dict of str to float
         How far a simulation of the log by vpm strays, as a share of each channel's range: joints, markers and gauges.
     played_in_full : dict of str to float
         The same on the model of the file, where the search took another level of detail; else empty.
-    notes : tuple of str
     """
 
     _samples = ("time", "data", "mesh_time", "mesh_states", "node_time", "node_commands")

@@ -23,7 +23,6 @@ class CompiledModel:
 
     Attributes
     ----------
-    name : str
     text : str
         What the file holds, JSON.
     inputs, outputs : tuple of str
@@ -52,7 +51,6 @@ def compile_model(
 
     Parameters
     ----------
-    model : Model
     rate : float
         Samples per second, Hz.
     integrator, substeps

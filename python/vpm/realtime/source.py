@@ -56,7 +56,6 @@ def c_source(model: Model, *, name: str | None = None, parameters: Sequence[str]
 
     Parameters
     ----------
-    model : Model
     name : str, optional
         Begins every name in C; made of the model's name by default.
     parameters : sequence of str

@@ -23,13 +23,7 @@ ROWS = 300
 
 @dataclass(frozen=True)
 class Report:
-    """A diagnosis, and a model reduction if there is one, as a page.
-
-    Attributes
-    ----------
-    diagnosis : Diagnosis
-    ladder : Ladder or None
-    """
+    """A diagnosis, and a model reduction if there is one, as a page."""
 
     diagnosis: Diagnosis
     ladder: Ladder | None = None
@@ -47,7 +41,6 @@ def report(diagnosis: Diagnosis, ladder: Ladder | None = None) -> Report:
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     ladder : Ladder, optional
         What `vpm.simplify` made of the repaired model.
 
@@ -102,11 +95,6 @@ def write_report(diagnosis: Diagnosis, folder: Path) -> tuple[Path, ...]:
     """Write ``report.json``, ``report.html``, the repaired ``model.toml`` and ``diagnosis.npz`` into a folder.
 
     The folder is made if need be; the last file holds everything, for `Diagnosis.load` and ``vpm report``.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    folder : Path
 
     Returns
     -------

@@ -31,7 +31,6 @@ class ImportedRobot:
 
     Attributes
     ----------
-    model : Model
     text : str
         Of its model file, with units and comments.
     notes : tuple of str

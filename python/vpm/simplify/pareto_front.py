@@ -25,7 +25,6 @@ class Rung(Storable):
     ----------
     removed : tuple of str
         What was made simpler, such as ``without coulomb_friction at elbow`` or ``upper as bezier(3)``.
-    integrator : str
     substeps : int
         In one period of the controller.
     states : int
@@ -85,7 +84,6 @@ class Ladder(Result):
         Whether it also fits its share of the period.
     rate : float
         Hz.
-    tolerance : float
     share : float
         Share of the period that a step may take.
     mode, against : str

@@ -63,7 +63,6 @@ def simplify(
 
     Parameters
     ----------
-    model : Model
     experiments : Experiment or sequence of Experiment
         Trajectories on which accuracy counts.
     rate : float

@@ -51,7 +51,6 @@ def simulate(
 
     Parameters
     ----------
-    model : Model
     experiment : Experiment
         Holds the commands (free run, restarts), the motion (inverse dynamics, prescribed motion) or the references
         (closed loop).

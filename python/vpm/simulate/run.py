@@ -30,10 +30,8 @@ class Run(Result):
 
     Attributes
     ----------
-    model_name, experiment_name, mode : str
     time : ndarray, shape (N,)
         s. In restarts the pieces follow each other.
-    channels, units : tuple of str
     values : ndarray, shape (N, C)
         Simulated channels.
     measured : ndarray, shape (N, C)

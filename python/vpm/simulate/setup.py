@@ -88,7 +88,6 @@ class Setup(Storable):
 
         Parameters
         ----------
-        model : Model
         bounded : bool
             Where ``auto`` would step adaptively, take ``guarded``, whose time has a bound.
         guided : bool

@@ -31,7 +31,6 @@ def view(
 
     Parameters
     ----------
-    model : Model
     run : Run, ScenarioRun or Experiment, optional
         What moves it; a log is simulated first, and shown beside. Without one the joints have sliders.
     page : path-like, optional

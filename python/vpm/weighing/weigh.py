@@ -32,7 +32,6 @@ class Weighing(Result):
 
     Attributes
     ----------
-    names : tuple of str
     probability : ndarray, shape (k,)
         That of each, if one of them is right and all were as likely before; not calibrated.
     evidence : ndarray, shape (k,)

@@ -48,7 +48,6 @@ class Fmu:
 
     Attributes
     ----------
-    path : pathlib.Path
     identifier : str
         What its files, and its functions in C, are called.
     token : str
@@ -57,7 +56,6 @@ class Fmu:
         Names of its variables.
     step : float
         Longest step of its own, s.
-    integrator : str
     platform : str or None
         What its library runs on; None where it has sources alone.
     notes : tuple of str
@@ -96,7 +94,6 @@ def write_fmu(
 
     Parameters
     ----------
-    model : Model
     path : path-like
         The file, ``machine.fmu``.
     rate : float

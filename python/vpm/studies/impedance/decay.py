@@ -33,7 +33,6 @@ class Decay(Result):
 
     Attributes
     ----------
-    name : str
     stiffness, damping : float
         N/m, N s/m.
     stiffness_std, damping_std : float
@@ -46,7 +45,6 @@ class Decay(Result):
         x_rest, m; weight and other constant forces are in it.
     noise : float
         Root of the mean squared residual, m.
-    notes : tuple of str
     """
 
     name: str
@@ -154,7 +152,6 @@ class LogarithmicDecrement(Result):
 
     Attributes
     ----------
-    name : str
     decrement : float
         ``ln(x_n / x_(n+1))`` of two maxima a period apart.
     decrement_std : float
@@ -190,7 +187,6 @@ def logarithmic_decrement(record: RecordLike, displacement: str) -> LogarithmicD
     Parameters
     ----------
     record : Experiment or mapping of str to array-like, shape (N,)
-    displacement : str
 
     Raises
     ------

@@ -44,7 +44,6 @@ class Loop(Result):
 
     Attributes
     ----------
-    name : str
     frequency : float
         Hz.
     amplitude : float

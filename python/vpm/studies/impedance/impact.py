@@ -54,7 +54,6 @@ class Stop(Result):
         ``E dt / (c dl^2)``.
     roundness : float
         ``v dt / dl`` over that of the assumed sine: 1 where the stop is one.
-    notes : tuple of str
     """
 
     damping: float

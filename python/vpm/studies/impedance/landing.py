@@ -26,14 +26,12 @@ class Landing(Result):
 
     Attributes
     ----------
-    name : str
     stiffness, damping, force_at_zero : float
         N/m, N s/m, N of ``F = F0 + k x + c dx/dt``, with the applied force.
     stiffness_std, damping_std : float
         Of white noise.
     misfit : float
         What the law leaves of the J integrals, as a share of their spread: above some percent the law is another one.
-    notes : tuple of str
     """
 
     name: str

@@ -45,7 +45,6 @@ class LossLaw(Result):
         ``E ~ X^p omega^q``; NaN where amplitude or frequency was not varied.
     scatter : float
         Relative standard deviation of the tests about that power law, not below 2 %.
-    sentence : str
     """
 
     law: str

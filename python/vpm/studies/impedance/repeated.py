@@ -35,15 +35,12 @@ class Repeated(Result):
 
     Attributes
     ----------
-    name, unit : str
     values : ndarray, shape (n,)
-    mean : float
     std : float
         Of one test, with n - 1 degrees of freedom.
     interval : tuple of float
         Two-sided interval of the mean at `confidence`, ``mean -+ t std / sqrt(n)``; errors that all tests share, such
         as the gain of a load cell or a delay, are not in it.
-    confidence : float
     """
 
     name: str
@@ -86,7 +83,6 @@ def repeat(values: ArrayLike, name: str = "value", unit: str = "1", *, confidenc
     ----------
     values : array-like, shape (n,)
         One number for each test, independent and about normal.
-    name, unit : str
     confidence : float
         Between 0 and 1.
 
@@ -121,7 +117,6 @@ class RepeatedTests(Result):
     ----------
     joint, impedance, test : str
         Such as ``"hip"``, ``"low"``, ``"quasi-static"``.
-    stiffness, damping : Repeated
     """
 
     joint: str
@@ -138,12 +133,6 @@ def repeat_tests(
     joint: str, impedance: str, test: str, estimates: Iterable[Estimate], *, confidence: float = 0.95
 ) -> RepeatedTests:
     """Stiffness and damping of repeated tests.
-
-    Parameters
-    ----------
-    joint, impedance, test : str
-    estimates : iterable of Loop, Landing or Decay
-    confidence : float
 
     Raises
     ------
@@ -163,12 +152,7 @@ def repeat_tests(
 
 @dataclass(frozen=True, repr=False, eq=False)
 class ImpedanceTable(Result):
-    """Rows of repeated tests; printing it gives the layout of D'Imperio (2016), table 5.2, with intervals.
-
-    Attributes
-    ----------
-    rows : tuple of RepeatedTests
-    """
+    """Rows of repeated tests; printing it gives the layout of D'Imperio (2016), table 5.2, with intervals."""
 
     rows: tuple[RepeatedTests, ...]
 

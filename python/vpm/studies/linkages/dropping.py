@@ -103,7 +103,6 @@ def drop_limit(
 
     Parameters
     ----------
-    leg : Leg
     term : {"velocity", "inertia"}
     tolerance : float
         Largest share of the effort that may be missing, between 0 and 1.

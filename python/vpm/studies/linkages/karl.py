@@ -66,7 +66,6 @@ class Karl:
     ----------
     geometry : KarlGeometry, optional
         Default: the prototype.
-    name : str
 
     Raises
     ------

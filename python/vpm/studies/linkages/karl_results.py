@@ -90,9 +90,7 @@ class KarlSingularities(Result):
 
         Parameters
         ----------
-        actuator : int
         kind : {"direct", "inverse"}
-        arrangement : str, optional
 
         Returns
         -------
@@ -124,7 +122,6 @@ class KarlWorkspace(Result):
         Row of `Karl.direct`, 0 to 3.
     angles, end_points, transmission : ndarray, shape (N, M, 2)
         As in `KarlPoses`.
-    singularities : KarlSingularities
     """
 
     first: Array

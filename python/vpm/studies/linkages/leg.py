@@ -41,7 +41,6 @@ class Leg:
     ----------
     parameters : LegParameters, optional
         Default: the CAD column for HyQ with the public shank.
-    name : str
 
     Raises
     ------

@@ -69,13 +69,7 @@ class LegPart(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Cylinder(Storable):
-    """A hydraulic cylinder of the leg: where it sits, and what it weighs.
-
-    Attributes
-    ----------
-    attachment : Attachment
-    barrel, rod : LegPart
-    """
+    """A hydraulic cylinder of the leg: where it sits, and what it weighs."""
 
     attachment: Attachment
     barrel: LegPart
@@ -90,8 +84,6 @@ class LegParameters(Storable):
     ----------
     slider_mass : float
         Of the slider, at the hip axis (kg).
-    upper, lower : Segment
-    hip, knee : Cylinder
     gravity : float
         Downward (m/s^2).
     """

@@ -40,7 +40,6 @@ def identify_maxwell(
     ----------
     static, dynamic : Experiment, or mapping of str to array-like, shape (N,), or a sequence of them
         One record for each pose at rest; tests in motion. Keep other tests to judge the result by.
-    signals : MaxwellSignals, optional
     degree : int or mapping of "k0" and "s0" to int, optional
         Of the maps; by default as many as windows left out ask for.
     refined_degree : int, optional
@@ -55,7 +54,6 @@ def identify_maxwell(
         the length makes k1 too small.
     step : float, optional
         Time between samples of records without a clock, s.
-    refine : bool
 
     Raises
     ------

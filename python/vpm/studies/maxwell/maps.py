@@ -30,10 +30,8 @@ class MaxwellMap(Result):
         Over ``1, u, s, u^2, u s, s^2, u^3, u^2 s, u s^2, s^3``, as `MaxwellNarx` takes them.
     covariance : ndarray, shape (10, 10)
         Of the coefficients.
-    degree : int
     misfit : float
         Root of the mean squared difference to the windows' values.
-    windows : int
     centre, scale : tuple of two floats
         Of the variables in which it was fitted.
     terms : tuple of int

@@ -42,7 +42,6 @@ def dynamic_windows(
     records : Experiment, or mapping of str to array-like, shape (N,), or a sequence of them
     k0, s0 : MaxwellMap
         From tests at rest; their covariance counts in that of k1 and c1.
-    signals : MaxwellSignals, optional
     width : float, optional
         Of a window, s; by default a window is a record.
     method : {"output_error", "instrumental", "least_squares"}

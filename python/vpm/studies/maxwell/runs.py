@@ -22,9 +22,7 @@ def maxwell_one_step(element: MaxwellNarx, record: RecordLike, signals: MaxwellS
 
     Parameters
     ----------
-    element : MaxwellNarx
     record : Experiment or mapping of str to array-like, shape (N,)
-    signals : MaxwellSignals, optional
 
     Raises
     ------
@@ -44,9 +42,7 @@ def maxwell_free_run(
 
     Parameters
     ----------
-    element : MaxwellNarx
     record : Experiment or mapping of str to array-like, shape (N,)
-    signals : MaxwellSignals, optional
     limit : float, optional
         Force that counts as diverged, N; by default a thousand times the largest measured one.
 
@@ -123,8 +119,6 @@ class MaxwellErrors(Result):
 
     Attributes
     ----------
-    tests : tuple of str
-    samples : tuple of int
     sigma : tuple of float
         ``100 mean((|F| - |F*|) / |F|)`` of the free run, %: the measure of D'Imperio (2016), Table 5.5. Errors of both
         signs cancel in it, and samples near zero force decide it; samples of exactly zero force are left out.
@@ -172,12 +166,7 @@ class MaxwellErrors(Result):
 
 
 def thesis_sigma(run: NarxRun) -> float:
-    """``100 mean((|F| - |F*|) / |F|)`` over the samples of a run after its start, % (D'Imperio 2016, Table 5.5).
-
-    Parameters
-    ----------
-    run : NarxRun
-    """
+    """``100 mean((|F| - |F*|) / |F|)`` over the samples of a run after its start, % (D'Imperio 2016, Table 5.5)."""
     measured, computed = np.abs(run.measured[run.start :]), np.abs(run.values[run.start :])
     moving = measured > 0.0
     return float(100.0 * np.mean((measured[moving] - computed[moving]) / measured[moving])) if moving.any() else 0.0
@@ -194,10 +183,8 @@ def maxwell_errors(
 
     Parameters
     ----------
-    element : MaxwellNarx
     records : Experiment, or mapping of str to array-like, or a sequence of them
         Tests that were not used for the fit.
-    signals : MaxwellSignals, optional
     cutoff : float, optional
         Of a low-pass filter for the length, Hz; by default none.
 

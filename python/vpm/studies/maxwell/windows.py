@@ -36,7 +36,6 @@ class MaxwellWindows(Result):
     values : ndarray, shape (n, 2)
     covariance : ndarray, shape (n, 2, 2)
     samples : ndarray, shape (n,)
-    notes : tuple of str
     """
 
     names: tuple[str, str]
@@ -98,7 +97,6 @@ def static_windows(
     ----------
     records : Experiment, or mapping of str to array-like, shape (N,), or a sequence of them
         One for each pose.
-    signals : MaxwellSignals, optional
     width : int
         Poses in a window, 2 at least.
     settle : float

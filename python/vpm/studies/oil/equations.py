@@ -78,7 +78,6 @@ class CylinderGeometry(Storable):
 
         Parameters
         ----------
-        model : Model
         actuator : str
             Its name.
 

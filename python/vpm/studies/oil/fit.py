@@ -44,8 +44,6 @@ class OilFit(Result):
         loses.
     residual : ndarray, shape (N, e)
         One column for each balance: m of the piston's place, or m/s.
-    samples : int
-    notes, warnings : tuple of str
     """
 
     names: tuple[str, ...]
@@ -142,7 +140,6 @@ def identify_oil(
     ----------
     time : array-like, shape (N,)
         Uniform, s.
-    geometry : CylinderGeometry
     position : array-like, shape (N,)
         Of the piston from mid-stroke, positive where side a is large, m.
     command : array-like, shape (N,)
