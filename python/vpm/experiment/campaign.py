@@ -1,7 +1,5 @@
 """Several records of one campaign as one object, and its honest division into what is fitted and what judges."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -9,17 +7,15 @@ from fnmatch import fnmatchcase
 from glob import glob, has_magic
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, Self, overload
+from typing import Literal, Self, overload
 
 from vpm.errors import ExperimentError, check_known, near_match
 from vpm.experiment.readers.base import reading
 from vpm.experiment.readers.lerobot import episodes_of, is_data_set
 from vpm.experiment.record import Experiment
 from vpm.files import exists
+from vpm.model import ChannelEntry, Model
 from vpm.results import Result
-
-if TYPE_CHECKING:
-    from vpm.model import ChannelEntry, Model
 
 
 def as_records(experiments: Experiment | Sequence[Experiment]) -> list[Experiment]:

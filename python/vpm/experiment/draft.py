@@ -1,13 +1,10 @@
 """Columns of a file as channels: which column is which, in what unit, scaled, shifted and converted."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,12 +14,9 @@ from vpm.experiment.readers import open_log
 from vpm.experiment.readers.base import Log, bracketed
 from vpm.experiment.table import Table
 from vpm.expression import PURE, Quantity, read_expression
+from vpm.model import ChannelEntry, Model
 from vpm.numbers import Array
 from vpm.units import Unit, parse_unit
-
-if TYPE_CHECKING:
-    from vpm.model import ChannelEntry, Model
-
 
 #: Names of a clock column where no channel table says which it is.
 TIME_COLUMNS = ("time", "time_s", "t")

@@ -1,10 +1,8 @@
 """From a file or from arrays to the parts of a record: select, check, scale, convert, align, interpolate."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from os import PathLike
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -23,12 +21,10 @@ from vpm.experiment.grid import (
 )
 from vpm.experiment.merge import merge_clocks
 from vpm.experiment.noise import FEWEST_SAMPLES, noise_std, quantisation_step
+from vpm.experiment.readers.base import Log
 from vpm.experiment.record import Experiment
+from vpm.model import ChannelEntry, Model
 from vpm.numbers import Array, array_of
-
-if TYPE_CHECKING:
-    from vpm.experiment.readers.base import Log
-    from vpm.model import ChannelEntry, Model
 
 
 class Parts(NamedTuple):
