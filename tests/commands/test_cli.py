@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from command_line import vpm
+from command_line import ran, vpm
 from interrupting import running, spent, work
 from places import EXAMPLES
 from sledge import SLEDGE, pushed
@@ -26,8 +26,7 @@ COMMANDS = (
 
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_help_with_an_example(command: str) -> None:
-    done = vpm(command, "--help")
-    assert done.returncode == 0
+    done = ran(command, "--help")
     assert "Example:" in done.stdout
 
 
@@ -49,7 +48,7 @@ def test_info_lists_parameters_with_units() -> None:
 
 
 def test_simulate_saves_and_plots(tmp_path: Path) -> None:
-    done = vpm(
+    ran(
         "simulate",
         MODEL,
         VALIDATION,
@@ -60,15 +59,13 @@ def test_simulate_saves_and_plots(tmp_path: Path) -> None:
         "--plot",
         tmp_path / "r.svg",
     )
-    assert done.returncode == 0, done.stderr
     assert (tmp_path / "r.npz").stat().st_size > 1000
     assert "<svg" in (tmp_path / "r.svg").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("words", [("FILE", "--plot"), ("--plot", "FILE"), ("FILE", "--plot", "--out", "runs.npz")])
 def test_a_scenario_runs_and_its_picture_is_named_after_it(tmp_path: Path, words: tuple[str, ...]) -> None:
-    done = vpm("simulate", *(STEP if word == "FILE" else word for word in words), cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = ran("simulate", *(STEP if word == "FILE" else word for word in words), cwd=tmp_path)
     assert "3 of 3 runs" in done.stdout
     assert "axis.position" in done.stdout
     assert (tmp_path / "step.png").read_bytes().startswith(b"\x89PNG")
@@ -82,8 +79,7 @@ def test_the_picture_of_a_scenario_goes_where_it_is_asked_for(tmp_path: Path) ->
 
 
 def test_a_log_gives_its_name_to_a_picture_without_one(tmp_path: Path) -> None:
-    done = vpm("simulate", MODEL, VALIDATION, "--plot", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    ran("simulate", MODEL, VALIDATION, "--plot", cwd=tmp_path)
     assert [path.name for path in tmp_path.iterdir()] == ["validation.png"]
 
 
@@ -103,15 +99,13 @@ def test_a_run_of_a_scenario_that_fails_is_named_and_the_others_are_shown(tmp_pa
 
 
 def test_compare_says_where_the_residual_lives() -> None:
-    done = vpm("compare", MODEL, VALIDATION)
-    assert done.returncode == 0, done.stderr
+    done = ran("compare", MODEL, VALIDATION)
     assert "of the residual's energy" in done.stdout
 
 
 def test_identify_prints_values_and_writes_the_model(tmp_path: Path) -> None:
     fitted = tmp_path / "fitted.toml"
-    done = vpm("identify", MODEL, TRAIN, "--free", "shoulder.friction.viscous", "--out", fitted)
-    assert done.returncode == 0, done.stderr
+    done = ran("identify", MODEL, TRAIN, "--free", "shoulder.friction.viscous", "--out", fitted)
     assert "shoulder.friction.viscous" in done.stdout
     assert vpm("info", fitted).returncode == 0
 
@@ -141,8 +135,7 @@ def test_identify_takes_the_settings_of_the_engine() -> None:
         "--bootstrap",
         "20",
     )
-    done = vpm("identify", MODEL, TRAIN, *words, *more, "--loss", "huber")
-    assert done.returncode == 0, done.stderr
+    done = ran("identify", MODEL, TRAIN, *words, *more, "--loss", "huber")
     for sentence in ("of 2 starts agree", "noise of shoulder.position", f"{name}, profile:", f"{name}, bootstrap:"):
         assert sentence in done.stdout
     refused = vpm("identify", MODEL, TRAIN, "--bound", f"{name}=1")
@@ -153,8 +146,7 @@ def test_identify_takes_the_settings_of_the_engine() -> None:
 def test_identify_writes_a_folder_and_judges_validation_records(tmp_path: Path) -> None:
     name, folder = "shoulder.friction.viscous", tmp_path / "fitted"
     words = ("--free", name, "--free", "arm.inertia.yy", "--fix", "arm.inertia.yy", "--validate", VALIDATION)
-    done = vpm("identify", MODEL, TRAIN, *words, "--out", folder, "--plot", tmp_path / "fit.svg")
-    assert done.returncode == 0, done.stderr
+    done = ran("identify", MODEL, TRAIN, *words, "--out", folder, "--plot", tmp_path / "fit.svg")
     assert "unseen shoulder.effort" in done.stdout
     names = {"model.toml", "parameters.csv", "report.md", "fit.npz", "fit.png"}
     assert {path.name for path in folder.iterdir()} == names
@@ -171,8 +163,7 @@ def test_identify_writes_a_folder_and_judges_validation_records(tmp_path: Path) 
 
 def test_identify_turns_a_model_round() -> None:
     words = ("--free", "shoulder.friction.viscous", "--mode", "input_error", "--horizon", "0.2")
-    done = vpm("identify", MODEL, TRAIN, *words)
-    assert done.returncode == 0, done.stderr
+    done = ran("identify", MODEL, TRAIN, *words)
     assert "residual motor.command" in done.stdout
 
 
@@ -194,13 +185,11 @@ def test_ctrl_c_keeps_the_best_of_a_fit_and_writes_it(tmp_path: Path) -> None:
 
 
 def test_diagnose_writes_its_report(tmp_path: Path) -> None:
-    done = vpm("diagnose", MODEL, TRAIN, "--validate", VALIDATION, "--effect", "coulomb_friction", "--out", tmp_path)
-    assert done.returncode == 0, done.stderr
+    ran("diagnose", MODEL, TRAIN, "--validate", VALIDATION, "--effect", "coulomb_friction", "--out", tmp_path)
     assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["verdict"] == "effect_found"
     assert (tmp_path / "report.html").is_file()
     assert "coulomb" in (tmp_path / "model.toml").read_text(encoding="utf-8")
-    again = vpm("report", tmp_path / "diagnosis.npz", "--out", tmp_path / "again")
-    assert again.returncode == 0, again.stderr
+    again = ran("report", tmp_path / "diagnosis.npz", "--out", tmp_path / "again")
     assert "verdict: effect_found" in again.stdout
     first, second = ((folder / "report.json").read_bytes() for folder in (tmp_path, tmp_path / "again"))
     assert first == second
@@ -209,13 +198,11 @@ def test_diagnose_writes_its_report(tmp_path: Path) -> None:
 def test_diagnose_leaves_effects_out_and_stops_at_a_limit(tmp_path: Path) -> None:
     tried = ("--effect", "coulomb_friction", "--effect", "spring")
     words = ("--validate", VALIDATION, *tried, "--workers", "1", "--out", tmp_path)
-    done = vpm("diagnose", MODEL, TRAIN, *words, "--without", "coulomb_friction")
-    assert done.returncode == 0, done.stderr
+    done = ran("diagnose", MODEL, TRAIN, *words, "--without", "coulomb_friction")
     assert "coulomb_friction" not in done.stdout
     assert "screening 1 of " in done.stderr
     assert "coulomb_friction" not in done.stderr
-    none = vpm("diagnose", MODEL, TRAIN, *words, "--limit", "0")
-    assert none.returncode == 0, none.stderr
+    ran("diagnose", MODEL, TRAIN, *words, "--limit", "0")
     assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))["effects"] == []
 
 
@@ -224,8 +211,7 @@ def test_rank_names_what_is_missing_and_writes_the_model(tmp_path: Path) -> None
     for seed in (1, 2):
         pushed(seed=seed, lag=0.008, duration=3.0).to_csv(tmp_path / f"push_{seed}.csv")
     words = ("sledge.toml", "push_1.csv", "--validate", "push_2.csv", "--most", "1", "--out", "better.toml")
-    done = vpm("rank", *words, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = ran("rank", *words, cwd=tmp_path)
     assert done.stdout.startswith("1. actuator_lag at motor removes ")
     assert "way.position, validation" in done.stdout
     better = Model.load(tmp_path / "better.toml")
@@ -262,15 +248,13 @@ def test_budget_exit_code_says_whether_it_holds() -> None:
 
 
 def test_simplify_leaves_out_what_does_not_matter(tmp_path: Path) -> None:
-    done = vpm("simplify", MODEL, VALIDATION, "--tolerance", "0.5", "--out", tmp_path / "cheap.toml")
-    assert done.returncode == 0, done.stderr
+    done = ran("simplify", MODEL, VALIDATION, "--tolerance", "0.5", "--out", tmp_path / "cheap.toml")
     assert "cheapest within 50 %" in done.stdout
     assert vpm("info", tmp_path / "cheap.toml").returncode == 0
 
 
 def test_demo_tells_the_story(tmp_path: Path) -> None:
-    done = vpm("demo", "--out", tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = ran("demo", "--out", tmp_path)
     assert "verdict: effect_found" in done.stdout
     assert "coulomb_friction at shoulder; found: coulomb_friction at shoulder" in done.stdout
 

@@ -13,15 +13,14 @@ from types import ModuleType
 import numpy as np
 import pytest
 from scipy.linalg import expm
-from typer.testing import CliRunner
 
+from command_line import ran
 from nightly import at_night
 from places import EXAMPLES
 from test_ball_joints import FRICTION, OVER, start, top
 from test_frictions import geared
 from test_sides import rubbing_on_both_sides
 from vpm import Model, Simulation
-from vpm.cli import app
 from vpm.errors import SimulationError, VpmError
 from vpm.linear import LinearModel
 from vpm.numbers import Array
@@ -283,12 +282,11 @@ def test_free_parameters_are_prepared_and_differentiated(tmp_path: Path) -> None
 
 def test_the_command_writes_what_the_function_gives(emps: Model, tmp_path: Path) -> None:
     words = ["compile", str(EXAMPLES / "emps" / "model.toml"), "--name", "axis", "--parameter", "*.mass"]
-    done = CliRunner().invoke(app, [*words, "--c", str(tmp_path / "axis")])
-    assert done.exit_code == 0, done.output
+    done = ran(*words, "--c", str(tmp_path / "axis"))
     written = c_source(emps, name="axis", parameters=["*.mass"])
     assert (tmp_path / "axis" / "axis.h").read_text(encoding="utf-8") == written.header
     assert (tmp_path / "axis" / "axis.c").read_text(encoding="utf-8") == written.source
-    assert all(name in done.output for name in written.parameters)
+    assert all(name in done.stdout for name in written.parameters)
 
 
 @WITHOUT_COMPILER

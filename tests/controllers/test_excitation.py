@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
 import vpm
+from command_line import ran
+from command_line import vpm as typed
 from places import EXAMPLES
 from two_link_arm import MODEL
-from vpm.cli import app
 from vpm.demo import MODEL as DEMO
 from vpm.errors import ExcitationError, SimulationError
 from vpm.excitation import (
@@ -29,8 +29,6 @@ from vpm.excitation.multisine import schroeder_phases
 from vpm.experiment import Experiment
 from vpm.numbers import Array
 from vpm.scenario.schema import Points
-
-RUNNER = CliRunner()
 
 
 @pytest.fixture(scope="module")
@@ -427,9 +425,8 @@ def test_a_motion_is_saved_and_read_back(tmp_path: Path, motion: FourierTrajecto
 
 @pytest.mark.parametrize("command", ["multisine", "chirp", "noise", "fourier"])
 def test_every_design_has_help_with_an_example(command: str) -> None:
-    done = RUNNER.invoke(app, ["excite", command, "--help"])
-    assert done.exit_code == 0
-    assert f"Example:  vpm excite {command}" in done.output
+    done = ran("excite", command, "--help")
+    assert f"Example:  vpm excite {command}" in done.stdout
 
 
 def test_a_motion_is_designed_on_the_command_line(tmp_path: Path) -> None:
@@ -439,15 +436,14 @@ def test_a_motion_is_designed_on_the_command_line(tmp_path: Path) -> None:
     limits.write_text(text.format("shoulder") + text.format("elbow"), encoding="utf-8")
     words = ["excite", "fourier", str(model), str(limits), "--period", "4", "--time-step", "0.01"]
     words += ["--evaluations", "25", "--out", str(tmp_path / "m.csv"), "--plot", str(tmp_path / "m.png")]
-    done = RUNNER.invoke(app, words)
-    assert done.exit_code == 0, done.output
-    assert "Condition number" in done.output
+    done = ran(*words)
+    assert "Condition number" in done.stdout
     assert Experiment.load(tmp_path / "m.csv")["shoulder.position"].size == 400
     assert (tmp_path / "m.png").read_bytes().startswith(b"\x89PNG")
     limits.write_text("[shoulder]\nposition = 1.0\n", encoding="utf-8")
-    wrong = RUNNER.invoke(app, words)
-    assert isinstance(wrong.exception, ExcitationError)
-    assert "[shoulder] is no table of limits" in str(wrong.exception)
+    wrong = typed(*words)
+    assert wrong.returncode == 1
+    assert "[shoulder] is no table of limits" in wrong.stderr
 
 
 # ---- what cannot be --------------------------------------------------------------------------------------------------

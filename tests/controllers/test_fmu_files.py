@@ -5,11 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from typer.testing import CliRunner
 
+from command_line import ran, vpm
 from places import EXAMPLES
 from vpm import Model, write_fmu
-from vpm.cli import app
 from vpm.errors import SimulationError
 from vpm.files import FileError
 from vpm.realtime import c_source
@@ -33,14 +32,12 @@ def test_the_same_model_gives_the_same_bytes_and_another_token_otherwise(emps: M
 def test_the_command_writes_one_and_says_what_it_leaves_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("CC", "no-such-compiler")
     axis = str(EXAMPLES / "emps" / "model.toml")
-    done = CliRunner().invoke(app, ["compile", axis, "--fmu", str(tmp_path / "a.fmu"), "--parameter", "*.mass"])
-    assert done.exit_code == 0, done.output
+    done = ran("compile", axis, "--fmu", str(tmp_path / "a.fmu"), "--parameter", "*.mass")
     assert (tmp_path / "a.fmu").is_file()
-    assert "takes drive.command" in done.output
-    assert "carriage.mass" in done.output
-    assert "there is no C compiler" in done.output
-    both = CliRunner().invoke(app, ["compile", axis, "--fmu", str(tmp_path / "b.fmu"), "--c", str(tmp_path / "c")])
-    assert both.exit_code != 0
+    assert "takes drive.command" in done.stdout
+    assert "carriage.mass" in done.stdout
+    assert "there is no C compiler" in done.stderr
+    assert vpm("compile", axis, "--fmu", tmp_path / "b.fmu", "--c", tmp_path / "c").returncode != 0
 
 
 def test_what_cannot_be_is_refused_in_one_sentence(

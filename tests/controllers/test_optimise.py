@@ -11,7 +11,7 @@ from scipy.linalg import expm
 from scipy.optimize import fsolve
 
 import vpm
-from command_line import vpm as command
+from command_line import ran
 from model_texts import effect_text, on_rail, sliding
 from places import EXAMPLES
 from vpm.errors import OptimisationError
@@ -346,8 +346,7 @@ def test_the_command_writes_a_log_that_a_simulation_plays(tmp_path: Path) -> Non
         encoding="utf-8",
     )
     words = ("optimise", "cart.toml", "dash.toml", "--log", "dash.csv", "--out", "dash.npz")
-    done = command(*words, cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = ran(*words, cwd=tmp_path)
     assert "dash: optimal" in done.stdout
     model = vpm.Model.load(tmp_path / "cart.toml")
     record = vpm.Experiment.load(tmp_path / "dash.csv", model=model)

@@ -6,13 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from typer.testing import CliRunner
 
+from command_line import ran
 from identify_cases import CASES, Case, fit_of, record_of
 from nightly import at_night
 from quotients import of_residual
 from validation import table
-from vpm.cli import app
 from vpm.identify.comparison import comparison
 from vpm.model import Model
 
@@ -66,8 +65,7 @@ def test_the_command_line_finds_the_same(name: str, tmp_path: Path) -> None:
         words += ["--noise", settings.noise]
         for state, value in settings.known_states.items():
             words += ["--known-state", f"{state}={value!r}"]
-    done = CliRunner().invoke(app, words)
-    assert done.exit_code == 0, (done.output, done.exception)
+    ran(*words)
     found = Model.load(out / "model.toml")
     fit = fit_of(name)
     for free, value, std in zip(fit.names, fit.values, fit.std, strict=True):

@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from typer.testing import CliRunner
 
+from command_line import ran
 from vpm import demo
-from vpm.cli import app
 from vpm.compare import Comparison, autocorrelation, compare, cross_correlation, effective_samples, write_mcap
 from vpm.errors import ExperimentError, MissingExtraError
 from vpm.experiment import Experiment
@@ -357,8 +356,7 @@ def test_what_is_written_is_what_was_compared(tmp_path: Path) -> None:
 
 def test_the_command(tmp_path: Path) -> None:
     pytest.importorskip("mcap")
-    done = CliRunner().invoke(app, ["compare", str(demo.MODEL), str(demo.TRAIN), "--mcap", str(tmp_path / "gap.mcap")])
-    assert done.exit_code == 0, done.output
+    ran("compare", str(demo.MODEL), str(demo.TRAIN), "--mcap", str(tmp_path / "gap.mcap"))
     assert {file.name for file in tmp_path.iterdir()} == {"gap.mcap", "gap.layout.json"}
 
 

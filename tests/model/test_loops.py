@@ -10,13 +10,12 @@ import numpy as np
 import pytest
 from numpy.typing import ArrayLike
 from scipy.integrate import solve_ivp
-from typer.testing import CliRunner
 
+from command_line import ran
 from model_texts import two_links
 from places import EXAMPLES
 from quotients import quotient
 from vpm import linkages
-from vpm.cli import app
 from vpm.errors import CoreError, ModelError, VpmError
 from vpm.experiment import Experiment
 from vpm.identify import identify
@@ -651,17 +650,15 @@ def test_examples_say_which_assembly_they_take(name: str) -> None:
     """Also where a link bends, whose frequencies with all joints locked nobody can tell."""
     model = load(name)
     q = model.loops.assembled()
-    done = CliRunner().invoke(app, ["info", str(EXAMPLES / "loops" / f"{name}.toml")], catch_exceptions=False)
-    assert done.exit_code == 0
-    assert f"closed from their start with {model.joints[0]} = {q[0]:.4g} " in done.output
+    done = ran("info", str(EXAMPLES / "loops" / f"{name}.toml"))
+    assert f"closed from their start with {model.joints[0]} = {q[0]:.4g} " in done.stdout
 
 
 def test_the_command_tells_the_assembly_or_that_there_are_two(tmp_path: Path) -> None:
     told = []
     for start in ("elbow = 0.4", "elbow = 0.01"):
         (tmp_path / "elbow.toml").write_text(ELBOW.replace("START", start), encoding="utf-8")
-        done = CliRunner().invoke(app, ["info", str(tmp_path / "elbow.toml")], catch_exceptions=False)
-        assert done.exit_code == 0
-        told.append(done.output)
+        done = ran("info", str(tmp_path / "elbow.toml"))
+        told.append(done.stdout)
     assert "closed from their start with shoulder = -0.6435 rad, elbow = 1.571 rad" in told[0]
     assert "and as near to their start with" in told[1]

@@ -14,6 +14,7 @@ from hypothesis import strategies as st
 
 import robot_texts as texts
 import vpm
+from command_line import ran
 from command_line import vpm as run_command
 from places import EXAMPLES, ROOT
 from vpm.errors import MissingExtraError, ModelError
@@ -532,12 +533,10 @@ def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 def test_commands(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(texts.ARM, encoding="utf-8")
-    done = run_command("import", "arm.urdf", "-o", "arm.toml", "--uncertain", "0.1", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = ran("import", "arm.urdf", "-o", "arm.toml", "--uncertain", "0.1", cwd=tmp_path)
     heavier = vpm.Model.load(tmp_path / "arm.toml").with_parameters({"l2.mass": 3.25})
     heavier.save(tmp_path / "fit.toml")
-    done = run_command("export", "fit.toml", "--urdf", "arm.urdf", "-o", "new.urdf", cwd=tmp_path)
-    assert done.returncode == 0, done.stderr
+    done = ran("export", "fit.toml", "--urdf", "arm.urdf", "-o", "new.urdf", cwd=tmp_path)
     assert done.stdout == 'link "l2": 3.25 kg\nwrote new.urdf\n'
     old, new = (tmp_path / "arm.urdf").read_text("utf-8"), (tmp_path / "new.urdf").read_text("utf-8")
     assert new == old.replace('mass value="3.0"', 'mass value="3.25"')
@@ -560,8 +559,7 @@ def test_the_tutorial_leads_from_a_urdf_and_a_bag_to_a_named_effect_in_three_com
         subprocess.run(words, cwd=tmp_path, check=True)
     (tmp_path / "channels.toml").write_text(table, encoding="utf-8")
     for line in commands.splitlines():
-        done = run_command(*line.split()[1:], cwd=tmp_path)
-        assert done.returncode == 0, done.stdout + done.stderr
+        ran(*line.split()[1:], cwd=tmp_path)
     found = vpm.Diagnosis.load(tmp_path / "report" / "diagnosis.npz")
     assert found.verdict == "effect_found"
     assert [(one.name, one.site) for one in found.effects] == [("coulomb_friction", "elbow")]

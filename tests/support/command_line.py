@@ -23,3 +23,10 @@ def vpm(*words: str | Path, cwd: Path | None = None) -> CompletedProcess[str]:
         except SystemExit as end:
             code = end.code
     return CompletedProcess(typed, int(code or 0), out.getvalue(), err.getvalue())
+
+
+def ran(*words: str | Path, cwd: Path | None = None) -> CompletedProcess[str]:
+    """What was said by a command that does what it should."""
+    done = vpm(*words, cwd=cwd)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done
