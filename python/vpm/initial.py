@@ -148,9 +148,10 @@ def _worked_out(model: Model, theta: Array, m: Motion) -> tuple[Array, Array, Ar
 def _along(model: Model, theta: Array, given: tuple[Array, Array, Array], joints: tuple[str, ...], dt: float) -> Array:
     """Outputs (N, channels) along a motion of some joints, the others passive, for an initial state.
 
-    What a followed joint remembers of its way changes the effort that it takes, not how the others move.
+    What a followed joint remembers of its way changes the effort that it takes, not how the others move. One behind a
+    spring moves what nobody measures, and stays.
     """
-    model, places = _forgetful(model, joints)
+    model, places = _without_memories(model, tuple(name for name in model.joints if name not in joints))
     theta = theta[places]
     followed = [place for place, name in enumerate(model.joints) if name in joints]
     passive = [place for place in range(len(model.joints)) if place not in followed]
@@ -161,14 +162,6 @@ def _along(model: Model, theta: Array, given: tuple[Array, Array, Array], joints
         theta, whole[0], whole[1], whole[2], dt, 1, "linearly_implicit", [], passive
     )
     return outputs
-
-
-def _forgetful(model: Model, joints: tuple[str, ...]) -> tuple[Model, NDArray[np.int64]]:
-    """Machine for an initial state without effects that remember at some joints, and its parameters.
-
-    One behind a spring moves what nobody measures, and stays.
-    """
-    return _without_memories(model, tuple(name for name in model.joints if name not in joints))
 
 
 @lru_cache(maxsize=128)
@@ -330,9 +323,9 @@ def joint_motion(
     return motion(experiment, _Joints(model.name, followed or model.joints, *inputs), cutoff=cutoff, band=band)
 
 
-def _fit_start(experiment: Experiment, channel: str, samples: int = 15) -> tuple[float, float]:
+def _fit_start(experiment: Experiment, channel: str) -> tuple[float, float]:
     """Initial position and velocity from a parabola through the first few samples."""
-    count = min(samples, len(experiment))
+    count = min(15, len(experiment))
     time = experiment.time[:count] - experiment.time[0]
     curve = np.polynomial.Polynomial.fit(time, experiment[channel][:count], min(2, count - 1)).convert()
     coefficients = np.append(curve.coef, [0.0, 0.0])

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.integrate import cumulative_trapezoid
 
 from vpm.experiment.signal import differentiate, lowpass, settling_samples
 from vpm.identify.statistics import correlation_length, window_sums
@@ -60,7 +61,7 @@ def integral_rows(
     regressors, instruments, steps = [], [], []
     for equation in equations:
         stored, flows = _columns(equation, opening, columns)
-        flowed = [_integral(flow, dt) for flow in flows]
+        flowed = [cumulative_trapezoid(flow, dx=dt, initial=0.0) for flow in flows]
         steps.append(dt * np.column_stack(flows))
         regressors.append(np.column_stack([s + f for s, f in zip(stored, flowed, strict=True)]))
         if instrument:
@@ -211,18 +212,11 @@ def unexplained(rows: Rows, values: Array, residual: Array) -> tuple[float, floa
     return float(np.sqrt(np.sum(np.mean(residual**2, axis=0)))), float(noise), float(compressed)
 
 
-def _integral(values: Array, dt: float) -> Array:
-    """Integral of a sampled function for the oil from the first sample on, by the trapezoidal rule."""
-    total = np.zeros_like(values)
-    np.cumsum(0.5 * dt * (values[1:] + values[:-1]), out=total[1:])
-    return total
-
-
 def _from_command(opening: Array, dt: float) -> list[Array]:
     """Instruments to solve for oil: functions of the command without noise of pressure sensors."""
     size = float(np.abs(opening).max())
     relative = opening / size
-    found = [_integral(relative, dt), _integral(np.abs(relative), dt)]
+    found = [cumulative_trapezoid(one, dx=dt, initial=0.0) for one in (relative, np.abs(relative))]
     seen: set[int] = set()
     for lag in LAGS:
         shift = round(lag / dt)
