@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from runge_kutta import moved
+
 Array = NDArray[np.float64]
 
 LENGTHS, MASSES, GAINS = (0.5, 0.4), (2.0, 1.0), (4.0, 2.5)
@@ -77,13 +79,7 @@ def log(arm: Arm, seed: int, *, seconds: float = 6.0, rate: float = 250.0, noise
         currents.append(wanted / np.array(GAINS))
         current = currents[-1 - round(arm.delay / dt)]
         for _ in range(steps):
-            h = dt / steps
-            k1 = arm.accelerations(q, v, current)
-            k2 = arm.accelerations(q + 0.5 * h * v, v + 0.5 * h * k1, current)
-            k3 = arm.accelerations(q + 0.5 * h * v + 0.25 * h**2 * k1, v + 0.5 * h * k2, current)
-            k4 = arm.accelerations(q + h * v + 0.5 * h**2 * k2, v + h * k3, current)
-            q = q + h * v + h**2 / 6.0 * (k1 + k2 + k3)
-            v = v + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
+            q, v = moved(arm.accelerations, q, v, current, dt / steps)
     angles, sent = np.array(rows), np.array(currents[-len(time) :])
     return {"t": time, "q1": angles[:, 0], "q2": angles[:, 1], "i1": sent[:, 0], "i2": sent[:, 1]}
 
