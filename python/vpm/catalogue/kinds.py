@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import Literal
 
 from vpm.catalogue.formula import Formula
@@ -66,7 +66,7 @@ NOT_NEGATIVE: Range = (0.0, math.inf)
 ABOVE_ZERO: Range = (POSITIVE, math.inf)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class EffectParameter:
     """One parameter of an effect.
 
@@ -108,12 +108,13 @@ class EffectParameter:
     unit: str
     scale: Scale
     meaning: str
+    _: KW_ONLY
     neutral: float | None
     start: float | tuple[float, float] | None
     physical: Range
-    evaluable: Range
-    linear: bool
-    shape: bool
+    evaluable: Range = ANY
+    linear: bool = False
+    shape: bool = False
     learnt: bool = False
     typical: float = 1.0
     optional: bool = False
@@ -212,17 +213,7 @@ def size(
 ) -> EffectParameter:
     """Kind of parameter: size of a law, in which the effort is linear unless said otherwise."""
     return EffectParameter(
-        name=name,
-        suffix=suffix,
-        unit=unit,
-        scale=scale,
-        meaning=meaning,
-        neutral=neutral,
-        start=neutral,
-        physical=physical,
-        evaluable=ANY,
-        linear=linear,
-        shape=False,
+        name, suffix, unit, scale, meaning, neutral=neutral, start=neutral, physical=physical, linear=linear
     )
 
 
@@ -238,20 +229,8 @@ def shape(
     learnt: bool = False,
 ) -> EffectParameter:
     """Kind of parameter: shape; law and physics have the same range."""
-    return EffectParameter(
-        name=name,
-        suffix=suffix,
-        unit=unit,
-        scale=scale,
-        meaning=meaning,
-        neutral=None,
-        start=start,
-        physical=bounds,
-        evaluable=bounds,
-        linear=False,
-        shape=True,
-        learnt=learnt,
-    )
+    sized = size(name, suffix, unit, scale, meaning, physical=bounds, linear=False)
+    return replace(sized, neutral=None, start=start, evaluable=bounds, shape=True, learnt=learnt)
 
 
 def nonlinear(
@@ -267,17 +246,5 @@ def nonlinear(
     typical: float = 1.0,
 ) -> EffectParameter:
     """Kind of parameter: size of an effect in which nothing is linear."""
-    return EffectParameter(
-        name=name,
-        suffix=suffix,
-        unit=unit,
-        scale=scale,
-        meaning=meaning,
-        neutral=neutral,
-        start=neutral,
-        physical=physical,
-        evaluable=evaluable,
-        linear=False,
-        shape=False,
-        typical=typical,
-    )
+    sized = size(name, suffix, unit, scale, meaning, physical=physical, neutral=neutral, linear=False)
+    return replace(sized, evaluable=evaluable, typical=typical)
