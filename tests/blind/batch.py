@@ -9,14 +9,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
-from blind.loads import Column
+from blind.loads import Array, Column
 from blind.loop import Actuators, Inputs, Sensors, closed_loop
 from blind.machine import Draft, Machine
 from blind.noise import normal
-
-Array = NDArray[np.float64]
 
 #: Relative step of the oracle's sensitivities.
 NUDGE = 0.02

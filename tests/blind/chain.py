@@ -12,9 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from blind.loads import Column, JointLoads, clip, stack
+from blind.loads import Array, Column, JointLoads, clip, stack
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 SEGMENTS = 8
 #: Speed of waves along a link [m/s], far below that of metal, and relaxation time of the damping [s].

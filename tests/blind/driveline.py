@@ -9,11 +9,9 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from blind.loads import Column, JointLoads, clip, stack
+from blind.loads import Array, Column, JointLoads, clip, stack
 
-Array = NDArray[np.float64]
 #: Sweeps over the joints in which their impulses of dry friction settle; they start from those of the step before.
 SWEEPS = 4
 

@@ -10,11 +10,9 @@ Arrays have the shape (cylinders, columns); a spool is counted in the unit of th
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from blind.loads import Column, clip, stack
+from blind.loads import Array, Column, clip, stack
 
-Array = NDArray[np.float64]
 #: Drop around which the flow through an edge turns from laminar to turbulent [Pa].
 LAMINAR = 1e4
 #: Contact of the piston with the ends of its stroke [N/m, N s/m].

@@ -11,9 +11,7 @@ from typing import Protocol, Self
 import numpy as np
 from numpy.typing import NDArray
 
-from blind.loads import Column, clip, stack
-
-Array = NDArray[np.float64]
+from blind.loads import Array, Column, clip, stack
 
 
 class Plant(Protocol):

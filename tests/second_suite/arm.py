@@ -9,12 +9,10 @@ The published moments of the third link are none that a body can have: its small
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from second_suite.machine import Choice, Joint, Law, Machine, Values, columns_of, loss_entries
+from second_suite.machine import Array, Choice, Joint, Law, Machine, Values, columns_of, loss_entries
 from second_suite.motions import mixed, moves, sines
 
-Array = NDArray[np.float64]
 DEGREE = np.pi / 180.0
 COUNT = 6
 ALPHA = np.array([0.0, -90.0, 0.0, -90.0, 90.0, -90.0]) * DEGREE

@@ -3,12 +3,9 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from second_suite.machine import Choice, Joint, Law, Machine, Values, loss_entries, uneven
+from second_suite.machine import Array, Choice, Joint, Law, Machine, Values, loss_entries, uneven
 from second_suite.motions import usual
-
-Array = NDArray[np.float64]
 
 
 def tree(values: Values, q: Array, v: Array) -> tuple[Array, Array]:

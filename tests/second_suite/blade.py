@@ -20,11 +20,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from second_suite.machine import Joint, Values, loss_entries
+from second_suite.machine import Array, Joint, Values, loss_entries
 
-Array = NDArray[np.float64]
 #: Points of Gauss and Legendre in each element.
 POINTS = 5
 

@@ -3,12 +3,10 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from second_suite.machine import Choice, Joint, Law, Machine, PressureGauge, Values, loss_entries, uneven
+from second_suite.machine import Array, Choice, Joint, Law, Machine, PressureGauge, Values, loss_entries, uneven
 from second_suite.motions import REST, chirp, fade, sines
 
-Array = NDArray[np.float64]
 DEGREE, BAR, GRAVITY = np.pi / 180.0, 1e5, 9.81
 #: Centre of mass and tip in the boom's frame, whose x points from the pin along the boom, and z up [m].
 CENTER, TIP = (1.2, 0.06), 2.4

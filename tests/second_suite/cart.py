@@ -3,13 +3,11 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from second_suite.machine import Choice, Joint, Machine, Values, below, loss_entries
+from second_suite.machine import Array, Choice, Joint, Machine, Values, below, loss_entries
 from second_suite.motions import usual
 from second_suite.pid import Pid
 
-Array = NDArray[np.float64]
 BOB_MASS, BOB_INERTIA, PAYLOAD_AT = 0.9, 0.014, 0.55
 GAIN = 20.0
 SERVO = Pid("winch", "rail", 90.0, 60.0, 14.0, 6.0)

@@ -3,13 +3,11 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from second_suite.machine import Choice, Joint, Machine, Values, loss_entries, uneven
+from second_suite.machine import Array, Choice, Joint, Machine, Values, loss_entries, uneven
 from second_suite.motions import usual
 from second_suite.pid import Pid
 
-Array = NDArray[np.float64]
 LOAD_MASS, ROPE_DAMPING = 30.0, 70.0
 GAIN = 95.0
 METRE_PER_MINUTE = 1.0 / 60.0

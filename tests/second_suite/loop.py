@@ -10,11 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from second_suite.machine import Machine, Values
+from second_suite.machine import Array, Machine, Values
 from second_suite.oil import OilPlant
 from second_suite.plant import Hidden, Plant
 
-Array = NDArray[np.float64]
 #: Corner of the filter behind the difference of two readings, as share of the rate.
 SPEED_FILTER = 0.12
 

@@ -15,13 +15,11 @@ no drop the root is a cubic with a finite slope (A. Ellman and R. Piche, 1999). 
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from second_suite.machine import Machine, Values
+from second_suite.machine import Array, Machine, Values
 from second_suite.plant import Hidden, Plant
 
-Array = NDArray[np.float64]
 #: Drop at which flow through an edge becomes turbulent, and pressure below which oil boils [Pa].
 TURBULENT, VAPOUR = 1e4, 2e3
 #: Of air in oil: pressure at which its share is counted, polytropic exponent.

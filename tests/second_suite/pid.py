@@ -3,11 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from second_suite.machine import Law, Machine
-
-Array = NDArray[np.float64]
+from second_suite.machine import Array, Law, Machine
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from second_suite.laws import MaxwellSlip, coupling, dry, smooth
+from second_suite.laws import Array, MaxwellSlip, coupling, dry, smooth
 from second_suite.machine import Machine, Values
 
-Array = NDArray[np.float64]
 #: Sweeps over all joints that may stick, where more than one can.
 SWEEPS = 6
 #: Effects that put the motor before a soft or loose gear, those of drives, and those that sit at the motor otherwise.

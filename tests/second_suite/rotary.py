@@ -3,12 +3,10 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from second_suite.machine import Choice, Joint, Law, Machine, Values, below, loss_entries, uneven
+from second_suite.machine import Array, Choice, Joint, Law, Machine, Values, below, loss_entries, uneven
 from second_suite.motions import fade, sines, usual
 
-Array = NDArray[np.float64]
 DEGREE = np.pi / 180.0
 MASS, RATIO, TORQUE_PER_AMPERE = 3.2, 50.0, 0.09
 GAIN = RATIO * TORQUE_PER_AMPERE

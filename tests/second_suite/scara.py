@@ -3,12 +3,10 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
-from second_suite.machine import Choice, Joint, Law, Machine, Values, columns_of, loss_entries, uneven
+from second_suite.machine import Array, Choice, Joint, Law, Machine, Values, columns_of, loss_entries, uneven
 from second_suite.motions import usual
 
-Array = NDArray[np.float64]
 DEGREE = np.pi / 180.0
 UPPER, UPPER_MASS, UPPER_LEVER = 0.35, 9.0, 0.17
 FORE, FORE_MASS, FORE_LEVER = 0.3, 5.0, 0.14

@@ -3,13 +3,11 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from second_suite.blade import Blade, Bridge
-from second_suite.machine import Choice, Joint, Law, Machine, uneven
+from second_suite.machine import Array, Choice, Joint, Law, Machine, uneven
 from second_suite.motions import chirp, mixed, moves, sines
 
-Array = NDArray[np.float64]
 GAIN, LIMIT = 1.2, 9.0
 STRIP = Blade(0.6, 0.04, 0.003, 7850.0, 0.05, 0.35, 3e-4, 0.03, 0.3)
 ENCODER, GAUGE = (2e-5, 5e-5), (4e-7, 2e-7)

@@ -3,13 +3,11 @@
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from second_suite.blade import Blade
-from second_suite.machine import Choice, Joint, Law, Machine, uneven
+from second_suite.machine import Array, Choice, Joint, Law, Machine, uneven
 from second_suite.motions import moves, sines
 
-Array = NDArray[np.float64]
 GAIN, LIMIT = 0.8, 8.0
 BLADE = Blade(0.7, 0.05, 0.004, 2700.0, 0.03, 0.3, 1e-4, 0.05, 0.4)
 ENCODER = (1e-5, 3.8e-5)

@@ -21,10 +21,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
-from hyl_laws import Ground, Hydraulics
+from hyl_laws import Array, Ground, Hydraulics
 from hyl_plane import Frame, Point, Rod
-
-Array = NDArray[np.float64]
 
 GRAVITY = 9.81
 UPPER, LOWER = 0.350, 0.341

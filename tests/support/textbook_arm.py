@@ -7,11 +7,8 @@ the ends of light links of lengths l, angles q from the x axis, gravity along -y
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from runge_kutta import moved
-
-Array = NDArray[np.float64]
+from runge_kutta import Array, moved
 
 LENGTHS, MASSES, GAINS = (0.5, 0.4), (2.0, 1.0), (4.0, 2.5)
 FILE = """

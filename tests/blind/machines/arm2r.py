@@ -8,17 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from blind.driveline import Driven
 from blind.effects import Scale
-from blind.loads import Column, stack
+from blind.loads import Array, Column, stack
 from blind.loop import Cascade
 from blind.machine import Draft, Layout, Signal, Writer, rub
 from blind.motion import moves, sines
 from blind.noise import encoder
 
-Array = NDArray[np.float64]
 GRAVITY = 9.81
 JOINTS, BODIES, DRIVES = ("shoulder", "elbow"), ("upper", "lower"), ("first", "second")
 ENCODERS, SERVOS = ("encoder_1", "encoder_2"), ("servo_1", "servo_2")

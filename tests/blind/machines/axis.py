@@ -5,17 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from blind.driveline import Driven
 from blind.effects import Scale
-from blind.loads import Column, stack
+from blind.loads import Array, Column, stack
 from blind.loop import Cascade
 from blind.machine import Draft, Layout, Signal, Writer
 from blind.motion import moves, sines
 from blind.noise import encoder
 
-Array = NDArray[np.float64]
 GRAVITY = 9.81
 
 _SITES = {

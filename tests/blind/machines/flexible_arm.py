@@ -5,17 +5,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from blind.chain import JOINTS, LINKS, SEGMENTS, Chain
 from blind.effects import Scale
-from blind.loads import Column, stack
+from blind.loads import Array, Column, stack
 from blind.loop import Cascade
 from blind.machine import Draft, Layout, Signal, Writer, rub
 from blind.motion import jumps, moves, sines
 from blind.noise import converter, encoder
 
-Array = NDArray[np.float64]
 DRIVES, ENCODERS, BRIDGES, SERVOS = (tuple(f"{n}_{k}" for k in (1, 2)) for n in ("motor", "encoder", "bridge", "servo"))
 DENSITY = 2700.0
 #: How much stiffer than it is a link is where the oracle takes its flexibility away; stiffer takes finer steps.

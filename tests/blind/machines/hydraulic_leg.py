@@ -8,19 +8,17 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from blind.driveline import Driveline
 from blind.effects import Scale
 from blind.hydraulics import Cylinders
-from blind.loads import Column, stack
+from blind.loads import Array, Column, stack
 from blind.loop import Proportional
 from blind.machine import Draft, Layout, Signal, Writer, rub
 from blind.machines.arm2r import GRAVITY, TwoLinks
 from blind.motion import moves, sines
 from blind.noise import converter, encoder
 
-Array = NDArray[np.float64]
 BAR = 1e5
 JOINTS, BODIES, DRIVES = ("hip", "knee"), ("upper", "lower"), ("hip_drive", "knee_drive")
 LENGTH, START, RETRACTED, STROKE = 0.35, (0.1, -1.3), 0.281, 0.08

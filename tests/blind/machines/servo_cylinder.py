@@ -8,18 +8,16 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.random import Generator
-from numpy.typing import NDArray
 
 from blind.driveline import Driveline
 from blind.effects import Scale
 from blind.hydraulics import Cylinders
-from blind.loads import Column, stack
+from blind.loads import Array, Column, stack
 from blind.loop import Proportional
 from blind.machine import Draft, Layout, Signal, Writer
 from blind.motion import moves, sines
 from blind.noise import converter
 
-Array = NDArray[np.float64]
 STROKE, BAR = 0.08, 1e5
 _SITES = {
     "joint": ("axis",),
