@@ -61,7 +61,7 @@ def integral_rows(
     regressors, instruments, steps = [], [], []
     for equation in equations:
         stored, flows = _columns(equation, opening, columns)
-        flowed = [cumulative_trapezoid(flow, dx=dt, initial=0.0) for flow in flows]
+        flowed = [cumulative_trapezoid(flow, dx=dt, initial=0) for flow in flows]
         steps.append(dt * np.column_stack(flows))
         regressors.append(np.column_stack([s + f for s, f in zip(stored, flowed, strict=True)]))
         if instrument:
@@ -216,7 +216,7 @@ def _from_command(opening: Array, dt: float) -> list[Array]:
     """Instruments to solve for oil: functions of the command without noise of pressure sensors."""
     size = float(np.abs(opening).max())
     relative = opening / size
-    found = [cumulative_trapezoid(one, dx=dt, initial=0.0) for one in (relative, np.abs(relative))]
+    found = [cumulative_trapezoid(one, dx=dt, initial=0) for one in (relative, np.abs(relative))]
     seen: set[int] = set()
     for lag in LAGS:
         shift = round(lag / dt)
