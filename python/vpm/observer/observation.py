@@ -98,9 +98,10 @@ class Observation(Result):
 
     def plot(self) -> Figure:
         """Plot an observation: innovations between their 95 % bounds. Needs the extra ``plot``."""
-        from vpm.plot import plot_innovations
+        from vpm.plot import plot_channels
 
-        return plot_innovations(self.time, self.innovations, self.expected, self.channels, self.units)
+        title = "innovations, and the bounds of 95 % of them"
+        return plot_channels(self.time, self.innovations, self.channels, self.units, title=title, std=self.expected)
 
 
 def observe(

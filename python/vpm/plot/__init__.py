@@ -6,7 +6,7 @@ from vpm.plot.inertial import plot_inertial
 from vpm.plot.linear import plot_bode, plot_poles
 from vpm.plot.narx import plot_narx_run, plot_narx_terms
 from vpm.plot.scenarios import plot_scenario
-from vpm.plot.signals import plot_channels, plot_correlation, plot_innovations, plot_run
+from vpm.plot.signals import plot_channels, plot_correlation, plot_run
 from vpm.plot.style import figure_to_svg
 from vpm.plot.summaries import plot_comparison, plot_pictures
 
@@ -21,7 +21,6 @@ __all__ = [
     "plot_evidence",
     "plot_gap",
     "plot_inertial",
-    "plot_innovations",
     "plot_ladder",
     "plot_narx_run",
     "plot_narx_terms",

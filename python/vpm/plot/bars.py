@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vpm.numbers import percent, short
-from vpm.plot.style import BLUE, GREEN, INK, LINE, ORANGE, SOFT, panels, styled
+from vpm.plot.style import BLUE, GREEN, INK, LINE, ORANGE, SOFT, legend_above, panels, styled
 
 if TYPE_CHECKING:
-    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
@@ -79,7 +78,7 @@ def plot_gap(gaps: Mapping[str, ChannelGap]) -> Figure:
     axis.set_xlabel("root mean square gap / measured signal [%]")
     kinds = [Patch(color=color, label=stage) for stage, color in stages]
     floor_line = Line2D([], [], linestyle="--", color=INK, linewidth=1.1, label="noise floor")
-    _legend_above(axis, [*kinds, floor_line] if any(np.isfinite(g.noise_floor) for g in gaps.values()) else kinds)
+    legend_above(axis, 4, [*kinds, floor_line] if any(np.isfinite(g.noise_floor) for g in gaps.values()) else kinds)
     return figure
 
 
@@ -111,7 +110,7 @@ def plot_candidates(candidates: Sequence[RankedCandidate]) -> Figure:
     _name_rows(axis, [f"{c.name.replace('_', ' ')} at {c.site}" for c in chosen])
     axis.set_xlabel("share of the residual's mean square that goes [%]")
     kinds = {"screened, training data": LINE, "accepted, validation data": GREEN, "refused, validation data": ORANGE}
-    _legend_above(axis, [Patch(color=color, label=text) for text, color in kinds.items()])
+    legend_above(axis, 4, [Patch(color=color, label=text) for text, color in kinds.items()])
     return figure
 
 
@@ -183,10 +182,6 @@ def plot_step_cost(quantiles: Mapping[str, float], period: float) -> Figure:
     _name_rows(axis, list(quantiles))
     axis.set_xlabel("time of one step [µs]")
     return figure
-
-
-def _legend_above(axis: Axes, handles: Sequence[Artist]) -> None:
-    axis.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=4, borderaxespad=0.2)
 
 
 def _name_rows(axis: Axes, names: Sequence[str]) -> None:

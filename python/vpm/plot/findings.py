@@ -11,9 +11,8 @@ from vpm.plot.signals import (
     draw_correlation,
     draw_residual_against,
     draw_residual_time,
-    legend_above,
 )
-from vpm.plot.style import BLUE, INK, ORANGE, SOFT, label, panels, styled, thinned
+from vpm.plot.style import BLUE, INK, ORANGE, SOFT, label, legend_above, panels, styled, thinned
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -39,7 +38,7 @@ def plot_traces(traces: Sequence[Trace]) -> Figure:
         axis.plot(time, after, color=BLUE, linewidth=1.0, label="simulated after")
         axis.set_ylabel(label(trace.channel, trace.unit))
         axis.margins(x=0.01)
-    legend_above(axes[0][0], 3, right=True)
+    legend_above(axes[0][0], 3)
     axes[-1][0].set_xlabel("time [s]")
     return figure
 
@@ -60,7 +59,7 @@ def plot_joint_over_time(picture: Picture, stages: Mapping[str, Array]) -> Figur
         color, line = (BLUE, "-") if name == last else (ORANGE, "--")
         above.plot(time, needed, color=color, linestyle=line, linewidth=1.0, label=f"needed, {name}")
     above.set_ylabel(label(picture.channel, picture.unit))
-    legend_above(above, 3, right=True)
+    legend_above(above, 3)
     draw_residual_time(below, picture.time, stages, picture.unit)
     return figure
 
@@ -107,7 +106,7 @@ def plot_joint_noise(
             right.loglog(frequency[there], density[there], mark, color=color, label=name)
     right.set_xlabel("frequency [Hz]")
     right.set_ylabel(label("density", f"{unit}/√Hz"))
-    legend_above(right, 2, right=True)
+    legend_above(right, 2)
     return figure
 
 

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vpm.numbers import Array
-from vpm.plot.signals import draw_overlay, legend_above
-from vpm.plot.style import BLUE, INK, label, panels, styled, thinned
+from vpm.plot.signals import draw_overlay
+from vpm.plot.style import BLUE, INK, label, legend_above, panels, styled, thinned
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,7 +23,7 @@ def plot_narx_run(run: NarxRun) -> Figure:
     figure, axes = panels(2, height=1.9, share_x=True)
     draw_overlay(axes[0][0], run.time, run.measured, run.values, [0])
     axes[0][0].set_ylabel(label(run.output, run.unit))
-    legend_above(axes[0][0], 2, right=True)
+    legend_above(axes[0][0], 2)
     axes[1][0].plot(*thinned(run.time, run.measured - run.values), color=BLUE)
     axes[1][0].set_ylabel(label("difference", run.unit))
     axes[1][0].set_xlabel("time")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vpm.numbers import Array, stretches
-from vpm.plot.style import BLUE, INK, ORANGE, SOFT, STAGES, label, panels, styled, thinned
+from vpm.plot.style import BLUE, INK, ORANGE, SOFT, STAGES, label, legend_above, panels, styled, thinned
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,39 +28,27 @@ LEAST_IN_BIN = 0.0005
 
 @styled
 def plot_channels(
-    time: Array, data: Array, channels: Sequence[str], units: Sequence[str], *, title: str = ""
+    time: Array,
+    data: Array,
+    channels: Sequence[str],
+    units: Sequence[str],
+    *,
+    title: str = "",
+    std: Array | None = None,
 ) -> Figure:
     """Draw signals: each channel over time in a panel of its own.
 
-    ``time``: shape (N,), s; ``data``: shape (N, C).
+    ``time``: shape (N,), s; ``data``: shape (N, C); ``std``: shape (N, C), draws bounds that should hold 95 % about 0.
     """
     figure, axes = panels(max(1, len(channels)), height=1.6, share_x=True)
     for at, (channel, unit) in enumerate(zip(channels, units, strict=True)):
         axis = axes[at][0]
         axis.plot(*thinned(time, data[:, at]), color=BLUE)
+        for side in () if std is None else (-1.96, 1.96):
+            axis.plot(*thinned(time, side * std[:, at]), color=ORANGE)
         axis.set_ylabel(label("", unit).strip())
         axis.set_title(channel)
     _finish_time(figure, axes[-1][0], title)
-    return figure
-
-
-@styled
-def plot_innovations(
-    time: Array, innovations: Array, expected: Array, channels: Sequence[str], units: Sequence[str]
-) -> Figure:
-    """Draw innovation signals between the bounds that should hold 95 % of them.
-
-    ``time``: shape (N,), s; ``innovations``, ``expected``: shape (N, C), and their standard deviation.
-    """
-    figure, axes = panels(max(1, len(channels)), height=1.6, share_x=True)
-    for at, (channel, unit) in enumerate(zip(channels, units, strict=True)):
-        axis = axes[at][0]
-        axis.plot(*thinned(time, innovations[:, at]), color=BLUE)
-        for side in (-1.96, 1.96):
-            axis.plot(*thinned(time, side * expected[:, at]), color=ORANGE)
-        axis.set_ylabel(label("", unit).strip())
-        axis.set_title(channel)
-    _finish_time(figure, axes[-1][0], "innovations, and the bounds of 95 % of them")
     return figure
 
 
@@ -83,7 +71,7 @@ def plot_run(run: Run) -> Figure:
         draw_overlay(axis, run.time, real, run.values[:, at], [int(start) for start in run.starts])
         axis.set_ylabel(label("", run.units[at]).strip())
         axis.set_title(run.channels[at])
-    legend_above(axes[0][0], 2, right=True)
+    legend_above(axes[0][0], 2)
     _finish_time(figure, axes[-1][0], f"{run.model_name} on {run.experiment_name}, {run.mode.replace('_', ' ')}")
     if run.notes:
         figure.supxlabel("\n".join(fill("note: " + note, 110) for note in run.notes), fontsize=8, color=ORANGE)
@@ -234,16 +222,6 @@ def _colors(count: int) -> tuple[str, ...]:
     if count == 1:
         return (BLUE,)
     return (STAGES[:count] if count >= 3 else (ORANGE, BLUE)) if count <= len(STAGES) else STAGES * (count // 6 + 1)
-
-
-def legend_above(axis: Axes, columns: int, *, right: bool = False) -> None:
-    """Legend above the axes of a signal, where it hides nothing."""
-    axis.legend(
-        loc="lower right" if right else "lower left",
-        bbox_to_anchor=(1.0 if right else 0.0, 1.0),
-        ncols=min(columns, 4),
-        borderaxespad=0.2,
-    )
 
 
 def _finish_time(figure: Figure, bottom: Axes, title: str) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import wraps
 from html import escape
@@ -17,6 +17,7 @@ from vpm.errors import needs
 from vpm.numbers import Array
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure
@@ -209,6 +210,12 @@ def _extremes(column: Array, stretch: int, first: int) -> Iterator[NDArray[np.in
     for sign in (1.0, -1.0):
         yield base + np.argmin(np.where(gaps, np.inf, sign * blocks), axis=1)
     yield (base + np.argmax(gaps, axis=1))[gaps.any(axis=1)]
+
+
+def legend_above(axis: Axes, columns: int, handles: Sequence[Artist] | None = None) -> None:
+    """Legend in the common style above axes, where it hides nothing: of their lines at the right, else at the left."""
+    corner = ("lower right", 1.0) if handles is None else ("lower left", 0.0)
+    axis.legend(handles=handles, loc=corner[0], bbox_to_anchor=(corner[1], 1.0), ncols=columns, borderaxespad=0.2)
 
 
 def label(quantity: str, unit: str) -> str:
