@@ -151,11 +151,9 @@ def plot_ladder(
         axis.axvline(1e6 * allowed, color=SOFT, linestyle="--", linewidth=1.0, label="allowed share of the period")
     if np.isfinite(limit):
         axis.axhline(100.0 * limit, color=SOFT, linestyle=":", linewidth=1.0, label="allowed error")
-    axis.set_xscale("log")
-    axis.set_yscale("log")
+    axis.set(xscale="log", yscale="log")
     axis.plot(times[chosen], gaps[chosen], "D", color=BLUE, markersize=8, label="chosen")
-    axis.set_xlabel("time of one step [µs]")
-    axis.set_ylabel("error / signal [%]")
+    axis.set(xlabel="time of one step [µs]", ylabel="error / signal [%]")
     axis.legend(loc="upper right")
     return figure
 
@@ -204,8 +202,7 @@ def plot_climb(levels: Sequence[Level], top: str) -> Figure:
     for place, (error, level) in enumerate(zip(errors, levels, strict=True)):
         marker, size = ("D", 8) if level.name == top else ("o", 6)
         above.plot(place, error, marker, color=BLUE if level.pays else SOFT, markersize=size)
-    above.set_yscale("log")
-    above.set_ylabel("error on validation\ndata [%]")
+    above.set(yscale="log", ylabel="error on validation\ndata [%]")
     last = next(level for level in levels if level.name == top)
     for name, value in last.values.items():
         held = [k for k, level in enumerate(levels) if name in level.values]

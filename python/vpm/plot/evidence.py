@@ -116,10 +116,10 @@ def _spectra(evidence: Evidence) -> Figure:
     if np.isfinite(evidence.noise_floor):
         level = evidence.noise_floor / np.sqrt(0.5 / step)
         axis.axhline(level, color=SOFT, linewidth=3.0, alpha=0.4, label="noise floor, if white")
-    axis.set_xlabel(label("frequency", "Hz"))
-    axis.set_ylabel(label("residual", f"{evidence.unit}/√Hz"))
-    axis.set_title(
-        f"without: {_size(evidence.without, evidence.unit)};  with: {_size(evidence.repaired, evidence.unit)}"
+    axis.set(
+        xlabel=label("frequency", "Hz"),
+        ylabel=label("residual", f"{evidence.unit}/√Hz"),
+        title=f"without: {_size(evidence.without, evidence.unit)};  with: {_size(evidence.repaired, evidence.unit)}",
     )
     figure.legend(*axis.get_legend_handles_labels(), loc="outside upper left", ncols=4)
     return figure

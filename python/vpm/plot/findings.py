@@ -104,8 +104,7 @@ def plot_joint_noise(
         if there.any():
             mark = ".-" if frequency.size < FEW else "-"
             right.loglog(frequency[there], density[there], mark, color=color, label=name)
-    right.set_xlabel("frequency [Hz]")
-    right.set_ylabel(label("density", f"{unit}/√Hz"))
+    right.set(xlabel="frequency [Hz]", ylabel=label("density", f"{unit}/√Hz"))
     legend_above(right, 2)
     return figure
 

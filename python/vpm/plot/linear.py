@@ -27,9 +27,7 @@ def plot_poles(poles: Complex) -> Figure:
             axes.plot(poles[chosen].real, poles[chosen].imag / (2.0 * np.pi), "x", color=color, label=meaning)
     axes.axvline(0.0, color=LINE)
     axes.axhline(0.0, color=LINE)
-    axes.set_xlabel(label("real part", "1/s"))
-    axes.set_ylabel(label("imaginary part / 2π", "Hz"))
-    axes.set_title("Poles")
+    axes.set(xlabel=label("real part", "1/s"), ylabel=label("imaginary part / 2π", "Hz"), title="Poles")
     axes.legend()
     return figure
 
@@ -48,10 +46,8 @@ def plot_bode(frequencies: Array, response: Complex, inputs: Sequence[str], outp
         line, color = response[:, row, column], STAGES[1:][number % (len(STAGES) - 1)]
         upper.loglog(frequencies, np.abs(line), color=color, label=f"{inputs[column]} → {outputs[row]}")
         lower.semilogx(frequencies, np.degrees(np.unwrap(np.angle(line))), color=color)
-    upper.set_ylabel(label("gain", "SI"))
-    upper.set_title("Frequency response, without delays")
+    upper.set(ylabel=label("gain", "SI"), title="Frequency response, without delays")
     upper.legend()
-    lower.set_ylabel(label("phase", "degrees"))
-    lower.set_xlabel(label("frequency", "Hz"))
+    lower.set(ylabel=label("phase", "degrees"), xlabel=label("frequency", "Hz"))
     lower.axhline(-180.0, color=SOFT, linewidth=0.6)
     return figure

@@ -25,8 +25,7 @@ def plot_narx_run(run: NarxRun) -> Figure:
     axes[0][0].set_ylabel(label(run.output, run.unit))
     legend_above(axes[0][0], 2)
     axes[1][0].plot(*thinned(run.time, run.measured - run.values), color=BLUE)
-    axes[1][0].set_ylabel(label("difference", run.unit))
-    axes[1][0].set_xlabel("time")
+    axes[1][0].set(ylabel=label("difference", run.unit), xlabel="time")
     figure.suptitle(f"{run.kind} on {run.record}")
     return figure
 

@@ -46,8 +46,7 @@ def plot_channels(
         axis.plot(*thinned(time, data[:, at]), color=BLUE)
         for side in () if std is None else (-1.96, 1.96):
             axis.plot(*thinned(time, side * std[:, at]), color=ORANGE)
-        axis.set_ylabel(label("", unit).strip())
-        axis.set_title(channel)
+        axis.set(ylabel=label("", unit).strip(), title=channel)
     _finish_time(figure, axes[-1][0], title)
     return figure
 
@@ -69,8 +68,7 @@ def plot_run(run: Run) -> Figure:
         axis = axes[row][0]
         real = run.measured[:, at] if measured[at] else None
         draw_overlay(axis, run.time, real, run.values[:, at], [int(start) for start in run.starts])
-        axis.set_ylabel(label("", run.units[at]).strip())
-        axis.set_title(run.channels[at])
+        axis.set(ylabel=label("", run.units[at]).strip(), title=run.channels[at])
     legend_above(axes[0][0], 2)
     _finish_time(figure, axes[-1][0], f"{run.model_name} on {run.experiment_name}, {run.mode.replace('_', ' ')}")
     if run.notes:
@@ -121,9 +119,7 @@ def draw_correlation(axis: Axes, lags: Array, values: Array, band: float | Array
         axis.plot(lags, values, "o", color=BLUE, markersize=2.5)
     axis.axhline(0.0, color=INK, linewidth=0.8)
     axis.set_ylim(min(-0.25, 1.1 * float(values.min())), max(0.25, 1.1 * float(values.max())))
-    axis.set_xlabel("lag [s]")
-    axis.set_ylabel("correlation")
-    axis.set_title(name)
+    axis.set(xlabel="lag [s]", ylabel="correlation", title=name)
     axis.legend(loc="upper right")
 
 
@@ -146,8 +142,7 @@ def draw_residual_time(axis: Axes, time: Array, stages: Mapping[str, Array], uni
     for (name, residual), color in zip(stages.items(), _colors(len(stages)), strict=True):
         axis.plot(*thinned(time, residual), color=color, linewidth=0.9, label=name)
     axis.axhline(0.0, color=INK, linewidth=0.7)
-    axis.set_xlabel("time [s]")
-    axis.set_ylabel(label("residual", unit))
+    axis.set(xlabel="time [s]", ylabel=label("residual", unit))
     axis.margins(x=0.01)
 
 
@@ -187,8 +182,7 @@ def draw_residual_against(
     if top > bottom:
         axis.set_ylim(bottom - 0.08 * (top - bottom), top + 0.08 * (top - bottom))
     axis.axhline(0.0, color=INK, linewidth=0.7)
-    axis.set_xlabel(axis_label)
-    axis.set_ylabel(label("residual", unit))
+    axis.set(xlabel=axis_label, ylabel=label("residual", unit))
 
 
 #: Points that a cloud keeps.

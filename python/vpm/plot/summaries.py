@@ -25,9 +25,11 @@ def plot_comparison(comparison: Comparison) -> Figure:
     for row, each in zip(axes, channels, strict=True):
         starts = [0, *(int(at) + 1 for at in np.flatnonzero(np.diff(each.time) <= 0.0))]
         draw_overlay(row[0], each.time, each.measured, each.simulated, starts)
-        row[0].set_title(f"{each.channel}, error {each.relative_error:.3g} %")
-        row[0].set_xlabel("time [s]")
-        row[0].set_ylabel(label(each.channel.rpartition(".")[2], each.unit))
+        row[0].set(
+            title=f"{each.channel}, error {each.relative_error:.3g} %",
+            xlabel="time [s]",
+            ylabel=label(each.channel.rpartition(".")[2], each.unit),
+        )
         draw_residual_time(row[1], each.time, {"": each.residual}, each.unit)
         row[1].set_title("residual over time")
         velocity = _velocity_of(comparison, each.channel)

@@ -24,9 +24,7 @@ def plot_limbs(elbows: Array, tips: Array, names: Sequence[str]) -> Figure:
     for elbow, tip, name in zip(elbows, tips, names, strict=True):
         axes.plot([0.0, elbow[0], tip[0]], [0.0, elbow[1], tip[1]], marker="o", markersize=3, label=name)
     axes.plot(0.0, 0.0, "s", color=INK)
-    axes.set_aspect("equal")
-    axes.set_xlabel("x [m]")
-    axes.set_ylabel("y [m]")
+    axes.set(aspect="equal", xlabel="x [m]", ylabel="y [m]")
     figure.legend(loc="outside right upper", title="q1, q2")
     return figure
 
@@ -47,10 +45,7 @@ def plot_stroke_workspace(
     reach.plot(tips[::4, :, 0].T, tips[::4, :, 1].T, color=BLUE, linewidth=0.6)
     reach.plot(tips[:, ::4, 0], tips[:, ::4, 1], color=ORANGE, linewidth=0.6)
     reach.plot(0.0, 0.0, "s", color=INK)
-    reach.set_aspect("equal")
-    reach.set_xlabel("x [m]")
-    reach.set_ylabel("y [m]")
-    reach.set_title("end point, lines of constant stroke")
+    reach.set(aspect="equal", xlabel="x [m]", ylabel="y [m]", title="end point, lines of constant stroke")
     for k, colour in enumerate((BLUE, ORANGE)):
         # Each angle depends on its own stroke alone.
         pick = (slice(None), _filled(angles[..., 0].T)) if k == 0 else (_filled(angles[..., 1]), slice(None))
@@ -85,10 +80,8 @@ def plot_strokes(angles: Array, strokes: Array, levers: Array, names: Sequence[s
         degrees = np.degrees(angles[:, k])
         rows[0][k].plot(degrees, strokes[:, k], color=BLUE)
         rows[1][k].plot(degrees, levers[:, k], color=GREEN)
-        rows[0][k].set_title(f"{name} cylinder")
-        rows[0][k].set_ylabel("length [m]")
-        rows[1][k].set_ylabel("lever arm [m/rad]")
-        rows[1][k].set_xlabel(f"{name} angle [deg]")
+        rows[0][k].set(title=f"{name} cylinder", ylabel="length [m]")
+        rows[1][k].set(ylabel="lever arm [m/rad]", xlabel=f"{name} angle [deg]")
     return figure
 
 
@@ -103,8 +96,7 @@ def plot_shares(first: Array, second: Array, maps: Mapping[str, Array], title: s
         mesh = axes.pcolormesh(np.degrees(second), np.degrees(first), 100.0 * table, shading="nearest", cmap="viridis")
         mesh.set_clim(0.0, max(100.0, float(np.nanpercentile(100.0 * table, 95))))
         axes.grid(visible=False)
-        axes.set_title(f"{name}: {100.0 * table.mean():.2f} % on average")
-        axes.set_xlabel("knee angle [deg]")
+        axes.set(title=f"{name}: {100.0 * table.mean():.2f} % on average", xlabel="knee angle [deg]")
     rows[0][0].set_ylabel("hip angle [deg]")
     figure.colorbar(mesh, ax=rows[0], label="largest share [%]", shrink=0.9)
     figure.suptitle(title, fontsize=11, x=0.01, ha="left")
