@@ -1,8 +1,8 @@
-"""From a file or from arrays to the parts of a record: select, check, scale, convert, align, interpolate."""
+"""From a file or from arrays to a record: select, check, scale, convert, align, interpolate."""
 
 from collections.abc import Mapping
 from os import PathLike
-from typing import NamedTuple
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,22 +26,11 @@ from vpm.experiment.record import Experiment
 from vpm.model import ChannelEntry, Model
 from vpm.numbers import Array, array_of
 
-
-class Parts(NamedTuple):
-    """Name, time, data, channels and history of an `Experiment` that is about to be made."""
-
-    name: str
-    time: Array
-    data: Array
-    channels: tuple[str, ...]
-    units: tuple[str, ...]
-    history: tuple[str, ...]
-    unused_columns: tuple[str, ...]
-    slower: Mapping[str, float]
-    retained: Mapping[str, float]
+R = TypeVar("R", bound=Experiment)
 
 
-def load_parts(
+def record_of_log(
+    make: type[R],
     log: Log,
     channels: Mapping[str, ChannelEntry] | str | PathLike[str] | None,
     model: Model | None,
@@ -49,14 +38,15 @@ def load_parts(
     irregular: str,
     resample: float | None,
     name: str,
-) -> Parts:
-    """Parts of the record in a log; see `Experiment.load`."""
+) -> R:
+    """Load the record in a log; see `Experiment.load`."""
     table = channel_table(channels, model)
     draft = plain_draft(log) if table is None else mapped_draft(log, table, model)
-    return _finish(draft, name, irregular, resample)
+    return _finish(make, draft, name, irregular, resample)
 
 
-def array_parts(
+def record_of_arrays(
+    make: type[R],
     time: ArrayLike,
     values: Mapping[str, ArrayLike],
     units: Mapping[str, str],
@@ -65,8 +55,8 @@ def array_parts(
     irregular: str,
     resample: float | None,
     name: str,
-) -> Parts:
-    """Loaded parts of a record from arrays; see `Experiment.from_arrays`."""
+) -> R:
+    """Load a record from arrays; see `Experiment.from_arrays`."""
     clock = array_of(time, f"{name}: the time", ExperimentError)
     if clock.ndim != 1:
         raise ExperimentError(f"{name}: the time has shape {clock.shape}; give one number per sample")
@@ -91,7 +81,7 @@ def array_parts(
         draft.columns[channel] = own.to_si(column)
         if not own.is_si:
             draft.history.append(f"{channel} was converted from {unit} to {draft.units[channel]}.")
-    return _finish(draft, name, irregular, resample)
+    return _finish(make, draft, name, irregular, resample)
 
 
 def channel_table(
@@ -113,7 +103,7 @@ def channel_table(
     return channels
 
 
-def _finish(draft: Draft, name: str, irregular: str, resample: float | None) -> Parts:
+def _finish(make: type[R], draft: Draft, name: str, irregular: str, resample: float | None) -> R:
     """Finish loading: check the clock, make it uniform if asked to, move back what lags, and resample."""
     if irregular not in {"error", "interpolate"}:
         raise ExperimentError(f'irregular="{irregular}" is not known; choose "error" or "interpolate"')
@@ -140,22 +130,10 @@ def _finish(draft: Draft, name: str, irregular: str, resample: float | None) -> 
     units = tuple(draft.units[channel] for channel in channels)
     step = float(np.median(np.diff(time)))
     slower = {channel: rate for channel, rate in slower.items() if rate * step * GAP < 1.0}
-    record = Experiment(name, time, data, channels, units, (*draft.history, sentence), draft.unused, slower)
+    record = make(name, time, data, channels, units, (*draft.history, sentence), draft.unused, slower)
     if draft.delays:
         record = record.align(draft.delays)
-    if resample is not None:
-        record = record.resample(resample)
-    return Parts(
-        record.name,
-        record.time,
-        record.data,
-        record.channels,
-        record.units,
-        record.history,
-        record.unused_columns,
-        record.slower,
-        record.retained,
-    )
+    return record if resample is None else record.resample(resample)
 
 
 def _take_fresh(draft: Draft, irregular: str) -> dict[str, float]:

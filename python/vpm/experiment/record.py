@@ -159,12 +159,12 @@ class Experiment(Result):
         """
         if str(path).endswith(".npz"):
             return _read_from(path, super().load(path), {})
-        from vpm.experiment.loading import channel_table, load_parts
+        from vpm.experiment.loading import channel_table, record_of_log
         from vpm.experiment.readers import open_log
 
         log, table = open_log(path), channel_table(channels, model)
         how: dict[str, Any] = {"irregular": irregular, "resample": resample, "name": name or Path(path).stem}
-        record = cls(*load_parts(log, table, model, **how))
+        record = record_of_log(cls, log, table, model, **how)
         return _read_from(path, record, {**how, "channels": None if table is None else dict(table), "model": model})
 
     @cached_property
@@ -207,11 +207,11 @@ class Experiment(Result):
         ------
         ExperimentError, UnitError
         """
-        from vpm.experiment.loading import load_parts
+        from vpm.experiment.loading import record_of_log
         from vpm.experiment.readers.frame import FrameLog
 
         log = FrameLog(frame, name)
-        return cls(*load_parts(log, channels, model, irregular=irregular, resample=resample, name=name))
+        return record_of_log(cls, log, channels, model, irregular=irregular, resample=resample, name=name)
 
     @classmethod
     def from_arrays(
@@ -242,10 +242,11 @@ class Experiment(Result):
         ------
         ExperimentError, UnitError
         """
-        from vpm.experiment.loading import array_parts
+        from vpm.experiment.loading import record_of_arrays
 
-        parts = array_parts(time, values, units or {}, model, irregular=irregular, resample=resample, name=name)
-        return cls(*parts)
+        return record_of_arrays(
+            cls, time, values, units or {}, model, irregular=irregular, resample=resample, name=name
+        )
 
     @property
     def dt(self) -> float:
