@@ -204,8 +204,8 @@ class Result(Storable):
         raise VpmError(f"{type(self).__name__} has no table form")
 
     def _html_rows(self) -> Mapping[str, object]:
-        """Rows of a result's HTML table."""
-        return self._headline()
+        """Rows of a result's HTML table, its notes below."""
+        return {**self._headline(), **{f"note {at}": note for at, note in enumerate(getattr(self, "notes", ()), 1)}}
 
     def _repr_html_(self) -> str:
         return html_table(type(self).__name__, ("field", "value"), list(self._html_rows().items()))

@@ -88,9 +88,6 @@ class Run(Result):
             **({} if self.resolution is None else {"steps": str(self.resolution)}),
         }
 
-    def _html_rows(self) -> Mapping[str, object]:
-        return {**self._headline(), **{f"note {i}": note for i, note in enumerate(self.notes, 1)}}
-
     def _frame_columns(self) -> Mapping[str, object]:
         return {"time": self.time, **dict(zip(self.channels, self.values.T, strict=True))}
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -57,9 +56,6 @@ class Decay(Result):
     rest: float
     noise: float
     notes: tuple[str, ...] = ()
-
-    def _html_rows(self) -> Mapping[str, object]:
-        return {**self._headline(), **{f"note {i}": note for i, note in enumerate(self.notes, 1)}}
 
 
 def identify_decay(record: RecordLike, displacement: str, mass: float) -> Decay:

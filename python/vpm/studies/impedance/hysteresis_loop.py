@@ -126,9 +126,6 @@ class Loop(Result):
             "coulomb_force": self.coulomb_force,
         }
 
-    def _html_rows(self) -> Mapping[str, object]:
-        return {**self._headline(), **{f"note {i}": note for i, note in enumerate(self.notes, 1)}}
-
     def _frame_columns(self) -> Mapping[str, object]:
         return {
             "cycle": np.arange(self.cycle_energy.size),

@@ -9,7 +9,6 @@ D'Imperio (2016), eq 5.27, prints the factor of the full cycle and ``m v^2`` for
 5.28 is no energy but an impulse, ``int F dt = m g dt + m dv``.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,9 +60,6 @@ class Stop(Result):
     factor: float
     roundness: float
     notes: tuple[str, ...] = ()
-
-    def _html_rows(self) -> Mapping[str, object]:
-        return {**self._headline(), **{f"note {i}": note for i, note in enumerate(self.notes, 1)}}
 
 
 def stop_damping(

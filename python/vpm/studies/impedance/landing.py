@@ -7,7 +7,6 @@ least squares, less the known share of the displacement's white noise in their n
 estimates too small.
 """
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,9 +41,6 @@ class Landing(Result):
     damping_std: float
     misfit: float
     notes: tuple[str, ...] = ()
-
-    def _html_rows(self) -> Mapping[str, object]:
-        return {**self._headline(), **{f"note {i}": note for i, note in enumerate(self.notes, 1)}}
 
 
 def identify_landing(
