@@ -232,12 +232,12 @@ class LinearModel(Result):
         }
 
 
-def _grid(poles: Complex, points: int = 600) -> Array:
+def _grid(poles: Complex) -> Array:
     """Frequencies (Hz) for a linear model from a decade below the slowest to one above the fastest pole."""
     size = np.abs(poles) / (2.0 * np.pi)
     size = size[size > 1e-6]
     low, high = (size.min(), size.max()) if size.size else (0.1, 10.0)
-    return np.geomspace(0.1 * low, 10.0 * high, points)
+    return np.geomspace(0.1 * low, 10.0 * high, 600)
 
 
 def _places(names: Sequence[str] | None, known: tuple[str, ...], what: str) -> list[int]:

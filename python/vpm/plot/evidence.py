@@ -54,9 +54,9 @@ def plot_evidence(evidence: Evidence) -> Figure:
     return figure
 
 
-def draw_partial(axis: Axes, evidence: Evidence, *, most: int = MOST_DOTS, color: str = ORANGE) -> None:
+def draw_partial(axis: Axes, evidence: Evidence) -> None:
     """Draw evidence: the residual without the effect as a cloud, and the law over it."""
-    _cloud(axis, evidence.values, evidence.without, color, "residual without it", most)
+    _cloud(axis, evidence.values, evidence.without, ORANGE, "residual without it")
     order = np.argsort(evidence.law_values, kind="stable")
     values, law = evidence.law_values[order], evidence.law[order]
     centers, means, share = law_line(values, law)
@@ -73,7 +73,7 @@ def draw_remaining(axis: Axes, evidence: Evidence) -> None:
     floor = evidence.noise_floor
     if np.isfinite(floor):
         axis.axhspan(-BAND * floor, BAND * floor, color=LINE, alpha=0.8, linewidth=0, label="noise floor, 95 %")
-    _cloud(axis, evidence.values, evidence.repaired, BLUE, "residual with it", MOST_DOTS)
+    _cloud(axis, evidence.values, evidence.repaired, BLUE, "residual with it")
     axis.axhline(0.0, color=SOFT, linewidth=0.7)
 
 
@@ -125,8 +125,8 @@ def _spectra(evidence: Evidence) -> Figure:
     return figure
 
 
-def _cloud(axis: Axes, values: Array, residual: Array, color: str, name: str, most: int) -> None:
-    step = -(-values.size // most)
+def _cloud(axis: Axes, values: Array, residual: Array, color: str, name: str) -> None:
+    step = -(-values.size // MOST_DOTS)
     shown = -(-values.size // step)
     size = float(np.clip(130.0 / np.sqrt(shown), 3.0, 6.5))
     axis.plot(

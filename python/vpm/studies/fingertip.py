@@ -217,11 +217,11 @@ def _convergence(levels: dict[str, list[Curve]]) -> Table:
     )
 
 
-def small_loads(fineness: int, shares: Sequence[float] = (0.03, 0.1)) -> Table:
+def small_loads(fineness: int) -> Table:
     """A ball on a flat layer, and the finger made of one material, beside Hertz."""
     rows: list[tuple[Cell, ...]] = []
     height, radius = 1e-2, 5e-2
-    for share in shares:
+    for share in (0.03, 0.1):
         way = (share * height) ** 2 / radius
         body = block(height, 1.3 * share * height, FINGER.tissue, fineness)
         seen = press(body, [way], start=0.0, curvature=-1.0 / radius)[-1]
@@ -248,16 +248,15 @@ def _beside(
     return name, share, seen.force / force, factor, seen.contact_radius**3 * 4.0 * plane / (3.0 * radius * seen.force)
 
 
-def penalties(fineness: int = 1, way: float = 1e-3) -> Table:
+def penalties() -> Table:
     """Fingertip force and overlap by the contact stiffness alone, and with augmented Lagrange."""
-    rows = []
-    ways = [0.5 * way, way]
+    rows, ways = [], [0.5e-3, 1e-3]
     for factor in (0.01, 0.1, 1.0, 10.0):
-        body = FINGER.body(fineness)
+        body = FINGER.body(1)
         body.penalty *= factor
         seen = press(body, ways, start=-FINGER.radius, augmented=False)[-1]
         rows.append((f"{factor:g}", seen.force, 1e6 * seen.overlap))
-    seen = press(FINGER.body(fineness), ways, start=-FINGER.radius)[-1]
+    seen = press(FINGER.body(1), ways, start=-FINGER.radius)[-1]
     rows.append(("1, augmented Lagrange", seen.force, 1e6 * seen.overlap))
     return Table(
         "Convergence with the contact stiffness, rim held, 1 mm",
@@ -287,16 +286,16 @@ def variations() -> dict[str, Finger]:
     }
 
 
-def sensitivities(fineness: int = 1) -> Table:
+def sensitivities() -> Table:
     """Fingertip forces with one assumption changed at a time."""
     rows: list[tuple[Cell, ...]] = []
     for name, finger in variations().items():
-        curve = indent(finger, fineness)
+        curve = indent(finger, 1)
         rows.append((name, *map(float, curve.force(DEPTHS)), float(curve.area(DEPTHS)[-1])))
     rows.append(("printed model", *map(float, PRINTED_FORCE), None))
     rows.append(("measured", *map(float, averages()), None))
     return Table(
-        f"What the assumptions do ({mesh_words(fineness)})",
+        f"What the assumptions do ({mesh_words(1)})",
         ("changed", "N at 1 mm", "N at 2 mm", "N at 3 mm", "mm^2 at 3 mm"),
         tuple(rows),
     )
