@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Self, TypedDict, TypeVar, Unpack
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -34,18 +34,6 @@ if TYPE_CHECKING:
 
     from vpm.experiment.readers.frame import Frame
     from vpm.model import ChannelEntry, Model
-
-
-class _Changes(TypedDict, total=False):
-    """Fields that a derived record may change."""
-
-    name: str
-    time: Array
-    data: Array
-    channels: tuple[str, ...]
-    units: tuple[str, ...]
-    slower: Mapping[str, float]
-    retained: Mapping[str, float]
 
 
 _Record = TypeVar("_Record", bound="Experiment")
@@ -481,7 +469,7 @@ class Experiment(Result):
             units=(*self.units, unit),
         )
 
-    def _changed(self, sentence: str, **changes: Unpack[_Changes]) -> Self:
+    def _changed(self, sentence: str, **changes: Any) -> Self:  # noqa: ANN401  other values of fields
         return replace(self, history=(*self.history, sentence), **changes)
 
     def _headline(self) -> Mapping[str, object]:
