@@ -44,8 +44,9 @@ def plot_channels(
     for at, (channel, unit) in enumerate(zip(channels, units, strict=True)):
         axis = axes[at][0]
         axis.plot(*thinned(time, data[:, at]), color=BLUE)
-        for side in () if std is None else (-1.96, 1.96):
-            axis.plot(*thinned(time, side * std[:, at]), color=ORANGE)
+        if std is not None:
+            for side in (-1.96, 1.96):
+                axis.plot(*thinned(time, side * std[:, at]), color=ORANGE)
         axis.set(ylabel=label("", unit).strip(), title=channel)
     _finish_time(figure, axes[-1][0], title)
     return figure

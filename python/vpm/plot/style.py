@@ -214,8 +214,10 @@ def _extremes(column: Array, stretch: int, first: int) -> Iterator[NDArray[np.in
 
 def legend_above(axis: Axes, columns: int, handles: Sequence[Artist] | None = None) -> None:
     """Legend in the common style above axes, where it hides nothing: of their lines at the right, else at the left."""
-    corner = ("lower right", 1.0) if handles is None else ("lower left", 0.0)
-    axis.legend(handles=handles, loc=corner[0], bbox_to_anchor=(corner[1], 1.0), ncols=columns, borderaxespad=0.2)
+    if handles is None:
+        axis.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=columns, borderaxespad=0.2)
+    else:
+        axis.legend(handles=handles, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, borderaxespad=0.2)
 
 
 def label(quantity: str, unit: str) -> str:
