@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from vpm.control.feedback import StateFeedback, at_axes
 from vpm.control.plan import FlexibleFeedforward
-from vpm.errors import SimulationError, near_match
+from vpm.errors import SimulationError, check_known
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.observer import Noise, Observer
@@ -224,9 +224,8 @@ def _measured(model: Model, channels: Sequence[str] | None) -> tuple[str, ...]:
 
 def _limits(model: Model, limits: Mapping[str, float]) -> Array:
     largest = np.full(len(model.inputs), np.inf)
+    check_known(limits, model.inputs, SimulationError, "limits:", "is unknown")
     for name, value in limits.items():
-        if name not in model.inputs:
-            raise SimulationError(f'limits: "{name}" is unknown; {near_match(name, model.inputs)}')
         if not value > 0.0:
             raise SimulationError(f'limits: "{name}" is {value:g}; give a positive number')
         largest[model.inputs.index(name)] = value

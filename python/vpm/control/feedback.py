@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.control.plan import FlexibleFeedforward
 from vpm.control.schedule import TIME, Schedule
-from vpm.errors import SimulationError, near_match
+from vpm.errors import SimulationError, check_known
 from vpm.linear import LinearModel
 from vpm.model import Model
 from vpm.numbers import Array
@@ -146,9 +146,8 @@ def _check(
         ("efforts", efforts, model.inputs),
         ("integrate", integrate, model.output_channels),
     ):
+        check_known(values, known, SimulationError, f"{what}:", "is unknown")
         for name, value in values.items():
-            if name not in known:
-                raise SimulationError(f'{what}: "{name}" is unknown; {near_match(name, known)}')
             if not (np.isfinite(value) and value > 0.0):
                 raise SimulationError(f'{what}: "{name}" is {value:g}; give a positive number')
     if not efforts or not deviations:

@@ -10,7 +10,7 @@ from vpm.control.rest import along, course, loaded
 from vpm.control.splitting import between, solve, split
 from vpm.control.target import TargetMotion
 from vpm.control.task import Task, task_of
-from vpm.errors import SimulationError, near_match
+from vpm.errors import SimulationError, check_known
 from vpm.model import Model
 from vpm.numbers import Array, array_of, number_of
 from vpm.simulate import Setup
@@ -104,9 +104,8 @@ def _start(model: Model, start: Mapping[str, float] | ArrayLike | None) -> Array
     """Coordinates near the first pose of a feed-forward: joints as given, links bent by gravity."""
     joints: Array = np.zeros(len(model.joints))
     if isinstance(start, Mapping):
+        check_known(start, model.joints, SimulationError, "start:", "is no joint")
         for name, value in start.items():
-            if name not in model.joints:
-                raise SimulationError(f'start: "{name}" is no joint; {near_match(name, model.joints)}')
             joints[model.joints.index(name)] = number_of(value, f"start: {name}", SimulationError)
     elif start is not None:
         given = array_of(start, "the start", SimulationError)
@@ -283,9 +282,8 @@ def _keep(found: FlexibleFeedforward, limits: Mapping[str, float]) -> None:
     tables = {name: found.commands[:, place] for place, name in enumerate(found.inputs)}
     for place, name in enumerate(found.coordinates):
         tables |= {f"{name}.position": found.position[:, place], f"{name}.velocity": found.velocity[:, place]}
+    check_known(limits, tables, SimulationError, "limits:", "is unknown")
     for name, limit in limits.items():
-        if name not in tables:
-            raise SimulationError(f'limits: "{name}" is unknown; {near_match(name, tuple(tables))}')
         if not limit > 0.0:
             raise SimulationError(f'limits: "{name}" is {limit:g}; give a positive number')
         largest = float(np.abs(tables[name]).max())

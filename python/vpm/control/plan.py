@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import SimulationError, near_match
+from vpm.errors import SimulationError, check_known
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.numbers import Array
@@ -89,9 +89,8 @@ class FlexibleFeedforward(Result):
             The model lacks a joint or an actuator.
         """
         values: dict[str, Array] = {}
+        check_known(self.inputs, model.inputs, SimulationError, f"{model.name} has no input")
         for place, name in enumerate(self.inputs):
-            if name not in model.inputs:
-                raise SimulationError(f'{model.name} has no input "{name}"; {near_match(name, model.inputs)}')
             measured = model.held_channels.get(name)
             if measured is None:
                 values[f"{name}.command"] = self.commands[:, place]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vpm.control.plan import FlexibleFeedforward
-from vpm.errors import SimulationError, near_match
+from vpm.errors import SimulationError, check_known
 from vpm.model import Model
 from vpm.numbers import Array, array_of
 from vpm.results import Storable
@@ -56,9 +56,8 @@ class Schedule(Storable):
         grid = tuple(
             np.atleast_1d(array_of(values, f"{name}: positions", SimulationError)) for name, values in joints.items()
         )
+        check_known(joints, model.joints, SimulationError, "", "is no joint to schedule by")
         for name, values in zip(joints, grid, strict=True):
-            if name not in model.joints:
-                raise SimulationError(f'"{name}" is no joint to schedule by; {near_match(name, model.joints)}')
             if values.ndim != 1 or not values.size or not np.isfinite(values).all() or (np.diff(values) <= 0.0).any():
                 raise SimulationError(f"{name}: positions of a schedule have to ascend; sort them, each once")
         places = [model.joints.index(name) for name in joints]

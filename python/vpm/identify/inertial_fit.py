@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vpm.errors import IdentificationError, near_match
+from vpm.errors import IdentificationError, check_known
 from vpm.numbers import Array
 from vpm.results import Result
 
@@ -126,8 +126,7 @@ class InertialFit(Result):
         return np.asarray(self.base_map @ np.asarray(values, dtype=np.float64))
 
     def __getitem__(self, name: str) -> float:
-        if name not in self.names:
-            raise IdentificationError(f'there is no parameter "{name}"; {near_match(name, self.names)}')
+        check_known([name], self.names, IdentificationError, "there is no parameter")
         return float(self.values[self.names.index(name)])
 
     def repaired(self, model: Model) -> Model:

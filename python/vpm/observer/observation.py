@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vpm.errors import SimulationError, check_known
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.numbers import Array
@@ -79,10 +80,7 @@ class Observation(Result):
 
     def state(self, name: str) -> Array:
         """State of an observation over time (N,), SI."""
-        from vpm.errors import SimulationError, near_match
-
-        if name not in self.state_names:
-            raise SimulationError(f'"{name}" is no state of this machine; {near_match(name, self.state_names)}')
+        check_known([name], self.state_names, SimulationError, "", "is no state of this machine")
         return self.states[:, self.state_names.index(name)]
 
     def _headline(self) -> Mapping[str, object]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vpm.errors import OptimisationError, near_match
+from vpm.errors import OptimisationError, check_known
 from vpm.experiment import Experiment
 from vpm.numbers import Array
 from vpm.results import Result
@@ -98,8 +98,7 @@ class Optimum(Result):
 
     def __getitem__(self, channel: str) -> Array:
         """Samples of a channel in the optimum's log, shape (N,)."""
-        if channel not in self.channels:
-            raise OptimisationError(f'{self.name} has no channel "{channel}"; {near_match(channel, self.channels)}')
+        check_known([channel], self.channels, OptimisationError, f"{self.name} has no channel")
         return self.data[:, self.channels.index(channel)]
 
     def experiment(self) -> Experiment:
