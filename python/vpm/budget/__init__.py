@@ -2,6 +2,6 @@
 
 from vpm.budget.measure import budget
 from vpm.budget.report import BudgetReport, Stage
-from vpm.budget.steps import commands, start_state, step_times
+from vpm.budget.steps import commands, start_state, time_steps
 
-__all__ = ["BudgetReport", "Stage", "budget", "commands", "start_state", "step_times"]
+__all__ = ["BudgetReport", "Stage", "budget", "commands", "start_state", "time_steps"]

@@ -35,36 +35,6 @@ class Timed:
     direct: str  #: Why they were evaluated directly; empty where they ran as machine code.
 
 
-def step_times(
-    model: Model,
-    rate: float,
-    setup: Setup,
-    steps: int,
-    inputs: Array,
-    priority: int | None = None,
-    start: Array | None = None,
-) -> Array:
-    """Duration of each step, s.
-
-    Parameters
-    ----------
-    rate : float
-        Hz.
-    inputs : ndarray, shape (N, inputs)
-        Repeated as often as needed.
-    priority : int, optional
-        Time them before all ordinary threads, see `vpm.realtime.Loop`, if permitted.
-    start : ndarray, shape (states,), optional
-        Where each way through the inputs starts; by default at rest at zero, once.
-
-    Raises
-    ------
-    SimulationError
-        The commands do not lead through a simulation in these steps.
-    """
-    return time_steps(model, rate, setup, steps, inputs, priority=priority, start=start).seconds
-
-
 def time_steps(
     model: Model,
     rate: float,
@@ -82,7 +52,9 @@ def time_steps(
 
     If they are to be ``compiled``, they run as machine code where there is any.
 
-    Each way through the inputs begins at ``start``, if it is given.
+    - ``rate``: Hz
+    - ``inputs``: shape (N, inputs), repeated as often as needed
+    - ``start``: shape (states,), where each way through the inputs starts; by default at rest at zero, once
     """
     from vpm._core import Diverged
 

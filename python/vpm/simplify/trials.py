@@ -7,7 +7,7 @@ from functools import partial
 
 import numpy as np
 
-from vpm.budget import commands, start_state, step_times
+from vpm.budget import commands, start_state, time_steps
 from vpm.errors import ExecutorError, SimulationError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -214,7 +214,7 @@ class Trials:
 
     def _coarse_time(self, model: Model, setup: Setup) -> float:
         inputs, start = self.courses.of(model)
-        return float(np.min(step_times(model, self.judge.rate, setup, COARSE, inputs, start=start)))
+        return float(np.min(time_steps(model, self.judge.rate, setup, COARSE, inputs, start=start).seconds))
 
     def _step(self, changes: Changes, coarse: Mapping[str, tuple[int, float]]) -> None:
         """Try every integrator with its fewest steps in a period, then more where they could pay."""
@@ -281,10 +281,10 @@ class Trials:
     def timed(self, model: Model, setup: Setup) -> tuple[float, float]:
         """Median and 99.9 % quantile of a trial's period, s."""
         rate, (inputs, start) = self.judge.rate, self.courses.of(model)
-        times = step_times(model, rate, setup, TIMED_STEPS[0], inputs, PRIORITY, start)
+        times = time_steps(model, rate, setup, TIMED_STEPS[0], inputs, priority=PRIORITY, start=start).seconds
         steps = int(np.clip(TIMED_SECONDS / np.median(times), *TIMED_STEPS))
         if steps > TIMED_STEPS[0]:
-            times = step_times(model, rate, setup, steps, inputs, PRIORITY, start)
+            times = time_steps(model, rate, setup, steps, inputs, priority=PRIORITY, start=start).seconds
         return float(np.median(times)), float(np.quantile(times, 0.999))
 
 
