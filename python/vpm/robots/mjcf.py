@@ -87,8 +87,8 @@ class _Reader:
             at = self._offset[body] @ _place(m.site_pos[site], m.site_quat[site])
             robot.frames.append(Frame(self._name("SITE", site, "site"), self._link[body], at))
         joints = [self._name("JOINT", joint, "joint") for joint in range(m.njnt)]
-        robot.shafts, robot.drives = drives_and_shafts(m, self._mujoco, joints, robot)
-        equalities(m, self._mujoco, joints, robot)
+        robot.shafts, robot.drives = self._drives_and_shafts(joints)
+        self._lead(joints)
         robot.notes += self._left_out()
         return robot
 
@@ -186,6 +186,74 @@ class _Reader:
             if count:
                 yield f"left out: {what} ({count})"
 
+    def _drives_and_shafts(self, joints: list[str]) -> tuple[list[Shaft], list[Drive] | None]:
+        """Shafts that drives turn, and drives; None where the file has no actuators, so that each joint gets one."""
+        m, mujoco, robot = self._m, self._mujoco, self._robot
+        if not m.nu:
+            return [], None
+        drives, tendons = [], {}
+        for index in range(m.nu):
+            name = self._name("ACTUATOR", index, "actuator")
+            kind, target = int(m.actuator_trntype[index]), int(m.actuator_trnid[index][0])
+            on_joint = kind in {int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)}
+            if on_joint and robot.joints[joints[target]].kind in SINGLE:
+                drives.append(self._drive(index, name, joint=joints[target]))
+            elif kind == int(mujoco.mjtTrn.mjTRN_TENDON) and (ratios := self._ratios(target, joints)):
+                tendon = self._name("TENDON", target, "tendon")
+                tendons[tendon] = Shaft(tendon, ratios)
+                drives.append(self._drive(index, name, shaft=tendon))
+            else:
+                robot.notes.append(
+                    f'actuator "{clean(name)}" is left out: it drives neither one coordinate nor a fixed tendon'
+                )
+        return list(tendons.values()), drives
+
+    def _ratios(self, tendon: int, joints: list[str]) -> dict[str, float]:
+        """Ratios of a fixed MJCF tendon, a sum of coefficient times coordinate; none of another one."""
+        m, mujoco = self._m, self._mujoco
+        first, count = int(m.tendon_adr[tendon]), int(m.tendon_num[tendon])
+        wraps = range(first, first + count)
+        if any(int(m.wrap_type[wrap]) != int(mujoco.mjtWrap.mjWRAP_JOINT) for wrap in wraps):
+            return {}
+        return {joints[int(m.wrap_objid[wrap])]: float(m.wrap_prm[wrap]) for wrap in wraps if m.wrap_prm[wrap] != 0.0}
+
+    def _drive(self, index: int, name: str, joint: str | None = None, shaft: str | None = None) -> Drive:
+        """Drive of an MJCF actuator: a motor is gear times gain times command; a servo takes efforts."""
+        m, mujoco = self._m, self._mujoco
+        gear = float(m.actuator_gear[index][0])
+        plain = (
+            int(m.actuator_gaintype[index]) == int(mujoco.mjtGain.mjGAIN_FIXED)
+            and int(m.actuator_biastype[index]) == int(mujoco.mjtBias.mjBIAS_NONE)
+            and int(m.actuator_dyntype[index]) == int(mujoco.mjtDyn.mjDYN_NONE)
+        )
+        gain = float(m.actuator_gainprm[index][0]) * gear
+        limits = [abs(gear) * np.abs(m.actuator_forcerange[index]).max()] if m.actuator_forcelimited[index] else []
+        if plain and gain != 0.0:
+            limits += [abs(gain) * np.abs(m.actuator_ctrlrange[index]).max()] if m.actuator_ctrllimited[index] else []
+            limit = float(min(limits)) if limits and min(limits) > 0.0 else None
+            return Drive(name, joint, shaft, gain=gain, unit="1", limit=limit)
+        rest = "its law (servo, lag or bias) is left out, and its command is the effort"
+        self._robot.notes.append(f'actuator "{clean(name)}": {rest}')
+        return Drive(name, joint, shaft, limit=float(min(limits)) if limits and min(limits) > 0.0 else None)
+
+    def _lead(self, joints: list[str]) -> None:
+        """MJCF equalities: joints that others lead by a straight line, y - y0 = a0 + a1 (x - x0)."""
+        m, mujoco, robot = self._m, self._mujoco, self._robot
+        for index in range(m.neq):
+            follower, leader = int(m.eq_obj1id[index]), int(m.eq_obj2id[index])
+            data = m.eq_data[index][:5]
+            straight = int(m.eq_type[index]) == int(mujoco.mjtEq.mjEQ_JOINT) and leader >= 0 and not np.any(data[2:])
+            name = self._name("EQUALITY", index, "equality")
+            free = straight and _leads(robot, joints[leader]) != joints[follower]
+            if not (free and m.eq_active0[index] and robot.joints[joints[follower]].mimic is None):
+                robot.notes.append(
+                    f'equality "{clean(name)}" is left out: only joints that follow one other by a line are kept'
+                )
+                continue
+            y0, x0 = (float(m.qpos0[m.jnt_qposadr[joint]]) for joint in (follower, leader))
+            mimic = Mimic(joints[leader], float(data[1]), float(data[0]) + y0 - float(data[1]) * x0)
+            robot.joints[joints[follower]] = replace(robot.joints[joints[follower]], mimic=mimic)
+
 
 def _back(kind: JointType, axis: Any, ref: float) -> Pose:  # noqa: ANN401
     """Pose that takes a joint of MJCF from its place at ``ref`` to that at zero."""
@@ -195,82 +263,6 @@ def _back(kind: JointType, axis: Any, ref: float) -> Pose:  # noqa: ANN401
         return Pose(tuple((-ref * axis).tolist()))
     half = -0.5 * ref
     return turn_of((math.cos(half), *(math.sin(half) * axis)))
-
-
-def drives_and_shafts(m: Any, mujoco: Any, joints: list[str], robot: Robot) -> tuple[list[Shaft], list[Drive] | None]:  # noqa: ANN401
-    """Shafts that drives turn, and drives; None where the file has no actuators, so that each joint gets one."""
-    if not m.nu:
-        return [], None
-    drives, tendons = [], {}
-    for index in range(m.nu):
-        name = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_ACTUATOR, index) or f"actuator{index}"
-        kind, target = int(m.actuator_trntype[index]), int(m.actuator_trnid[index][0])
-        on_joint = kind in {int(mujoco.mjtTrn.mjTRN_JOINT), int(mujoco.mjtTrn.mjTRN_JOINTINPARENT)}
-        if on_joint and robot.joints[joints[target]].kind in SINGLE:
-            drives.append(_drive(m, mujoco, index, name, robot, joint=joints[target]))
-        elif kind == int(mujoco.mjtTrn.mjTRN_TENDON) and (ratios := _ratios(m, mujoco, target, joints)):
-            tendon = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_TENDON, target) or f"tendon{target}"
-            tendons[tendon] = Shaft(tendon, ratios)
-            drives.append(_drive(m, mujoco, index, name, robot, shaft=tendon))
-        else:
-            robot.notes.append(
-                f'actuator "{clean(name)}" is left out: it drives neither one coordinate nor a fixed tendon'
-            )
-    return list(tendons.values()), drives
-
-
-def _ratios(m: Any, mujoco: Any, tendon: int, joints: list[str]) -> dict[str, float]:  # noqa: ANN401
-    """Ratios of a fixed MJCF tendon, a sum of coefficient times coordinate; none of another one."""
-    first, count = int(m.tendon_adr[tendon]), int(m.tendon_num[tendon])
-    wraps = range(first, first + count)
-    if any(int(m.wrap_type[wrap]) != int(mujoco.mjtWrap.mjWRAP_JOINT) for wrap in wraps):
-        return {}
-    return {joints[int(m.wrap_objid[wrap])]: float(m.wrap_prm[wrap]) for wrap in wraps if m.wrap_prm[wrap] != 0.0}
-
-
-def _drive(
-    m: Any,  # noqa: ANN401
-    mujoco: Any,  # noqa: ANN401
-    index: int,
-    name: str,
-    robot: Robot,
-    joint: str | None = None,
-    shaft: str | None = None,
-) -> Drive:
-    """Drive of an MJCF actuator: a motor is gear times gain times command; a servo takes efforts."""
-    gear = float(m.actuator_gear[index][0])
-    plain = (
-        int(m.actuator_gaintype[index]) == int(mujoco.mjtGain.mjGAIN_FIXED)
-        and int(m.actuator_biastype[index]) == int(mujoco.mjtBias.mjBIAS_NONE)
-        and int(m.actuator_dyntype[index]) == int(mujoco.mjtDyn.mjDYN_NONE)
-    )
-    gain = float(m.actuator_gainprm[index][0]) * gear
-    limits = [abs(gear) * np.abs(m.actuator_forcerange[index]).max()] if m.actuator_forcelimited[index] else []
-    if plain and gain != 0.0:
-        limits += [abs(gain) * np.abs(m.actuator_ctrlrange[index]).max()] if m.actuator_ctrllimited[index] else []
-        limit = float(min(limits)) if limits and min(limits) > 0.0 else None
-        return Drive(name, joint, shaft, gain=gain, unit="1", limit=limit)
-    rest = "its law (servo, lag or bias) is left out, and its command is the effort"
-    robot.notes.append(f'actuator "{clean(name)}": {rest}')
-    return Drive(name, joint, shaft, limit=float(min(limits)) if limits and min(limits) > 0.0 else None)
-
-
-def equalities(m: Any, mujoco: Any, joints: list[str], robot: Robot) -> None:  # noqa: ANN401
-    """MJCF equalities: joints that others lead by a straight line, y - y0 = a0 + a1 (x - x0)."""
-    for index in range(m.neq):
-        follower, leader = int(m.eq_obj1id[index]), int(m.eq_obj2id[index])
-        data = m.eq_data[index][:5]
-        straight = int(m.eq_type[index]) == int(mujoco.mjtEq.mjEQ_JOINT) and leader >= 0 and not np.any(data[2:])
-        name = mujoco.mj_id2name(m, mujoco.mjtObj.mjOBJ_EQUALITY, index) or f"equality{index}"
-        free = straight and _leads(robot, joints[leader]) != joints[follower]
-        if not (free and m.eq_active0[index] and robot.joints[joints[follower]].mimic is None):
-            robot.notes.append(
-                f'equality "{clean(name)}" is left out: only joints that follow one other by a line are kept'
-            )
-            continue
-        y0, x0 = (float(m.qpos0[m.jnt_qposadr[joint]]) for joint in (follower, leader))
-        mimic = Mimic(joints[leader], float(data[1]), float(data[0]) + y0 - float(data[1]) * x0)
-        robot.joints[joints[follower]] = replace(robot.joints[joints[follower]], mimic=mimic)
 
 
 def _leads(robot: Robot, joint: str) -> str:
