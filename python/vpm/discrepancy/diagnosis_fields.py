@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vpm.catalogue import EFFECTS
+from vpm.compare import compare
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, is_clear, weaker
 from vpm.discrepancy.diagnosis import (
     OBSERVED,
@@ -15,7 +16,9 @@ from vpm.discrepancy.diagnosis import (
     ChannelGap,
     Diagnosis,
     EffectParameterEstimate,
+    Picture,
     Step,
+    Trace,
 )
 from vpm.discrepancy.noise.noise_floor import noise_floor
 from vpm.discrepancy.noise.residual_structure import Structure, structure
@@ -29,16 +32,12 @@ from vpm.discrepancy.search.search import Search
 from vpm.identify import Fit, InverseDynamicsProblem, OutputErrorProblem, Problem, gaps
 from vpm.identify.fit_result import fit_of
 from vpm.model import Model
-from vpm.simulate import Setup
+from vpm.numbers import stretches
+from vpm.simulate import Run, Setup
 
 if TYPE_CHECKING:
     from vpm.ranking import Ranked, Ranking
     from vpm.ranking import Settings as RankingSettings
-
-from vpm.compare import compare
-from vpm.discrepancy.diagnosis import Picture, Trace
-from vpm.numbers import stretches
-from vpm.simulate import Run
 
 #: Said of what would do in the place of an effect.
 ALIKE = "predicts the validation data as well"

@@ -354,8 +354,13 @@ def _where_it_acts(current: Judged, validation: Array, problem: InverseDynamicsP
     lost = float(validation @ validation) > float(current.validation @ current.validation)
     if len(problem.blocks) == len(problem.motions) or lost:
         return None
-    here = acts_on(current.model, problem, site)
-    return gain(here * current.validation, here * validation, segments(problem)) if np.any(here) else None
+    return gain_at(current.model, problem, site, current.validation, validation)
+
+
+def gain_at(model: Model, problem: InverseDynamicsProblem, site: str, before: Array, after: Array) -> Gain | None:
+    """Confirmed gain between two residuals (n,) in efforts of the joint at a site; None where no effort is compared."""
+    here = acts_on(model, problem, site)
+    return gain(here * before, here * after, segments(problem)) if np.any(here) else None
 
 
 def simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:

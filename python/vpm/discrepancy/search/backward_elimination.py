@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, gain_at, judge
 from vpm.discrepancy.confirmation.refusal import CLEAR_GAIN, LEAST_GAIN, NORMAL_95_ONE_SIDED
-from vpm.discrepancy.screening.candidates import Key, acts_on
+from vpm.discrepancy.screening.candidates import Key
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.errors import DivergedError, ModelError
 from vpm.identify import Gain, gain, segments
@@ -64,12 +64,10 @@ def drop_replaced(stages: list[Stage], accepted: list[Accepted], data: Data, dro
 
 def _work(entry: Accepted, reduced: Judged, current: Judged, data: Data) -> Gain:
     """Validation gain of an effect before elimination over the model without it, of all or at its joint alone."""
-    here, pieces = acts_on(current.model, data.validation, entry.trial.probe.candidate.site), segments(data.validation)
-    whole = gain(reduced.validation, current.validation, pieces)
-    if not np.any(here):
-        return whole
-    own = gain(here * reduced.validation, here * current.validation, pieces)
-    return max(whole, own, key=lambda one: one.relative)
+    site = entry.trial.probe.candidate.site
+    whole = gain(reduced.validation, current.validation, segments(data.validation))
+    own = gain_at(current.model, data.validation, site, reduced.validation, current.validation)
+    return whole if own is None else max(whole, own, key=lambda one: one.relative)
 
 
 def _renamed(current: Judged, reduced: Judged, model: Model, free: tuple[str, ...], data: Data) -> bool:

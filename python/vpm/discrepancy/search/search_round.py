@@ -10,7 +10,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confirm, finished
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confirm, finished, gain_at
 from vpm.discrepancy.confirmation.delay_in_motion import in_motion, is_late
 from vpm.discrepancy.confirmation.low_frequency import low_frequency
 from vpm.discrepancy.confirmation.refusal import (
@@ -29,7 +29,7 @@ from vpm.discrepancy.noise.residual_structure import structure
 from vpm.discrepancy.noise.sample_timing import InTime, in_time
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.discrepancy.screening.backlash_start import is_read_off, only_compliant
-from vpm.discrepancy.screening.candidates import Candidate, Key, acts_on, candidates, joint_at, left_out
+from vpm.discrepancy.screening.candidates import Candidate, Key, candidates, joint_at, left_out
 from vpm.discrepancy.screening.probe import Probe, prepare, probe, refit_effort, screening_effort
 from vpm.discrepancy.screening.short_list import SHORT_LIST, most_promising, same_models
 from vpm.discrepancy.search.candidate_choice import Accepted, choose
@@ -279,8 +279,8 @@ class Round:
             before, validation = (in_motion(self.data.validation) * each for each in (before, validation))
         timed = gain(before, validation, segments(self.data.validation))
         if trial.there is trial.here and timed.relative > 0.0:
-            here = acts_on(self.current.model, self.data.validation, trial.probe.candidate.site)
-            timed = gain(here * before, here * validation, segments(self.data.validation))
+            site = trial.probe.candidate.site
+            timed = gain_at(self.current.model, self.data.validation, site, before, validation) or timed
         return refuse_timing(timed, self.timed.shift, thresholds, beside=shifted.shift)
 
     def best(self) -> Accepted | None:
