@@ -46,15 +46,8 @@ ALIKE = "predicts the validation data as well"
 def of_search(model: Model, records: Records, start: Judged, found: Search, fitted: Problem) -> Diagnosis:
     """Diagnosis with the fields of the search alone, where what follows it could not be computed or was stopped.
 
-    Parameters
-    ----------
-    model : Model
-    records : tuple
-    start : Judged
-        What the last fit is compared with.
-    found : Search
-    fitted : problem
-        What was fitted.
+    - ``start``: what the last fit is compared with
+    - ``fitted``: what was fitted
     """
     training, validation, notes = records
     names = ", ".join(entry.label for entry in found.accepted) or "no effect"
@@ -190,15 +183,9 @@ def unmeasured(model: Model, records: Records, ranking: Ranking, settings: Ranki
 
     Values are those of the ranking, and nobody has looked at how sure they are.
 
-    Parameters
-    ----------
-    model : Model
-        As the user wrote it.
-    records : tuple
-        See `vpm.discrepancy.preparation`.
-    ranking : Ranking
-    settings : vpm.ranking.Settings
-        Of the ranking.
+    - ``model``: as the user wrote it
+    - ``records``: see `vpm.discrepancy.preparation`
+    - ``settings``: of the ranking
     """
     training, validation, notes = records
     effects = ranking.effects

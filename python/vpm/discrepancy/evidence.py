@@ -80,15 +80,9 @@ def gather(
 ) -> tuple[Evidence, ...]:
     """Gather the evidence of each accepted effect; none where the model without it cannot be computed.
 
-    Parameters
-    ----------
-    model : Model
-        The repaired model.
-    effects : sequence of (str, str)
-        Name and site of those that were accepted.
-    validation : InverseDynamicsProblem
-    floor : mapping of str to float
-        Noise floor by channel, in its unit.
+    - ``model``: the repaired model
+    - ``effects``: name and site of those that were accepted
+    - ``floor``: noise floor by channel, in its unit
     """
     found = []
     for key in effects:
@@ -138,27 +132,14 @@ def _evidence(
 
 @dataclass(frozen=True)
 class View:
-    """View of one record from the site of an effect: states there, and the residual.
+    """View of one record from the site of an effect: states there, and the residual."""
 
-    Attributes
-    ----------
-    model : Model
-        The repaired model.
-    key : (str, str)
-        Effect and site.
-    problem : InverseDynamicsProblem
-    record : int
-    channel_name : str
-        Channel in which the effect shows.
-    fine : bool
-        Samples as logged, between the two ends; else the retained ones, filtered as in the residual.
-    """
-
-    model: Model
-    key: tuple[str, str]
+    model: Model  #: The repaired model.
+    key: tuple[str, str]  #: Effect and site.
     problem: InverseDynamicsProblem
     record: int
-    channel_name: str
+    channel_name: str  #: Channel in which the effect shows.
+    #: Samples as logged, between the two ends; else the retained ones, filtered as in the residual.
     fine: bool = False
 
     def at_full_rate(self) -> View:

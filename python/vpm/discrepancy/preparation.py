@@ -165,14 +165,9 @@ def filters(
 ) -> tuple[tuple[float, ...], tuple[float, ...]]:
     """Cut-off frequency of the motion filter and highest compared frequency of each record, Hz.
 
-    Parameters
-    ----------
-    model : Model
-        Flexible links and drives with states respond to the whole motion, and noise rings in them. For these, and where
-        ``cutoff`` is given, the band is that of the motion filter.
-    training : InverseDynamicsProblem
-        With the cut-off frequencies that suit each record.
-    cutoff : float or None
+    - ``model``: flexible links and drives with states respond to the whole motion, and noise rings in them. For
+      these, and where ``cutoff`` is given, the band is that of the motion filter
+    - ``training``: with the cut-off frequencies that suit each record
     """
     own = tuple(m.cutoff for m in training.motions)
     bands = tuple(UNDISTORTED_BAND * one for one in own)

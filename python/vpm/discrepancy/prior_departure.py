@@ -63,20 +63,12 @@ def _least_departures(model: Model, recalibrated: Judged) -> dict[str, float]:
 def driven_away(nominal: Model, recalibrated: Judged, final: Judged, ranked: Model | None = None) -> dict[str, float]:
     """Parameters that accepted effects clearly drive away from their prior in the model file.
 
-    Parameters
-    ----------
-    nominal : Model
-        As the file has it.
-    recalibrated, final : Judged
-        Without the effects, and with them.
-    ranked : Model, optional
-        With the effects, as an observer of all joints knows it: the residual may see some of them alone.
+    - ``nominal``: as the file has it
+    - ``recalibrated``, ``final``: without the effects, and with them
+    - ``ranked``: with the effects, as an observer of all joints knows it: the residual may see some of them alone
 
-    Returns
-    -------
-    dict of str to float
-        Stated uncertainties by which the parameter stands away, the farthest first. Parameters that were as far before
-        are left out: the file is wrong whatever is missing. So are those that the data hardly show beside the effects.
+    Stated uncertainties by which the parameter stands away, the farthest first. Parameters that were as far before are
+    left out: the file is wrong whatever is missing. So are those that the data hardly show beside the effects.
     """
     found = {}
     for name, std in zip(final.free, final.fit.std, strict=True):

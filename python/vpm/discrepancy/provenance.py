@@ -66,13 +66,7 @@ def provenance(
 ) -> Provenance:
     """Provenance of the diagnosis that runs now.
 
-    Parameters
-    ----------
-    model : Model
-    fitted, validation : sequence of Experiment
-    command : str
-    settings : mapping of str to (object, object)
-        Value and default of each.
+    - ``settings``: value and default of each
     """
     text = model.to_toml().encode()
     sources = [Source("model", model.name, model.path or "", _checksum(model.path, text))]

@@ -104,15 +104,9 @@ def searched(
 ) -> tuple[Search, tuple[Rivals, ...]]:
     """Outcome of a ranking in the form of a search, with rivals of each ranked effect.
 
-    Parameters
-    ----------
-    ranking : Ranking
-        Of the training records.
-    recalibrated : Judged
-        The model without effects.
-    data : Data
-    settings : vpm.ranking.Settings
-        Of the ranking.
+    - ``ranking``: of the training records
+    - ``recalibrated``: the model without effects
+    - ``settings``: of the ranking
 
     Ctrl-C gives the effects that were refitted until then; before the first one was, it raises.
     """
@@ -142,17 +136,10 @@ def staged(
 ) -> Search:
     """Stages of a search from a ranking: its effects are added and refitted one by one.
 
-    Parameters
-    ----------
-    ranking : Ranking
-    recalibrated : Judged
-        The model without effects.
-    beside : callable
-        Measures an effect: of a model without it, the model with it, and the effect.
-    offered : callable
-        All that could still be missing of a model.
-    settings : vpm.ranking.Settings
-        Of the ranking.
+    - ``recalibrated``: the model without effects
+    - ``beside``: measures an effect: of a model without it, the model with it, and the effect
+    - ``offered``: all that could still be missing of a model
+    - ``settings``: of the ranking
 
     Ctrl-C gives the effects that were measured until then; before the first one was, it raises.
     """
@@ -207,10 +194,7 @@ def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
     A parameter moves if the residual tells it from all others at these values, and stays where it is if not. The refit
     counts if the training records are left no more and the validation ones are simulated no worse than by those values.
 
-    Raises
-    ------
-    VpmError
-        Efforts cannot be balanced in this model.
+    Raises VpmError: efforts cannot be balanced in this model.
     """
     candidate = _candidate(current, one, data)
     known, own = fitted_in(current, model, one)
@@ -336,10 +320,7 @@ def _tried(ranking: Ranking, key: Key, label: str) -> Ranked:
 def _placed(rival: Ranked, final: Judged, entry: Accepted, data: Data) -> Trial:
     """Model with a rival in the place of a ranked effect, beside all others.
 
-    Raises
-    ------
-    VpmError
-        It cannot stand there.
+    Raises VpmError: it cannot stand there.
     """
     model = final.model.without_effect(*entry.key, entry.side)
     free, bounds = final.kept_in(model)

@@ -27,10 +27,7 @@ def is_moving(record: Experiment, channel: str) -> bool:
 def check_moving(model: Model, records: Sequence[Experiment]) -> None:
     """Raise an error where records show no motion: all channels are stuck, and any effect would explain them.
 
-    Raises
-    ------
-    DiagnosisError
-        All positions that are measured are constant, or a channel is that the model itself moves.
+    Raises DiagnosisError: all positions that are measured are constant, or a channel is that the model itself moves.
     """
     shown = [f"{joint}.position" for joint in model.joints]
     measured = [(record, channel) for record in records for channel in shown if channel in record]
@@ -46,10 +43,7 @@ def check_moving(model: Model, records: Sequence[Experiment]) -> None:
 def check_stuck(model: Model, records: Sequence[Experiment]) -> None:
     """Raise an error about a channel that is stuck while the simulated model moves it measurably.
 
-    Raises
-    ------
-    DiagnosisError
-        There is one.
+    Raises DiagnosisError: there is one.
     """
     for record in records:
         _check_record(model, record)

@@ -66,17 +66,9 @@ def verdict(
 ) -> tuple[str, str, bool]:
     """Verdict, summary, and whether the remaining error should be described.
 
-    Parameters
-    ----------
-    data : Data or None
-        None where no efforts can be balanced: gaps are those of an observer alone.
-    nominal, recalibrated : Judged
-    found : Search
-    gap : dict of str to ChannelGap
-    left : Structure or None
-        Of the residual with the accepted effects; None without efforts.
-    rest : Remainder or None
-        None where nothing was found and what is left is negligible.
+    - ``data``: None where no efforts can be balanced: gaps are those of an observer alone
+    - ``left``: of the residual with the accepted effects; None without efforts
+    - ``rest``: None where nothing was found and what is left is negligible
     """
     errors = _Errors.of(data, found, gap, left, rest)
     if found.accepted:

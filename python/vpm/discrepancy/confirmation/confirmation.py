@@ -86,44 +86,22 @@ class Judged:
 
 @dataclass(frozen=True)
 class Trial:
-    """Trial of a candidate: its refit, and its gain on training and validation records.
-
-    Attributes
-    ----------
-    probe : Probe
-    judged : Judged
-        The refitted model and its residuals.
-    parameters : tuple of str
-        The effect's own fitted parameters.
-    held : tuple of Alias
-    training, validation : Gain
-        Against the model without the effect.
-    simulated : Gain or None
-        The same by simulation of the validation records, if there is one.
-    low_frequency : Gain or None
-        The validation gain of the low-frequency part, where a backlash is in the model already; None elsewhere.
-    diverged : str
-        Why the simulation of the validation records stopped, or "".
-    clear : bool
-        Whether the effect's size differs from zero on the training data.
-    error : float
-        Largest share of its signal that the model without the effect leaves of a validation channel.
-    here : Gain or None
-        The validation gain of the effort on the joint where the effect acts, if nothing is lost elsewhere.
-    """
+    """Trial of a candidate: its refit, and its gain on training and validation records."""
 
     probe: Probe
     judged: Judged
-    parameters: tuple[str, ...]
+    parameters: tuple[str, ...]  #: The effect's own fitted parameters.
     held: tuple[Alias, ...]
+    #: Gains against the model without the effect; by simulation only where there is one.
     training: Gain
     validation: Gain
     simulated: Gain | None
-    diverged: str
-    clear: bool
+    diverged: str  #: Why the simulation of the validation records stopped, or "".
+    clear: bool  #: Whether the effect's size differs from zero on the training data.
+    #: The validation gain of the low-frequency part, where a backlash is in the model already; None elsewhere.
     low_frequency: Gain | None = None
-    error: float = 0.0
-    here: Gain | None = None
+    error: float = 0.0  #: Largest share of its signal that the model without the effect leaves of a validation channel.
+    here: Gain | None = None  #: The validation gain at the joint where the effect acts, if nothing is lost elsewhere.
 
     @property
     def there(self) -> Gain:
@@ -152,12 +130,9 @@ def judge(
     is taken if none is given. A fit that is not on a tangent of links ends early if it is not ``worth`` its time, or
     after its first step if that is ``linear_only``.
 
-    Raises
-    ------
-    DivergedError
-        The fitted model cannot simulate the validation records.
-    KeyboardInterrupt
-        Ctrl-C ended the fit: its values say nothing of a candidate.
+    Raises DivergedError: the fitted model cannot simulate the validation records.
+
+    Raises KeyboardInterrupt: Ctrl-C ended the fit: its values say nothing of a candidate.
     """
     bounds = ends_apart(model, free, bounds)
     if origin is None and has_tangent(model, data.training):
@@ -483,15 +458,9 @@ def nearer_start(start: Model, added: Sequence[str], known: Sequence[str], data:
     small valve. From there the true values lie behind a ridge once the effect is present.
     Where nothing of the drives changes, or they have no states, a fit is linear enough to end at one place from both.
 
-    Parameters
-    ----------
-    start : Model
-        With the candidate at its estimated values, and what is known as it was fitted without it.
-    added : sequence of str
-        Dotted names of the candidate's own parameters.
-    known : sequence of str
-        Free parameters of the model without the candidate.
-    data : InverseDynamicsProblem
+    - ``start``: with the candidate at its estimated values, and what is known as it was fitted without it
+    - ``added``: dotted names of the candidate's own parameters
+    - ``known``: free parameters of the model without the candidate
     """
     if not has_own_drives(start) or any(has_hidden(start, m.joints) for m in data.motions):
         return start

@@ -78,15 +78,9 @@ def timed_in_motion(
 ) -> dict[str, tuple[float, float]] | None:
     """Bounds of a delay's parameters by a fit to the samples in motion; None where those are too few.
 
-    Parameters
-    ----------
-    model : Model
-        With the delay.
-    free, known : sequence of str
-        Its free parameters, and those of the model without the delay.
-    training : InverseDynamicsProblem
-    bounds : mapping
-        Bounds of free parameters that replace those of the model.
+    - ``model``: with the delay
+    - ``free``, ``known``: its free parameters, and those of the model without the delay
+    - ``bounds``: bounds of free parameters that replace those of the model
     """
     fitted = InMotion(training)
     own = [name for name in free if name not in known]

@@ -127,17 +127,11 @@ def explains_most(trial: Trial) -> bool:
 def refuse_timing(timed: Gain, shift: float, thresholds: Thresholds, *, beside: float) -> str:
     """Reason of refusal of a candidate that does no more than shifted commands within a sampling interval.
 
-    Parameters
-    ----------
-    timed : Gain
-        Of the candidate, with a shift before and after.
-    shift : float
-        How much later commands hold without the candidate, in sampling intervals.
-    thresholds : Thresholds
-    beside : float
-        The same with it. The shift and the candidate are one finding with two names if beside the candidate no shift
-        matters, and beside the shift the candidate does. That is one question, and the data answer it if they are
-        clear.
+    - ``timed``: of the candidate, with a shift before and after
+    - ``shift``: how much later commands hold without the candidate, in sampling intervals
+    - ``beside``: the same with it. The shift and the candidate are one finding with two names if beside the candidate
+      no shift matters, and beside the shift the candidate does. That is one question, and the data answer it if they
+      are clear
     """
     encompasses = beside == 0.0 and timed.relative >= LEAST_GAIN
     if thresholds.met(timed) or (encompasses and timed.score >= replace(thresholds, candidates=1).score(timed.pieces)):

@@ -45,17 +45,10 @@ def noise_floor(
     that no channel shows (see `white_level`). Noise that a drive with states integrated counts too (see
     `noise_shapes`).
 
-    Parameters
-    ----------
-    model : Model
-        The best model found.
-    validation : InverseDynamicsProblem
-        The records it is judged on.
-    residual : ndarray
-        Its residual there.
-    mode : str
-        In which the records can be simulated; only "closed_loop" gives whole logs.
-    setup : Setup, optional
+    - ``model``: the best model found
+    - ``validation``: the records it is judged on
+    - ``residual``: its residual there
+    - ``mode``: in which the records can be simulated; only "closed_loop" gives whole logs
     """
     generator = np.random.default_rng(SEED)
     logs = validation.experiments
@@ -86,14 +79,9 @@ def white_level(residual: Array, moving: Array, shape: Array | None = None) -> f
     the mean follows from any quantile of the periodogram. A low one is taken, which what follows the motion or stands
     out as a line does not reach.
 
-    Parameters
-    ----------
-    residual : ndarray, shape (n,)
-        Zero where it does not count.
-    moving : ndarray, shape (n,)
-        1 where it counts.
-    shape : ndarray, optional
-        Of noise whose spectrum is not flat, see `noise_shapes`; then the size of that is meant.
+    - ``residual`` (n,): zero where it does not count
+    - ``moving`` (n,): 1 where it counts
+    - ``shape``: of noise whose spectrum is not flat, see `noise_shapes`; then the size of that is meant
     """
     n = residual.size
     count = float(np.count_nonzero(moving))

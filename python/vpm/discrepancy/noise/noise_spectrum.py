@@ -36,17 +36,10 @@ _LOCK = Lock()
 def noise_shapes(model: Model, problem: InverseDynamicsProblem) -> tuple[Array | None, ...]:
     """Noise spectrum of each block: power by frequency, of instruments and of drives.
 
-    Parameters
-    ----------
-    model : Model
-        Near enough to the machine for the colour of the noise.
-    problem : InverseDynamicsProblem
+    - ``model``: near enough to the machine for the colour of the noise
 
-    Returns
-    -------
-    tuple of (ndarray, shape (2, n // 2 + 1)) or None
-        For each block in its order. The first row is the noise of the instruments, in units of the weighted residual
-        squared per frequency; the second row has an unknown scale. None where no drive colours the noise.
+    For each block in its order. The first row is the noise of the instruments, in units of the weighted residual
+    squared per frequency; the second row has an unknown scale. None where no drive colours the noise.
     """
     if not problem.shown or not has_own_drives(model):
         return (None,) * len(problem.blocks)
@@ -72,13 +65,9 @@ def _alike(model: Model, known: Model) -> bool:
 def noise_spectrum(residual: Array, shape: Array, quiet: float) -> Array:
     """Noise spectrum of a residual: instruments, and the share of drives that its quiet part shows.
 
-    Parameters
-    ----------
-    residual : ndarray, shape (n,)
-    shape : ndarray, shape (2, n // 2 + 1)
-        See `noise_shapes`.
-    quiet : float
-        Share of the frequencies that hold no more than noise.
+    - ``residual`` (n,)
+    - ``shape`` (2, n // 2 + 1): see `noise_shapes`
+    - ``quiet``: share of the frequencies that hold no more than noise
     """
     power, (own, drive) = periodogram(residual), shape
     inside = slice(1, max(2, int(_BAND * power.size)))

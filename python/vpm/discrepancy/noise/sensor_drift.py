@@ -59,16 +59,10 @@ def sensor_drifts(
     bridge is as slow as its temperature (E. Doebelin, *Measurement Systems*, 2004, section 3.2), and no force of a
     machine that moves goes along a straight line for a whole record.
 
-    Parameters
-    ----------
-    model : Model
-        The best model found.
-    problems : sequence of (InverseDynamicsProblem, ndarray)
-        Training and validation records, each with the residual of the model.
-    gap : mapping of str to ChannelGap
-        On validation records, with the noise floor.
-    factor : float
-        Of the noise floor up to which an error is noise.
+    - ``model``: the best model found
+    - ``problems``: training and validation records, each with the residual of the model
+    - ``gap``: on validation records, with the noise floor
+    - ``factor``: of the noise floor up to which an error is noise
     """
     found: list[Drift] = []
     for channel in problems[-1][0].shown:

@@ -36,11 +36,7 @@ def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
     A drift or a rhythm depends on the time of the record and is described in words. As a force of the machine's state
     it would be wrong in the next record.
 
-    Returns
-    -------
-    Empirical
-    Judged
-        With the formula in the model, or ``final`` as it was.
+    The model holds the formula, or is ``final`` as it was.
     """
     joint = busiest_joint(data, final)
     channel = data.validation.efforts(0)[joint].channel
@@ -83,14 +79,8 @@ def beside(base: Judged, described: Empirical, joint_fit: Judged, data: Data) ->
 
     What is no physics takes nothing from what is.
 
-    Parameters
-    ----------
-    base : Judged
-        With the effects, without the formula.
-    described : Empirical
-    joint_fit : Judged
-        With the formula, all parameters fitted together.
-    data : Data
+    - ``base``: with the effects, without the formula
+    - ``joint_fit``: with the formula, all parameters fitted together
     """
     if not described.terms:
         return described, base

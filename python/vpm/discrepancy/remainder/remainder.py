@@ -70,15 +70,9 @@ class Remainder:
 def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float, workers: int = 1) -> Remainder:
     """Describe the remainder of the final model, and that of the model before effects.
 
-    Parameters
-    ----------
-    recalibrated, final : Judged
-        Without and with the accepted effects; the same one if there is none.
-    data : Data
-    interval : float
-        Sampling interval, s.
-    workers : int
-        Models that are described at a time; the result does not depend on it.
+    - ``recalibrated``, ``final``: without and with the accepted effects; the same one if there is none
+    - ``interval``: sampling interval, s
+    - ``workers``: models that are described at a time; the result does not depend on it
     """
     bases = [final] if recalibrated is final else [recalibrated, final]
     choices = tuple(in_order([partial(_described, base, data) for base in bases], workers))

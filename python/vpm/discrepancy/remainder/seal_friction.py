@@ -51,11 +51,7 @@ class Seals:
 def seals(base: Judged, data: Data) -> Seals | None:
     """Friction of seals with the least training residual; None where none surely dissipates.
 
-    Parameters
-    ----------
-    base : Judged
-        The recalibrated model without effects.
-    data : Data
+    - ``base``: the recalibrated model without effects
     """
     drives = _pressed(base.model, data.training)
     if not drives:

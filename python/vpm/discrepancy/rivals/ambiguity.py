@@ -221,21 +221,12 @@ def _power(judged: Judged) -> float:
 def probe_beside(final: Judged, without: Judged, data: InverseDynamicsProblem, entry: Accepted, probe: Probe) -> Probe:
     """Probe of a nested rival beside the accepted effect whose law it contains.
 
-    Parameters
-    ----------
-    final, without : Judged
-        The model with all accepted effects, and without this one.
-    data : InverseDynamicsProblem
-        Training records.
-    entry : Accepted
-    probe : Probe
-        Of the rival, on the model without the effect.
+    - ``final``, ``without``: the model with all accepted effects, and without this one
+    - ``data``: training records
+    - ``probe``: of the rival, on the model without the effect
 
-    Returns
-    -------
-    Probe
-        To be refitted from the size that one step beside the effect says; ``probe`` itself if it was not held, is not
-        confused with the effect at its site, cannot be computed beside it, or has no clear size there (95 %).
+    It is to be refitted from the size that one step beside the effect says; ``probe`` itself if it was not held, is not
+    confused with the effect at its site, cannot be computed beside it, or has no clear size there (95 %).
     """
     candidate = probe.candidate
     if probe.free or not probe.held or not candidate.neutral or not alike(candidate, entry.trial.probe.candidate):
@@ -275,16 +266,10 @@ def contains(rival: Judged, parameters: tuple[str, ...], final: Judged, own: tup
     counts as evidence, so validation records, which are fewer, only have to improve. Of laws that are different, and of
     friction whose fit makes up for reversals that filters smooth, neither holds.
 
-    Parameters
-    ----------
-    rival : Judged
-        The model with the rival in the place of the effect.
-    parameters : tuple of str
-        The rival's own.
-    final : Judged
-        The model with the effect.
-    own : tuple of str
-        The effect's own parameters.
+    - ``rival``: the model with the rival in the place of the effect
+    - ``parameters``: the rival's own
+    - ``final``: the model with the effect
+    - ``own``: the effect's own parameters
     """
     if len(parameters) <= len(own):
         return False

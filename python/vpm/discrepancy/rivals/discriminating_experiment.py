@@ -52,20 +52,11 @@ def experiments(
 ) -> tuple[ProposedExperiment, ...]:
     """Discriminating experiment for each pair of an effect and its rival.
 
-    Parameters
-    ----------
-    final : Judged
-        The repaired model.
-    ambiguous : sequence of Rivals
-    data : InverseDynamicsProblem
-        Gives the range within which a motion is proposed: positions, speeds and accelerations that were seen.
-    noise : mapping of str to float
-        Root mean square noise of each channel of the residual.
+    - ``final``: the repaired model
+    - ``data``: gives the range within which a motion is proposed: positions, speeds and accelerations that were seen
+    - ``noise``: root mean square noise of each channel of the residual
 
-    Returns
-    -------
-    tuple of ProposedExperiment
-        None for machines whose drives have states or whose links bend.
+    None for machines whose drives have states or whose links bend.
     """
     if has_own_drives(final.model) or has_hidden(final.model, data.motions[0].joints):
         return ()

@@ -33,12 +33,9 @@ def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search
     it need not halve the residual. It only has to predict the validation data better than the effect. Where these do
     not tell, as at one speed, training records do: there it has to leave less than half.
 
-    Returns
-    -------
-    found : Search
-        The same one if every effect stays.
-    known : tuple of Rivals
-        Those of the one that came in are complete, those of the others are as they were.
+    The search is the same one if every effect stays.
+
+    Rivals of the effect that came in are complete, those of the others are as they were.
     """
     thresholds = _thresholds(known, data)
     winners = [
@@ -98,12 +95,8 @@ def earned(fitted: Gain, more: int) -> bool:
     By the information criterion on training records. Parameters that these do not show would only fit the errors of
     friction laws at a few reversals of other records.
 
-    Parameters
-    ----------
-    fitted : Gain
-        Of the training records, from the effect to the rival.
-    more : int
-        Numbers that the rival has more than the effect.
+    - ``fitted``: of the training records, from the effect to the rival
+    - ``more``: numbers that the rival has more than the effect
     """
     return fitted.relative > 0.0 and schwarz(fitted, max(more, 0)) < 0.0
 

@@ -103,17 +103,10 @@ def read_off(
 ) -> Candidate:
     """Candidate backlash with the one start value of least residual.
 
-    Parameters
-    ----------
-    model : Model
-        Without the backlash.
-    free : sequence of str
-        Its parameters that a fit may change; every width is judged with the best change of these.
-    data : InverseDynamicsProblem
-    candidate : Candidate
-        A backlash.
-    hard : bool
-        Between hard contacts. Soft ones show the width best; what swings in them may still not simulate.
+    - ``model``: without the backlash
+    - ``free``: its parameters that a fit may change; every width is judged with the best change of these
+    - ``candidate``: a backlash
+    - ``hard``: between hard contacts. Soft ones show the width best; what swings in them may still not simulate
     """
     search = _Search(model, free, data, candidate)
     looks = search.survey()
@@ -218,15 +211,10 @@ def flights(
     new velocity, which is stable up to ``w`` times the interval of 2. Source: dead-zone model of Nordin and Gutman,
     Automatica 38(10), 2002, section 2.
 
-    Parameters
-    ----------
-    model : Model
-        With the backlash, of any width.
-    site : str
-        Its joint.
-    data : InverseDynamicsProblem
-    gaps, frequencies, dampings : ndarray, shape (backlashes,)
-        Widths, m or rad; Hz at which the link swings on a contact while the motor stands; damping ratios there.
+    - ``model``: with the backlash, of any width
+    - ``site``: its joint
+    - ``gaps``, ``frequencies``, ``dampings`` (backlashes,): widths, m or rad; Hz at which the link swings on a
+      contact while the motor stands; damping ratios there
     """
     added = []
     for m in data.motions:

@@ -95,10 +95,7 @@ class Excitation:
 def asked_for(effects: Sequence[str] | None) -> tuple[str, ...]:
     """Names of effects that may become candidates: the given ones, or all with a law.
 
-    Raises
-    ------
-    DiagnosisError
-        The catalogue has no such effect, or it has no law.
+    Raises DiagnosisError: the catalogue has no such effect, or it has no law.
     """
     laws = tuple(name for name, effect in EFFECTS.items() if effect.has_law)
     for name in effects or ():
@@ -122,19 +119,12 @@ def candidates(
 ) -> tuple[Candidate, ...]:
     """List the candidates: all effects that could be missing from ``model``, at each site.
 
-    Parameters
-    ----------
-    model : Model
-        Effects that it already has are left out.
-    data : InverseDynamicsProblem
-        Gives speeds, travel and commands for the start values.
-    residual : ndarray
-        Residual of ``model`` on ``data``; periods of a ripple are read from it.
-    effects : sequence of str, optional
-        Restrict the search to these; to those that a diagnosis tries if not given.
-    simulated : bool
-        Whether motion that no channel measures is simulated with the memories of effects. Then both sides of a joint
-        that is split may have the same effect, each its own.
+    - ``model``: effects that it already has are left out
+    - ``data``: gives speeds, travel and commands for the start values
+    - ``residual``: residual of ``model`` on ``data``; periods of a ripple are read from it
+    - ``effects``: restrict the search to these; to those that a diagnosis tries if not given
+    - ``simulated``: whether motion that no channel measures is simulated with the memories of effects. Then both
+      sides of a joint that is split may have the same effect, each its own
     """
     return tuple(
         _candidate(effect, site, model, data, residual)
@@ -379,20 +369,11 @@ def limit_start(data: InverseDynamicsProblem, joint: str, actuator: int, residua
     A limited drive leaves what the command has too much, which is a ramp in the command with the slope of the gain.
     Commands of a loop whose drive gives no more run far beyond it, so that shares of the largest one say little.
 
-    Parameters
-    ----------
-    data : InverseDynamicsProblem
-    joint : str
-        On which the drive acts.
-    actuator : int
-        Its number among the inputs.
-    residual : ndarray
-        Of the model without the limit.
+    - ``joint``: on which the drive acts
+    - ``actuator``: its number among the inputs
+    - ``residual``: of the model without the limit
 
-    Returns
-    -------
-    float or None
-        None where no such ramp is in the residual.
+    None where no such ramp is in the residual.
     """
     column = data.joints.index(joint) if joint in data.joints else 0
     commands = [m.inputs[:, actuator] for m in data.motions]

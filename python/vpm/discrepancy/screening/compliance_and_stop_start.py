@@ -141,16 +141,9 @@ def structural_starts(
 ) -> tuple[Starts, Bounds]:
     """Start values and bounds of a compliance, backlash or stop by short name.
 
-    Parameters
-    ----------
-    effect : EffectType
-        With a motion of its own.
-    site : str
-    model : Model
-    travel : float
-        Half range of the joint's travel in the data.
-    swing : tuple of float, optional
-        What the logs say of the spring, see `logged_swing`; it is tried beside the grid of frequencies.
+    - ``effect``: with a motion of its own
+    - ``travel``: half range of the joint's travel in the data
+    - ``swing``: what the logs say of the spring, see `logged_swing`; it is tried beside the grid of frequencies
     """
     inertia = moved(model, site)
     held = (softest(model, site), math.inf)
@@ -191,14 +184,9 @@ def stop_starts(position: Array, residual: Array, middle: float, travel: float, 
     A stop pushes back over the last part of the travel, so the residual (applied - required) grows outwards from its
     position. The positions on either side are those at which such a ramp explains most of it.
 
-    Parameters
-    ----------
-    position, residual : ndarray, shape (n,)
-        Of the joint, at the same samples.
-    middle, travel : float
-        Middle and half range of the joint's travel in the data.
-    least : float
-        Stiffness of the softest stop.
+    - ``position``, ``residual`` (n,): of the joint, at the same samples
+    - ``middle``, ``travel``: middle and half range of the joint's travel in the data
+    - ``least``: stiffness of the softest stop
     """
     ends: dict[str, list[float]] = {}
     for name, side in (("high", 1.0), ("low", -1.0)):

@@ -37,15 +37,9 @@ def best_start(
 ) -> Mapping[str, float] | None:
     """Start stiffness of a joint compliance with the least residual, or None if none improves it.
 
-    Parameters
-    ----------
-    model : Model
-        Without the spring.
-    left_of : callable
-        Part (n,) that its free parameters leave of a residual (n,).
-    data : InverseDynamicsProblem
-    candidate : Candidate
-        A spring in series.
+    - ``model``: without the spring
+    - ``left_of``: part (n,) that its free parameters leave of a residual (n,)
+    - ``candidate``: a spring in series
     """
 
     def left(one: Model) -> float:

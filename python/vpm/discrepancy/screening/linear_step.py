@@ -78,21 +78,11 @@ def free_location(
 ) -> Place | None:
     """Location parameter of a candidate that has a size and a location, or None.
 
-    Parameters
-    ----------
-    data : InverseDynamicsProblem
-    model : Model
-        With the candidate at its start, which has no size.
-    candidate : Candidate
-    added : sequence of str
-        Its parameters, by dotted name.
-    fresh : ndarray, shape (n, len(added))
-        Their columns there.
+    - ``model``: with the candidate at its start, which has no size
+    - ``added``: its parameters, by dotted name
+    - ``fresh`` (n, len(added)): their columns there
 
-    Returns
-    -------
-    Place or None
-        None too where the column of the size does not change by equal steps with the place.
+    None too where the column of the size does not change by equal steps with the place.
     """
     if not candidate.neutral or len(candidate.starts) > 1 or len(added) != PLACED:
         return None

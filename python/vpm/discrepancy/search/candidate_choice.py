@@ -120,12 +120,8 @@ def schwarz(gained: Gain, numbers: int) -> float:
 
     It is 0 for no change.
 
-    Parameters
-    ----------
-    gained : Gain
-        What the numbers gain.
-    numbers : int
-        How many are fitted.
+    - ``gained``: what the numbers gain
+    - ``numbers``: how many are fitted
     """
     pieces = max(gained.pieces, 3)
     return float(np.log(_share(gained)) + numbers * np.log(pieces) / pieces)
