@@ -19,7 +19,9 @@ from vpm.discrepancy.screening.compliance_and_stop_start import (
     sites_worth_trying,
     softest,
     stop_starts,
+    strongest,
     structural_starts,
+    thresholds,
 )
 from vpm.errors import DiagnosisError, near_match
 from vpm.identify import InverseDynamicsProblem
@@ -36,8 +38,8 @@ PERIODS = 3
 #: Cells of the way in the shortest wave of an octave, waves in one more on the whole way, share of a wave that a slow
 #: sample may pass until the next one, and fewest of them: a wave has two sizes and is told from a mean.
 CELLS, FINER, PASSED, SLOWEST = 32, 4, 0.4, 16
-#: Limits compared, the largest share of the samples that may lie beyond one, and the fewest.
-LIMITS, LIMITED_MOST, LIMITED_LEAST = 30, 0.5, 3
+#: Largest share of the samples that may lie beyond a limit of the drive.
+LIMITED_MOST = 0.5
 
 
 @dataclass(frozen=True)
@@ -375,20 +377,12 @@ def limit_start(data: InverseDynamicsProblem, joint: str, actuator: int, residua
 
     None where no such ramp is in the residual.
     """
-    column = data.joints.index(joint) if joint in data.joints else 0
     commands = [m.inputs[:, actuator] for m in data.motions]
-    order = np.sort(np.abs(np.concatenate(commands)))
-    most = int(LIMITED_MOST * order.size)
-    if most <= LIMITED_LEAST:
-        return None
-    limits = order[-np.unique(np.geomspace(LIMITED_LEAST, most, LIMITS).astype(np.int64)) - 1]
-    along, power = np.zeros(limits.size), np.zeros(limits.size)
-    for record, (m, command) in enumerate(zip(data.motions, commands, strict=True)):
-        block = data.efforts(record)[column]
-        beyond = command[:, None] - np.clip(command[:, None], -limits, limits)
-        ramps = m.parallel(beyond) * block.moving[:, None]
-        along += ramps.T @ residual[block.samples]
-        power += np.sum(ramps**2, axis=0)
-    taken = along**2 / np.where(power > 0.0, power, np.inf)
-    best = int(np.argmax(taken))
-    return float(limits[best]) if taken[best] > 0.0 else None
+    limits = thresholds(np.abs(np.concatenate(commands)), LIMITED_MOST)
+    blocks = [data.efforts(record)[_column(data, joint)] for record in range(len(data.motions))]
+    ramps = [
+        m.parallel(command[:, None] - np.clip(command[:, None], -limits, limits)) * block.moving[:, None]
+        for m, command, block in zip(data.motions, commands, blocks, strict=True)
+    ]
+    push = np.concatenate([residual[block.samples] for block in blocks])
+    return strongest(limits, np.concatenate(ramps), push) if limits.size else None

@@ -32,8 +32,8 @@ CONTACT_FREQUENCY = 50.0
 GAP_SHARES = (5e-4, 3e-3, 1.5e-2)
 #: Places of a stop, as shares of the half travel from its middle.
 STOP_SHARES = (0.6, 0.8, 0.95)
-#: Places of a stop compared on either side, the largest share of the samples that may lie beyond one, and the fewest.
-STOP_PLACES, BEYOND_MOST, BEYOND_LEAST = 30, 0.3, 3
+#: Places of a stop, or limits of a drive, that are compared; the fewest samples beyond one, and the most beyond a stop.
+COMPARED, BEYOND_LEAST, BEYOND_MOST = 30, 3, 0.3
 
 #: Least inertia on the side of the drive, as a share of what the joint moves.
 LEAST_DRIVEN = 1e-4
@@ -190,33 +190,32 @@ def stop_starts(position: Array, residual: Array, middle: float, travel: float, 
     """
     ends: dict[str, list[float]] = {}
     for name, side in (("high", 1.0), ("low", -1.0)):
-        found = _ramp(side * (position - middle), side * residual)
-        shares = [share * travel for share in STOP_SHARES]
-        ends[name] = [middle + side * place for place in (*found, *shares)]
-        if found:
-            ends[f"{name} seen"] = [middle + side * found[0]]
-    both = [{"low": low, "high": high} for low in ends.get("low seen", []) for high in ends.get("high seen", [])]
+        outwards = side * (position - middle)
+        places = thresholds(outwards, BEYOND_MOST)
+        found = strongest(places, np.maximum(outwards[:, None] - places, 0.0), side * residual)
+        seen = [] if found is None else [middle + side * found]
+        ends[name] = [*seen, *(middle + side * share * travel for share in STOP_SHARES)]
+        ends[f"{name} seen"] = seen
+    both = [{"low": low, "high": high} for low in ends["low seen"] for high in ends["high seen"]]
     reach = (middle - 1.2 * travel, middle + 1.2 * travel)
     one = [{name: place} for name in ("high", "low") for place in ends[name]]
     width = (1e-6 * travel, 0.05 * travel)
     return (*one, *both), {"low": reach, "high": reach, "width": width, "stiffness": (least, math.inf)}
 
 
-def _ramp(outwards: Array, push: Array) -> tuple[float, ...]:
-    """Start position of an end stop: a ramp outwards from there explains the residual best; None without one."""
-    order = np.sort(outwards)
-    most = int(BEYOND_MOST * order.size)
-    if most <= BEYOND_LEAST:
-        return ()
-    counts = np.unique(np.geomspace(BEYOND_LEAST, most, STOP_PLACES).astype(np.int64))
-    best, place = 0.0, None
-    for start in order[-counts - 1]:
-        ramp = np.maximum(outwards - start, 0.0)
-        along = float(ramp @ push)
-        power = float(ramp @ ramp)
-        if along > 0.0 and power > 0.0 and along**2 / power > best:
-            best, place = along**2 / power, float(start)
-    return () if place is None else (place,)
+def thresholds(values: Array, most: float) -> Array:
+    """Places of which a share between the fewest samples and ``most`` of all lies beyond, the outermost first."""
+    last = int(most * values.size)
+    if last <= BEYOND_LEAST:
+        return np.zeros(0)
+    return np.sort(values)[-np.unique(np.geomspace(BEYOND_LEAST, last, COMPARED).astype(np.int64)) - 1]
+
+
+def strongest(places: Array, ramps: Array, push: Array) -> float | None:
+    """Place whose ramp (n, places) explains most of ``push`` (n,), along it; None where none does."""
+    along, power = np.maximum(ramps.T @ push, 0.0), np.sum(ramps**2, axis=0)
+    taken = along**2 / np.where(power > 0.0, power, np.inf)
+    return float(places[np.argmax(taken)]) if np.any(taken > 0.0) else None
 
 
 def moved(model: Model, site: str) -> float:
