@@ -42,12 +42,15 @@ def main_gaps(gap: Mapping[str, ChannelGap]) -> list[ChannelGap]:
 
 def is_negligible(gap: Mapping[str, ChannelGap]) -> bool:
     """Whether the remaining error is negligible beside the efforts, for the verdict that nothing is missing."""
-    return all(map(_is_nothing, main_gaps(gap)))
+    return all(g.after <= (NEGLIGIBLE * g.signal or FLOOR_FACTOR * g.noise_floor) for g in main_gaps(gap))
 
 
-def _is_nothing(gap: ChannelGap) -> bool:
-    """Whether the remaining error of one channel is negligible beside its signal, or its noise if a drive is off."""
-    return gap.after <= (NEGLIGIBLE * gap.signal or FLOOR_FACTOR * gap.noise_floor)
+def _is_clear(value: float, gap: ChannelGap) -> bool:
+    """Whether an error of a channel is clear of its noise, where that is known, and not negligible beside its signal.
+
+    A channel far above its noise that is nothing beside its signal says nothing of one that is not.
+    """
+    return not value <= FLOOR_FACTOR * gap.noise_floor and value > NEGLIGIBLE * gap.signal
 
 
 def _above(main: list[ChannelGap]) -> float:
@@ -106,13 +109,13 @@ class _Errors:
     ) -> _Errors:
         """Errors for the `verdict`."""
         main, beside = main_gaps(gap), [g for g in gap.values() if g.mode == OBSERVED]
-        still = [g for g in beside if not _is_nothing(g) and _above([g]) > FLOOR_FACTOR]
-        # A channel far above its noise that is nothing beside its signal says nothing of one that is not.
-        clear = _above([g for g in main if not _is_nothing(g)]) > FLOOR_FACTOR
-        structured = left is not None and left.present and clear
+        still = [g for g in beside if _is_clear(g.after, g)]
+        structured = left is not None and left.present and any(_is_clear(g.after, g) for g in main)
         remaining = structured or (rest is not None and rest.repeats and not is_negligible(gap)) or bool(still)
         judged = beside if beside and _is_unmeasured(found, data) else main + beside
-        worst = max([g for g in judged if not _is_noise(g)] or judged, key=_clear_of_noise)
+        # A channel of noise alone, such as a deflection of what does not bend, says nothing.
+        shown = [g for g in judged if not g.signal <= FLOOR_FACTOR * g.noise_floor]
+        worst = max(shown or judged, key=_clear_of_noise)
         above = _above(main + still or beside)
         return cls(main, beside, still, above, structured, remaining and not found.within_laws, worst)
 
@@ -135,15 +138,17 @@ def _of_named(
     names, worst = ", then ".join(e.trial.probe.candidate.label for e in found.accepted), errors.worst
     numbers = f"Error on validation data: {_stages(worst)}, {_percent(worst.after, worst)} after."
     if away:
+        name, times = next(iter(away.items()))
         return (
             "unexplained",
             "Only together with values that the model file rules out do effects of the catalogue explain the gap: with "
-            f"{names}, {_farthest(away)}. {numbers}",
+            f"{names}, {name} would be off by {times:.1f} times its stated uncertainty. {numbers}",
             True,
         )
     tracked = min(found.left.values(), default=np.nan)
     open_anywhere = errors.structured or (data is None and bool(errors.still))  # without efforts an observer can tell
-    mostly_open = (open_anywhere and errors.share_left > MOSTLY_OPEN) or _is_described_better(rest)
+    described_better = rest is not None and (rest.open > MOSTLY_OPEN or rest.instead)
+    mostly_open = (open_anywhere and errors.share_left > MOSTLY_OPEN) or described_better
     joints = Joints.of(gap, left, found.left)
     apart = joints.differ and not any(joints.has(entry, found.final.model) for entry in found.accepted)
     if _is_spoiled(found, gap, tracked) or (not apart and not _is_explanation(found, tracked, mostly_open)):
@@ -158,11 +163,6 @@ def _of_named(
     return "effect_found", f"Missing: {names}. {numbers}{more}", errors.remaining
 
 
-def _is_worse_than_none(gap: ChannelGap) -> bool:
-    """Whether effects leave more of a measured effort than a model without any force, which spoils the verdict."""
-    return gap.recalibrated < gap.signal < gap.after
-
-
 def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], tracked: float) -> bool:
     """Whether the verdict on named effects is spoiled: they leave most of a measured effort where they act.
 
@@ -173,7 +173,8 @@ def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], tracked: float) ->
         return False
     efforts = [gap[channel] for joint in _joints(found) if (channel := f"{joint}.effort") in gap]
     most = any(g.after**2 > MOST_OF_IT * g.signal**2 for g in efforts)
-    return most or any(map(_is_worse_than_none, main_gaps(gap)))
+    # A model without any force would leave less.
+    return most or any(g.recalibrated < g.signal < g.after for g in main_gaps(gap))
 
 
 def _is_unmeasured(found: Search, data: Data | None) -> bool:
@@ -188,19 +189,10 @@ def _joints(found: Search) -> set[str]:
     return {model.joint_of_body(site) if site in model.bodies else joint_at(model, site) for site in sites}
 
 
-def _is_noise(gap: ChannelGap) -> bool:
-    """Whether a channel holds noise alone, such as a deflection of what does not bend: its error says nothing."""
-    return gap.signal <= FLOOR_FACTOR * gap.noise_floor
-
-
 def _clear_of_noise(gap: ChannelGap) -> float:
     """Error before effects that is clear of noise, as a share of the signal, for the verdict."""
     floor = gap.noise_floor if np.isfinite(gap.noise_floor) else 0.0
     return float(np.sqrt(max(gap.recalibrated**2 - floor**2, 0.0))) / gap.signal if gap.signal else 0.0
-
-
-def _is_described_better(rest: Remainder | None) -> bool:
-    return rest is not None and (rest.open > MOSTLY_OPEN or rest.instead)
 
 
 def _is_explanation(found: Search, tracked: float, mostly_open: bool) -> bool:
@@ -214,12 +206,6 @@ def _is_explanation(found: Search, tracked: float, mostly_open: bool) -> bool:
     if np.isnan(tracked):
         return not mostly_open
     return tracked <= MOSTLY_OPEN or (tracked < 1.0 and not mostly_open)
-
-
-def _farthest(away: Mapping[str, float]) -> str:
-    """Sentence of the verdict on the parameter farthest from the model file, by its stated uncertainty."""
-    name, times = next(iter(away.items()))
-    return f"{name} would be off by {times:.1f} times its stated uncertainty"
 
 
 def _nothing_missing(
@@ -254,8 +240,7 @@ def _is_better(nominal: Judged, recalibrated: Judged, data: Data) -> bool:
 
 def _was_closed(gap: ChannelGap) -> bool:
     """Verdict on calibration: whether other known parameters explain the model error."""
-    was_there = gap.before > FLOOR_FACTOR * gap.noise_floor and gap.before > NEGLIGIBLE * gap.signal
-    return was_there and gap.recalibrated < gap.before * np.sqrt(1.0 - LEAST_GAIN)
+    return _is_clear(gap.before, gap) and gap.recalibrated < gap.before * np.sqrt(1.0 - LEAST_GAIN)
 
 
 def _stages(gap: ChannelGap) -> str:
@@ -282,8 +267,11 @@ class Joints:
     @classmethod
     def of(cls, gap: Mapping[str, ChannelGap], left: Structure | None, tracked: Mapping[str, float]) -> Joints:
         """Open and closed joints, from the residual by joint and what a tracker leaves, see `Search.left`."""
-        efforts = {channel.rpartition(".")[0]: g for channel, g in gap.items() if _is_effort(channel, g)}
-        efforts = {joint: g for joint, g in efforts.items() if _is_clear(g.recalibrated, g)}
+        efforts = {
+            channel.removesuffix(".effort"): g
+            for channel, g in gap.items()
+            if channel.endswith(".effort") and g.mode == "inverse_dynamics" and _is_clear(g.recalibrated, g)
+        }
         shares = {
             joint: min((g.after / g.recalibrated) ** 2, tracked.get(joint, np.inf)) for joint, g in efforts.items()
         }
@@ -306,15 +294,6 @@ class Joints:
     def has(self, entry: Accepted, model: Model) -> bool:
         """Whether an effect acts at an open joint; one that acts on all joints counts at the worst."""
         return (joint_at(model, entry.key[1]) or self.worst) in self.open
-
-
-def _is_effort(channel: str, gap: ChannelGap) -> bool:
-    return channel.endswith(".effort") and gap.mode == "inverse_dynamics"
-
-
-def _is_clear(value: float, gap: ChannelGap) -> bool:
-    """Whether the residual of a joint is clear of noise and not negligible beside the effort."""
-    return value > FLOOR_FACTOR * gap.noise_floor and value > NEGLIGIBLE * gap.signal
 
 
 def only_where_closed(found: Search, data: Data, gap: Mapping[str, ChannelGap], left: Structure) -> Search:
