@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from vpm.catalogue import EFFECTS
+from vpm.catalogue.kinds import Side
 from vpm.compare import compare
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, is_clear, weaker
 from vpm.discrepancy.diagnosis import (
@@ -26,6 +27,7 @@ from vpm.discrepancy.noise.sample_timing import in_time
 from vpm.discrepancy.preparation import Records
 from vpm.discrepancy.ranked_effects import candidates_of, refused_by, tracker_gaps
 from vpm.discrepancy.rivals.ambiguity import Rivals
+from vpm.discrepancy.screening.candidates import Key
 from vpm.discrepancy.search.backward_elimination import Stage
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search import Search
@@ -66,13 +68,7 @@ def of_search(model: Model, records: Records, start: Judged, found: Search, fitt
         tuple(e.name for e in validation),
         tuple(notes),
         found.final.model,
-        fit_of(
-            found.final.model,
-            fitted,
-            found.final.fit,
-            start.fit.residual,
-            [e.name for e in training],
-        ),
+        fit_of(found.final.model, fitted, found.final.fit, start.fit.residual, [e.name for e in training]),
         (),
         0.0,
         found.interrupted,
@@ -125,13 +121,8 @@ def _signal(problem: InverseDynamicsProblem | OutputErrorProblem, channel: str) 
 def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
     """Field of a diagnosis: an accepted effect with its estimates in the final model, and its evidence."""
     probe, candidate = entry.trial.probe, entry.trial.probe.candidate
-    effect = final.model.effect(*candidate.key, entry.side)
-    estimates = []
-    for short, dotted in effect.parameter_names.items():
-        parameter = final.model.parameters[dotted]
-        std = float(final.fit.std[final.free.index(dotted)]) if dotted in final.free else 0.0
-        estimates.append(EffectParameterEstimate(short, dotted, parameter.value, parameter.unit, std))
-    texts = {e.name: f"{e.value:.4g} {e.unit}" for e in estimates}
+    deviations = dict(zip(final.free, map(float, final.fit.std), strict=True))
+    estimates = _estimates(final.model, candidate.key, entry.side, lambda dotted: deviations.get(dotted, 0.0))
     notes = [f"{alias.parameter} held: not discriminated from {alias.partner}" for alias in entry.trial.held]
     if entry.ranked and probe.invisible and not (probe.free or probe.held):
         notes.append("that is a share of the inverse-dynamics residual, which does not show it; see the observed gaps")
@@ -140,8 +131,8 @@ def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
     return AcceptedEffect(
         candidate.effect.name,
         candidate.site,
-        candidate.effect.sentence.format(at=candidate.site, **texts),
-        tuple(estimates),
+        _sentence(candidate.key, estimates),
+        estimates,
         entry.trial.validation.relative,
         entry.trial.validation.score,
         (*notes, *(f"{'not discriminated from it' if entry.ranked else ALIKE}: {rival}" for rival in entry.rivals)),
@@ -149,6 +140,19 @@ def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
         entry.evidence,
         entry.class_probability,
     )
+
+
+def _estimates(model: Model, key: Key, side: Side, std: Callable[[str], float]) -> tuple[EffectParameterEstimate, ...]:
+    known, names = model.parameters, model.effect(*key, side).parameter_names
+    return tuple(
+        EffectParameterEstimate(short, dotted, known[dotted].value, known[dotted].unit, std(dotted))
+        for short, dotted in names.items()
+    )
+
+
+def _sentence(key: Key, estimates: Sequence[EffectParameterEstimate]) -> str:
+    texts = {one.name: f"{one.value:.4g} {one.unit}" for one in estimates}
+    return EFFECTS[key[0]].sentence.format(at=key[1], **texts)
 
 
 def classes(accepted: Sequence[Accepted], ambiguous: Sequence[Rivals]) -> tuple[tuple[str, ...], ...]:
@@ -216,17 +220,12 @@ def unmeasured(model: Model, records: Records, ranking: Ranking, settings: Ranki
 
 def _effect(one: Ranked, model: Model) -> AcceptedEffect:
     """Effect of an unmeasured diagnosis."""
-    names = model.effect(*one.key, one.side).parameter_names
-    values = {short: model.parameters[dotted] for short, dotted in names.items()}
-    texts = {short: f"{parameter.value:.4g} {parameter.unit}" for short, parameter in values.items()}
+    estimates = _estimates(model, one.key, one.side, lambda _: np.nan)
     return AcceptedEffect(
         one.effect,
         one.site,
-        EFFECTS[one.effect].sentence.format(at=one.site, **texts),
-        tuple(
-            EffectParameterEstimate(short, names[short], parameter.value, parameter.unit, np.nan)
-            for short, parameter in values.items()
-        ),
+        _sentence(one.key, estimates),
+        estimates,
         np.nan,
         np.nan,
         tuple(f"not discriminated from it: {rival}" for rival in one.rivals),
