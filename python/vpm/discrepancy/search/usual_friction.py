@@ -10,11 +10,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-import numpy as np
-
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, is_clear, judge, measured
 from vpm.discrepancy.confirmation.refusal import CLEAR_GAIN, Thresholds, refuse_trial
+from vpm.discrepancy.noise.sample_timing import in_time
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import TRANSITION, Candidate, candidates, joint_at
 from vpm.discrepancy.screening.probe import Probe
@@ -23,7 +22,6 @@ from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search import Search
 from vpm.discrepancy.search.search_round import Tell
 from vpm.errors import VpmError
-from vpm.identify.identifiability import RANK_TOLERANCE, least_step
 from vpm.identify.response_along_motion import answers_at_once
 from vpm.model import Model
 
@@ -43,16 +41,17 @@ def with_usual_friction(
     listed = [c for c in candidates(start.model, data.training, start.fit.residual, usual) if c.neutral]
     if len(_joints(start, listed)) < 2:
         return found
+    alone = replace(data, simulation=None)
     tell(f"fitting the friction of {len(_joints(start, listed))} joints together")
     try:
         judged = _fitted(start, data, listed)
         while len(_joints(start, listed)) > 1 and len(listed) <= limit:
             unclear = [c for c in listed if not is_clear(judged, _own(judged, c))]
-            trials = [] if unclear else list(map(_Beside(judged, data), listed))
+            trials = [] if unclear else [_beside(judged, alone, candidate) for candidate in listed]
             tried = len(usual) * len(start.model.joints)
             leaving = unclear or _leaving(trials, Thresholds(tried, min(m.dt for m in data.training.motions)))
             if not leaving:
-                return _begun(found, judged, data, trials, each)
+                return _begun(found, judged, alone, trials, each)
             listed = [c for c in listed if c not in leaving]
             judged = _fitted(start, data, listed)
     except VpmError:
@@ -91,45 +90,18 @@ def _middle(candidate: Candidate) -> dict[str, float]:
     return dict(candidate.starts[len(candidate.starts) // 2])
 
 
-class _Beside:
-    """Trials of each friction beside all others, by the regression at the values of the joint fit.
+def _beside(judged: Judged, data: Data, candidate: Candidate) -> Trial:
+    """Trial of one friction beside all others, by one step of a fit without it.
 
-    Efforts are linear in sizes, and nearly so in all else. A regression without one of them knows no bounds, and may
-    let commands hold up to one sample later or earlier. So it leaves less than a fit would, and what is lost by it is
-    no less than it says.
+    Commands may then hold up to a sample later or earlier, so that what is lost by it is no less than it says.
     """
-
-    def __init__(self, judged: Judged, data: Data) -> None:
-        model, columns = judged.model, [judged.model.index(name) for name in judged.free]
-        self.judged, self.data = judged, data
-        self.fitted, self.slopes = judged.fit.residual, judged.fit.jacobian
-        self.later = data.training.later().evaluate(model, model.theta)[0] - self.fitted
-        self.unseen, self.unseen_slopes = data.validation.evaluate(model, model.theta, columns)
-        self.unseen_later = data.validation.later().evaluate(model, model.theta)[0] - self.unseen
-
-    def __call__(self, candidate: Candidate) -> Trial:
-        """Trial of one friction beside all others."""
-        judged, own = self.judged, _own(self.judged, candidate)
-        values = {name: judged.model.parameters[name].value for name in own}
-        gone = _sizes(judged.model, candidate)
-        move = np.array([-values[name] if name in gone else 0.0 for name in judged.free])
-        others = np.array([name not in own for name in judged.free])
-        left, slopes = self.fitted + self.slopes @ move, self.slopes[:, others]
-        shift = float(np.clip(least_step(np.column_stack([slopes, self.later]), left, RANK_TOLERANCE)[-1], -1.0, 1.0))
-        move[others] = least_step(slopes, left + shift * self.later, RANK_TOLERANCE)
-        left = self.fitted + self.slopes @ move + shift * self.later
-        unseen = self.unseen + self.unseen_slopes @ move + shift * self.unseen_later
-        less = replace(
-            judged,
-            model=judged.model.without_effect(*candidate.key),
-            fit=replace(judged.fit, residual=left),
-            validation=unseen,
-            simulated=None,
-        )
-        spread = dict(zip(own, (float(judged.fit.std[judged.free.index(name)]) for name in own), strict=True))
-        drop = 1.0 - float(self.fitted @ self.fitted) / float(left @ left)
-        probe = Probe(candidate, judged.model, own, (), (), values, spread, drop)
-        return measured(less, self.data, probe, judged, own, (), "")
+    less, own = _reduced(judged, [candidate], data), _own(judged, candidate)
+    timed = in_time(less, data)
+    less = replace(less, fit=replace(less.fit, residual=timed.fitted), validation=timed.validation)
+    values = {name: judged.model.parameters[name].value for name in own}
+    spread = {name: float(judged.fit.std[judged.free.index(name)]) for name in own}
+    drop = 1.0 - float(judged.fit.residual @ judged.fit.residual) / float(timed.fitted @ timed.fitted)
+    return measured(less, data, Probe(candidate, judged.model, own, (), (), values, spread, drop), judged, own, (), "")
 
 
 def _sizes(model: Model, candidate: Candidate) -> list[str]:
@@ -164,11 +136,10 @@ def _begun(found: Search, judged: Judged, data: Data, trials: Sequence[Trial], e
     """Search with friction that was judged, the clearest first."""
     ordered = sorted(trials, key=lambda trial: -trial.there.relative)
     listed = [trial.probe.candidate for trial in ordered]
-    alone = replace(data, simulation=None)
     places = range(1, len(listed))
     fits = each(
         "friction: refitting one after the other",
-        lambda place: _reduced(judged, listed[place:], alone),
+        lambda place: _reduced(judged, listed[place:], data),
         places,
         lambda place: listed[place - 1].label,
     )
