@@ -11,8 +11,7 @@ from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import is_clear
 from vpm.discrepancy.screening.candidates import Candidate
 from vpm.discrepancy.screening.linear_step import softened
-from vpm.discrepancy.screening.probe import Baseline, Probe, _stepped
-from vpm.discrepancy.screening.short_list import same_models
+from vpm.discrepancy.screening.probe import Baseline, Probe, _stepped, same_models
 from vpm.discrepancy.search.search_round import Round
 from vpm.identify import Estimate, InverseDynamicsProblem, Worth, estimate
 

@@ -17,8 +17,7 @@ from vpm.discrepancy.rivals.ambiguity import Rivals
 from vpm.discrepancy.rivals.rival_exchange import earned, in_order
 from vpm.discrepancy.screening.candidates import candidates
 from vpm.discrepancy.screening.probe import Baseline, probe
-from vpm.discrepancy.search.backward_elimination import Stage
-from vpm.discrepancy.search.search import Search, begin, further
+from vpm.discrepancy.search.search import Search, Stage, begin, further
 from vpm.identify import Gain, InverseDynamicsProblem, estimate
 
 

@@ -28,9 +28,8 @@ from vpm.discrepancy.preparation import Records
 from vpm.discrepancy.ranked_effects import candidates_of, refused_by, tracker_gaps
 from vpm.discrepancy.rivals.ambiguity import Rivals
 from vpm.discrepancy.screening.candidates import Key
-from vpm.discrepancy.search.backward_elimination import Stage
 from vpm.discrepancy.search.candidate_choice import Accepted
-from vpm.discrepancy.search.search import Search
+from vpm.discrepancy.search.search import Search, Stage
 from vpm.identify import Fit, InverseDynamicsProblem, OutputErrorProblem, Problem, gaps
 from vpm.identify.fit_result import fit_of
 from vpm.model import Model

@@ -21,9 +21,8 @@ from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RankedCandidate, Ref
 from vpm.discrepancy.rivals.ambiguity import Rivals
 from vpm.discrepancy.screening.candidates import Candidate, Key, asked_for, candidates
 from vpm.discrepancy.screening.probe import Probe, sort_columns
-from vpm.discrepancy.search.backward_elimination import Stage
 from vpm.discrepancy.search.candidate_choice import Accepted
-from vpm.discrepancy.search.search import Search
+from vpm.discrepancy.search.search import Search, Stage
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import gain, segments

@@ -15,9 +15,8 @@ from vpm.discrepancy.noise.residual_structure import Structure
 from vpm.discrepancy.prior_departure import driven_away
 from vpm.discrepancy.remainder.remainder import Remainder
 from vpm.discrepancy.screening.candidates import joint_at
-from vpm.discrepancy.search.backward_elimination import Stage
 from vpm.discrepancy.search.candidate_choice import Accepted
-from vpm.discrepancy.search.search import Search
+from vpm.discrepancy.search.search import Search, Stage
 from vpm.errors import VpmError
 from vpm.identify import gain, segments
 from vpm.model import Model

@@ -16,9 +16,8 @@ from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, finis
 from vpm.discrepancy.confirmation.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, Thresholds, refuse_trial
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.rivals.ambiguity import Rivals, as_good, contains
-from vpm.discrepancy.search.backward_elimination import Stage
 from vpm.discrepancy.search.candidate_choice import REFINED, Accepted, alike, schwarz
-from vpm.discrepancy.search.search import Search
+from vpm.discrepancy.search.search import Search, Stage
 from vpm.identify import Gain, gain, segments
 
 #: Why a rival takes the place of an effect, where validation data prefer it, and where they do not tell.

@@ -6,6 +6,7 @@ that a better value of a known parameter would explain.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -14,7 +15,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from vpm.discrepancy.screening.backlash_start import is_read_off, near_prior, read_off
-from vpm.discrepancy.screening.candidates import Candidate, acts_on
+from vpm.discrepancy.screening.candidates import Candidate, Key, acts_on, joint_at
 from vpm.discrepancy.screening.compliance_and_stop_start import LOSSES, in_series
 from vpm.discrepancy.screening.joint_compliance_start import best_start, is_searched
 from vpm.discrepancy.screening.linear_step import free_location, is_outside, linear_step, softened, step_without
@@ -28,6 +29,12 @@ from vpm.numbers import Array
 #: Share of the largest influence on a residual below which that of a parameter is rounding.
 ROUNDED = 1e-12
 
+#: Candidates refitted in one round: those that have the largest predicted gain for their numbers, of the machine and of
+#: each joint, and those that have the largest predicted gain of all. Without the last, several names of one regressor,
+#: as a constant force and a tilted world, crowd out a law of two numbers that takes more than any of them.
+SHORT_LIST, OF_JOINT, RICHEST = 7, 3, 2
+#: Share by which the gain that screening predicts of two candidates may differ by rounding alone.
+TWIN = 1e-6
 #: Significance asked of an effect's size on the training data.
 SIZE_LEVEL = 0.05
 
@@ -330,3 +337,36 @@ def sort_columns(
             held.append(Alias(added[i], [*names, *(added[j] for j in others)][closest]))
             keep.remove(i)
     return keep, tuple(held), invisible
+
+
+def same_models(short_list: Sequence[Probe]) -> dict[Key, Key]:
+    """Candidates for the short list with a motion of their own that are the same model as an earlier one.
+
+    A rigid link that bends at its root is a drive with joint compliance: no digit of what screening says parts the two.
+    Refits of such machines take long, so that one of each pair has to be enough where it is refused.
+    """
+    found: dict[Key, Key] = {}
+    for place, one in enumerate(short_list):
+        for other in short_list[:place]:
+            pair = one.candidate.effect, other.candidate.effect
+            heavy = all(effect.elastic for effect in pair) and pair[0].motion != pair[1].motion
+            same = len(one.free) == len(other.free) and abs(one.drop - other.drop) <= TWIN * abs(other.drop)
+            if heavy and same and other.candidate.key not in found:
+                found[one.candidate.key] = other.candidate.key
+    return found
+
+
+def most_promising(promising: Sequence[Probe]) -> list[Probe]:
+    """Short list of probes to refit, by falling score.
+
+    Efforts of each joint are balanced by themselves, so that what one joint lacks says nothing of another one.
+    """
+    richest = {p.candidate.key for p in sorted(promising, key=lambda p: -p.drop)[:RICHEST]}
+    seats: Counter[str] = Counter()
+    chosen = []
+    for rank, one in enumerate(promising):
+        joint = joint_at(one.model, one.candidate.site)
+        if rank < SHORT_LIST or one.candidate.key in richest or (joint and seats[joint] < OF_JOINT):
+            chosen.append(one)
+            seats[joint] += 1
+    return chosen

@@ -30,8 +30,16 @@ from vpm.discrepancy.noise.sample_timing import InTime, in_time
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.discrepancy.screening.backlash_start import is_read_off, only_compliant
 from vpm.discrepancy.screening.candidates import Candidate, Key, candidates, joint_at, left_out
-from vpm.discrepancy.screening.probe import Probe, prepare, probe, refit_effort, screening_effort
-from vpm.discrepancy.screening.short_list import SHORT_LIST, most_promising, same_models
+from vpm.discrepancy.screening.probe import (
+    SHORT_LIST,
+    Probe,
+    most_promising,
+    prepare,
+    probe,
+    refit_effort,
+    same_models,
+    screening_effort,
+)
 from vpm.discrepancy.search.candidate_choice import Accepted, choose
 from vpm.identify import gain, segments
 from vpm.identify.response_along_motion import answers_at_once, bends

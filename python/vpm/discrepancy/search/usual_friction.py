@@ -17,9 +17,8 @@ from vpm.discrepancy.noise.sample_timing import in_time
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import TRANSITION, Candidate, candidates, joint_at
 from vpm.discrepancy.screening.probe import Probe
-from vpm.discrepancy.search.backward_elimination import Stage
 from vpm.discrepancy.search.candidate_choice import Accepted
-from vpm.discrepancy.search.search import Search
+from vpm.discrepancy.search.search import Search, Stage
 from vpm.discrepancy.search.search_round import Tell
 from vpm.errors import VpmError
 from vpm.identify.response_along_motion import answers_at_once
