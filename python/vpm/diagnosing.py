@@ -393,7 +393,7 @@ def _concluded(
     final, empirical = chosen.judged, chosen.empirical
     accepted = found.accepted if chosen.base is found.final else ()
     if accepted:
-        empirical, final = beside(found.final, empirical, final, known.data)
+        empirical, final = beside(found.final, chosen, known.data)
     gap = gaps_of(known.data, known.nominal, known.recalibrated, final, floor)
     summary = f"{summary} {empirical.sentence}" + (f" {rest.seals.sentence}" if rest.seals is not None else "")
     return _Concluded(word, summary, gap, final, empirical, accepted)

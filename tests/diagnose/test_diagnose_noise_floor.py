@@ -57,7 +57,7 @@ def test_noise_is_no_structure_and_what_follows_the_effort_is() -> None:
     growing = [noise * np.abs(effort) for noise, effort in zip(white, efforts, strict=True)]
     assert structure(model, problems[0], problems[1], growing[0], growing[1]).growing > 3.0
     friction = [np.abs(e) * np.sign(p.state(0)[1][:, 0]) for p, e in zip(problems, efforts, strict=True)]
-    assert structure(model, problems[0], problems[1], friction[0], friction[1]).predicted > 0.5
+    assert structure(model, problems[0], problems[1], friction[0], friction[1]).present
 
 
 def test_ranking_puts_what_was_confirmed_first() -> None:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -14,7 +13,7 @@ from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyho
 from vpm.discrepancy.diagnosis import Empirical, EmpiricalTerm
 from vpm.discrepancy.remainder.sparse_formula import Formula, select
 from vpm.discrepancy.remainder.state_dependence import Rhythm, Shares, busiest_joint, rhythm, shares
-from vpm.identify import gain, segments
+from vpm.identify import Gain, gain, segments
 from vpm.model import Model
 
 #: Share of the validation mean square that a formula has to take away to be put into the model.
@@ -24,74 +23,73 @@ TIME_AHEAD = 0.1
 #: Least share of the residual that a state has to predict to be named, and most states that are.
 NAMED = 0.1
 MOST_NAMED = 4
-#: Share of the weightiest term below which a term is left out.
-SMALL = 0.03
 #: A period may move by this factor when the formula is fitted.
 PERIOD_RANGE = 1.15
 
 
-def describe(final: Judged, data: Data) -> tuple[Empirical, Judged]:
+@dataclass(frozen=True)
+class Described:
+    """Description of a remainder: a model, what is said of its residual, and the model with a formula for it."""
+
+    base: Judged
+    empirical: Empirical
+    judged: Judged
+    formula: Formula | None
+
+
+def describe(base: Judged, data: Data) -> Described:
     """Describe a residual: the states that it depends on, and an empirical formula if one predicts validation data.
 
     A drift or a rhythm depends on the time of the record and is described in words. As a force of the machine's state
     it would be wrong in the next record.
-
-    The model holds the formula, or is ``final`` as it was.
     """
-    joint = busiest_joint(data, final)
+    joint = busiest_joint(data, base)
     channel = data.validation.efforts(0)[joint].channel
-    states, beat = shares(data, final, joint), rhythm(data, final, joint)
-    formula = select(final, data)
-    fitted = None
-    if formula is not None:
-        fitted = _fit(formula, final, data)
-        if (shorter := _without_small(formula, fitted)) != formula:
-            formula, fitted = shorter, _fit(shorter, final, data)
-    gained = gain(
-        final.validation, final.validation if fitted is None else fitted.validation, segments(data.validation)
-    )
+    states, beat = shares(data, base, joint), rhythm(data, base, joint)
+    formula = select(base, data)
+    fitted = base if formula is None else _fit(formula, base, data)
+    gained = gain(base.validation, fitted.validation, segments(data.validation))
     remark, share = _in_time(states.of, beat, gained.relative)
-    if remark or formula is None or fitted is None or gained.relative < LEAST_GAIN:
+    if remark or formula is None or gained.relative < LEAST_GAIN:
         sentence = _say_without(channel, states, remark)
         left = gained.before
-        return Empirical(channel, states.of, remark, "", (), left, left, sentence, states.alike, share), final
+        empirical = Empirical(channel, states.of, remark, "", (), left, left, sentence, states.alike, share)
+        return Described(base, empirical, base, None)
+    return Described(base, _formulated(channel, states, formula, fitted, gained), fitted, formula)
+
+
+def _formulated(channel: str, states: Shares, formula: Formula, fitted: Judged, gained: Gain) -> Empirical:
     text = "; ".join(_text(formula, fitted.model, at) for at in formula.terms)
-    sentence, terms = _say(channel, states, text, gained.after / gained.before), _terms(formula, fitted)
-    return (
-        Empirical(
-            channel,
-            states.of,
-            "",
-            text,
-            terms,
-            gained.before,
-            gained.after,
-            sentence,
-            states.alike,
-            gained.relative,
-        ),
-        fitted,
+    return Empirical(
+        channel,
+        states.of,
+        "",
+        text,
+        _terms(formula, fitted),
+        gained.before,
+        gained.after,
+        _say(channel, states, text, gained.after / gained.before),
+        states.alike,
+        gained.relative,
     )
 
 
-def beside(base: Judged, described: Empirical, joint_fit: Judged, data: Data) -> tuple[Empirical, Judged]:
-    """Empirical formula fitted beside accepted effects, whose parameters stay.
+def beside(base: Judged, described: Described, data: Data) -> tuple[Empirical, Judged]:
+    """Empirical formula fitted beside accepted effects, the model ``base``, whose parameters stay.
 
     What is no physics takes nothing from what is.
-
-    - ``base``: with the effects, without the formula
-    - ``joint_fit``: with the formula, all parameters fitted together
     """
-    if not described.terms:
-        return described, base
-    own = tuple(term.dotted for term in described.terms)
-    start = joint_fit.model.with_parameters({name: base.model.parameters[name].value for name in base.free})
+    told = described.empirical
+    if described.formula is None:
+        return told, base
+    own = tuple(term.dotted for term in told.terms)
+    start = described.judged.model.with_parameters({name: base.model.parameters[name].value for name in base.free})
     fitted, _ = judged_anyhow(start, own, data, {})
     better = gain(base.validation, fitted.validation, segments(data.validation))
-    states = Shares(described.states, described.alike)
+    states = Shares(told.states, told.alike)
     if better.relative < LEAST_GAIN:
-        sentence = _say_without(described.channel, states, "")
-        return replace(described, formula="", terms=(), after=described.before, sentence=sentence, predicted=0.0), base
+        sentence = _say_without(told.channel, states, "")
+        return replace(told, formula="", terms=(), after=told.before, sentence=sentence, predicted=0.0), base
     fit = replace(
         fitted.fit,
         names=(*base.free, *own),
@@ -100,30 +98,7 @@ def beside(base: Judged, described: Empirical, joint_fit: Judged, data: Data) ->
         covariance=block_diag(base.fit.covariance, fitted.fit.covariance),
     )
     judged = replace(fitted, free=fit.names, fit=fit, bounds=base.bounds)
-    formula = _formula_of(judged.model, own)
-    text = "; ".join(_text(formula, judged.model, at) for at in formula.terms)
-    sentence = _say(described.channel, states, text, better.after / better.before)
-    terms = _terms(formula, judged)
-    return replace(
-        described, formula=text, terms=terms, after=better.after, sentence=sentence, predicted=better.relative
-    ), judged
-
-
-def _formula_of(model: Model, own: Sequence[str]) -> Formula:
-    """Terms and shapes of the empirical formula that a model holds."""
-    terms: dict[str, tuple[str, ...]] = {}
-    for dotted in own:
-        joint, _, term = dotted.partition(".empirical.")
-        terms[joint] = (*terms.get(joint, ()), term)
-    shapes = {
-        joint: {
-            name.removeprefix(f"{joint}.empirical."): model.parameters[name].value
-            for name in model.parameters
-            if name.startswith(f"{joint}.empirical.") and name not in own
-        }
-        for joint in terms
-    }
-    return Formula(terms, shapes)
+    return _formulated(told.channel, states, described.formula, judged, better), judged
 
 
 def _fit(formula: Formula, final: Judged, data: Data) -> Judged:
@@ -140,26 +115,6 @@ def _fit(formula: Formula, final: Judged, data: Data) -> Judged:
         value = model.parameters[name].value
         bounds[name] = (value / PERIOD_RANGE, value * PERIOD_RANGE)
     return judged_anyhow(sized.model, (*final.free, *own, *periods), data, bounds)[0]
-
-
-def _without_small(formula: Formula, fitted: Judged) -> Formula:
-    """Empirical formula without its small terms; sine and cosine of one wave go together."""
-    weight = {}
-    for joint, terms in formula.terms.items():
-        for term in terms:
-            place = fitted.free.index(f"{joint}.empirical.{term}")
-            weight[joint, term] = float(np.linalg.norm(fitted.fit.jacobian[:, place]) * abs(fitted.fit.values[place]))
-    least = SMALL * max(weight.values())
-    kept = {}
-    for joint, terms in formula.terms.items():
-        pairs = {term: term.replace("cosine", "sine") for term in terms}
-        heavy = {pairs[term] for term in terms if weight[joint, term] >= least}
-        kept[joint] = tuple(term for term in terms if pairs[term] in heavy)
-    shapes = {joint: dict(formula.shapes[joint]) for joint, terms in kept.items() if terms}
-    for joint, own in shapes.items():
-        if not any("sine" in term for term in kept[joint]):
-            own.pop("period", None)
-    return Formula({joint: terms for joint, terms in kept.items() if terms}, shapes)
 
 
 def _terms(formula: Formula, fitted: Judged) -> tuple[EmpiricalTerm, ...]:

@@ -14,9 +14,8 @@ import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.confirmation.refusal import WORTH_A_NAME, Thresholds
-from vpm.discrepancy.diagnosis import Empirical
 from vpm.discrepancy.noise.sample_timing import in_time
-from vpm.discrepancy.remainder.empirical_formula import describe
+from vpm.discrepancy.remainder.empirical_formula import Described, describe
 from vpm.discrepancy.remainder.seal_friction import Seals, seals
 from vpm.identify import InverseDynamicsProblem, gain, segments
 from vpm.identify.parallel import in_order
@@ -25,8 +24,6 @@ from vpm.numbers import Array
 
 #: A later description has to leave less than this share of what an earlier one leaves to be taken in its place.
 CLEARLY = 0.9
-#: Share of what effects leave, below which a fit with no more numbers is not a matter of chance or of a rough law.
-HALF = 0.5
 #: Models that are described: that with the effects, and that without.
 DESCRIBED = 2
 #: Share of the power of the efforts that lies in the band.
@@ -38,15 +35,6 @@ WHOLE_BAND = 0.9
 
 
 @dataclass(frozen=True)
-class Described:
-    """Description of a remainder: a model, a remark on its residual, and the model with a formula for it."""
-
-    base: Judged
-    empirical: Empirical
-    judged: Judged
-
-
-@dataclass(frozen=True)
 class Remainder:
     """Remainder of validation records under the model with all accepted effects."""
 
@@ -55,10 +43,7 @@ class Remainder:
     #: Share that the effects leave of the mean square that a fit finds in the recalibrated residual; 0 where nothing
     #: repeats.
     open: float
-    #: Whether a fit in the place of the effects, with no more numbers, leaves less than ``HALF`` of their error. Also
-    #: true if friction of seals, a single number, clearly leaves less.
-    instead: bool
-    seals: Seals | None = None  #: That friction, if it does.
+    seals: Seals | None = None  #: Friction of seals, a single number, that clearly leaves less than the effects.
 
     @property
     def best(self) -> Described:
@@ -75,25 +60,17 @@ def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float, 
     - ``workers``: models that are described at a time; the result does not depend on it
     """
     bases = [final] if recalibrated is final else [recalibrated, final]
-    choices = tuple(in_order([partial(_described, base, data) for base in bases], workers))
+    choices = tuple(in_order([partial(describe, base, data) for base in bases], workers))
     view = _View(data, motion_band(data.training, final.model), Thresholds(DESCRIBED, interval))
     left = view(final)
     clear = [view.clearly_better(choice, left) for choice in choices]
     pressed = None if recalibrated is final else view.pressed(recalibrated, left)
     if not any(clear):
-        return Remainder(choices, repeats=pressed is not None, open=0.0, instead=pressed is not None, seals=pressed)
+        return Remainder(choices, repeats=pressed is not None, open=0.0, seals=pressed)
     power, whole = _power(in_time(final, data).validation), _power(_before(recalibrated, final, data))
     least = min(view.leaves(choice) for choice, better in zip(choices, clear, strict=True) if better)
     share = np.clip((power - least) / max(whole - least, 1e-300), 0.0, 1.0)
-    plain = len(choices[0].judged.free) <= len(final.free)
-    instead = recalibrated is not final and clear[0] and plain and not choices[0].empirical.remark
-    instead = instead and _power(view(choices[0].judged)) < HALF * _power(left)
-    instead = instead or pressed is not None
-    return Remainder(choices, repeats=True, open=float(share), instead=instead, seals=pressed)
-
-
-def _described(base: Judged, data: Data) -> Described:
-    return Described(base, *describe(base, data))
+    return Remainder(choices, repeats=True, open=float(share), seals=pressed)
 
 
 def _before(recalibrated: Judged, final: Judged, data: Data) -> Array:

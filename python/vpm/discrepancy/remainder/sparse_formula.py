@@ -17,6 +17,7 @@ import numpy as np
 from vpm.catalogue import without_law
 from vpm.catalogue.empirical import TERMS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
+from vpm.discrepancy.screening.candidates import ripple_periods
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.numbers import Array
@@ -32,12 +33,10 @@ LEAST_OWN = 0.03
 #: Transition velocity of dry terms as shares of the largest speed, where no friction of the model has one.
 TRANSITION_SHARES = (0.002, 0.01, 0.04)
 _HARMONIC = (("cosine", "sine"), ("dry_cosine", "dry_sine"), ("load_cosine", "load_sine"))
-#: Shortest and longest period that is looked for, as parts and multiples of the whole travel.
-SHORTEST, LONGEST = 1.0 / 40.0, 1.5
+#: Longest period that is looked for, in multiples of the whole travel.
+LONGEST = 1.5
 #: Periods that are proposed for each of the three ways in which a residual can repeat.
 PROPOSED = 2
-#: Most samples that take part.
-MOST_WAVE_SAMPLES = 4000
 
 
 @dataclass(frozen=True)
@@ -225,36 +224,12 @@ def _columns(
 def harmonic_periods(
     base: Judged, data: InverseDynamicsProblem, joint: str, ranges: Mapping[str, float]
 ) -> tuple[float, ...]:
-    """Periods in position (m or rad) at which a residual is strongest, itself or multiplied by direction or load.
-
-    Least squares with a cosine and a sine at evenly spaced wave numbers, beside a constant and the direction (N. Lomb,
-    *Astrophysics and Space Science* 39, 1976).
-    """
-    column = data.joints.index(joint)
-    records = range(len(data.motions))
-    position = np.concatenate([data.state(r)[0][:, column] for r in records])
-    velocity = np.concatenate([data.state(r)[1][:, column] for r in records])
+    """Periods in position (m or rad) at which a residual is strongest, itself or multiplied by direction or load."""
+    column, records = data.joints.index(joint), range(len(data.motions))
+    position, velocity = (np.concatenate([data.state(r)[which][:, column] for r in records]) for which in (0, 1))
     load = np.concatenate([data.effort(base.model, base.model.theta, r)[1][:, column] for r in records])
     residual = np.concatenate([base.fit.residual[data.efforts(r)[column].samples] for r in records])
-    thin = max(1, residual.size // MOST_WAVE_SAMPLES)
-    position, velocity, load, residual = (x[::thin] for x in (position, velocity, load, residual))
-    travel = 2.0 * ranges["reach"]
-    step = float(np.median(np.abs(np.diff(position)))) or travel / 1e3
-    highest = min(1.0 / (2.5 * step), 1.0 / (SHORTEST * travel))
-    waves = np.arange(1.0 / LONGEST, max(highest * travel, 2.0), 0.1) / travel
     direction = np.tanh(velocity / ranges["transition_velocity"])
-    found: list[float] = []
-    for factor in (np.ones_like(residual), direction, np.abs(load) / max(float(np.abs(load).max()), 1e-300)):
-        power = np.array([_wave_power(residual, factor, direction, 2.0 * np.pi * wave * position) for wave in waves])
-        peaks = [k for k in range(1, power.size - 1) if power[k - 1] <= power[k] > power[k + 1]]
-        peaks = sorted(peaks or [int(np.argmax(power))], key=lambda k: -power[k])[:PROPOSED]
-        found += [float(1.0 / waves[k]) for k in peaks]
-    return tuple(dict.fromkeys(found))
-
-
-def _wave_power(residual: Array, factor: Array, direction: Array, phase: Array) -> float:
-    """Sum of squares that a wave of one period in position explains."""
-    columns = np.column_stack([np.ones_like(phase), direction, factor * np.cos(phase), factor * np.sin(phase)])
-    normal = columns.T @ columns + 1e-9 * phase.size * np.eye(4)
-    right = columns.T @ residual
-    return float(right @ np.linalg.solve(normal, right))
+    signals = (residual, residual * direction, residual * np.abs(load))
+    found = (ripple_periods(position, signal, 1.0 / LONGEST)[:PROPOSED] for signal in signals)
+    return tuple(dict.fromkeys(period for several in found for period in several))

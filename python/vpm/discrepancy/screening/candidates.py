@@ -208,7 +208,7 @@ def _periodic(effect: EffectType, site: str, data: InverseDynamicsProblem, model
     where, rate, values = _over_way(data, model, site, residual)
     if effect.rubs or effect.takes_effort:
         values = values * (np.sign(rate) if effect.rubs else _applied(data, site))
-    periods = _ripple_periods(where, values, 0.5 if effect.rubs else 2.0)
+    periods = ripple_periods(where, values, 0.5 if effect.rubs else 2.0)
     bounds = {"period": (min(periods) / 1.5, max(periods) * 1.5)}
     return Candidate(effect, site, tuple({"period": p} for p in periods), bounds)
 
@@ -296,7 +296,7 @@ def _excitation(data: InverseDynamicsProblem, model: Model, site: str, actuator:
     )
 
 
-def _ripple_periods(position: Array, values: Array, fewest: float) -> list[float]:
+def ripple_periods(position: Array, values: Array, fewest: float) -> list[float]:
     """Start periods of candidates in position: peaks of the residual's least-squares periodogram.
 
     Evenly spaced frequencies up to what the decimated samples resolve, from ``fewest`` periods per travel; friction
