@@ -35,6 +35,7 @@ from vpm.discrepancy.rivals.discriminating_experiment import experiments as expe
 from vpm.discrepancy.screening.candidates import asked_for
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search import Search, ambiguities
+from vpm.discrepancy.search.search_round import Request, Tell
 from vpm.discrepancy.verdict import FLOOR_FACTOR, is_negligible, only_where_closed, verdict
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records
@@ -43,7 +44,7 @@ from vpm.identify.fit_result import fit_of
 from vpm.identify.parallel import worker_count
 from vpm.log_check import refuse_mistakes
 from vpm.model import Model
-from vpm.naming import BROKEN, FAILED, RANKING, STOPPED, Names, Tell, named, ranked_notes, ranking_of, until_stopped
+from vpm.naming import BROKEN, FAILED, RANKING, STOPPED, Names, named, ranked_notes, ranking_of, until_stopped
 from vpm.observer import measured_outputs
 from vpm.one_thread import in_one_thread
 from vpm.ranking import Ranking, Settings
@@ -225,7 +226,8 @@ def diagnosed(
         odd = [str(one) for one in found if one.kind in NOTED]
     most = max(LEAST_LIMIT, 2 * len(model.joints)) if limit is None else limit
     names = asked.get("names", RANKING)
-    diagnosis = _diagnosis(model, records, (names, effects, most), cutoff, setup, each, tell or (lambda _: None))
+    request = Request(effects, most, tell or (lambda _: None), each, names)
+    diagnosis = _diagnosis(model, records, request, cutoff, setup)
     blind = [] if diagnosis.verdict != "unexplained" else _without_sensor(model, records[0])
     return replace(diagnosis, notes=(*odd, *diagnosis.notes, *blind))
 
@@ -236,15 +238,7 @@ def _without_sensor(model: Model, records: Sequence[Experiment]) -> list[str]:
     return [NO_SENSOR.format(channels=", ".join(sorted(bare)))] if bare else []
 
 
-def _diagnosis(
-    model: Model,
-    records: Records,
-    by: tuple[Names, Sequence[str] | None, int],
-    cutoff: float | None,
-    setup: Setup,
-    each: ParallelCandidates,
-    say: Tell,
-) -> Diagnosis:
+def _diagnosis(model: Model, records: Records, request: Request, cutoff: float | None, setup: Setup) -> Diagnosis:
     """Diagnosis on checked records; once more without the drifts of sensors where these explain a channel."""
     began = time.perf_counter()
     training, validation, given = records
@@ -254,69 +248,64 @@ def _diagnosis(
         taken = (fitted, kept, [*given, *(drift.sentence for drift in drifts)])
         # A record cut off in the middle of a motion does not say what its controller remembers.
         mode = "restarts" if given else judging_mode(model, kept)
-        outcome = _named_and_judged(model, taken, by, (mode, cutoff, setup), each, say, may_drift=not drifts)
+        outcome = _named_and_judged(_Job(model, taken, request, mode, cutoff, setup, may_drift=not drifts))
         if isinstance(outcome, Diagnosis):
             return replace(outcome, seconds=time.perf_counter() - began)
-        say("diagnosing again without the drift of sensors")
+        request.tell("diagnosing again without the drift of sensors")
         drifts = outcome
 
 
-def _named_and_judged(
-    model: Model,
-    records: Records,
-    by: tuple[Names, Sequence[str] | None, int],
-    how: tuple[str, float | None, Setup],
-    each: ParallelCandidates,
-    say: Tell,
-    *,
-    may_drift: bool,
-) -> Diagnosis | list[Drift]:
+@dataclass(frozen=True)
+class _Job:
+    """Diagnosis to be done on records, with or without the drifts of their sensors."""
+
+    model: Model
+    records: Records
+    request: Request
+    mode: str  #: In which records are simulated.
+    cutoff: float | None
+    setup: Setup
+    may_drift: bool  #: Whether drifts of sensors are still in the records.
+
+
+def _named_and_judged(job: _Job) -> Diagnosis | list[Drift]:
     """Diagnosis that names effects, judges them, and describes the rest; drifts of sensors where it needs them."""
-    training, validation, notes = records
-    ranking = ranking_of(model, (training, validation), by, how[2], say, each, notes)
+    training, validation, notes = job.records
+    ranking = ranking_of(job.model, (training, validation), job.request, job.setup, notes)
     try:
-        return _measured(model, records, ranking, by, how, each, say, may_drift=may_drift)
+        return _measured(job, ranking)
     except KeyboardInterrupt:
-        known = ranking or Ranking((), (), model, model)
+        known = ranking or Ranking((), (), job.model, job.model)
         told = ranked_notes(known, (), known.interrupted) if ranking is not None else []
         told.append(STOPPED_UNMEASURED if known.effects else STOPPED)
         notes.extend(note for note in dict.fromkeys(told) if note not in notes)
-        return unmeasured(model, records, known, Settings(effects=by[2]))
+        return unmeasured(job.model, job.records, known, Settings(effects=job.request.limit))
 
 
-def _measured(
-    model: Model,
-    records: Records,
-    ranking: Ranking | None,
-    by: tuple[Names, Sequence[str] | None, int],
-    how: tuple[str, float | None, Setup],
-    each: ParallelCandidates,
-    say: Tell,
-    *,
-    may_drift: bool,
-) -> Diagnosis | list[Drift]:
+def _measured(job: _Job, ranking: Ranking | None) -> Diagnosis | list[Drift]:
     """Diagnosis from a ranking, or by a search where there is none, measured on validation records."""
-    training, validation, notes = records
-    (mode, cutoff, setup), (_, effects, limit) = how, by
-    if ranking is not None and ranking.hold != setup.course:
+    model, request, (training, validation, notes) = job.model, job.request, job.records
+    if ranking is not None and ranking.hold != job.setup.course:
         notes.append(FOUND_HOLD.format(hold=ranking.hold))
-        setup = replace(setup, hold=ranking.hold)
+        job = replace(job, setup=replace(job.setup, hold=ranking.hold))
     if ranking is not None and (reason := why_unbalanced(model, training)):
-        say("measuring what was named on validation records")
-        notes.extend([] if cutoff is None else [UNFILTERED])
-        told = diagnosed_by_tracker(ranking, model, records, (effects, limit), setup, reason)
+        request.tell("measuring what was named on validation records")
+        notes.extend([] if job.cutoff is None else [UNFILTERED])
+        asked = request.effects, request.limit
+        told = diagnosed_by_tracker(ranking, model, job.records, asked, job.setup, reason)
         more = ranked_notes(ranking, told.refused, told.interrupted)
         return replace(told, notes=(*told.notes, *more))
-    data = data_of(model, training, validation, mode, cutoff, setup, notes)
-    say("comparing the nominal model with the data")
+    data = data_of(model, training, validation, job.mode, job.cutoff, job.setup, notes)
+    request.tell("comparing the nominal model with the data")
     nominal = nominal_of(model, data, notes)
-    say("recalibrating the nominal parameters")
-    recalibrated = recalibrated_of(model, data, notes, each, None if ranking is None else ranking.recalibrated)
-    found, ambiguous, late = named(ranking, recalibrated, data, by, say, each, notes)
-    known = _Known(model, records, data, nominal, recalibrated, ranking, ambiguous, late, may_drift)
-    so_far = partial(of_search, model, records, recalibrated, found, data.training)
+    request.tell("recalibrating the nominal parameters")
+    start = None if ranking is None else ranking.recalibrated
+    recalibrated = recalibrated_of(model, data, notes, request.each, start)
+    found, ambiguous, late = named(ranking, recalibrated, data, request, notes)
+    known = _Known(job, data, nominal, recalibrated, ranking, ambiguous, late)
+    so_far = partial(of_search, model, job.records, recalibrated, found, data.training)
     try:
-        return _told(known, found, mode, setup, each, say)
+        return _told(known, found)
     except BROKEN as error:
         notes.append(FAILED.format(what="what follows the search", error=error))
         return so_far()
@@ -328,17 +317,15 @@ def _measured(
 
 @dataclass(frozen=True)
 class _Known:
-    """Intermediate results of `diagnose` once effects are named: models, records, ranking and rivals."""
+    """Intermediate results of `diagnose` once effects are named: models, ranking and rivals."""
 
-    model: Model
-    records: Records
+    job: _Job
     data: Data
     nominal: Judged
     recalibrated: Judged
     ranking: Ranking | None
     ambiguous: tuple[Rivals, ...]
     late: bool  #: Whether Ctrl-C left open what else would do.
-    may_drift: bool  #: Whether drifts of sensors are still in the records.
 
 
 @dataclass(frozen=True)
@@ -353,28 +340,26 @@ class _Concluded:
     accepted: tuple[Accepted, ...]
 
 
-def _told(
-    known: _Known, found: Search, mode: str, setup: Setup, each: ParallelCandidates, say: Tell
-) -> Diagnosis | list[Drift]:
+def _told(known: _Known, found: Search) -> Diagnosis | list[Drift]:
     """Diagnosis after naming: noise floor, remaining residual, and verdict; or drifts of sensors."""
-    data, (_, _, notes) = known.data, known.records
-    say("measuring the noise floor")
-    measure = partial(examined, known.nominal, known.recalibrated, data, mode, setup)
+    data, job = known.data, known.job
+    job.request.tell("measuring the noise floor")
+    measure = partial(examined, known.nominal, known.recalibrated, data, job.mode, job.setup)
     floor, gap, left = measure(found.final)
     if (kept := only_where_closed(found, data, gap, left)) is not found:
         found, (floor, gap, left) = kept, measure(kept.final)
-    rest, stopped = until_stopped(lambda: _rest(known.recalibrated, found, data, gap, each, say), None)
+    rest, stopped = until_stopped(lambda: _rest(known, found, gap), None)
     beyond = tracker_gaps(known.ranking, data.training.joints) if known.ranking is not None else {}
     said = verdict(data, known.nominal, known.recalibrated, found, gap | beyond, left, rest)
-    if said[0] == "unexplained" and not found.accepted and known.may_drift:
+    if said[0] == "unexplained" and not found.accepted and job.may_drift:
         pairs = ((data.training, found.final.fit.residual), (data.validation, found.final.validation))
         if drifts := sensor_drifts(found.final.model, pairs, gap, FLOOR_FACTOR):
             return drifts
     concluded = _concluded(known, found, said, gap, floor, rest)
     if stopped or known.late:
-        notes.append(STOPPED_LATE)
+        job.records[2].append(STOPPED_LATE)
     concluded = replace(concluded, gap=concluded.gap | beyond)
-    return _whole(known, found, concluded, floor, say, interrupted=found.interrupted or stopped or known.late)
+    return _whole(known, found, concluded, floor, interrupted=found.interrupted or stopped or known.late)
 
 
 def _concluded(
@@ -400,10 +385,10 @@ def _concluded(
 
 
 def _whole(
-    known: _Known, found: Search, concluded: _Concluded, floor: dict[str, float], say: Tell, *, interrupted: bool
+    known: _Known, found: Search, concluded: _Concluded, floor: dict[str, float], *, interrupted: bool
 ) -> Diagnosis:
     """Result of `diagnose` with its evidence and pictures, as far as Ctrl-C leaves time for them."""
-    data, nominal, (training, validation, notes) = known.data, known.nominal, known.records
+    data, nominal, (training, validation, notes) = known.data, known.nominal, known.job.records
     final, accepted, summary = concluded.final, concluded.accepted, concluded.summary
     ambiguous = known.ambiguous if accepted else ()
     told = Diagnosis(
@@ -426,7 +411,7 @@ def _whole(
         interrupted,
         empirical=concluded.empirical,
         classes=classes(accepted, ambiguous),
-        stated={name: parameter.value for name, parameter in known.model.parameters.items()},
+        stated={name: parameter.value for name, parameter in known.job.model.parameters.items()},
     )
     at_motors = [entry.key for entry in accepted if entry.side == "motor"]
     more: dict[str, Callable[[], Any]] = {
@@ -437,7 +422,7 @@ def _whole(
         "experiments": lambda: experiments_for(found.final, ambiguous, data.training, floor),
     }
     try:
-        say("designing discriminating experiments")
+        known.job.request.tell("designing discriminating experiments")
         for field, compute in more.items():
             told = replace(told, **{field: compute()})
     except KeyboardInterrupt:
@@ -445,15 +430,15 @@ def _whole(
     return told
 
 
-def _rest(
-    recalibrated: Judged, found: Search, data: Data, gap: dict[str, ChannelGap], each: ParallelCandidates, say: Tell
-) -> Remainder | None:
+def _rest(known: _Known, found: Search, gap: dict[str, ChannelGap]) -> Remainder | None:
     """Remainder of the residual in `diagnose`, under the effects found; none where all is known."""
-    say("examining what is left")
+    request, data = known.job.request, known.data
+    request.tell("examining what is left")
     if not found.accepted and is_negligible(gap):
         return None
-    start = found.final if found.interrupted or not found.accepted else recalibrated
-    return remainder(start, found.final, data, min(m.dt for m in data.training.motions), worker_count(each.workers))
+    start = found.final if found.interrupted or not found.accepted else known.recalibrated
+    workers = worker_count(request.each.workers)
+    return remainder(start, found.final, data, min(m.dt for m in data.training.motions), workers)
 
 
 @dataclass(frozen=True)

@@ -1,18 +1,19 @@
 """Naming of missing effects: by a ranking of the training records, or by a search on inverse-dynamics residuals."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 from typing import Literal, TypeVar
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import RefusedEffect
-from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.ranked_effects import free_joints, searched, why_not_ranked
 from vpm.discrepancy.ranked_effects import notes as notes_of
 from vpm.discrepancy.rivals.ambiguity import Rivals, rivals
 from vpm.discrepancy.rivals.rival_exchange import in_order, replaced
 from vpm.discrepancy.search.search import Search, begin, further
+from vpm.discrepancy.search.search_round import Request
 from vpm.discrepancy.search.usual_friction import with_usual_friction
 from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment
@@ -34,7 +35,6 @@ UNSEEN = "the joint {joint} has no drive: no inverse-dynamics residual shows wha
 FAILED = "{what} could not be computed: {error}"
 BROKEN = (ValueError, ArithmeticError, LookupError)
 
-Tell = Callable[[str], None]
 #: Where names come from.
 Names = Literal["ranking", "search"]
 RANKING: Names = "ranking"
@@ -44,19 +44,17 @@ Found = TypeVar("Found")
 def ranking_of(
     model: Model,
     records: tuple[Sequence[Experiment], Sequence[Experiment]],
-    by: tuple[Names, Sequence[str] | None, int],
+    request: Request,
     setup: Setup,
-    tell: Tell,
-    each: ParallelCandidates,
     notes: list[str],
 ) -> Ranking | None:
     """Ranking of the training records if the naming uses one and it covers the machine.
 
     Validation records only say, at the end, how much of their error what was found leaves.
 
-    ``by`` says where names come from, of which effects, and how many at most. What keeps it from that is noted.
+    What keeps it from that is noted.
     """
-    names, effects, limit = by
+    names, effects = request.names, request.effects
     training, validation = records
     unbalanced = why_unbalanced(model, training)
     if names != "ranking":
@@ -67,17 +65,17 @@ def ranking_of(
     reason = "" if unbalanced else why_not_ranked(model, training)
     if not reason:
         try:
-            tell("ranking what could be missing")
+            request.tell("ranking what could be missing")
             return rank(
                 model,
                 training,
                 validation,
                 effects=effects,
-                settings=Settings(effects=limit),
+                settings=Settings(effects=request.limit),
                 setup=setup,
-                workers=each.workers,
-                tell=tell,
-                progress=each.progress,
+                workers=request.each.workers,
+                tell=request.tell,
+                progress=request.each.progress,
             )
         except KeyboardInterrupt:
             return Ranking((), (), model, model, interrupted=True, hold=setup.course)
@@ -92,28 +90,20 @@ def ranking_of(
 
 
 def named(
-    ranking: Ranking | None,
-    recalibrated: Judged,
-    data: Data,
-    by: tuple[Names, Sequence[str] | None, int],
-    tell: Tell,
-    each: ParallelCandidates,
-    notes: list[str],
+    ranking: Ranking | None, recalibrated: Judged, data: Data, request: Request, notes: list[str]
 ) -> tuple[Search, tuple[Rivals, ...], bool]:
     """Naming of missing effects by a ranking or a search, with rivals, and whether Ctrl-C ended it."""
-    _, effects, limit = by
-    screened = _searchable(effects)
     if ranking is not None:
-        tell("measuring what was named on validation records")
-        found, ambiguous = searched(ranking, recalibrated, data, Settings(effects=limit), effects)
+        request.tell("measuring what was named on validation records")
+        found, ambiguous = searched(ranking, recalibrated, data, Settings(effects=request.limit), request.effects)
         notes.extend([*notes_of(found.accepted), *ranked_notes(ranking, found.refused, found.interrupted)])
         return found, ambiguous, False
-    begun = with_usual_friction(begin(recalibrated), data, screened, limit, tell, each)
-    found = further(begun, data, screened, limit, tell, each)
+    screened = replace(request, effects=_searchable(request.effects))
+    found = further(with_usual_friction(begin(recalibrated), data, screened), data, screened)
     if found.interrupted:
         notes.append(STOPPED)
     nothing: tuple[Rivals, ...] = ()
-    settle = partial(_settled, found, data, screened, limit, tell, each)
+    settle = partial(_settled, found, data, screened)
     try:
         (found, ambiguous), late = until_stopped(settle, (found, nothing))
     except BROKEN as error:
@@ -130,22 +120,20 @@ def ranked_notes(ranking: Ranking, refused: Sequence[RefusedEffect], interrupted
     return [RANKED, *([STOPPED] if interrupted else []), *told]
 
 
-def _settled(
-    found: Search, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: ParallelCandidates
-) -> tuple[Search, tuple[Rivals, ...]]:
+def _settled(found: Search, data: Data, request: Request) -> tuple[Search, tuple[Rivals, ...]]:
     """Names and their order, with the rivals of each, after it was removed again.
 
     Where something takes the place of an effect, the search goes on beside that.
     """
-    tell("looking for what else would do in the place of each effect")
-    known = rivals(found.final, data, found.accepted, effects, each, found.last)
-    for _ in range(limit):
+    request.tell("looking for what else would do in the place of each effect")
+    known = rivals(found.final, data, found.accepted, request, found.last)
+    for _ in range(request.limit):
         changed, known = replaced(found, known, data)
         if changed is found:
             break
-        found = changed if found.interrupted else further(changed, data, effects, limit, tell, each)
+        found = changed if found.interrupted else further(changed, data, request)
         if len(found.accepted) != 1 or len(known) != 1 or found.final is not changed.final:
-            known = rivals(found.final, data, found.accepted, effects, each, found.last)
+            known = rivals(found.final, data, found.accepted, request, found.last)
     return in_order(found, known)
 
 

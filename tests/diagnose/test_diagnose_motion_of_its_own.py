@@ -12,7 +12,7 @@ from vpm.discrepancy.confirmation.confirmation import is_clear
 from vpm.discrepancy.screening.candidates import Candidate
 from vpm.discrepancy.screening.linear_step import softened
 from vpm.discrepancy.screening.probe import Baseline, Probe, _stepped, same_models
-from vpm.discrepancy.search.search_round import Round
+from vpm.discrepancy.search.search_round import Request, Round
 from vpm.identify import Estimate, InverseDynamicsProblem, Worth, estimate
 
 DT = 1e-3
@@ -117,7 +117,7 @@ def test_what_takes_little_has_to_meet_motions_of_their_own_once(
 ) -> None:
     current: Any = SimpleNamespace(model=vpm.Model.from_toml(AXIS))
     unused: Any = None
-    outcome = Round(current, unused, 1, lambda _: None, unused)
+    outcome = Round(current, unused, 1, Request(None, 1, lambda _: None, unused))
     outcome._ranking = {("joint_compliance", site): unused for site in others}
     best: Any = SimpleNamespace(trial=SimpleNamespace(there=SimpleNamespace(relative=taken)))
     assert outcome.weak(best) == meets

@@ -18,6 +18,7 @@ from vpm.discrepancy.rivals.rival_exchange import earned, in_order
 from vpm.discrepancy.screening.candidates import candidates
 from vpm.discrepancy.screening.probe import Baseline, probe
 from vpm.discrepancy.search.search import Search, Stage, begin, further
+from vpm.discrepancy.search.search_round import Request
 from vpm.identify import Gain, InverseDynamicsProblem, estimate
 
 
@@ -89,8 +90,8 @@ def test_a_search_goes_on_beside_what_took_the_place_of_an_effect(monkeypatch: p
     """Beside the true name a second effect stands clear; the name that went out does not come back."""
     naming = import_module("vpm.naming")
     model, free, data = inverse_dynamics_data(shared_case("axis_linear", ("spring", "viscous_friction"), 3))
-    start, each = judge(model, free, data, {}), ParallelCandidates(1)
-    spring = further(begin(start), data, ["spring"], 6, print, each)
+    start, asked = judge(model, free, data, {}), Request(["spring"], 6, print, ParallelCandidates(1))
+    spring = further(begin(start), data, asked)
     gone = (Stage("added", "bias_force", "axis", start), Stage("removed", "bias_force", "axis", start))
     exchanged = replace(
         spring,
@@ -103,7 +104,7 @@ def test_a_search_goes_on_beside_what_took_the_place_of_an_effect(monkeypatch: p
         "replaced",
         lambda found, known, _: (exchanged if found is plain else found, known),
     )
-    found, known = naming._settled(plain, data, ["bias_force", "spring", "viscous_friction"], 6, print, each)
+    found, known = naming._settled(plain, data, replace(asked, effects=["bias_force", "spring", "viscous_friction"]))
     assert {entry.key for entry in found.accepted} == {("spring", "axis"), ("viscous_friction", "axis")}
     assert {(one.effect, one.site) for one in known} == {entry.key for entry in found.accepted}
     assert ("bias_force", "axis") not in {(c.name, c.site) for c in found.ranking}

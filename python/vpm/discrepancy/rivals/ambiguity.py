@@ -17,12 +17,13 @@ import numpy as np
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confirm, judge
 from vpm.discrepancy.confirmation.refusal import CLEAR_GAIN, LEAST_GAIN
 from vpm.discrepancy.diagnosis import Ambiguity
-from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
+from vpm.discrepancy.parallel_candidates import Failure
 from vpm.discrepancy.screening.candidates import Candidate, Key, candidates, joint_at
 from vpm.discrepancy.screening.linear_step import linear_step
 from vpm.discrepancy.screening.probe import Probe, impossible_values, probe, refit_effort, screening_effort
 from vpm.discrepancy.search.candidate_choice import Accepted, alike
 from vpm.discrepancy.search.search import Tried
+from vpm.discrepancy.search.search_round import Request
 from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem, gain, segments
 from vpm.identify.identifiability import COPY_SHARE, Span
@@ -68,12 +69,7 @@ def listed(known: Sequence[Ambiguity], found: Sequence[Rivals]) -> tuple[Ambigui
 
 
 def rivals(
-    final: Judged,
-    data: Data,
-    accepted: Sequence[Accepted],
-    effects: Sequence[str] | None = None,
-    each: ParallelCandidates | None = None,
-    last: Tried | None = None,
+    final: Judged, data: Data, accepted: Sequence[Accepted], request: Request, last: Tried | None = None
 ) -> tuple[Rivals, ...]:
     """Ambiguity of each accepted effect: rivals in its place that predict the validation data as well.
 
@@ -81,7 +77,7 @@ def rivals(
     are refitted. They have to predict the validation records as well as the effect. What the ``last`` effect competed
     with when it came in is not worked out again.
     """
-    each = each or ParallelCandidates(1)
+    each = request.each
     known = {last.key: last} if last is not None else {}
     left = each("what each adds: refitting without", partial(_without, final, data, known), accepted, _label)
     bases = [None if isinstance(one, Failure) else one for one in left]
@@ -89,7 +85,7 @@ def rivals(
         _Job(entry, without, candidate)
         for entry, without in zip(accepted, bases, strict=True)
         if without is not None and entry.key not in known
-        for candidate in _others(without, data, entry, effects)
+        for candidate in _others(without, data, entry, request.effects)
     ]
     probes = each(
         "what else would do: screening",

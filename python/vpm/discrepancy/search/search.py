@@ -10,11 +10,10 @@ import numpy as np
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, gain_at, judge
 from vpm.discrepancy.confirmation.refusal import CLEAR_GAIN, LEAST_GAIN, NORMAL_95_ONE_SIDED
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
-from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import Key
 from vpm.discrepancy.screening.probe import Probe
 from vpm.discrepancy.search.candidate_choice import Accepted
-from vpm.discrepancy.search.search_round import Round, Tell
+from vpm.discrepancy.search.search_round import Request, Round
 from vpm.errors import DivergedError, ModelError
 from vpm.identify import Gain, gain, segments
 from vpm.identify.identifiability import Span, is_alias
@@ -79,16 +78,14 @@ def begin(start: Judged) -> Search:
     return Search((Stage("recalibrated", "", "", start),), (), (), ())
 
 
-def further(
-    found: Search, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: ParallelCandidates
-) -> Search:
+def further(found: Search, data: Data, request: Request) -> Search:
     """Continue a search: add effects one at a time and drop replaced ones, until none is accepted any more.
 
     Removed effects do not come back.
     A new effect in the place of another one leaves what the other one had covered. A second effect that was refused
     before may be clear in that.
     """
-    going = _Going(found, data, effects, limit, tell, each)
+    going = _Going(found, data, request)
     interrupted = False
     try:
         while going.another():
@@ -101,16 +98,8 @@ def further(
 class _Going:
     """Search that goes on: whatever Ctrl-C interrupts, `outcome` is what is known until then."""
 
-    def __init__(
-        self,
-        found: Search,
-        data: Data,
-        effects: Sequence[str] | None,
-        limit: int,
-        tell: Tell,
-        each: ParallelCandidates,
-    ) -> None:
-        self.data, self.effects, self.limit, self.tell, self.each = data, effects, limit, tell, each
+    def __init__(self, found: Search, data: Data, request: Request) -> None:
+        self.data, self.request = data, request
         self.stages, self.accepted, self.ranking = list(found.stages), list(found.accepted), list(found.ranking)
         self.dropped = {(r.name, r.site): r.reason for r in found.refused if (r.name, r.site) in found.gone}
         self.last: Tried | None = None
@@ -122,10 +111,10 @@ class _Going:
     def another(self) -> bool:
         """Whether one more effect comes in; those that it makes needless are dropped."""
         self.number += 1
-        if self.number > 2 * self.limit + 1:
+        if self.number > 2 * self.request.limit + 1:
             return False
         outcome = self._begun(self.tried)
-        if len(self.accepted) >= self.limit or (self.accepted and outcome.done()):
+        if len(self.accepted) >= self.request.limit or (self.accepted and outcome.done()):
             return False
         best = self._waited(outcome)
         # In a round of a few, little else was tried.
@@ -141,7 +130,7 @@ class _Going:
         self.last = known if alone else None
         self.accepted.append(best)
         self.stages.append(Stage("added", *best.key, best.trial.judged))
-        self.tell(f"round {self.number}: accepted {best.label}")
+        self.request.tell(f"round {self.number}: accepted {best.label}")
         self._reconsider()
         return True
 
@@ -162,7 +151,7 @@ class _Going:
         """Next round of the search; of the one before it, only the ranking is kept."""
         if self.round is not None:
             self.ranking += self.round.ranked()
-        self.round = Round(self.stages[-1].judged, self.data, self.number, self.tell, self.each, tried)
+        self.round = Round(self.stages[-1].judged, self.data, self.number, self.request, tried)
         return self.round
 
     def _waited(self, outcome: Round) -> Accepted | None:
@@ -175,9 +164,9 @@ class _Going:
 
     def _best(self, outcome: Round) -> Accepted | None:
         """Best candidate of a search round; where it leaves most, those with a motion of their own compete too."""
-        best = outcome.light(self.effects, set(self.dropped))
+        best = outcome.light(set(self.dropped))
         if best is None or outcome.weak(best):
-            best = outcome.heavy(self.effects, set(self.dropped)) or best
+            best = outcome.heavy(set(self.dropped)) or best
         return best
 
     def _reconsider(self) -> None:

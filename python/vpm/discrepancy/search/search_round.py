@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property, partial
 
 import numpy as np
@@ -53,13 +53,23 @@ RINGING, FEW = 0.2, 1
 Tell = Callable[[str], None]
 
 
+@dataclass(frozen=True)
+class Request:
+    """Request for names of missing effects: what is tried, who hears of it, and who computes."""
+
+    effects: Sequence[str] | None  #: All that a search tries if None.
+    limit: int  #: Most effects to accept.
+    tell: Tell
+    each: ParallelCandidates
+    names: str = "search"  #: Where names come from.
+
+
 class Round:
     """One round of the search."""
 
-    def __init__(
-        self, current: Judged, data: Data, number: int, tell: Tell, each: ParallelCandidates, tried: int = 0
-    ) -> None:
-        self.current, self.data, self.number, self.tell, self.each = current, data, number, tell, each
+    def __init__(self, current: Judged, data: Data, number: int, request: Request, tried: int = 0) -> None:
+        self.current, self.data, self.number, self.request = current, data, number, request
+        self.tell, self.each = request.tell, request.each
         self._chosen_from = tried
         self.refused: dict[Key, str] = {}
         self._ranking: dict[Key, RankedCandidate] = {}
@@ -72,18 +82,18 @@ class Round:
         """Whether a round has nothing to explain: the residual is noise, as far as links ring by it."""
         return noise_alone(self.current.model, self.data, self.timed.validation)
 
-    def light(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
+    def light(self, without: set[Key]) -> Accepted | None:
         """Best candidate of the round among those whose regressor needs the measured motion alone."""
-        self.screen(effects, without, heavy=False)
+        self.screen(without, heavy=False)
         if self._promising and self._promising[0].candidate.effect.has_play:
             # What is compliant passes for backlash, and has to compete with it.
             light = self._promising
-            self.screen(effects, without, heavy=True)
+            self.screen(without, heavy=True)
             self._promising = sorted((*light, *self._promising), key=lambda p: -p.score)
         self.confirm()
         return self.best()
 
-    def heavy(self, effects: Sequence[str] | None, without: set[Key]) -> Accepted | None:
+    def heavy(self, without: set[Key]) -> Accepted | None:
         """Best candidate of the round among those with a motion of their own, if more than noise is left.
 
         A spring that swings within the whole band leaves a residual as white as noise. On rigid machines, one with a
@@ -94,7 +104,7 @@ class Round:
         quiet = not left.present and left.above_white <= NOISE_ONLY
         if (quiet and self._takes_long()) or self.done():
             return None
-        self.screen(effects, without, heavy=True)
+        self.screen(without, heavy=True)
         if quiet:
             self._promising = [one for one in self._promising if one.drop >= RINGING]
         self.confirm()
@@ -102,7 +112,7 @@ class Round:
 
     def again(self, key: Key) -> Accepted | None:
         """Candidate that an earlier round would have accepted too, if the round accepts it beside what came in."""
-        self.screen([key[0]], set(), heavy=False, only={key})
+        self.screen(set(), heavy=False, only={key})
         self.confirm()
         return self.best()
 
@@ -138,11 +148,9 @@ class Round:
         """Whether probes of candidates with a motion of their own take long in this round."""
         return not answers_at_once(self.current.model)
 
-    def screen(
-        self, effects: Sequence[str] | None, without: set[Key], *, heavy: bool, only: set[Key] | None = None
-    ) -> None:
+    def screen(self, without: set[Key], *, heavy: bool, only: set[Key] | None = None) -> None:
         """Screen all or some candidates of the round, and set aside impossible ones."""
-        current, data = self.current, self.data
+        current, data, effects = self.current, self.data, self.request.effects
         self._promising = []
         found = candidates(current.model, data.training, current.fit.residual, effects)
         self.refused.update(left_out(current.model, data.training, effects))

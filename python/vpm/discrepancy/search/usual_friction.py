@@ -19,15 +19,13 @@ from vpm.discrepancy.screening.candidates import TRANSITION, Candidate, candidat
 from vpm.discrepancy.screening.probe import Probe
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search import Search, Stage
-from vpm.discrepancy.search.search_round import Tell
+from vpm.discrepancy.search.search_round import Request
 from vpm.errors import VpmError
 from vpm.identify.response_along_motion import answers_at_once
 from vpm.model import Model
 
 
-def with_usual_friction(
-    found: Search, data: Data, effects: Sequence[str] | None, limit: int, tell: Tell, each: ParallelCandidates
-) -> Search:
+def with_usual_friction(found: Search, data: Data, request: Request) -> Search:
     """Search that begins with the usual friction of several joints; as it was where that does not do most of the work.
 
     Each size has to be clear on training records. Without each effect, all else fitted again, validation records have
@@ -36,21 +34,22 @@ def with_usual_friction(
     start = found.final
     if not answers_at_once(start.model):
         return found
-    usual = [name for name, one in EFFECTS.items() if one.usual == "friction" and (effects is None or name in effects)]
+    usual = [name for name, one in EFFECTS.items() if one.usual == "friction"]
+    usual = [name for name in usual if request.effects is None or name in request.effects]
     listed = [c for c in candidates(start.model, data.training, start.fit.residual, usual) if c.neutral]
     if len(_joints(start, listed)) < 2:
         return found
     alone = replace(data, simulation=None)
-    tell(f"fitting the friction of {len(_joints(start, listed))} joints together")
+    request.tell(f"fitting the friction of {len(_joints(start, listed))} joints together")
     try:
         judged = _fitted(start, data, listed)
-        while len(_joints(start, listed)) > 1 and len(listed) <= limit:
+        while len(_joints(start, listed)) > 1 and len(listed) <= request.limit:
             unclear = [c for c in listed if not is_clear(judged, _own(judged, c))]
             trials = [] if unclear else [_beside(judged, alone, candidate) for candidate in listed]
             tried = len(usual) * len(start.model.joints)
             leaving = unclear or _leaving(trials, Thresholds(tried, min(m.dt for m in data.training.motions)))
             if not leaving:
-                return _begun(found, judged, alone, trials, each)
+                return _begun(found, judged, alone, trials, request.each)
             listed = [c for c in listed if c not in leaving]
             judged = _fitted(start, data, listed)
     except VpmError:
