@@ -8,7 +8,6 @@ import pytest
 from model_texts import on_rail
 from vpm import Experiment, Model
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.confirmation.low_frequency import AVERAGED, has_impacts, low_frequency
 from vpm.discrepancy.screening.candidates import Candidate, candidates
 from vpm.discrepancy.screening.probe import Baseline, probe
 from vpm.identify import InverseDynamicsProblem
@@ -58,21 +57,6 @@ def test_asymmetric_friction_is_screened_with_a_change_of_direction_as_sharp_as_
     found = probe(Baseline(model, free, residual, jacobian), data, candidate)
     assert found.model.parameters["axis.friction.asymmetric_transition_velocity"].value < 0.01
     assert found.values["axis.friction.coulomb_difference"] == pytest.approx(0.8, rel=0.1)
-
-
-def test_low_frequencies_keep_what_lasts_and_loses_what_is_over_soon(problem: InverseDynamicsProblem) -> None:
-    block = problem.blocks[0]
-    lasting = np.sin(2.0 * np.pi * 0.2 / AVERAGED * block.time)
-    short = np.sin(2.0 * np.pi * 2.5 / AVERAGED * block.time)
-    middle = slice(block.time.size // 4, 3 * block.time.size // 4)
-    kept = low_frequency(problem, lasting + short)[middle]
-    assert np.std(kept) == pytest.approx(np.std(lasting[middle]) * np.sinc(0.2) ** 2, rel=0.05)
-
-
-def test_only_play_has_impacts() -> None:
-    model = Model.from_toml(TEXT)
-    assert not has_impacts(model)
-    assert has_impacts(model.with_effect("backlash", at="axis", gap=1e-3, stiffness=1e5))
 
 
 def test_no_candidate_is_credited_with_what_a_bound_forbids(problem: InverseDynamicsProblem) -> None:

@@ -48,7 +48,6 @@ def trial(value: float) -> Trial:
             training=gained(),
             simulated=None,
             diverged="",
-            low_frequency=None,
             clear=True,
             error=NEGLIGIBLE,
         ),
@@ -102,30 +101,6 @@ def test_a_hysteresis_within_two_samples_is_dry_friction_unless_that_is_fitted_b
     reason = refuse_trial(cast("Trial", SimpleNamespace(**{**vars(one), **held})), Thresholds(30, 1e-3))
     assert (reason == "") == accepted
     assert accepted or "between two samples" in reason
-
-
-def beside_backlash(whole: Gain, low_frequency: Gain) -> str:
-    """Reason to refuse beside a backlash, by gains of the whole validation residual and of its low frequencies."""
-    one = trial(1.1)
-    return refuse_trial(
-        cast(
-            "Trial",
-            SimpleNamespace(**{**vars(one), "validation": whole, "there": whole, "low_frequency": low_frequency}),
-        ),
-        Thresholds(30, 1e-3),
-    )
-
-
-def test_what_helps_impacts_and_hurts_low_frequencies_is_refused_beside_a_backlash() -> None:
-    assert "single impacts of the backlash" in beside_backlash(gained(), Gain(1.0, 1.5, 0.3, 2.0, 20))
-
-
-def test_low_frequencies_show_an_effect_that_impacts_cover_unless_they_alone_do() -> None:
-    covered = Gain(before=1.0, after=0.96, weight=0.8, score=3.0, pieces=40)
-    assert beside_backlash(covered, gained()) == ""
-    assert "only 7.84 %" in beside_backlash(covered, Gain(1.0, 0.99, 0.5, 2.0, 20))
-    assert beside_backlash(Gain(before=1.0, after=0.995, weight=0.5, score=3.0, pieces=40), gained())
-    assert beside_backlash(Gain(before=1.0, after=0.96, weight=0.5, score=1.0, pieces=40), gained())
 
 
 @pytest.mark.parametrize(("drop", "words"), [(-63.0, "larger"), (1e-3, "only 0.10 %")])

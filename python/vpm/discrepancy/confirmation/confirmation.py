@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from vpm.discrepancy.confirmation.delay_in_motion import is_late, timed_in_motion
-from vpm.discrepancy.confirmation.low_frequency import has_impacts, low_frequency
 from vpm.discrepancy.screening.candidates import acts_on
 from vpm.discrepancy.screening.compliance_and_stop_start import ends_apart
 from vpm.discrepancy.screening.probe import ROUNDED, Alias, Baseline, Probe, size_is_clear
@@ -98,8 +97,6 @@ class Trial:
     simulated: Gain | None
     diverged: str  #: Why the simulation of the validation records stopped, or "".
     clear: bool  #: Whether the effect's size differs from zero on the training data.
-    #: The validation gain of the low-frequency part, where a backlash is in the model already; None elsewhere.
-    low_frequency: Gain | None = None
     error: float = 0.0  #: Largest share of its signal that the model without the effect leaves of a validation channel.
     here: Gain | None = None  #: The validation gain at the joint where the effect acts, if nothing is lost elsewhere.
 
@@ -238,7 +235,6 @@ def measured(
         simulated_gain(current, judged, data),
         diverged,
         is_clear(judged, own),
-        _low_frequency_gain(current, validation, data.validation),
         error=max(share for _, share, _ in gaps(data.validation, current.validation).values()),
         here=_where_it_acts(current, validation, data.validation, probe.candidate.site),
     )
@@ -343,12 +339,6 @@ def simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:
     if data.simulation is None or current.simulated is None or judged.simulated is None:
         return None
     return gain(current.simulated, judged.simulated, segments(data.simulation))
-
-
-def _low_frequency_gain(current: Judged, validation: Array, data: InverseDynamicsProblem) -> Gain | None:
-    if not has_impacts(current.model):
-        return None
-    return gain(low_frequency(data, current.validation), low_frequency(data, validation), segments(data))
 
 
 def _timed(current: Judged, judged: Judged, data: Data, probe: Probe) -> dict[str, tuple[float, float]] | None:

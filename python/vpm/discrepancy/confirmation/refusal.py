@@ -94,7 +94,6 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
         _not_clear(trial),
         worse_in_simulation(trial),
         _too_little(trial, thresholds),
-        _only_impacts(trial),
     )
     return next(filter(None, reasons), "")
 
@@ -257,27 +256,8 @@ def _not_clear(trial: Trial) -> str:
     return f"the 95 % interval of {worst} covers zero ({low:.3g} to {high:.3g} {model.parameters[worst].unit})"
 
 
-def _only_impacts(trial: Trial) -> str:
-    """Refusal beside a backlash of an effect that does not help at low frequencies, without impacts."""
-    if trial.low_frequency is None or trial.low_frequency.relative >= -LEAST_GAIN:
-        return ""
-    return (
-        f"it {_moves('the validation error', trial.validation)} and "
-        f"{_moves('its low-frequency part', trial.low_frequency)}: it makes up for single impacts of the backlash"
-    )
-
-
-def low_frequency_shows_it(trial: Trial, thresholds: Thresholds) -> bool:
-    """Whether low frequencies support an effect that impacts of a backlash hide, which would be refused."""
-    validation, sure = trial.validation, NORMAL_95_ONE_SIDED
-    whole = validation.relative >= LEAST_GAIN and validation.score >= sure
-    return trial.low_frequency is not None and whole and thresholds.met(trial.low_frequency)
-
-
 def _too_little(trial: Trial, thresholds: Thresholds) -> str:
     validation = trial.there
-    if low_frequency_shows_it(trial, thresholds):
-        return ""
     if validation.relative < WORTH_A_NAME:
         return f"it {_moves('the validation error', validation, 'only ')}"
     needed = thresholds.needed(validation)

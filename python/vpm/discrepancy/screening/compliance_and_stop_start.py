@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import product
 
 import numpy as np
 
@@ -30,6 +31,11 @@ SLOWEST = 0.5
 #: Frequency of the contacts of backlash, Hz, and widths of it tried, as shares of the half travel.
 CONTACT_FREQUENCY = 50.0
 GAP_SHARES = (5e-4, 3e-3, 1.5e-2)
+#: Springs that are simulated: frequencies, Hz, and damping ratios.
+SWINGS, RATIOS = np.geomspace(4.0, 64.0, 16), (0.1, 0.3)
+#: Contacts of a backlash that are simulated, widths as shares of the half travel, and the share of a width over which a
+#: contact closes.
+CONTACTS, CONTACT_RATIOS, FINE_GAPS, CLOSING = np.array([10.0, 30.0]), (0.5,), np.geomspace(5e-5, 5e-2, 18), 1e-3
 #: Places of a stop, as shares of the half travel from its middle.
 STOP_SHARES = (0.6, 0.8, 0.95)
 #: Places of a stop, or limits of a drive, that are compared; the fewest samples beyond one, and the most beyond a stop.
@@ -171,6 +177,24 @@ def structural_starts(
         }
     starts = tuple({"stiffness": k, "damping": 2.0 * LOOSE * math.sqrt(k * inertia)} for k in stiffnesses)
     return (*({"stiffness": k, "damping": c} for k, c in known), *starts), {"stiffness": held, "inertia": share}
+
+
+def fine_starts(effect: EffectType, site: str, model: Model, travel: float) -> Starts:
+    """Start values of a spring or a backlash that are simulated along the motion, where efforts follow at once.
+
+    The residual depends on a stiffness only near the true value, where the resonance is, and on a width only where
+    flights end together. A linearised step from elsewhere predicts a gain that is not there.
+    """
+    if not (effect.winds_up or effect.has_play):
+        return ()
+    inertia, play = moved(model, site), effect.has_play
+    stiffnesses = (inertia * (2.0 * math.pi * (CONTACTS if play else SWINGS)) ** 2).tolist()
+    damping, ratios = ("contact_damping", CONTACT_RATIOS) if play else ("damping", RATIOS)
+    widths = [{"gap": gap, "width": CLOSING * gap} for gap in (travel * FINE_GAPS).tolist()] if play else [{}]
+    return tuple(
+        {"stiffness": k, damping: 2.0 * ratio * math.sqrt(k * inertia), **width}
+        for k, ratio, width in product(stiffnesses, ratios, widths)
+    )
 
 
 def softest(model: Model, site: str) -> float:

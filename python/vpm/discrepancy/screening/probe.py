@@ -6,6 +6,7 @@ that a better value of a known parameter would explain.
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -14,14 +15,13 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtri
 
-from vpm.discrepancy.screening.backlash_start import is_read_off, near_prior, read_off
 from vpm.discrepancy.screening.candidates import Candidate, Key, acts_on, joint_at
 from vpm.discrepancy.screening.compliance_and_stop_start import LOSSES, in_series
-from vpm.discrepancy.screening.joint_compliance_start import best_start, is_searched
 from vpm.discrepancy.screening.linear_step import free_location, is_outside, linear_step, softened, step_without
+from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.identifiability import Span, closest_column, column_lengths, is_alias
-from vpm.identify.response_along_motion import bends
+from vpm.identify.response_along_motion import answers_at_once, bends
 from vpm.identify.tangent import has_tangent
 from vpm.model import Model
 from vpm.numbers import Array
@@ -150,15 +150,8 @@ def _short(model: Model, candidate: Candidate, name: str) -> str:
     return next(short for short, dotted in effect.parameter_names.items() if dotted == name)
 
 
-def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *, hard: bool = False) -> Probe:
-    """Probe a candidate from all its start values; the best step counts, possible estimates before impossible ones.
-
-    A backlash that is read off the motion has one start, with the contacts that suit it or ``hard`` ones.
-    """
-    if is_read_off(base.model, data, candidate):
-        base = replace(base, model=near_prior(base.model, data.nominal, base.free))
-        start = read_off(base.model, base.free, data, candidate, hard=hard)
-        return _probe_start(base, data, start, still=True)
+def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe:
+    """Probe a candidate from all its start values; the best step counts, possible estimates before impossible ones."""
     if (found := _searched(base, data, candidate)) is not None:
         return found
     # Of starts without any gain one that resembles known parameters tells why, not a place without influence.
@@ -175,18 +168,27 @@ def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate, *,
 
 
 def _searched(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe | None:
-    """Probe of a joint compliance at its best start value; None where none lowers the residual."""
-    if not is_searched(base.model, data, candidate):
+    """Probe at the start that leaves least along the motion, where efforts follow at once; None if none helps."""
+    measured = candidate.site in data.motions[0].joints
+    if not candidate.fine or not measured or not answers_at_once(base.model):
         return None
-    start = best_start(base.model, base.left, data, candidate)
-    found = None if start is None else _probe_start(base, data, candidate, start, still=True)
-    return found if found is not None and found.free and found.drop > 0.0 else None
+
+    def left(start: Mapping[str, float]) -> float:
+        model = base.model.with_effect(candidate.effect.name, at=candidate.site, **start)
+        try:
+            rest = base.left(data.evaluate(model, model.theta)[0])
+        except DivergedError:
+            return math.inf
+        power = float(rest @ rest)
+        return power if math.isfinite(power) else math.inf
+
+    found = _probe_start(base, data, candidate, min(candidate.fine, key=left), still=True)
+    return found if found.free and found.drop > 0.0 else None
 
 
 def screening_effort(candidate: Candidate) -> float:
-    """Time estimate of a `probe`, in starts that do nothing: a backlash is searched by its flights."""
-    searched = 50.0 if candidate.effect.has_play else 0.0
-    return searched + len(candidate.starts) * (1.0 if candidate.neutral else 2.0)
+    """Time estimate of a `probe`, in starts that do nothing."""
+    return len(candidate.fine) + len(candidate.starts) * (1.0 if candidate.neutral else 2.0)
 
 
 def refit_effort(probe: Probe) -> float:

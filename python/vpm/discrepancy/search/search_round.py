@@ -12,23 +12,19 @@ import numpy as np
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confirm, finished, gain_at
 from vpm.discrepancy.confirmation.delay_in_motion import in_motion, is_late
-from vpm.discrepancy.confirmation.low_frequency import low_frequency
 from vpm.discrepancy.confirmation.refusal import (
     CLEAR_GAIN,
     Thresholds,
     explains_most,
-    low_frequency_shows_it,
     refuse_probe,
     refuse_timing,
     refuse_trial,
-    worse_in_simulation,
 )
 from vpm.discrepancy.diagnosis import RankedCandidate
 from vpm.discrepancy.noise.noise_floor import NOISE_ONLY, noise_alone, only_ringing
 from vpm.discrepancy.noise.residual_structure import structure
 from vpm.discrepancy.noise.sample_timing import InTime, in_time
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
-from vpm.discrepancy.screening.backlash_start import is_read_off, only_compliant
 from vpm.discrepancy.screening.candidates import Candidate, Key, candidates, joint_at, left_out
 from vpm.discrepancy.screening.probe import (
     SHORT_LIST,
@@ -85,11 +81,6 @@ class Round:
     def light(self, without: set[Key]) -> Accepted | None:
         """Best candidate of the round among those whose regressor needs the measured motion alone."""
         self.screen(without, heavy=False)
-        if self._promising and self._promising[0].candidate.effect.has_play:
-            # What is compliant passes for backlash, and has to compete with it.
-            light = self._promising
-            self.screen(without, heavy=True)
-            self._promising = sorted((*light, *self._promising), key=lambda p: -p.score)
         self.confirm()
         return self.best()
 
@@ -185,12 +176,10 @@ class Round:
         """Whether a candidate of the round adds an unmeasured motion, simulated for every probe.
 
         Where the log holds that motion, it is evidence like any. The same holds for bending of a rigid beam beside
-        flexible ones, and for a backlash between rigid links. Light effects would only imitate them.
+        flexible ones. Light effects would only imitate them.
         """
         model, motion = self.current.model, candidate.effect.motion
         if bends(model) and motion == "bending" and candidate.site in model.beams:
-            return False
-        if is_read_off(model, self.data.training, candidate):
             return False
         logged = {f"{candidate.site}_{suffix}.position" for suffix in ("bending", "deflection")}
         return bool(motion) and not logged & set(self.data.training.shown)
@@ -239,7 +228,7 @@ class Round:
         """Trials of some candidates of the round side by side; ``rival`` is the residual of another, see `confirm`."""
         thresholds = self.thresholds()
         what = f"round {self.number}: refitting"
-        confirmed = partial(self._confirmed, rival=rival)
+        confirmed = partial(confirm, self.current, self.data, rival=rival)
         trials = self.each(what, confirmed, short_list, lambda p: p.candidate.label, refit_effort)
         for tried_one, trial in zip(short_list, trials, strict=True):
             key = tried_one.candidate.key
@@ -253,18 +242,6 @@ class Round:
             else:
                 self._supported.append(trial)
 
-    def _confirmed(self, one: Probe, rival: float) -> Trial:
-        """Trial of the round; a backlash with soft contacts that cannot simulate gets hard ones if they are better.
-
-        The residual hardly tells how hard the contacts are, for errors of the flights add up between lively ones.
-        """
-        trial = confirm(self.current, self.data, one, rival)
-        if not is_read_off(self.current.model, self.data.training, one.candidate) or not worse_in_simulation(trial):
-            return trial
-        other = probe(self.current.baseline, self.data.training, one.candidate, hard=True)
-        harder = confirm(self.current, self.data, other)
-        return trial if worse_in_simulation(harder) else harder
-
     def thresholds(self) -> Thresholds:
         """Thresholds of the round for an effect when so many have been tried."""
         return Thresholds(self.tried * self.number, min(m.dt for m in self.data.training.motions))
@@ -276,10 +253,7 @@ class Round:
 
     def _refused(self, trial: Trial, thresholds: Thresholds) -> str:
         """Reason why a trial of the round is refused, or ""."""
-        candidate = trial.probe.candidate
         reason = refuse_trial(trial, thresholds) or self._only_timing(trial, thresholds)
-        if not reason and is_read_off(self.current.model, self.data.training, candidate):
-            reason = only_compliant(trial.judged.model, candidate.site, self.data.training)
         return reason or only_ringing(self.current, self.data, trial)
 
     def _only_timing(self, trial: Trial, thresholds: Thresholds) -> str:
@@ -288,8 +262,6 @@ class Round:
             return ""
         shifted = in_time(trial.judged, self.data)
         before, validation = self.timed.validation, shifted.validation
-        if low_frequency_shows_it(trial, thresholds):
-            before, validation = (low_frequency(self.data.validation, each) for each in (before, validation))
         if is_late(trial.probe.candidate.effect, trial.judged.model):
             # Stiction looks like a delay, with a shift as without, so delays are judged in motion only.
             before, validation = (in_motion(self.data.validation) * each for each in (before, validation))
