@@ -36,7 +36,8 @@ from vpm.discrepancy.screening.candidates import asked_for
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search import Search, ambiguities
 from vpm.discrepancy.search.search_round import Request, Tell
-from vpm.discrepancy.verdict import FLOOR_FACTOR, is_negligible, only_where_closed, verdict
+from vpm.discrepancy.settings import FLOOR_FACTOR
+from vpm.discrepancy.verdict import is_negligible, only_where_closed, verdict
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records
 from vpm.experiment.signal import check_cutoff

@@ -5,7 +5,8 @@ import pytest
 
 import vpm
 from shared_cases import shared_case
-from vpm.discrepancy.confirmation.delay_in_motion import CREEPING, in_motion
+from vpm.discrepancy.confirmation.delay_in_motion import in_motion
+from vpm.discrepancy.settings import CREEPING
 from vpm.identify import InverseDynamicsProblem
 
 #: A lag, and the delays that it may be taken for.

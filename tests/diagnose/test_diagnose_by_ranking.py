@@ -233,8 +233,8 @@ def test_machines_that_a_ranking_does_not_cover_say_why() -> None:
 
 def test_a_refit_that_simulates_worse_is_not_kept(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
     monkeypatch.setattr(naming, "rank", lambda *_, **__: two())
-    never = replace(ranked_effects.SETTINGS, worse=-np.inf, sure=-np.inf)
-    monkeypatch.setattr(ranked_effects, "SETTINGS", never)
+    for limit in ("LEAST_GAIN", "NORMAL_95_ONE_SIDED"):
+        monkeypatch.setattr(ranked_effects, limit, -np.inf)
     why = diagnose(nominal(), records[0], records[1], names="ranking", workers=1)
     step = why.steps[1]
     assert step.values["axis.friction.coulomb"] == pytest.approx(8.8)

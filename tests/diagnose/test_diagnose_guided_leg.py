@@ -1,7 +1,5 @@
 """A hydraulic leg on a guide that has no drive: no inverse-dynamics residual shows what acts there."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -54,7 +52,7 @@ def test_a_ranking_covers_oil_where_a_joint_has_no_drive() -> None:
 
 def test_what_no_balance_sees_is_told_where_a_search_names(monkeypatch: pytest.MonkeyPatch) -> None:
     """A payload on the trunk loads the guide's joint alone; that nothing is said of it has to be said."""
-    monkeypatch.setattr(ranked_effects, "SETTINGS", replace(ranked_effects.SETTINGS, joints=2))
+    monkeypatch.setattr(ranked_effects, "RANKED_JOINTS", 2)
     *train, test = logged(leg().with_effect("payload", at="carriage", mass=0.8))
     why = vpm.diagnose(leg(), train, test, effects=["bias_force"])
     assert any(note.startswith("the joint slider has no drive") for note in why.notes)

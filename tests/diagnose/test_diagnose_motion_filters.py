@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from synthetic import Truth, nominal, simulate_axis
-from vpm.discrepancy.preparation import QUICKER, filters, quickest
+from vpm.discrepancy.preparation import filters, quickest
+from vpm.discrepancy.settings import QUICKER
 from vpm.experiment import Experiment, choose_cutoff, motion
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model

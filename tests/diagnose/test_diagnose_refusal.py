@@ -14,7 +14,6 @@ from vpm.catalogue import EFFECTS
 from vpm.demo import MODEL
 from vpm.discrepancy.confirmation.confirmation import Trial
 from vpm.discrepancy.confirmation.refusal import (
-    NEGLIGIBLE,
     Thresholds,
     refuse_probe,
     refuse_timing,
@@ -23,6 +22,7 @@ from vpm.discrepancy.confirmation.refusal import (
 )
 from vpm.discrepancy.screening.candidates import Candidate
 from vpm.discrepancy.screening.probe import Probe
+from vpm.discrepancy.settings import NEGLIGIBLE
 from vpm.identify import Gain
 from vpm.model import Model
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 import vpm
-from vpm.discrepancy.confirmation.refusal import LEAST_SCREENED, refuse_probe
+from vpm.discrepancy.confirmation.refusal import refuse_probe
 from vpm.discrepancy.screening.candidates import candidates
 from vpm.discrepancy.screening.probe import Baseline, probe
+from vpm.discrepancy.settings import NEGLIGIBLE
 from vpm.identify import InverseDynamicsProblem, estimate
 from vpm.numbers import Array
 
@@ -119,5 +120,5 @@ def test_what_shows_at_a_joint_is_tried_though_another_one_hides_it() -> None:
     fitted = model.with_parameters(dict(zip(fit.names, map(float, fit.values), strict=True)))
     base = Baseline(fitted, free, fit.residual, fit.jacobian)
     found = {one.site: probe(base, data, one) for one in candidates(fitted, data, fit.residual, ["spring"])}
-    assert found["A3"].drop < LEAST_SCREENED
+    assert found["A3"].drop < NEGLIGIBLE
     assert [site for site, one in found.items() if not refuse_probe(one)] == ["A3"]

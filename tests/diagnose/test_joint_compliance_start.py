@@ -6,10 +6,10 @@ import pytest
 
 import vpm
 from shared_cases import shared_case
-from vpm.discrepancy.confirmation.refusal import LEAST_SCREENED
 from vpm.discrepancy.screening.candidates import candidates
 from vpm.discrepancy.screening.compliance_and_stop_start import moved
 from vpm.discrepancy.screening.probe import Baseline, probe
+from vpm.discrepancy.settings import NEGLIGIBLE
 from vpm.identify import InverseDynamicsProblem, estimate
 
 PAIR = ("joint_compliance", "viscous_friction")
@@ -40,7 +40,7 @@ def test_a_start_is_as_near_as_springs_that_are_tried_and_none_where_nothing_win
         (spring,) = candidates(fitted, data, fit.residual, ["joint_compliance"])
         found = probe(Baseline(fitted, fit.names, fit.residual, fit.jacobian), data, spring)
         if len(hidden) == 1:
-            assert found.drop < LEAST_SCREENED
+            assert found.drop < NEGLIGIBLE
         else:
             true = math.sqrt(case.truth.hidden[0].parameters["stiffness"] / moved(fitted, "axis"))
             start = found.model.parameters["axis.compliance.stiffness"].value

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS, signature_of
+from vpm.discrepancy.settings import CLEARLY, LAW_SAMPLES, PICTURE_BINS
 from vpm.errors import VpmError
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.response_along_motion import Response, respond
@@ -22,15 +23,9 @@ from vpm.model import Model
 from vpm.numbers import Array
 from vpm.results import Storable
 
-#: Samples that the curve of a law keeps.
-LAW_SAMPLES = 3000
 #: Axis, words, unit and values at each sample.
 ExcitationRange = tuple[str, str, str, Array]
 
-#: Bins over a state in which the part of an effect is measured that the state explains.
-BINS = 40
-#: A later axis of a signature is taken only if it explains so much more than an earlier one.
-CLEARLY = 0.05
 
 _STATE = {"position": (0, ""), "velocity": (1, "/s"), "acceleration": (2, "/s²")}
 
@@ -266,7 +261,7 @@ def explained(values: Array, part: Array) -> float:
     total = float(np.var(part))
     if total <= 1e-3 * float(np.mean(part)) ** 2 or float(np.ptp(values)) <= 0.0:
         return 0.0
-    place = np.digitize(values, np.linspace(values.min(), values.max(), BINS + 1)[1:-1])
-    count = np.bincount(place, minlength=BINS)
-    means = np.bincount(place, part, BINS) / np.maximum(count, 1)
+    place = np.digitize(values, np.linspace(values.min(), values.max(), PICTURE_BINS + 1)[1:-1])
+    count = np.bincount(place, minlength=PICTURE_BINS)
+    means = np.bincount(place, part, PICTURE_BINS) / np.maximum(count, 1)
     return float(np.average((means - part.mean()) ** 2, weights=count) / total)

@@ -17,6 +17,7 @@ from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyho
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.prior_departure import moved_far
 from vpm.discrepancy.screening.candidates import shares_at, slow_speeds
+from vpm.discrepancy.settings import HELD_OUT, QUICKER, REACH
 from vpm.discrepancy.stuck_channels import check_moving, check_stuck
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, Motion, choose_cutoff, joints_from_sensors
@@ -30,15 +31,8 @@ from vpm.identify.sample_mask import STANDSTILL_SHARE
 from vpm.model import Model
 from vpm.simulate import Setup
 
-#: Share of each record that is kept out of the fit when no validation record is given.
-HELD_OUT = 0.3
-#: Stated uncertainties, on a logarithmic scale, that a recalibration may move what the model is not linear in.
-REACH = 4.0
-
 #: Records to fit, records to judge on, and notes on both.
 Records = tuple[tuple[Experiment, ...], tuple[Experiment, ...], list[str]]
-#: The motion is filtered at most so many times as high as the least error of its acceleration asks for.
-QUICKER = 4.0
 
 
 def records_of(model: Model, experiments: Sequence[Experiment], validate: Sequence[Experiment]) -> Records:

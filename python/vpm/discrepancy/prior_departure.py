@@ -10,13 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Judged
+from vpm.discrepancy.settings import FAR
 from vpm.identify.moments import on_the_border
 from vpm.model import Model, Parameter
 from vpm.numbers import NORMAL_95, short
-
-#: Parameters that move by more of their stated uncertainties than this are reported, and no effect is accepted that
-#: drives one so far.
-FAR = 3.0
 
 
 def moved_far(model: Model, recalibrated: Judged) -> list[str]:

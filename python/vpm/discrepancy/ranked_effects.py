@@ -16,13 +16,13 @@ from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, judged_anyhow, measured, unmoved
-from vpm.discrepancy.confirmation.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED
 from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RankedCandidate, RefusedEffect
 from vpm.discrepancy.rivals.ambiguity import Rivals
 from vpm.discrepancy.screening.candidates import Candidate, Key, asked_for, candidates
 from vpm.discrepancy.screening.probe import Probe, sort_columns
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search import Search, Stage
+from vpm.discrepancy.settings import LEAST_GAIN, NORMAL_95_ONE_SIDED, RANKED_JOINTS
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import gain, segments
@@ -39,19 +39,6 @@ if TYPE_CHECKING:
 BEHIND = ".link."
 
 
-@dataclass(frozen=True, kw_only=True)
-class Settings:
-    """Settings by which a diagnosis takes names from a ranking and refits them."""
-
-    joints: int = 3  #: Most joints of a machine that a ranking covers, beside those that effects split off.
-    #: Share of the mean square of a simulation that a refit may add to that of the values of the ranking.
-    worse: float = LEAST_GAIN
-    sure: float = NORMAL_95_ONE_SIDED  #: Standard deviations by which it has to be worse to count as worse.
-
-
-SETTINGS = Settings()
-
-
 def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
     """Why names do not come from a ranking, or "": it covers up to three joints, rigid links, and drives without oil.
 
@@ -65,8 +52,8 @@ def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
     if oil and not free_joints(model):
         return f"the actuator {oil[0]} has type hydraulic"
     own = set(model.joints) - set(model.added_joints)
-    if len(own) > SETTINGS.joints:
-        return f"there are {len(own)} joints, more than {SETTINGS.joints}"
+    if len(own) > RANKED_JOINTS:
+        return f"there are {len(own)} joints, more than {RANKED_JOINTS}"
     bent = [f"{body}_bending.position" for body in model.bodies]
     held = [channel for channel in bent if any(channel in record for record in experiments)]
     return f"records hold {held[0]}" if held else ""
@@ -233,7 +220,7 @@ def _refitted(
         return still, stopped
     if data.simulation is not None and judged.simulated is not None and still.simulated is not None:
         gained = gain(still.simulated, judged.simulated, segments(data.simulation))
-        if gained.relative < -SETTINGS.worse and gained.harm > SETTINGS.sure:
+        if gained.relative < -LEAST_GAIN and gained.harm > NORMAL_95_ONE_SIDED:
             return still, stopped
     return judged, diverged
 

@@ -7,16 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from vpm.discrepancy.settings import ROUNDING, STEPS
 from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.observer import measured_outputs
 from vpm.simulate import judging_mode, simulate
-
-#: Change of a reading that is rounding, in steps from one number of its size to the next.
-ROUNDING = 8.0
-#: Steps in which the coarsest converters in use divide a range, those of 8 bits.
-STEPS = 256
 
 
 def is_moving(record: Experiment, channel: str) -> bool:

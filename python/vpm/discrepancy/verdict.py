@@ -9,7 +9,6 @@ import numpy as np
 from scipy.special import ndtri
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
-from vpm.discrepancy.confirmation.refusal import FALSE_ALARM_LEVEL, LEAST_GAIN, MOST_OF_IT, NEGLIGIBLE
 from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RefusedEffect
 from vpm.discrepancy.noise.residual_structure import Structure
 from vpm.discrepancy.prior_departure import driven_away
@@ -17,6 +16,7 @@ from vpm.discrepancy.remainder.remainder import Remainder
 from vpm.discrepancy.screening.candidates import joint_at
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search import Search, Stage
+from vpm.discrepancy.settings import CLEAR_GAIN, FALSE_ALARM_LEVEL, FLOOR_FACTOR, LEAST_GAIN, MOSTLY_OPEN, NEGLIGIBLE
 from vpm.errors import VpmError
 from vpm.identify import gain, segments
 from vpm.model import Model
@@ -26,12 +26,8 @@ from vpm.numbers import percent, short
 _REST = " A structured residual above the noise remains."
 #: The same where effects explain what is missing at other joints.
 _OPEN = " What is left at {joints} is structured, and no effect of the catalogue explains it."
-#: A residual within this factor of the noise floor has nothing left to explain, unless it repeats.
-FLOOR_FACTOR = 1.3
 #: Smallest signal that divides: of a motor that is off there is none.
 TINY = 1e-300
-#: Where so much of what could be explained remains, what was found is not the explanation.
-MOSTLY_OPEN = 0.15
 
 
 def main_gaps(gap: Mapping[str, ChannelGap]) -> list[ChannelGap]:
@@ -171,7 +167,7 @@ def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], tracked: float) ->
     if tracked <= MOSTLY_OPEN and any(effect.type.has_play for effect in found.final.model.effects):
         return False
     efforts = [gap[channel] for joint in _joints(found) if (channel := f"{joint}.effort") in gap]
-    most = any(g.after**2 > MOST_OF_IT * g.signal**2 for g in efforts)
+    most = any(g.after**2 > CLEAR_GAIN * g.signal**2 for g in efforts)
     # A model without any force would leave less.
     return most or any(g.recalibrated < g.signal < g.after for g in main_gaps(gap))
 

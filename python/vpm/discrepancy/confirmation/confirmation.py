@@ -11,6 +11,7 @@ from vpm.discrepancy.confirmation.delay_in_motion import is_late, timed_in_motio
 from vpm.discrepancy.screening.candidates import acts_on
 from vpm.discrepancy.screening.compliance_and_stop_start import ends_apart
 from vpm.discrepancy.screening.probe import ROUNDED, Alias, Baseline, Probe, size_is_clear
+from vpm.discrepancy.settings import FAR_AWAY, FEW_EVALUATIONS, HOPELESS, SLOW_EVALUATIONS, SLOW_GAIN, TOLERANCE
 from vpm.errors import DivergedError
 from vpm.identify import (
     Estimate,
@@ -25,25 +26,12 @@ from vpm.identify import (
     segments,
 )
 from vpm.identify.estimation import MOST_EVALUATIONS, standing
-from vpm.identify.identifiability import COPY_SHARE, Span, closest_column, is_alias
+from vpm.identify.identifiability import Span, closest_column, is_alias
 from vpm.identify.parts import moves_drives
 from vpm.identify.response_along_motion import bends, has_hidden, has_own_drives
 from vpm.identify.tangent import Tangent, drives_on_tangent, estimate_on_tangent, has_tangent
 from vpm.model import Model
 from vpm.numbers import Array
-
-#: A refit stops when the sum of squares changes by less than this share: far below what a verdict rests on.
-TOLERANCE = 1e-6
-#: So many ranges of what the data reach, a place is nowhere.
-FAR_AWAY = 1e3
-#: Evaluations for a spring more where links bend already: each is a simulation with a dozen derivatives, and one that
-#: is there gains most in the first.
-FEW_EVALUATIONS = 6
-#: A refit that has lowered the training error by less than this share of its mean square in so many evaluations, and
-#: hardly goes on, ends early: validation data have to show ten times as much.
-SLOW_GAIN, SLOW_EVALUATIONS = 0.01, 10
-#: Of two candidates, one that leaves so many times what the other leaves is not the one that comes in.
-HOPELESS = 10.0
 
 
 @dataclass(frozen=True)
@@ -193,15 +181,10 @@ def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) ->
     cost = float(current.fit.residual @ current.fit.residual)
     worth = Worth(min((1.0 - SLOW_GAIN) * cost, HOPELESS * rival), SLOW_EVALUATIONS)
     judged, diverged = judged_anyhow(start, free, data, bounds, origin, worth)
-    doubtful = probe.held
-    if seen := _visible_now(judged, data, probe):
-        free, doubtful = (*free, *seen), tuple(alias for alias in doubtful if alias.parameter not in seen)
-        origin = None if origin is None else judged.model.theta
-        judged, diverged = judged_anyhow(judged.model, free, data, bounds, origin, worth)
     own = free[len(current.free) :]
     if (timed := _timed(current, judged, data, probe)) is not None:
         judged, diverged = judged_anyhow(judged.model, free, data, {**bounds, **timed}, origin)
-    return measured(current, data, probe, judged, own, (*doubtful, *held), diverged)
+    return measured(current, data, probe, judged, own, (*probe.held, *held), diverged)
 
 
 def finished(current: Judged, data: Data, trial: Trial) -> Trial:
@@ -253,29 +236,6 @@ def judged_anyhow(
         return judge(start, free, data, bounds, origin, worth), ""
     except DivergedError as error:
         return judge(start, free, replace(data, simulation=None), bounds, origin, worth), str(error)
-
-
-def _visible_now(judged: Judged, data: Data, probe: Probe) -> tuple[str, ...]:
-    """Held parameters of a confirmation trial that became identifiable during the refit.
-
-    A stiffness looks like the inertia behind it as long as neither is near its value. A doubtful parameter of an effect
-    that does nothing at its start may stay there. Any other start is a guess, so it moves if the data show it at all.
-    """
-    names = [alias.parameter for alias in probe.held]
-    if not names:
-        return ()
-    model = judged.model
-    _, columns = data.training.evaluate(model, model.theta, [model.index(name) for name in names])
-    known, seen = Span.of(judged.fit.jacobian), []
-    for name, column in zip(names, columns.T, strict=True):
-        if probe.candidate.neutral:
-            alike = is_alias(column, known, judged.fit.residual)
-        else:
-            alike = known.share(column) > COPY_SHARE
-        if np.any(column) and not alike:
-            seen.append(name)
-            known = known.beside(column[:, None])
-    return tuple(seen)
 
 
 def _still(data: InverseDynamicsProblem, probe: Probe) -> frozenset[str]:

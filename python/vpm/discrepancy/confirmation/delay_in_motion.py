@@ -14,21 +14,11 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 from vpm.catalogue import EffectType
+from vpm.discrepancy.settings import CREEPING, SAMPLES_EACH, TOLERANCE, VISIBLE
 from vpm.identify import InverseDynamicsProblem, estimate
 from vpm.identify.identifiability import column_lengths
 from vpm.model import Model
-from vpm.numbers import Array
-
-#: Share of its largest speed below which a joint may stick.
-CREEPING = 0.05
-#: Samples in clear motion that a fit needs, for each fitted number.
-FEWEST = 10
-#: A parameter that shows less of itself in motion than this share of its regressor's power stays as it is.
-SHOWN = 0.1
-#: Standard deviations around a time fitted in motion within which it stays when all samples are fitted.
-WITHIN = 2.0
-#: A fit stops when the sum of squares changes by less than this share.
-TOLERANCE = 1e-6
+from vpm.numbers import NORMAL_95, Array
 
 
 class InMotion:
@@ -84,7 +74,7 @@ def timed_in_motion(
     """
     fitted = InMotion(training)
     own = [name for name in free if name not in known]
-    if np.count_nonzero(fitted.counted) < FEWEST * (len(free) + 1):
+    if np.count_nonzero(fitted.counted) < SAMPLES_EACH * (len(free) + 1):
         return None
     shown = _shown(model, free, fitted, own)
     fit = estimate(model, fitted, shown, bounds=bounds, tolerance=TOLERANCE)
@@ -99,7 +89,7 @@ def _near(
 ) -> tuple[float, float]:
     parameter = model.parameters[name]
     low, high = bounds.get(name, (parameter.minimum, parameter.maximum))
-    return max(low, value - WITHIN * std), min(high, value + WITHIN * std)
+    return max(low, value - NORMAL_95 * std), min(high, value + NORMAL_95 * std)
 
 
 def _shown(model: Model, free: Sequence[str], problem: InMotion, own: Sequence[str]) -> list[str]:
@@ -107,4 +97,4 @@ def _shown(model: Model, free: Sequence[str], problem: InMotion, own: Sequence[s
     columns = [model.index(name) for name in free]
     _, whole = problem.data.evaluate(model, model.theta, columns)
     shares = np.sum((problem.counted[:, None] * whole) ** 2, axis=0) / column_lengths(whole) ** 2
-    return [name for name, share in zip(free, shares, strict=True) if name in own or share >= SHOWN]
+    return [name for name, share in zip(free, shares, strict=True) if name in own or share >= VISIBLE]

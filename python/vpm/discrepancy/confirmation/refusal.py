@@ -9,38 +9,21 @@ from scipy.special import stdtrit
 from vpm.discrepancy.confirmation.confirmation import Trial
 from vpm.discrepancy.screening.compliance_and_stop_start import coupled
 from vpm.discrepancy.screening.probe import Probe, impossible_values
+from vpm.discrepancy.settings import (
+    CLEAR_GAIN,
+    FALSE_ALARM_LEVEL,
+    LEAST_GAIN,
+    MAGNIFIED,
+    MODEST_FACTOR,
+    MODEST_GAIN,
+    NEGLIGIBLE,
+    NORMAL_95_ONE_SIDED,
+    SAMPLED,
+    WORTH_A_NAME,
+)
 from vpm.identify import Gain
 from vpm.model import Model
 from vpm.numbers import NORMAL_95, percent, short
-
-#: Probability of accepting any effect by chance, shared among all candidates that are tried.
-FALSE_ALARM_LEVEL = 0.01
-#: Drop of the validation mean square below which an effect is not worth its name.
-LEAST_GAIN = 0.02
-#: The same for an effect that is to be accepted: what sticks and creeps leaves more than that to imitate.
-WORTH_A_NAME = 0.1
-#: Below this drop most of the residual is something else, which the effect might merely imitate: the evidence then has
-#: to be this many times as strong.
-MODEST_GAIN, MODEST_FACTOR = 0.3, 3.0
-#: From this drop on, the inverse-dynamics residual decides alone on a machine of several joints. With two effects
-#: missing, adding one may worsen the simulation, because errors of coupled joints had cancelled.
-CLEAR_GAIN = 0.5
-#: A delay or lag that the times of samples leave open is named from this drop on: it matters whether the delay is that
-#: of the drive or of the record. Below it, sampling explains it as well.
-MOST_OF_IT = 0.5
-#: Neither a residual nor an error of an instrument's gain means anything below this share of the signal: links are
-#: cut into pieces and gauges calibrated to no better.
-NEGLIGIBLE = 0.005
-#: An error of an instrument shows so many times as large in the residual that it is more than an error of the model
-#: there.
-MAGNIFIED = 4.0
-#: One-sided 95 % quantile of the normal distribution: a simulation that is worse by less is worse by chance.
-NORMAL_95_ONE_SIDED = 1.6448536269514722
-#: Samples that what builds up over a way has to last, to be seen to build up.
-SAMPLED = 2.0
-#: Drop of the training mean square below which a candidate is not refitted at all, unless it promises to be worth its
-#: name at its own joint: errors of one joint say nothing of another one.
-LEAST_SCREENED = 0.005
 
 
 @dataclass(frozen=True)
@@ -75,7 +58,7 @@ def refuse_probe(probe: Probe) -> str:
         return "it has no influence on these data"
     if probe.drop < 0.0:
         return "it would make the training error larger wherever it was tried"
-    if probe.drop < LEAST_SCREENED and probe.here < WORTH_A_NAME:
+    if probe.drop < NEGLIGIBLE and probe.here < WORTH_A_NAME:
         return f"it would lower the training error by only {percent(probe.drop)} of its mean square"
     outside = impossible_values(probe)
     if outside:
@@ -120,7 +103,7 @@ def explains_most(trial: Trial) -> bool:
     """
     candidate = trial.probe.candidate
     late = bool(candidate.effect.late) and not has_peers(trial.judged.model, candidate.site)
-    return late and trial.validation.relative >= MOST_OF_IT
+    return late and trial.validation.relative >= CLEAR_GAIN
 
 
 def refuse_timing(timed: Gain, shift: float, thresholds: Thresholds, *, beside: float) -> str:

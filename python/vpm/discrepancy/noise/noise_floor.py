@@ -12,7 +12,8 @@ import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial
 from vpm.discrepancy.confirmation.refusal import refuse_ringing
-from vpm.discrepancy.noise.noise_spectrum import TIMES, noise_shapes, noise_spectrum, with_noise
+from vpm.discrepancy.noise.noise_spectrum import noise_shapes, noise_spectrum, with_noise
+from vpm.discrepancy.settings import DRAWS, ENOUGH, FLOOR_FACTOR, QUIET_SHARE, SEED
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.experiment.signal import RETAINED_BAND
@@ -21,15 +22,6 @@ from vpm.identify.response_along_motion import bends
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.simulate import Setup, simulate_arrays
-
-#: Seed of the noise that is carried through; any would do.
-SEED = 20160331
-#: So many numbers of noise tell its root mean square to a twentieth: of fewer there are more draws.
-ENOUGH = 200
-#: Share of the frequencies of a residual that hold no more than noise, for the estimate of what is white in it.
-QUIET_SHARE = 0.4
-#: Ratio of a residual to the noise in it up to which it is noise alone.
-NOISE_ONLY = 1.2
 
 
 def noise_floor(
@@ -63,7 +55,7 @@ def noise_floor(
             left[_rows(quiet, record)] = 0.0
     found: dict[str, list[float]] = {}
     counted = max(1.0, min(float(block.moving.sum()) for block in quiet.blocks))
-    for _ in range(int(np.clip(ENOUGH / counted, 1, TIMES))):
+    for _ in range(int(np.clip(ENOUGH / counted, 1, DRAWS))):
         pairs = zip(quiet.experiments, logs, strict=True)
         noisy = quiet.on([with_noise(model, one, log, generator) for one, log in pairs])
         for channel, (rms, _, _) in gaps(quiet, noisy.evaluate(model, model.theta)[0] - left).items():
@@ -140,7 +132,7 @@ def noise_alone(model: Model, data: Data, validation: Array) -> bool:
     if not bends(model) or data.simulation is None:
         return False
     allowed = _ringing(model, data)
-    return all(gap <= NOISE_ONLY * allowed[name] for name, (gap, _, _) in gaps(data.validation, validation).items())
+    return all(gap <= FLOOR_FACTOR * allowed[name] for name, (gap, _, _) in gaps(data.validation, validation).items())
 
 
 def only_ringing(current: Judged, data: Data, trial: Trial) -> str:

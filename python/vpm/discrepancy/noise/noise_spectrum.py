@@ -13,6 +13,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from vpm.discrepancy.settings import COMMAND_NOISE, DRAWS, NEAR, SEED, SMOOTHED
 from vpm.experiment import Experiment, Motion, drawn_noise
 from vpm.experiment.signal import RETAINED_BAND as _BAND
 from vpm.identify import InverseDynamicsProblem
@@ -22,12 +23,6 @@ from vpm.identify.response_along_motion import has_own_drives, respond
 from vpm.model import Model
 from vpm.numbers import Array
 
-#: Seed and number of the noises that are sent through the drives; size of each, as a share of the commands.
-SEED, TIMES, SHARE = 20160331, 6, 0.01
-#: Neighbouring frequencies over which a spectrum of noise is smoothed, as a share of the band.
-SMOOTHED = 0.08
-#: Share by which parameters of drives may differ for the same colours: these are smoothed over as much.
-NEAR = 0.05
 #: Colours worked out last for each problem, with their model: one round of a search asks for those of the last one.
 _KNOWN: WeakKeyDictionary[InverseDynamicsProblem, tuple[Model, tuple[Array | None, ...]]] = WeakKeyDictionary()
 _LOCK = Lock()
@@ -100,15 +95,15 @@ def _of_record(
     m = problem.motions[record]
     whole = replace(m, edge=0)
     clean = _shown(model, problem, record, whole)
-    sizes = SHARE * np.sqrt(np.mean(m.inputs**2, axis=0))
+    sizes = COMMAND_NOISE * np.sqrt(np.mean(m.inputs**2, axis=0))
     drives = np.zeros_like(_powers(clean))
     first = record * (len(problem.joints) + len(problem.shown)) + len(problem.joints)
     blocks = problem.blocks[first : first + len(problem.shown)]
     counted = np.column_stack([block.moving for block in blocks])
-    for _ in range(TIMES):
+    for _ in range(DRAWS):
         noisy = whole.inputs + sizes * generator.standard_normal(whole.inputs.shape)
         change = _shown(model, problem, record, replace(whole, inputs=noisy)) - clean
-        drives += _powers(change * counted) / TIMES
+        drives += _powers(change * counted) / DRAWS
     own = _of_instruments(model, problem, record, generator)
     shapes: list[Array | None] = [None] * len(problem.joints)
     for column, block in enumerate(blocks):

@@ -8,20 +8,10 @@ import numpy as np
 
 from vpm.discrepancy.noise.noise_floor import white_level
 from vpm.discrepancy.noise.noise_spectrum import noise_shapes
+from vpm.discrepancy.settings import ABOVE_WHITE, DRIFTING, GROWING, NEW, THINNED
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.model import Model
 from vpm.numbers import Array
-
-#: One sample in so many is taken for independent of the others.
-THINNED = 2
-#: A residual of so many times its white part is not white.
-ABOVE_WHITE = 1.6
-#: Strains and other signs of hidden motion integrate noise, which raises them above their white part about so much.
-DRIFTING = 1.5
-#: Validation records with so many times the relative error of the training records hold something new.
-NEW = 4.0
-#: From so many standard deviations of the rank correlation between the two on, its size grows with that of the effort.
-GROWING = 4.0
 
 
 @dataclass(frozen=True)

@@ -11,12 +11,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
+from vpm.discrepancy.settings import LEAST_GAIN
 from vpm.identify import gain, segments
 from vpm.identify.identifiability import least_step
 from vpm.numbers import Array
-
-#: A shift matters if it takes so much of the mean square of the residual, on training and on validation records.
-MATTERS = 0.02
 
 
 @dataclass(frozen=True)
@@ -44,12 +42,12 @@ def in_time(judged: Judged, data: Data) -> InTime:
         return predict
     shift = float(np.clip(-(rest @ own) / power, -1.0, 1.0))
     fitted = own + shift * rest
-    if gain(own, fitted, segments(data.training)).relative < MATTERS:
+    if gain(own, fitted, segments(data.training)).relative < LEAST_GAIN:
         return predict
     columns = [model.index(name) for name in judged.free]
     own_validation, slopes = data.validation.evaluate(model, model.theta, columns)
     later_validation, _ = data.validation.later().evaluate(model, model.theta)
     validation = own_validation + shift * (later_validation - own_validation + slopes @ step)
-    if gain(own_validation, validation, segments(data.validation)).relative < MATTERS:
+    if gain(own_validation, validation, segments(data.validation)).relative < LEAST_GAIN:
         return predict
     return InTime(fitted, validation, shift)

@@ -13,18 +13,9 @@ from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyho
 from vpm.discrepancy.diagnosis import Empirical, EmpiricalTerm
 from vpm.discrepancy.remainder.sparse_formula import Formula, select
 from vpm.discrepancy.remainder.state_dependence import Rhythm, Shares, busiest_joint, rhythm, shares
+from vpm.discrepancy.settings import MOST_NAMED, PERIOD_RANGE, WORTH_A_NAME
 from vpm.identify import Gain, gain, segments
 from vpm.model import Model
-
-#: Share of the validation mean square that a formula has to take away to be put into the model.
-LEAST_GAIN = 0.1
-#: Time has to predict this much more of the residual than any state of the machine before it is named in its place.
-TIME_AHEAD = 0.1
-#: Least share of the residual that a state has to predict to be named, and most states that are.
-NAMED = 0.1
-MOST_NAMED = 4
-#: A period may move by this factor when the formula is fitted.
-PERIOD_RANGE = 1.15
 
 
 @dataclass(frozen=True)
@@ -50,7 +41,7 @@ def describe(base: Judged, data: Data) -> Described:
     fitted = base if formula is None else _fit(formula, base, data)
     gained = gain(base.validation, fitted.validation, segments(data.validation))
     remark, share = _in_time(states.of, beat, gained.relative)
-    if remark or formula is None or gained.relative < LEAST_GAIN:
+    if remark or formula is None or gained.relative < WORTH_A_NAME:
         sentence = _say_without(channel, states, remark)
         left = gained.before
         empirical = Empirical(channel, states.of, remark, "", (), left, left, sentence, states.alike, share)
@@ -87,7 +78,7 @@ def beside(base: Judged, described: Described, data: Data) -> tuple[Empirical, J
     fitted, _ = judged_anyhow(start, own, data, {})
     better = gain(base.validation, fitted.validation, segments(data.validation))
     states = Shares(told.states, told.alike)
-    if better.relative < LEAST_GAIN:
+    if better.relative < WORTH_A_NAME:
         sentence = _say_without(told.channel, states, "")
         return replace(told, formula="", terms=(), after=told.before, sentence=sentence, predicted=0.0), base
     fit = replace(
@@ -157,12 +148,12 @@ def _in_time(states: dict[str, float], beat: Rhythm | None, formula_share: float
     """Sentence on a rhythm in time of the residual and its share; empty if formula or state explain it as well."""
     time = max((share for name, share in states.items() if name.startswith("time")), default=0.0)
     machine = max((formula_share, *(share for name, share in states.items() if not name.startswith("time"))))
-    if beat is not None and beat.share > max(machine, time) + TIME_AHEAD:
+    if beat is not None and beat.share > max(machine, time) + WORTH_A_NAME:
         return (
             f"it repeats every {beat.period:.3g} s whatever the machine does ({100 * beat.share:.0f} % of it), so that "
             "something outside of the machine, or its controller, disturbs it"
         ), beat.share
-    if time > machine + TIME_AHEAD:
+    if time > machine + WORTH_A_NAME:
         return (
             f"it changes with the time in the record ({100 * time:.0f} % of it), not with the state of the machine: "
             "something drifts, as friction does while a machine warms up"
@@ -172,7 +163,7 @@ def _in_time(states: dict[str, float], beat: Rhythm | None, formula_share: float
 
 def _depends(states: Shares) -> str:
     """States for the empirical description: the best one, those not discriminated from it, and clearly worse ones."""
-    named = [name for name, share in states.of.items() if share >= NAMED][:MOST_NAMED]
+    named = [name for name, share in states.of.items() if share >= WORTH_A_NAME][:MOST_NAMED]
     if not named or not states.alike:
         return "no single state of the machine predicts it"
 

@@ -13,25 +13,15 @@ from functools import partial
 import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
-from vpm.discrepancy.confirmation.refusal import WORTH_A_NAME, Thresholds
+from vpm.discrepancy.confirmation.refusal import Thresholds
 from vpm.discrepancy.noise.sample_timing import in_time
 from vpm.discrepancy.remainder.empirical_formula import Described, describe
 from vpm.discrepancy.remainder.seal_friction import Seals, seals
+from vpm.discrepancy.settings import EFFORT_SHARE, WORTH_A_NAME
 from vpm.identify import InverseDynamicsProblem, gain, segments
 from vpm.identify.parallel import in_order
 from vpm.model import Model
 from vpm.numbers import Array
-
-#: A later description has to leave less than this share of what an earlier one leaves to be taken in its place.
-CLEARLY = 0.9
-#: Models that are described: that with the effects, and that without.
-DESCRIBED = 2
-#: Share of the power of the efforts that lies in the band.
-EFFORT_SHARE = 0.99
-#: Order of the low-pass, which passes forward and backward.
-FILTER_ORDER = 2
-#: Above this share of the highest frequency that the samples hold there is nothing to filter.
-WHOLE_BAND = 0.9
 
 
 @dataclass(frozen=True)
@@ -49,7 +39,7 @@ class Remainder:
     def best(self) -> Described:
         """Best description of the remainder, with fewer effects if that is hardly worse."""
         *first, last = self.choices
-        return first[0] if first and last.empirical.after >= CLEARLY * first[0].empirical.after else last
+        return first[0] if first and last.empirical.after >= (1.0 - WORTH_A_NAME) * first[0].empirical.after else last
 
 
 def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float, workers: int = 1) -> Remainder:
@@ -61,7 +51,7 @@ def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float, 
     """
     bases = [final] if recalibrated is final else [recalibrated, final]
     choices = tuple(in_order([partial(describe, base, data) for base in bases], workers))
-    view = _View(data, motion_band(data.training, final.model), Thresholds(DESCRIBED, interval))
+    view = _View(data, motion_band(data.training, final.model), Thresholds(len(bases), interval))
     left = view(final)
     clear = [view.clearly_better(choice, left) for choice in choices]
     pressed = None if recalibrated is final else view.pressed(recalibrated, left)
@@ -145,6 +135,6 @@ def below(problem: InverseDynamicsProblem, values: Array, frequency: float) -> A
     kept = values.copy()
     for block in problem.blocks:
         share = 2.0 * frequency * float(block.time[1] - block.time[0])
-        if 0.0 < share < WHOLE_BAND:
-            kept[block.samples] = sosfiltfilt(butter(FILTER_ORDER, share, output="sos"), values[block.samples])
+        if 0.0 < share < 0.9:
+            kept[block.samples] = sosfiltfilt(butter(2, share, output="sos"), values[block.samples])
     return kept

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
-from vpm.discrepancy.remainder.sparse_formula import TRANSITION_SHARES
 from vpm.discrepancy.screening.linear_step import linear_step
+from vpm.discrepancy.settings import TRANSITION_SHARES
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.drives import driven, first_drives
 from vpm.identify.response_along_motion import has_hidden

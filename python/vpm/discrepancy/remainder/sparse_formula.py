@@ -18,25 +18,12 @@ from vpm.catalogue import without_law
 from vpm.catalogue.empirical import TERMS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.screening.candidates import ripple_periods
+from vpm.discrepancy.settings import FOLDS, LONGEST_PERIOD, MOST_TERMS, PERIODS, TERM_GAIN, TRANSITION_SHARES
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.numbers import Array
 
-#: Parts of each training record; every one is predicted once from the others.
-FOLDS = 5
-#: Most terms of a formula; a cosine with its sine counts as one.
-MOST_TERMS = 5
-#: Share of the predicted mean square that a term has to take away.
-LEAST_GAIN = 0.03
-#: A term that is nearer than this to what is free already says nothing of its own (share of its length).
-LEAST_OWN = 0.03
-#: Transition velocity of dry terms as shares of the largest speed, where no friction of the model has one.
-TRANSITION_SHARES = (0.002, 0.01, 0.04)
 _HARMONIC = (("cosine", "sine"), ("dry_cosine", "dry_sine"), ("load_cosine", "load_sine"))
-#: Longest period that is looked for, in multiples of the whole travel.
-LONGEST = 1.5
-#: Periods that are proposed for each of the three ways in which a residual can repeat.
-PROPOSED = 2
 
 
 @dataclass(frozen=True)
@@ -87,7 +74,7 @@ def select(base: Judged, records: Data) -> Formula | None:
         if not tried:
             break
         lowest, atom = min(tried, key=lambda pair: pair[0])
-        if lowest > (1.0 - LEAST_GAIN * len(atom.terms) ** 0.5) * error:
+        if lowest > (1.0 - TERM_GAIN * len(atom.terms) ** 0.5) * error:
             break
         chosen, error = [*chosen, atom], lowest
         chosen, error = _without_needless(chosen, error, scorer)
@@ -110,7 +97,7 @@ def _without_needless(chosen: list[Atom], error: float, scorer: _Folds) -> tuple
     for atom in chosen[:-1]:
         rest = [a for a in chosen if a is not atom]
         without = scorer.error(rest)
-        if without < (1.0 + 0.5 * LEAST_GAIN) * error:
+        if without < (1.0 + 0.5 * TERM_GAIN) * error:
             chosen, error = rest, without
     return chosen, error
 
@@ -124,7 +111,7 @@ def _most_promising(base: Judged, chosen: Sequence[Atom], atoms: Sequence[Atom],
     for atom in atoms:
         own = atom.columns - basis @ (basis.T @ atom.columns)
         lengths = np.linalg.norm(atom.columns, axis=0)
-        if np.any(np.linalg.norm(own, axis=0) < LEAST_OWN * lengths) or not np.all(lengths > 0.0):
+        if np.any(np.linalg.norm(own, axis=0) < TERM_GAIN * lengths) or not np.all(lengths > 0.0):
             continue
         scores.append((float(np.sum((_basis(own).T @ rest) ** 2)) / len(atom.terms), atom))
     scores.sort(key=lambda pair: -pair[0])
@@ -231,5 +218,5 @@ def harmonic_periods(
     residual = np.concatenate([base.fit.residual[data.efforts(r)[column].samples] for r in records])
     direction = np.tanh(velocity / ranges["transition_velocity"])
     signals = (residual, residual * direction, residual * np.abs(load))
-    found = (ripple_periods(position, signal, 1.0 / LONGEST)[:PROPOSED] for signal in signals)
+    found = (ripple_periods(position, signal, 1.0 / LONGEST_PERIOD)[:PERIODS] for signal in signals)
     return tuple(dict.fromkeys(period for several in found for period in several))

@@ -10,23 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
+from vpm.discrepancy.settings import BINS, CLEARLY, FEWEST_PERIODS, MOST_SAMPLES, PULL
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.statistics import robust_covariance
 from vpm.numbers import NORMAL_95, Array
 
 #: A state, the direction of the motion (0 or 1) and what is to be predicted.
 Cells = tuple[Array, NDArray[np.int64], Array]
-
-#: Bins of a state.
-BINS = 10
-#: Strength of the pull of a bin towards zero, in samples of a bin that all alike would fill.
-PULL = 0.02
-#: The direction of the motion takes part in the name of a state if it adds this share.
-DIRECTION_ADDS = 0.05
-#: Frequencies of a disturbance that is looked for: at least this many periods in a record.
-FEWEST_PERIODS = 3.0
-#: Most samples of a record that take part in the search for a frequency.
-MOST_SAMPLES = 3000
 
 
 @dataclass(frozen=True)
@@ -80,7 +70,7 @@ def shares(data: Data, final: Judged, joint: int) -> Shares:
         own = f"velocity of {data.training.joints[joint]}"
         signs = [(states[own] > 0.0).astype(np.int64) for states in (seen, met)]
         both = _left((seen[name], signs[0], target), (met[name], signs[1], left), edges)
-        with_direction = _share(both, left) > _share(plain, left) + DIRECTION_ADDS
+        with_direction = _share(both, left) > _share(plain, left) + CLEARLY
         found[f"{name} and direction" if with_direction else name] = both if with_direction else plain
     best = min(found, key=lambda name: float(found[name] @ found[name]))
     ends = np.cumsum([0, *(data.validation.efforts(r)[joint].time.size for r in range(len(data.validation.motions)))])

@@ -15,7 +15,6 @@ from functools import partial
 import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confirm, judge
-from vpm.discrepancy.confirmation.refusal import CLEAR_GAIN, LEAST_GAIN
 from vpm.discrepancy.diagnosis import Ambiguity
 from vpm.discrepancy.parallel_candidates import Failure
 from vpm.discrepancy.screening.candidates import Candidate, Key, candidates, joint_at
@@ -24,19 +23,13 @@ from vpm.discrepancy.screening.probe import Probe, impossible_values, probe, ref
 from vpm.discrepancy.search.candidate_choice import Accepted, alike
 from vpm.discrepancy.search.search import Tried
 from vpm.discrepancy.search.search_round import Request
+from vpm.discrepancy.settings import CLEAR_GAIN, CLEARLY, LEAST_SHARE, NESTED, RIVALS_TRIED
 from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem, gain, segments
 from vpm.identify.identifiability import COPY_SHARE, Span
 from vpm.identify.response_along_motion import answers_at_once, bends
 from vpm.model import Model
 from vpm.numbers import NORMAL_95
-
-#: Rivals that are refitted in the place of an effect, and how many of the others that may refine it.
-SHORT_LIST, NESTED = 3, 2
-#: A rival that takes less than this share of what the effect takes from the training residual is none.
-LEAST_SHARE = 0.8
-#: A rival that leaves up to this share more of the validation mean square predicts as well.
-AS_GOOD = 0.05
 
 
 @dataclass(frozen=True)
@@ -183,8 +176,8 @@ def _short_list(final: Judged, without: Judged | None, entry: Accepted, probes: 
     ]
     good.sort(key=lambda p: -p.score)
     own = entry.trial.probe.candidate
-    nested = [p for p in good[SHORT_LIST:] if alike(p.candidate, own)]
-    return good[:SHORT_LIST] + sorted(nested, key=lambda p: -p.drop)[:NESTED]
+    nested = [p for p in good[RIVALS_TRIED:] if alike(p.candidate, own)]
+    return good[:RIVALS_TRIED] + sorted(nested, key=lambda p: -p.drop)[:NESTED]
 
 
 def _near(model: Model, candidate: Candidate, entry: Accepted) -> bool:
@@ -207,7 +200,7 @@ def as_good(final: Judged, trial: Trial, data: Data) -> bool:
     if not trial.clear:
         return False
     change = gain(final.validation, trial.judged.validation, segments(data.validation)).relative
-    return change > -max(AS_GOOD, LEAST_GAIN)
+    return change > -CLEARLY
 
 
 def _power(judged: Judged) -> float:

@@ -18,25 +18,13 @@ import numpy as np
 from vpm.discrepancy.confirmation.confirmation import Judged
 from vpm.discrepancy.diagnosis import ProposedExperiment
 from vpm.discrepancy.rivals.ambiguity import Rivals
+from vpm.discrepancy.settings import AMPLITUDES, DURATION, EXPERIMENT_SAMPLES, LONGEST_EXPERIMENT, RANGE_SHARE, SPEEDS
 from vpm.errors import ExcitationError
 from vpm.excitation import Excitation, JointLimits, chirp, multisine, trapezoid
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.response_along_motion import has_hidden, has_own_drives
 from vpm.model import Model
 from vpm.numbers import Array
-
-#: A difference below this many times the noise discriminates nothing.
-TELLING = 1.0
-#: Longest experiment, s, and most samples of one.
-LONGEST, MOST_SAMPLES = 60.0, 20000
-#: Share of the range seen that is used, so that a controller's overshoot stays within it.
-WITHIN = 0.9
-#: Speeds of the trapezoids as shares of the largest one seen; the slow ones creep through the reversal.
-SPEEDS = (1.0, 0.3, 0.05, 0.01)
-#: Amplitudes of chirps and multisines as shares of half the range.
-AMPLITUDES = (1.0, 0.3, 0.05)
-#: Duration of a chirp and period of a multisine, s.
-DURATION = 20.0
 
 
 @dataclass(frozen=True)
@@ -175,7 +163,7 @@ def _with_sentence(found: ProposedExperiment, seen: ExcitationRange) -> Proposed
     numbers = ", ".join(f"{k} {v:.4g}" if isinstance(v, float) else f"{k} {v}" for k, v in found.parameters.items())
     what = f"move {seen.joint} on a {found.excitation.name} ({numbers})"
     size = f"{found.difference:.3g} {found.unit} of {found.channel}, {found.ratio:.3g} times the noise"
-    if found.ratio < TELLING:
+    if found.ratio < 1.0:
         text = (
             f"No motion within the range seen tells {found.effect} from {found.rival}: the best, to {what}, "
             f"shows {size}; go beyond that range"
@@ -211,11 +199,11 @@ def designs(seen: ExcitationRange) -> list[Callable[[], Motion]]:
 def _way(seen: ExcitationRange, share: float) -> Motion:
     """Designed motion back and forth at constant speed with rests; a slow one uses the time available."""
     speed = share * seen.speed
-    middle, half = 0.5 * (seen.low + seen.high), 0.5 * WITHIN * (seen.high - seen.low)
-    half = min(half, 0.05 * LONGEST * speed)
+    middle, half = 0.5 * (seen.low + seen.high), 0.5 * RANGE_SHARE * (seen.high - seen.low)
+    half = min(half, 0.05 * LONGEST_EXPERIMENT * speed)
     limits = {seen.joint: JointLimits((seen.low, seen.high), speed, seen.acceleration)}
     points = {seen.joint: [middle - half, middle + half, middle - half, middle, middle + half, middle - half]}
-    step = _step(seen, LONGEST)
+    step = _step(seen, LONGEST_EXPERIMENT)
     made = trapezoid(points, limits, time_step=step, dwell=0.5, unit=seen.unit)
     numbers = {"speed": speed, "amplitude": half, "offset": middle, "acceleration": seen.acceleration, "dwell": 0.5}
     motion = (made[f"{seen.joint}.{quantity}"] for quantity in ("position", "velocity", "acceleration"))
@@ -223,7 +211,7 @@ def _way(seen: ExcitationRange, share: float) -> Motion:
 
 
 def _chirp(seen: ExcitationRange, share: float) -> Motion:
-    middle, amplitude = 0.5 * (seen.low + seen.high), 0.5 * WITHIN * share * (seen.high - seen.low)
+    middle, amplitude = 0.5 * (seen.low + seen.high), 0.5 * RANGE_SHARE * share * (seen.high - seen.low)
     fastest = _fastest(seen, amplitude)
     first = max(0.1 * fastest, 2.0 / DURATION)
     made = chirp(
@@ -241,7 +229,7 @@ def _chirp(seen: ExcitationRange, share: float) -> Motion:
 
 
 def _multisine(seen: ExcitationRange, share: float) -> Motion:
-    middle, amplitude = 0.5 * (seen.low + seen.high), 0.5 * WITHIN * share * (seen.high - seen.low)
+    middle, amplitude = 0.5 * (seen.low + seen.high), 0.5 * RANGE_SHARE * share * (seen.high - seen.low)
     fastest = max(_fastest(seen, amplitude), 3.0 / DURATION)
     made = multisine(
         f"{seen.joint}.position",
@@ -265,7 +253,7 @@ def _fastest(seen: ExcitationRange, amplitude: float) -> float:
 
 def _step(seen: ExcitationRange, duration: float) -> float:
     """Time step of a designed motion: a multiple of that of the records, and a whole part of a second."""
-    step = max(seen.time_step, duration / MOST_SAMPLES)
+    step = max(seen.time_step, duration / EXPERIMENT_SAMPLES)
     return 1.0 / max(1, int(1.0 / step))
 
 

@@ -13,11 +13,12 @@ from dataclasses import replace
 import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, finished, shrinkage, simulated_gain
-from vpm.discrepancy.confirmation.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, Thresholds, refuse_trial
+from vpm.discrepancy.confirmation.refusal import Thresholds, refuse_trial
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.rivals.ambiguity import Rivals, as_good, contains
-from vpm.discrepancy.search.candidate_choice import REFINED, Accepted, alike, schwarz
+from vpm.discrepancy.search.candidate_choice import Accepted, alike, schwarz
 from vpm.discrepancy.search.search import Search, Stage
+from vpm.discrepancy.settings import CLEAR_GAIN, LEAST_GAIN, NORMAL_95_ONE_SIDED
 from vpm.identify import Gain, gain, segments
 
 #: Why a rival takes the place of an effect, where validation data prefer it, and where they do not tell.
@@ -66,7 +67,7 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
         return 0.0
     shown = fitted.score >= thresholds.score(fitted.pieces)
     silent = as_good(final, trial, data) and validation.harm < NORMAL_95_ONE_SIDED
-    if shown and silent and fitted.relative > 1.0 - REFINED:
+    if shown and silent and fitted.relative > 1.0 - CLEAR_GAIN:
         return fitted.score
     nested = shown and contains(trial.judged, trial.parameters, final, entry.trial.parameters)
     sure = validation.score >= thresholds.score(validation.pieces)

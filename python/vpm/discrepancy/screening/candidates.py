@@ -24,6 +24,7 @@ from vpm.discrepancy.screening.compliance_and_stop_start import (
     structural_starts,
     thresholds,
 )
+from vpm.discrepancy.settings import CELLS, FINER, LIMITED_MOST, MOST_SAMPLES, PASSED, PERIODS, SLOWEST
 from vpm.errors import DiagnosisError, near_match
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
@@ -34,13 +35,6 @@ Key = tuple[str, str]
 
 #: Short name of the speed at which a friction law bends; where it is fixed, it is that of the dry friction beside.
 TRANSITION = "transition_velocity"
-#: Number of ripple periods proposed by the periodogram, of waves that most samples show and of shorter ones.
-PERIODS = 3
-#: Cells of the way in the shortest wave of an octave, waves in one more on the whole way, share of a wave that a slow
-#: sample may pass until the next one, and fewest of them: a wave has two sizes and is told from a mean.
-CELLS, FINER, PASSED, SLOWEST = 32, 4, 0.4, 16
-#: Largest share of the samples that may lie beyond a limit of the drive.
-LIMITED_MOST = 0.5
 
 
 @dataclass(frozen=True)
@@ -307,7 +301,7 @@ def ripple_periods(position: Array, values: Array, fewest: float) -> list[float]
     1976. Shorter waves than these come from slow samples, see `_short_waves`.
     """
     short = _short_waves(position, values)
-    thin = max(1, len(values) // 4000)
+    thin = max(1, len(values) // MOST_SAMPLES)
     position, values = position[::thin], values[::thin]
     travel = max(float(np.ptp(position)), 1e-12)
     step = float(np.median(np.abs(np.diff(position)))) or travel / 1e3

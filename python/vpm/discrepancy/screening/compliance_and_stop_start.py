@@ -12,6 +12,25 @@ from itertools import product
 import numpy as np
 
 from vpm.catalogue import EFFECTS, EffectType
+from vpm.discrepancy.settings import (
+    BEYOND_LEAST,
+    BEYOND_MOST,
+    CLOSING,
+    COMPARED,
+    CONTACT,
+    CONTACT_FREQUENCY,
+    CONTACT_RATIOS,
+    CONTACTS,
+    FINE_GAPS,
+    FREQUENCIES,
+    GAP_SHARES,
+    LEAST_DRIVEN,
+    LOOSE,
+    RATIOS,
+    SOFTEST,
+    STOP_SHARES,
+    SWINGS,
+)
 from vpm.experiment.signal import differentiate
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.response_along_motion import has_own_drives
@@ -23,26 +42,7 @@ from vpm.numbers import Array
 SERIES = "stiffness"
 #: What of these springs turns motion into heat, by short names.
 LOSSES = ("damping", "time")
-#: Frequencies at which a spring lets the link swing behind a motor that stands still, Hz, and damping ratios there.
-FREQUENCIES = (3.0, 8.0, 20.0, 50.0)
-LOOSE, CONTACT = 0.05, 0.1
-#: Slowest of these in a fit, Hz: a softer spring holds nothing.
-SLOWEST = 0.5
-#: Frequency of the contacts of backlash, Hz, and widths of it tried, as shares of the half travel.
-CONTACT_FREQUENCY = 50.0
-GAP_SHARES = (5e-4, 3e-3, 1.5e-2)
-#: Springs that are simulated: frequencies, Hz, and damping ratios.
-SWINGS, RATIOS = np.geomspace(4.0, 64.0, 16), (0.1, 0.3)
-#: Contacts of a backlash that are simulated, widths as shares of the half travel, and the share of a width over which a
-#: contact closes.
-CONTACTS, CONTACT_RATIOS, FINE_GAPS, CLOSING = np.array([10.0, 30.0]), (0.5,), np.geomspace(5e-5, 5e-2, 18), 1e-3
-#: Places of a stop, as shares of the half travel from its middle.
-STOP_SHARES = (0.6, 0.8, 0.95)
-#: Places of a stop, or limits of a drive, that are compared; the fewest samples beyond one, and the most beyond a stop.
-COMPARED, BEYOND_LEAST, BEYOND_MOST = 30, 3, 0.3
 
-#: Least inertia on the side of the drive, as a share of what the joint moves.
-LEAST_DRIVEN = 1e-4
 
 Starts = tuple[Mapping[str, float], ...]
 Bounds = Mapping[str, tuple[float, float]]
@@ -139,7 +139,7 @@ def logged_swing(data: InverseDynamicsProblem, model: Model, site: str) -> tuple
         columns.append(kept[:, :2])
         wanted.append(-kept[:, 2])
     stiffness, damping = np.linalg.lstsq(np.vstack(columns), np.concatenate(wanted), rcond=None)[0]
-    return (float(stiffness), max(float(damping), 0.0)) if stiffness > (2.0 * math.pi * SLOWEST) ** 2 else None
+    return (float(stiffness), max(float(damping), 0.0)) if stiffness > (2.0 * math.pi * SOFTEST) ** 2 else None
 
 
 def structural_starts(
@@ -199,7 +199,7 @@ def fine_starts(effect: EffectType, site: str, model: Model, travel: float) -> S
 
 def softest(model: Model, site: str) -> float:
     """Least start stiffness of a compliance that holds what the joint moves, N/m or N m/rad."""
-    return moved(model, site) * (2.0 * math.pi * SLOWEST) ** 2
+    return moved(model, site) * (2.0 * math.pi * SOFTEST) ** 2
 
 
 def stop_starts(position: Array, residual: Array, middle: float, travel: float, least: float) -> tuple[Starts, Bounds]:

@@ -1,27 +1,18 @@
-"""Linear step of least squares, by which a candidate is judged before it is refitted.
-
-A place, such as where a spring rests, is estimated together with the size. At size zero the location has no influence.
-A spring that is assumed to rest in the middle of the motion then comes out wrong where most of its effort is constant.
-An effort ``size (c + location d)`` is linear in ``size`` and in ``size location``, so both follow from one linear step.
-"""
+"""Linear step of least squares, by which a candidate is judged before it is refitted."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 
-from vpm.discrepancy.screening.candidates import Candidate
 from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
 from vpm.identify.identifiability import column_lengths
-from vpm.model import Model, Parameter
+from vpm.model import Parameter
 from vpm.numbers import Array
 
-#: Numbers of an effect that has a size and a place, and bounds of a place that may lie anywhere.
-PLACED, ANYWHERE = 2, (-np.inf, np.inf)
-#: Two equal steps of a place change the column of the size alike, to rounding.
-EVEN = 1e-6
+#: Bounds of a place that may lie anywhere.
+ANYWHERE = (-np.inf, np.inf)
 
 
 def linear_step(data: InverseDynamicsProblem, jacobian: Array, residual: Array) -> tuple[Array, Array, Array]:
@@ -62,43 +53,3 @@ def softened(start: float, estimate: float, std: float) -> tuple[float, float]:
     if ratio <= 0.0:
         return estimate, std
     return start / ratio, std / ratio**2
-
-
-@dataclass(frozen=True)
-class Place:
-    """Indices of size and location parameter of an effect, and the column of their product."""
-
-    size: int
-    where: int
-    column: Array
-
-
-def free_location(
-    data: InverseDynamicsProblem, model: Model, candidate: Candidate, added: Sequence[str], fresh: Array
-) -> Place | None:
-    """Location parameter of a candidate that has a size and a location, or None.
-
-    - ``model``: with the candidate at its start, which has no size
-    - ``added``: its parameters, by dotted name
-    - ``fresh`` (n, len(added)): their columns there
-
-    None too where the column of the size does not change by equal steps with the place.
-    """
-    if not candidate.neutral or len(candidate.starts) > 1 or len(added) != PLACED:
-        return None
-    effect = model.effect(*candidate.key)
-    short = {dotted: name for name, dotted in effect.parameter_names.items()}
-    own = [candidate.effect.parameter(short[name]) for name in added]
-    anywhere = [i for i, p in enumerate(own) if p.shape and tuple(p.physical) == ANYWHERE]
-    if len(anywhere) != 1 or own[1 - anywhere[0]].shape:
-        return None
-    where, size = anywhere[0], 1 - anywhere[0]
-    start, step = model.parameters[added[where]].value, own[where].typical
-    columns = [fresh[:, size]]
-    for steps in (1.0, 2.0):
-        moved = model.with_parameters({added[where]: start + steps * step})
-        columns.append(data.evaluate(moved, moved.theta, [moved.index(added[size])])[1][:, 0])
-    first, second = columns[1] - columns[0], columns[2] - columns[1]
-    if not np.any(first) or np.linalg.norm(second - first) > EVEN * np.linalg.norm(first):
-        return None
-    return Place(size, where, first / step)

@@ -17,7 +17,8 @@ from scipy.special import chdtri
 
 from vpm.discrepancy.screening.candidates import Candidate, Key, acts_on, joint_at
 from vpm.discrepancy.screening.compliance_and_stop_start import LOSSES, in_series
-from vpm.discrepancy.screening.linear_step import free_location, is_outside, linear_step, softened, step_without
+from vpm.discrepancy.screening.linear_step import is_outside, linear_step, softened, step_without
+from vpm.discrepancy.settings import OF_JOINT, RICHEST, SHORT_LIST, SIZE_LEVEL
 from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.identifiability import Span, closest_column, column_lengths, is_alias
@@ -29,14 +30,8 @@ from vpm.numbers import Array
 #: Share of the largest influence on a residual below which that of a parameter is rounding.
 ROUNDED = 1e-12
 
-#: Candidates refitted in one round: those that have the largest predicted gain for their numbers, of the machine and of
-#: each joint, and those that have the largest predicted gain of all. Without the last, several names of one regressor,
-#: as a constant force and a tilted world, crowd out a law of two numbers that takes more than any of them.
-SHORT_LIST, OF_JOINT, RICHEST = 7, 3, 2
 #: Share by which the gain that screening predicts of two candidates may differ by rounding alone.
 TWIN = 1e-6
-#: Significance asked of an effect's size on the training data.
-SIZE_LEVEL = 0.05
 
 
 @dataclass(frozen=True)
@@ -230,15 +225,9 @@ def _probe_start(
     columns = [model.index(name) for name in added]
     # Known columns are taken as before it: few effects change them, and where links bend each costs a simulation.
     residual, fresh = data.evaluate(model, model.theta, columns)
-    place = free_location(data, model, candidate, added, fresh)
-    if place is not None:
-        fresh[:, place.where] = place.column
     keep, held, invisible = sort_columns(
         added, fresh, base.span, (base.free, base.jacobian), residual, _sizes(model, candidate, base.free, added)
     )
-    if place is not None and place.where in keep and place.size not in keep:
-        keep.remove(place.where)
-        invisible = (*invisible, added[place.where])
     free = tuple(added[i] for i in keep)
     start_values = model.theta[[columns[i] for i in keep]]
     values, std, left = _stepped(base, data, fresh[:, keep], residual, start_values, _losses(model, candidate, free))
@@ -247,14 +236,6 @@ def _probe_start(
     estimates = dict(zip(free, (values + start_values).tolist(), strict=True))
     deviations = dict(zip(free, std.tolist(), strict=True))
     drop, here = _lowered(base, data, candidate, left) if free else (0.0, 0.0)
-    if place is not None and place.where in keep:
-        size, where = added[place.size], added[place.where]
-        if estimates[size] <= model.parameters[size].minimum:
-            free, invisible = tuple(name for name in free if name != where), (*invisible, where)
-        else:
-            first = model.parameters[where].value
-            estimates[where] = first + (estimates[where] - first) / estimates[size]
-            deviations[where] /= abs(estimates[size])
     for name in free:
         if _short(model, candidate, name) in in_series(candidate.effect):
             estimates[name], deviations[name] = softened(

@@ -16,21 +16,12 @@ import numpy as np
 from vpm.catalogue import EFFECTS, EffectType
 from vpm.catalogue.kinds import Side
 from vpm.discrepancy.confirmation.confirmation import Data, Trial
-from vpm.discrepancy.confirmation.refusal import LEAST_GAIN, NORMAL_95_ONE_SIDED, WORTH_A_NAME
 from vpm.discrepancy.screening.candidates import Candidate, Key
 from vpm.discrepancy.screening.compliance_and_stop_start import coupled
+from vpm.discrepancy.settings import CLEAR_GAIN, LEAST_GAIN, NORMAL_95_ONE_SIDED, SAME, SENSOR_SHARE, TIE, WORTH_A_NAME
 from vpm.identify import Gain, InverseDynamicsProblem, gain, segments
 from vpm.model import Model
 from vpm.numbers import Array
-
-#: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
-SENSOR_SHARE = 0.25
-#: What leaves up to so many times as much as the best explains the data as well, if it is also little of the whole gap.
-SAME = 1.5
-#: Difference of two logarithms of evidence that says nothing.
-TIE = 0.01
-#: A refinement leaves less than this share of the mean square that the plainer effect leaves.
-REFINED = 0.5
 
 
 @dataclass(frozen=True)
@@ -71,7 +62,7 @@ class Accepted:
 def choose(supported: Sequence[Trial], data: Data) -> Accepted:
     """Choose the candidate with the least criterion; of equally good ones the one whose simulation is best.
 
-    One that refines another only takes its place if it leaves less than ``REFINED`` of what that leaves.
+    One that refines another only takes its place if it leaves less than ``CLEAR_GAIN`` of what that leaves.
     """
     least = partial(cost, stated=data.training.nominal)
     first = min(supported, key=least)
@@ -130,7 +121,7 @@ def schwarz(gained: Gain, numbers: int) -> float:
 def _plainer(trial: Trial, first: Trial) -> bool:
     """Whether a candidate explains nearly as much as ``first`` with fewer numbers, at the same site and confusable."""
     fewer = len(trial.parameters) < len(first.parameters)
-    return alike(trial.probe.candidate, first.probe.candidate) and fewer and REFINED * _left(trial) <= _left(first)
+    return alike(trial.probe.candidate, first.probe.candidate) and fewer and CLEAR_GAIN * _left(trial) <= _left(first)
 
 
 def alike(one: Candidate, other: Candidate) -> bool:

@@ -8,12 +8,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, gain_at, judge
-from vpm.discrepancy.confirmation.refusal import CLEAR_GAIN, LEAST_GAIN, NORMAL_95_ONE_SIDED
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
 from vpm.discrepancy.screening.candidates import Key
 from vpm.discrepancy.screening.probe import Probe
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search_round import Request, Round
+from vpm.discrepancy.settings import CLEAR_GAIN, LEAST_GAIN, NORMAL_95_ONE_SIDED
 from vpm.errors import DivergedError, ModelError
 from vpm.identify import Gain, gain, segments
 from vpm.identify.identifiability import Span, is_alias
@@ -105,29 +105,19 @@ class _Going:
         self.last: Tried | None = None
         self.round: Round | None = None
         self.number = max((candidate.round for candidate in found.ranking), default=0)
-        # What a round would have accepted at other joints, too, and of how many candidates.
-        self.waiting, self.tried = list[Key](), 0
 
     def another(self) -> bool:
         """Whether one more effect comes in; those that it makes needless are dropped."""
         self.number += 1
         if self.number > 2 * self.request.limit + 1:
             return False
-        outcome = self._begun(self.tried)
+        outcome = self._begun()
         if len(self.accepted) >= self.request.limit or (self.accepted and outcome.done()):
             return False
-        best = self._waited(outcome)
-        # In a round of a few, little else was tried.
-        alone = best is None
-        if best is None:
-            self.round = None
-            outcome = self._begun()
-            best = self._best(outcome)
-            self.waiting, self.tried = [] if best is None else outcome.elsewhere(best), outcome.tried
+        best = self._best(outcome)
         if best is None:
             return False
-        known = Tried(best.key, outcome.current, tuple(outcome.probes), tuple(outcome.trials))
-        self.last = known if alone else None
+        self.last = Tried(best.key, outcome.current, tuple(outcome.probes), tuple(outcome.trials))
         self.accepted.append(best)
         self.stages.append(Stage("added", *best.key, best.trial.judged))
         self.request.tell(f"round {self.number}: accepted {best.label}")
@@ -147,20 +137,12 @@ class _Going:
             None if self.dropped else self.last,
         )
 
-    def _begun(self, tried: int = 0) -> Round:
+    def _begun(self) -> Round:
         """Next round of the search; of the one before it, only the ranking is kept."""
         if self.round is not None:
             self.ranking += self.round.ranked()
-        self.round = Round(self.stages[-1].judged, self.data, self.number, self.request, tried)
+        self.round = Round(self.stages[-1].judged, self.data, self.number, self.request)
         return self.round
-
-    def _waited(self, outcome: Round) -> Accepted | None:
-        """First candidate that still waits for the search and is accepted beside what came in meanwhile."""
-        while self.waiting:
-            key = self.waiting.pop(0)
-            if key not in self.dropped and (best := outcome.again(key)) is not None:
-                return best
-        return None
 
     def _best(self, outcome: Round) -> Accepted | None:
         """Best candidate of a search round; where it leaves most, those with a motion of their own compete too."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -12,22 +11,14 @@ import numpy as np
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confirm, finished, gain_at
 from vpm.discrepancy.confirmation.delay_in_motion import in_motion, is_late
-from vpm.discrepancy.confirmation.refusal import (
-    CLEAR_GAIN,
-    Thresholds,
-    explains_most,
-    refuse_probe,
-    refuse_timing,
-    refuse_trial,
-)
+from vpm.discrepancy.confirmation.refusal import Thresholds, explains_most, refuse_probe, refuse_timing, refuse_trial
 from vpm.discrepancy.diagnosis import RankedCandidate
-from vpm.discrepancy.noise.noise_floor import NOISE_ONLY, noise_alone, only_ringing
+from vpm.discrepancy.noise.noise_floor import noise_alone, only_ringing
 from vpm.discrepancy.noise.residual_structure import structure
 from vpm.discrepancy.noise.sample_timing import InTime, in_time
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
-from vpm.discrepancy.screening.candidates import Candidate, Key, candidates, joint_at, left_out
+from vpm.discrepancy.screening.candidates import Candidate, Key, candidates, left_out
 from vpm.discrepancy.screening.probe import (
-    SHORT_LIST,
     Probe,
     most_promising,
     prepare,
@@ -37,13 +28,10 @@ from vpm.discrepancy.screening.probe import (
     screening_effort,
 )
 from vpm.discrepancy.search.candidate_choice import Accepted, choose
+from vpm.discrepancy.settings import CLEAR_GAIN, FEW, FLOOR_FACTOR, RINGING, SHORT_LIST
 from vpm.identify import gain, segments
 from vpm.identify.response_along_motion import answers_at_once, bends
 from vpm.identify.tangent import drives_on_tangent
-
-#: Where links bend already, the noise of the measured motion rings in them: another spring needs this predicted gain as
-#: a share of the residual. Only the best is refitted.
-RINGING, FEW = 0.2, 1
 
 #: Called with a sentence on what is being done.
 Tell = Callable[[str], None]
@@ -63,10 +51,9 @@ class Request:
 class Round:
     """One round of the search."""
 
-    def __init__(self, current: Judged, data: Data, number: int, request: Request, tried: int = 0) -> None:
+    def __init__(self, current: Judged, data: Data, number: int, request: Request) -> None:
         self.current, self.data, self.number, self.request = current, data, number, request
         self.tell, self.each = request.tell, request.each
-        self._chosen_from = tried
         self.refused: dict[Key, str] = {}
         self._ranking: dict[Key, RankedCandidate] = {}
         self._promising: list[Probe] = []
@@ -92,7 +79,7 @@ class Round:
         """
         model = self.current.model
         left = structure(model, self.data.training, self.data.validation, self.timed.fitted, self.timed.validation)
-        quiet = not left.present and left.above_white <= NOISE_ONLY
+        quiet = not left.present and left.above_white <= FLOOR_FACTOR
         if (quiet and self._takes_long()) or self.done():
             return None
         self.screen(without, heavy=True)
@@ -101,29 +88,10 @@ class Round:
         self.confirm()
         return self.best()
 
-    def again(self, key: Key) -> Accepted | None:
-        """Candidate that an earlier round would have accepted too, if the round accepts it beside what came in."""
-        self.screen(set(), heavy=False, only={key})
-        self.confirm()
-        return self.best()
-
     @property
     def tried(self) -> int:
         """Candidates of the round from which those to refit were chosen."""
-        return max(len(self._ranking), self._chosen_from)
-
-    def elsewhere(self, best: Accepted) -> list[Key]:
-        """Best candidate of the round at each other joint, by falling gain, of those without a motion of their own."""
-        model = self.current.model
-        here = joint_at(model, best.key[1])
-        by_joint: dict[str, list[Trial]] = defaultdict(list)
-        for trial in self._supported:
-            candidate = trial.probe.candidate
-            joint = joint_at(model, candidate.site)
-            if here and joint and joint != here and not self._is_heavy(candidate):
-                by_joint[joint].append(trial)
-        chosen = [choose(trials, self.data) for trials in by_joint.values()]
-        return [one.key for one in sorted(chosen, key=lambda one: -one.trial.validation.score)]
+        return len(self._ranking)
 
     def weak(self, best: Accepted) -> bool:
         """Whether the best candidate of the round leaves most of the error, so that a hidden motion is tried too.
@@ -139,14 +107,13 @@ class Round:
         """Whether probes of candidates with a motion of their own take long in this round."""
         return not answers_at_once(self.current.model)
 
-    def screen(self, without: set[Key], *, heavy: bool, only: set[Key] | None = None) -> None:
+    def screen(self, without: set[Key], *, heavy: bool) -> None:
         """Screen all or some candidates of the round, and set aside impossible ones."""
         current, data, effects = self.current, self.data, self.request.effects
         self._promising = []
         found = candidates(current.model, data.training, current.fit.residual, effects)
         self.refused.update(left_out(current.model, data.training, effects))
         listed = [c for c in found if c.key not in without and self._is_heavy(c) == heavy]
-        listed = listed if only is None else [c for c in listed if c.key in only]
         self.tell(f"round {self.number}: screening {len(listed)} candidates")
         screen = partial(probe, prepare(current.baseline, data.training, listed), data.training)
         results = self.each(f"round {self.number}: screening", screen, listed, lambda c: c.label, screening_effort)

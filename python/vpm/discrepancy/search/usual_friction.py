@@ -12,7 +12,7 @@ from dataclasses import replace
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, is_clear, judge, measured
-from vpm.discrepancy.confirmation.refusal import CLEAR_GAIN, Thresholds, refuse_trial
+from vpm.discrepancy.confirmation.refusal import Thresholds, refuse_trial
 from vpm.discrepancy.noise.sample_timing import in_time
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import TRANSITION, Candidate, candidates, joint_at
@@ -20,6 +20,7 @@ from vpm.discrepancy.screening.probe import Probe
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search import Search, Stage
 from vpm.discrepancy.search.search_round import Request
+from vpm.discrepancy.settings import CLEAR_GAIN
 from vpm.errors import VpmError
 from vpm.identify.response_along_motion import answers_at_once
 from vpm.model import Model

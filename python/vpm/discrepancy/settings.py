@@ -1,0 +1,157 @@
+"""Settings of the residual diagnosis: every number that decides, each with its reason."""
+
+import numpy as np
+
+# ---- chance ----------------------------------------------------------------------------------------------------------
+
+#: Probability of accepting any effect by chance, shared among all candidates that are tried.
+FALSE_ALARM_LEVEL = 0.01
+#: Significance asked of an effect's size on the training data.
+SIZE_LEVEL = 0.05
+#: One-sided 95 % quantile of the normal distribution: what is worse by less is worse by chance.
+NORMAL_95_ONE_SIDED = 1.6448536269514722
+#: Parameters that move by more of their stated uncertainties are reported, and no effect may drive one so far.
+FAR = 3.0
+
+# ---- shares of a mean square -----------------------------------------------------------------------------------------
+
+#: Share of a signal below which neither a residual nor an instrument's error means anything: links are cut into pieces
+#: and gauges calibrated to no better. A candidate that promises less of the training error is not refitted.
+NEGLIGIBLE = 0.005
+#: Gain below which a change is none, also one by shifted samples.
+LEAST_GAIN = 0.02
+#: Gain that a second description of the same thing has to add to a simpler one.
+CLEARLY = 0.05
+#: Gain that is worth a name: what sticks and creeps leaves less than that to imitate.
+WORTH_A_NAME = 0.1
+#: Below this gain most of the residual is something else, which an effect might merely imitate: the evidence then has
+#: to be this many times as strong.
+MODEST_GAIN, MODEST_FACTOR = 0.3, 3.0
+#: From this gain on an effect does most of the work: on a machine of several joints, where errors of two missing
+#: effects cancel in a simulation, the residual decides alone; a delay is named whatever the timing of samples.
+CLEAR_GAIN = 0.5
+#: Where so much of what could be explained remains, what was found is not the explanation.
+MOSTLY_OPEN = 0.15
+#: A rival that takes less than this share of what the effect takes from the training residual is none.
+LEAST_SHARE = 0.8
+#: Predicted gain asked of a spring more where links bend already: noise of the motion rings in them. How many are
+#: refitted, and evaluations of that: each is a simulation, and a spring that is there gains most in the first.
+RINGING, FEW, FEW_EVALUATIONS = 0.2, 1, 6
+
+# ---- choice ----------------------------------------------------------------------------------------------------------
+
+#: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
+SENSOR_SHARE = 0.25
+#: What leaves up to so many times as much as the best explains the data as well, if it is also little of the whole gap.
+SAME = 1.5
+#: Difference of two logarithms of evidence that says nothing.
+TIE = 0.01
+#: An error of an instrument shows so many times as large in the residual that it is more than an error of the model.
+MAGNIFIED = 4.0
+#: Samples that what builds up over a way has to last, to be seen to build up.
+SAMPLED = 2.0
+#: Most joints of a machine that a ranking covers, beside those that effects split off.
+RANKED_JOINTS = 3
+#: Candidates refitted in one round: those of the largest predicted gain for their numbers, of the machine and of each
+#: joint, and of the largest gain of all. Without the last, several names of one regressor crowd out a richer law.
+SHORT_LIST, OF_JOINT, RICHEST = 7, 3, 2
+#: Rivals that are refitted in the place of an effect, and how many of the others that may refine it.
+RIVALS_TRIED, NESTED = 3, 2
+
+# ---- fits ------------------------------------------------------------------------------------------------------------
+
+#: A fit stops when the sum of squares changes by less than this share: far below what a verdict rests on.
+TOLERANCE = 1e-6
+#: A refit that has lowered the training error by less than this share in so many evaluations, and hardly goes on, ends:
+#: validation data have to show ten times as much.
+SLOW_GAIN, SLOW_EVALUATIONS = 0.01, 10
+#: Of two candidates, one that leaves so many times what the other leaves is not the one that comes in.
+HOPELESS = 10.0
+#: So many ranges of what the data reach, a place is nowhere.
+FAR_AWAY = 1e3
+#: Share of each record that is kept out of the fit when no validation record is given.
+HELD_OUT = 0.3
+#: Stated uncertainties, on a logarithmic scale, that a recalibration may move what the model is not linear in.
+REACH = 4.0
+#: The motion is filtered at most so many times as high as the least error of its acceleration asks for.
+QUICKER = 4.0
+#: Share of its largest speed below which a joint may stick; samples in clear motion for each fitted number; share of
+#: its regressor's power below which a parameter does not show in these.
+CREEPING, SAMPLES_EACH, VISIBLE = 0.05, 10, 0.1
+
+# ---- noise and structure ---------------------------------------------------------------------------------------------
+
+#: A residual within this factor of the noise floor has nothing left to explain, unless it repeats.
+FLOOR_FACTOR = 1.3
+#: Share of the frequencies of a residual that hold no more than noise, for the estimate of what is white in it.
+QUIET_SHARE = 0.4
+#: A residual of so many times its white part is not white. Strains and other signs of hidden motion integrate noise,
+#: which raises them about so much.
+ABOVE_WHITE, DRIFTING = 1.6, 1.5
+#: Validation records with so many times the relative error of the training records hold something new.
+NEW = 4.0
+#: Standard deviations of a rank correlation from which the residual grows with the effort, and of how many samples one
+#: is taken for independent.
+GROWING, THINNED = 4.0, 2
+#: Seed of drawn noise; any would do. Most draws, and numbers of noise that tell its size to a twentieth.
+SEED, DRAWS, ENOUGH = 20160331, 6, 200
+#: Noise of commands that is sent through drives, as a share of these; share of the band over which its spectrum is
+#: smoothed; share by which parameters of drives may differ for the same one.
+COMMAND_NOISE, SMOOTHED, NEAR = 0.01, 0.08, 0.05
+#: Change of a reading that is rounding, in steps between numbers of its size; steps of the coarsest converters, 8 bits.
+ROUNDING, STEPS = 8.0, 256
+
+# ---- what is left ----------------------------------------------------------------------------------------------------
+
+#: Parts of each training record, of which each is predicted from the others, and most terms of a formula.
+FOLDS, MOST_TERMS = 5, 5
+#: Share of the predicted mean square that a term has to take, and of its length that is its own.
+TERM_GAIN = 0.03
+#: Transition velocity of dry terms as shares of the largest speed, where no friction of the model has one.
+TRANSITION_SHARES = (0.002, 0.01, 0.04)
+#: Longest period that is looked for, in multiples of the travel, and factor by which a fit may move one.
+LONGEST_PERIOD, PERIOD_RANGE = 1.5, 1.15
+#: Share of the power of the efforts that lies in the band in which the remainder is compared.
+EFFORT_SHARE = 0.99
+#: Bins of a state, and pull of each towards zero, in samples of a bin that all alike would fill; most states named.
+BINS, PULL, MOST_NAMED = 10, 0.02, 4
+#: Fewest periods of a disturbance in a record.
+FEWEST_PERIODS = 3.0
+#: Bins of a state that an effect is drawn over, and samples that the curve of its law keeps.
+PICTURE_BINS, LAW_SAMPLES = 40, 3000
+#: Most samples in which periods are looked for.
+MOST_SAMPLES = 4000
+
+# ---- start values ----------------------------------------------------------------------------------------------------
+
+#: Start periods that are proposed.
+PERIODS = 3
+#: Cells of the way in the shortest wave of an octave, waves in one more on the whole way, share of a wave that a slow
+#: sample may pass until the next one, and fewest of them: a wave has two sizes and is told from a mean.
+CELLS, FINER, PASSED, SLOWEST = 32, 4, 0.4, 16
+#: Places of a stop, or limits of a drive, that are compared; fewest samples beyond one; largest share of them beyond a
+#: stop and beyond a limit.
+COMPARED, BEYOND_LEAST, BEYOND_MOST, LIMITED_MOST = 30, 3, 0.3, 0.5
+#: Places of a stop, as shares of the half travel from its middle.
+STOP_SHARES = (0.6, 0.8, 0.95)
+#: Frequencies at which a spring lets the link swing behind a motor that stands still, Hz, and damping ratio there.
+FREQUENCIES, LOOSE = (3.0, 8.0, 20.0, 50.0), 0.05
+#: Slowest of these in a fit, Hz: a softer spring holds nothing. Least inertia on the side of the drive, as a share.
+SOFTEST, LEAST_DRIVEN = 0.5, 1e-4
+#: Frequency of the contacts of backlash, Hz, damping ratio, and widths as shares of the half travel.
+CONTACT_FREQUENCY, CONTACT, GAP_SHARES = 50.0, 0.1, (5e-4, 3e-3, 1.5e-2)
+#: Springs that are simulated along the motion: frequencies, Hz, and damping ratios.
+SWINGS, RATIOS = np.geomspace(4.0, 64.0, 16), (0.1, 0.3)
+#: Contacts of a backlash that are simulated, widths as shares of the half travel, and the share of a width over which a
+#: contact closes.
+CONTACTS, CONTACT_RATIOS, FINE_GAPS, CLOSING = np.array([10.0, 30.0]), (0.5,), np.geomspace(5e-5, 5e-2, 18), 1e-3
+
+# ---- discriminating experiments --------------------------------------------------------------------------------------
+
+#: Longest experiment, s, and most samples of one.
+LONGEST_EXPERIMENT, EXPERIMENT_SAMPLES = 60.0, 20000
+#: Share of the range seen that is used, so that a controller's overshoot stays within it.
+RANGE_SHARE = 0.9
+#: Speeds of trapezoids as shares of the largest one seen, the slow ones to creep through the reversal; amplitudes of
+#: chirps and multisines as shares of half the range, and their duration or period, s.
+SPEEDS, AMPLITUDES, DURATION = (1.0, 0.3, 0.05, 0.01), (1.0, 0.3, 0.05), 20.0
