@@ -15,7 +15,7 @@ import numpy as np
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, finished, shrinkage, simulated_gain
 from vpm.discrepancy.confirmation.refusal import Thresholds, refuse_trial
 from vpm.discrepancy.diagnosis import RefusedEffect
-from vpm.discrepancy.rivals.ambiguity import Rivals, as_good, contains
+from vpm.discrepancy.rivals.ambiguity import Rivals, as_good
 from vpm.discrepancy.search.candidate_choice import Accepted, alike, schwarz
 from vpm.discrepancy.search.search import Search, Stage
 from vpm.discrepancy.settings import CLEAR_GAIN, LEAST_GAIN, NORMAL_95_ONE_SIDED
@@ -69,9 +69,8 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
     silent = as_good(final, trial, data) and validation.harm < NORMAL_95_ONE_SIDED
     if shown and silent and fitted.relative > 1.0 - CLEAR_GAIN:
         return fitted.score
-    nested = shown and contains(trial.judged, trial.parameters, final, entry.trial.parameters)
     sure = validation.score >= thresholds.score(validation.pieces)
-    return validation.score if sure and validation.harm <= (0.0 if nested else -NORMAL_95_ONE_SIDED) else 0.0
+    return validation.score if sure and validation.harm <= -NORMAL_95_ONE_SIDED else 0.0
 
 
 def _gains(final: Judged, judged: Judged, data: Data) -> tuple[Gain, Gain, Gain | None]:
