@@ -8,7 +8,7 @@ import pytest
 
 import vpm
 from shared_cases import shared_case
-from vpm.discrepancy.prior_departure import driven_away
+from vpm.discrepancy.verdict import driven_away
 
 AXIS = """
 name = "axis"

@@ -15,9 +15,8 @@ import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
-from vpm.discrepancy.prior_departure import moved_far
 from vpm.discrepancy.screening.candidates import shares_at, slow_speeds
-from vpm.discrepancy.settings import HELD_OUT, QUICKER, REACH
+from vpm.discrepancy.settings import FAR, HELD_OUT, QUICKER, REACH
 from vpm.discrepancy.stuck_channels import check_moving, check_stuck
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, Motion, choose_cutoff, joints_from_sensors
@@ -25,10 +24,12 @@ from vpm.experiment.cutoff import HIGHEST
 from vpm.experiment.signal import UNDISTORTED_BAND
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
 from vpm.identify.comparison import relative_to_drives
+from vpm.identify.moments import on_the_border
 from vpm.identify.parallel import worker_count
 from vpm.identify.response_along_motion import answers_at_once
 from vpm.identify.sample_mask import STANDSTILL_SHARE
-from vpm.model import Model
+from vpm.model import Model, Parameter
+from vpm.numbers import NORMAL_95, short
 from vpm.simulate import Setup
 
 #: Records to fit, records to judge on, and notes on both.
@@ -189,3 +190,49 @@ def quickest(record: Experiment, m: Motion, joints: Sequence[str]) -> float:
         if noise > 0.0:
             found = min(found, float(np.cbrt(3.0 * record.rate * least**2 / (8.0 * np.pi**2 * noise**2))))
     return found
+
+
+def moved_far(model: Model, recalibrated: Judged) -> list[str]:
+    """Notes on parameters that a recalibration moved far from their prior, alone or together, or to a border."""
+    notes = []
+    for name, std in zip(recalibrated.free, recalibrated.fit.std, strict=True):
+        before, after = model.parameters[name], recalibrated.model.parameters[name]
+        spread = stated(before)
+        if abs(after.value - before.value) - NORMAL_95 * float(std) > FAR * spread:
+            notes.append(
+                f"recalibration moved {name} from {short(before.value)} to {short(after.value)} {before.unit}, "
+                f"{abs(after.value - before.value) / spread:.1f} times its stated uncertainty"
+            )
+    together = {name: away for name, away in _least_departures(model, recalibrated).items() if away > FAR}
+    if together:
+        notes.append(
+            f"the records show {', '.join(together)} only together; no values that explain them lie nearer to the "
+            f"model file than {max(together.values()):.1f} times their stated uncertainties: question the file, or "
+            "look for what it lacks there, such as a load"
+        )
+    known = [names for names, _ in on_the_border(model, recalibrated.free)]
+    found = on_the_border(recalibrated.model, recalibrated.free)
+    return notes + [f"recalibration stopped at {sentence}" for names, sentence in found if names not in known]
+
+
+def _least_departures(model: Model, recalibrated: Judged) -> dict[str, float]:
+    """Prior departures, in stated uncertainties, of parameters in unidentifiable combinations.
+
+    Values anywhere along these combinations explain the records as well. Those count whose squared departures have the
+    least sum: of Gaussian priors the most probable.
+    """
+    parts = [dict(zip(one.names, one.weights, strict=True)) for one in recalibrated.fit.unseen]
+    if not parts:
+        return {}
+    names = [name for name in recalibrated.free if any(name in part for part in parts)]
+    spreads = np.array([stated(model.parameters[name]) for name in names])
+    moved = [recalibrated.model.parameters[name].value - model.parameters[name].value for name in names]
+    along = np.array([[part.get(name, 0.0) for part in parts] for name in names]) / spreads[:, None]
+    away = np.array(moved) / spreads
+    away -= along @ np.linalg.lstsq(along, away, rcond=None)[0]
+    return dict(sorted(zip(names, map(float, np.abs(away)), strict=True), key=lambda item: -item[1]))
+
+
+def stated(parameter: Parameter) -> float:
+    """Prior deviation of a parameter as the model file states it; infinite if nothing is stated."""
+    return parameter.uncertainty or float("inf")

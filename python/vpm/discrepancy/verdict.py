@@ -11,16 +11,24 @@ from scipy.special import ndtri
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
 from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RefusedEffect
 from vpm.discrepancy.noise.residual_structure import Structure
-from vpm.discrepancy.prior_departure import driven_away
+from vpm.discrepancy.preparation import stated
 from vpm.discrepancy.remainder.remainder import Remainder
 from vpm.discrepancy.screening.candidates import joint_at
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search import Search, Stage
-from vpm.discrepancy.settings import CLEAR_GAIN, FALSE_ALARM_LEVEL, FLOOR_FACTOR, LEAST_GAIN, MOSTLY_OPEN, NEGLIGIBLE
+from vpm.discrepancy.settings import (
+    CLEAR_GAIN,
+    FALSE_ALARM_LEVEL,
+    FAR,
+    FLOOR_FACTOR,
+    LEAST_GAIN,
+    MOSTLY_OPEN,
+    NEGLIGIBLE,
+)
 from vpm.errors import VpmError
 from vpm.identify import gain, segments
 from vpm.model import Model
-from vpm.numbers import percent, short
+from vpm.numbers import NORMAL_95, percent, short
 
 #: Said of what stays after effects were found.
 _REST = " A structured residual above the noise remains."
@@ -319,3 +327,32 @@ def _refused(entry: Accepted, joints: Joints, model: Model) -> RefusedEffect:
     joint = joint_at(model, entry.key[1]) or joints.worst
     share = 100.0 * joints.open[joint]
     return RefusedEffect(*entry.key, f"{share:.0f} % of the mean square of the gap at {joint} is left with it")
+
+
+def driven_away(nominal: Model, recalibrated: Judged, final: Judged, ranked: Model | None = None) -> dict[str, float]:
+    """Parameters that accepted effects clearly drive away from their prior in the model file.
+
+    A stated uncertainty is a measurement, and a correct effect brings known parameters back to it. One that imitates
+    another force together with a shifted centre of mass moves them away.
+
+    - ``nominal``: as the file has it
+    - ``recalibrated``, ``final``: without the effects, and with them
+    - ``ranked``: with the effects, as an observer of all joints knows it: the residual may see some of them alone
+
+    Stated uncertainties by which the parameter stands away, the farthest first. Parameters that were as far before are
+    left out: the file is wrong whatever is missing. So are those that the data hardly show beside the effects.
+    """
+    found = {}
+    for name, std in zip(final.free, final.fit.std, strict=True):
+        if name not in nominal.parameters or name not in recalibrated.model.parameters:
+            continue
+        parameter = nominal.parameters[name]
+        spread = stated(parameter)
+        after = final.model.parameters[name].value
+        away = abs(after - parameter.value) - NORMAL_95 * float(std)
+        moved = abs(after - recalibrated.model.parameters[name].value)
+        if ranked is not None and abs(ranked.parameters[name].value - parameter.value) <= FAR * spread:
+            continue
+        if min(away, moved) > FAR * spread:
+            found[name] = abs(after - parameter.value) / spread
+    return dict(sorted(found.items(), key=lambda item: -item[1]))

@@ -11,8 +11,7 @@ from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Judged, Trial, is_clear
 from vpm.discrepancy.diagnosis import Diagnosis, Trace
 from vpm.discrepancy.diagnosis_fields import classes, of_search, step
-from vpm.discrepancy.preparation import Records
-from vpm.discrepancy.prior_departure import moved_far
+from vpm.discrepancy.preparation import Records, moved_far
 from vpm.discrepancy.ranked_effects import fitted_in, staged, tracker_gaps
 from vpm.discrepancy.rivals.ambiguity import listed
 from vpm.discrepancy.screening.candidates import Candidate, asked_for, candidates

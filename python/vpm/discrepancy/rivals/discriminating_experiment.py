@@ -27,14 +27,6 @@ from vpm.model import Model
 from vpm.numbers import Array
 
 
-@dataclass(frozen=True)
-class _Residual:
-    """Torque residual of a model along a motion of the experiment (n, joints), and its derivative."""
-
-    residual: Array
-    slopes: Array
-
-
 def experiments(
     final: Judged, ambiguous: Sequence[Rivals], data: InverseDynamicsProblem, noise: Mapping[str, float]
 ) -> tuple[ProposedExperiment, ...]:
@@ -96,10 +88,10 @@ def _difference(first: Judged, second: Judged, motion: Motion, seen: ExcitationR
     """Root mean square difference of two models in an experiment that the second cannot imitate, and its joint."""
     model = first.model
     inputs = _commands(model, motion, seen)
-    one = _residual(model, (), motion, inputs)
-    other = _residual(second.model, second.free, motion, inputs)
-    change = other.residual - one.residual
-    flat, slopes = change.reshape(-1), other.slopes.reshape(change.size, -1)
+    one, _ = _residual(model, (), motion, inputs)
+    other, slopes = _residual(second.model, second.free, motion, inputs)
+    change = other - one
+    flat, slopes = change.reshape(-1), slopes.reshape(change.size, -1)
     spread = max(float(np.sqrt(np.mean(second.fit.residual**2))), 1e-12) * seen.effort
     left = flat - slopes @ _imitation(flat, slopes, second, spread)
     by_joint = np.sqrt(np.mean(left.reshape(change.shape) ** 2, axis=0))
@@ -123,12 +115,13 @@ def _imitation(change: Array, slopes: Array, second: Judged, spread: float) -> A
     return np.asarray(std * np.linalg.lstsq(normal, scaled.T @ (change / spread), rcond=1e-12)[0])
 
 
-def _residual(model: Model, free: Sequence[str], motion: Motion, inputs: Array) -> _Residual:
+def _residual(model: Model, free: Sequence[str], motion: Motion, inputs: Array) -> tuple[Array, Array]:
+    """Torque residual of a model along a motion of the experiment (n, joints), and its derivative."""
     columns = [model.index(name) for name in free]
     required, applied, jacobian = model.core.inverse_dynamics(
         model.theta, motion.position, motion.velocity, motion.acceleration, inputs, motion.time_step, columns
     )
-    return _Residual(applied - required, -jacobian)
+    return applied - required, -jacobian
 
 
 def _commands(model: Model, motion: Motion, seen: ExcitationRange) -> Array:
