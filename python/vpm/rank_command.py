@@ -26,7 +26,8 @@ from vpm.command_output import give, wrote
 
 if TYPE_CHECKING:
     from vpm.model import Model
-    from vpm.ranking import Ranked, Ranking
+from vpm.numbers import rough_percent
+from vpm.ranking import Ranked, Ranking
 
 EXAMPLES = (
     "Example:  vpm rank model.toml train.csv --validate test.csv --out better.toml\n\n"
@@ -93,7 +94,7 @@ def lines_of(ranking: Ranking) -> Iterator[str]:
     if not ranking.effects:
         yield f"{ranking.model.name}: no effect removes enough of the error to be added"
     for number, one in enumerate(ranking.effects, 1):
-        yield f"{number}. {one.effect} at {one.place} removes {_percent(one.judgement.removed)} of the error power"
+        yield f"{number}. {one.effect} at {one.place} removes {rough_percent(one.judgement.removed)} of the error power"
         yield f"     {_sentence(one, ranking.model)}"
         if one.rivals:
             yield f"     these records do not tell it from {', '.join(one.rivals)}"
@@ -104,16 +105,12 @@ def lines_of(ranking: Ranking) -> Iterator[str]:
         yield "next, with what each would remove of what is left, and its size beside all effects of the model:"
     for other in others:
         told = other.judgement
-        yield f"  {other.effect} at {other.place}: {_percent(told.least)}, size {_percent(told.size)}"
+        yield f"  {other.effect} at {other.place}: {rough_percent(told.least)}, size {rough_percent(told.size)}"
     for channel, gap in ranking.gaps.items():
         levels = (
             f"{gap.before:.4g} before, {gap.recalibrated:.4g} with fitted parameters, {gap.after:.4g} {gap.unit} now"
         )
         yield f"{channel}, validation, root mean square beside a slow observer: {levels}"
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %"
 
 
 def _sentence(one: Ranked, model: Model) -> str:

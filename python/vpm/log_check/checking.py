@@ -19,7 +19,7 @@ from vpm.log_check.shares import Judge, Shares
 from vpm.log_check.stretches import odd_stretches
 from vpm.log_check.table import line_of
 from vpm.model import ChannelEntry, Model
-from vpm.numbers import Array
+from vpm.numbers import Array, rough_percent
 from vpm.observer import measured_outputs
 from vpm.one_thread import in_one_thread
 from vpm.simulate import Setup
@@ -258,8 +258,8 @@ def _of_related(
         correction.kind,
         correction.channels,
         (record,),
-        f"{correction.sentence(units)}; {related.teller} differs from it by {_percent(before)} of its power as it is, "
-        f"and by {_percent(after)} with that corrected",
+        f"{correction.sentence(units)}; {related.teller} differs from it by {rough_percent(before)} of its power as it "
+        f"is, and by {rough_percent(after)} with that corrected",
         repair,
         True,
         correction.factor,
@@ -283,17 +283,13 @@ def _evidence(found: Explanation, place: str) -> str:
             f"as it is the model explains the log only with {before.farthest} {before.far:.2g} of its deviations "
             f"away from the model file, and with {corrected} none is farther away than {after.far:.2g}"
         )
-    left, then = (_percent(shares.by_channel[place]) for shares in (before, after))
+    left, then = (rough_percent(shares.by_channel[place]) for shares in (before, after))
     return f"of {place} the model leaves {left} unexplained as it is, and {then} with {corrected}"
 
 
 def _of_parameters(undetermined: Sequence[str], record: str) -> Finding:
     sentence = f"the beginning of its motion says next to nothing of {', '.join(undetermined)}"
     return Finding("unseen", (), (record,), sentence, "fit other parameters, or move the machine so that they matter")
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %"
 
 
 def _together(findings: Sequence[Finding]) -> list[Finding]:
