@@ -75,9 +75,6 @@ HELD_OUT = 0.3
 REACH = 4.0
 #: The motion is filtered at most so many times as high as the least error of its acceleration asks for.
 QUICKER = 4.0
-#: Share of its largest speed below which a joint may stick; samples in clear motion for each fitted number; share of
-#: its regressor's power below which a parameter does not show in these.
-CREEPING, SAMPLES_EACH, VISIBLE = 0.05, 10, 0.1
 
 # ---- noise and structure ---------------------------------------------------------------------------------------------
 

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from vpm.discrepancy.confirmation.delay_in_motion import is_late, timed_in_motion
 from vpm.discrepancy.screening.candidates import acts_on
 from vpm.discrepancy.screening.compliance_and_stop_start import ends_apart
 from vpm.discrepancy.screening.probe import ROUNDED, Alias, Baseline, Probe, size_is_clear
@@ -182,8 +181,6 @@ def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) ->
     worth = Worth(min((1.0 - SLOW_GAIN) * cost, HOPELESS * rival), SLOW_EVALUATIONS)
     judged, diverged = judged_anyhow(start, free, data, bounds, origin, worth)
     own = free[len(current.free) :]
-    if (timed := _timed(current, judged, data, probe)) is not None:
-        judged, diverged = judged_anyhow(judged.model, free, data, {**bounds, **timed}, origin)
     return measured(current, data, probe, judged, own, (*probe.held, *held), diverged)
 
 
@@ -299,13 +296,6 @@ def simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:
     if data.simulation is None or current.simulated is None or judged.simulated is None:
         return None
     return gain(current.simulated, judged.simulated, segments(data.simulation))
-
-
-def _timed(current: Judged, judged: Judged, data: Data, probe: Probe) -> dict[str, tuple[float, float]] | None:
-    """Bounds to confirm a delay beside dry friction, from samples in motion; None where these do not tell."""
-    if not is_late(probe.candidate.effect, current.model) or has_tangent(probe.model, data.training):
-        return None
-    return timed_in_motion(judged.model, judged.free, current.free, data.training, judged.bounds)
 
 
 def _bounds(probe: Probe) -> dict[str, tuple[float, float]]:

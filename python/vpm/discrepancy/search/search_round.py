@@ -10,7 +10,6 @@ import numpy as np
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confirm, finished, gain_at
-from vpm.discrepancy.confirmation.delay_in_motion import in_motion, is_late
 from vpm.discrepancy.confirmation.refusal import Thresholds, explains_most, refuse_probe, refuse_timing, refuse_trial
 from vpm.discrepancy.diagnosis import RankedCandidate
 from vpm.discrepancy.noise.noise_floor import noise_alone, only_ringing
@@ -229,9 +228,6 @@ class Round:
             return ""
         shifted = in_time(trial.judged, self.data)
         before, validation = self.timed.validation, shifted.validation
-        if is_late(trial.probe.candidate.effect, trial.judged.model):
-            # Stiction looks like a delay, with a shift as without, so delays are judged in motion only.
-            before, validation = (in_motion(self.data.validation) * each for each in (before, validation))
         timed = gain(before, validation, segments(self.data.validation))
         if trial.there is trial.here and timed.relative > 0.0:
             site = trial.probe.candidate.site
