@@ -7,11 +7,8 @@ import numpy as np
 import pytest
 
 import vpm
-from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import is_clear
-from vpm.discrepancy.screening.candidates import Candidate
-from vpm.discrepancy.screening.linear_step import softened
-from vpm.discrepancy.screening.probe import Baseline, Probe, _stepped, same_models
+from vpm.discrepancy.screening.probe import Baseline, _stepped, softened
 from vpm.discrepancy.search.search_round import Request, Round
 from vpm.identify import Estimate, InverseDynamicsProblem, Worth, estimate
 
@@ -121,19 +118,6 @@ def test_what_takes_little_has_to_meet_motions_of_their_own_once(
     outcome._ranking = {("joint_compliance", site): unused for site in others}
     best: Any = SimpleNamespace(trial=SimpleNamespace(there=SimpleNamespace(relative=taken)))
     assert outcome.weak(best) == meets
-
-
-def promise(name: str, drop: float, free: tuple[str, ...] = ("stiffness",)) -> Probe:
-    unused: Any = None
-    return Probe(Candidate(EFFECTS[name], "axis", ()), unused, free, (), (), {}, {}, drop)
-
-
-def test_a_link_that_bends_at_its_root_is_the_twin_of_a_drive_that_winds_up() -> None:
-    soft, bent = promise("joint_compliance", 0.7), promise("link_flexibility", 0.7 * (1.0 + 1e-8))
-    assert same_models([soft, bent]) == {("link_flexibility", "axis"): ("joint_compliance", "axis")}
-    assert not same_models([soft, promise("link_flexibility", 0.7001)])
-    assert not same_models([soft, promise("link_flexibility", 0.7, ("stiffness", "time"))])
-    assert not same_models([promise("spring", 0.7), promise("bias_force", 0.7)])
 
 
 def test_a_fit_is_lost_if_it_is_late_and_hardly_comes_nearer() -> None:

@@ -7,8 +7,7 @@ import pytest
 
 import vpm
 from model_texts import DAMPED_AXIS
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge
-from vpm.discrepancy.noise.sample_timing import in_time
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, in_time, judge
 from vpm.identify import InverseDynamicsProblem
 from vpm.numbers import Array
 

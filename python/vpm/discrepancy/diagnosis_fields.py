@@ -10,7 +10,7 @@ import numpy as np
 from vpm.catalogue import EFFECTS
 from vpm.catalogue.kinds import Side
 from vpm.compare import compare
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, is_clear, weaker
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, in_time, is_clear, weaker
 from vpm.discrepancy.diagnosis import (
     OBSERVED,
     AcceptedEffect,
@@ -23,7 +23,6 @@ from vpm.discrepancy.diagnosis import (
 )
 from vpm.discrepancy.noise.noise_floor import noise_floor
 from vpm.discrepancy.noise.residual_structure import Structure, structure
-from vpm.discrepancy.noise.sample_timing import in_time
 from vpm.discrepancy.preparation import Records
 from vpm.discrepancy.ranked_effects import candidates_of, refused_by, tracker_gaps
 from vpm.discrepancy.rivals.ambiguity import Rivals

@@ -9,9 +9,8 @@ from types import MappingProxyType
 
 import numpy as np
 
-from vpm.catalogue.kinds import Side
+from vpm.catalogue.kinds import ANY, Side
 from vpm.discrepancy.screening.candidates import Key
-from vpm.discrepancy.screening.linear_step import ANYWHERE
 from vpm.model import Effect, Model
 from vpm.numbers import Array
 from vpm.ranking.settings import MOVE, OVERTONE
@@ -155,7 +154,7 @@ class Structure:
         names, found = list(self.priors), []
         for effect in self.model.effects if self.free_places else ():
             own = [(effect.type.parameter(short), name) for short, name in effect.parameter_names.items()]
-            places = [name for one, name in own if one.shape and tuple(one.physical) == ANYWHERE and name in names]
+            places = [name for one, name in own if one.shape and tuple(one.physical) == ANY and name in names]
             sizes = [name for one, name in own if not one.shape and name in names]
             if len(places) == len(sizes) == 1 and self.theta[self.place(sizes[0])] != 0.0:
                 found.append((names.index(sizes[0]), names.index(places[0])))

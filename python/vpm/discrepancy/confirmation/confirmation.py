@@ -10,7 +10,15 @@ import numpy as np
 from vpm.discrepancy.screening.candidates import acts_on
 from vpm.discrepancy.screening.compliance_and_stop_start import ends_apart
 from vpm.discrepancy.screening.probe import ROUNDED, Alias, Baseline, Probe, size_is_clear
-from vpm.discrepancy.settings import FAR_AWAY, FEW_EVALUATIONS, HOPELESS, SLOW_EVALUATIONS, SLOW_GAIN, TOLERANCE
+from vpm.discrepancy.settings import (
+    FAR_AWAY,
+    FEW_EVALUATIONS,
+    HOPELESS,
+    LEAST_GAIN,
+    SLOW_EVALUATIONS,
+    SLOW_GAIN,
+    TOLERANCE,
+)
 from vpm.errors import DivergedError
 from vpm.identify import (
     Estimate,
@@ -25,7 +33,7 @@ from vpm.identify import (
     segments,
 )
 from vpm.identify.estimation import MOST_EVALUATIONS, standing
-from vpm.identify.identifiability import Span, closest_column, is_alias
+from vpm.identify.identifiability import Span, closest_column, is_alias, least_step
 from vpm.identify.parts import moves_drives
 from vpm.identify.response_along_motion import bends, has_hidden, has_own_drives
 from vpm.identify.tangent import Tangent, drives_on_tangent, estimate_on_tangent, has_tangent
@@ -418,3 +426,43 @@ def _left_at(model: Model, data: InverseDynamicsProblem) -> float:
     except DivergedError:
         return np.inf
     return float(residual @ residual)
+
+
+@dataclass(frozen=True)
+class InTime:
+    """Residuals of a fitted model with the best shift in the timing of all commands, within one interval.
+
+    A logged command may hold from its sample on, until its sample, or as the mean over the interval; the log does not
+    tell. What a shift within one interval explains is therefore no missing physics.
+    """
+
+    #: Residuals on training and validation records.
+    fitted: Array
+    validation: Array
+    shift: float  #: How much later the commands hold, in sampling intervals; 0 where a shift does not matter.
+
+
+def in_time(judged: Judged, data: Data) -> InTime:
+    """Residuals after the best shift of command timing, to first order; free parameters move with it."""
+    predict = InTime(judged.fit.residual, judged.validation, 0.0)
+    model = judged.model
+    later, _ = data.training.later().evaluate(model, model.theta)
+    own = judged.fit.residual
+    change, known = later - own, judged.fit.jacobian
+    # Free parameters give way to the shift and do nothing else: one that its bounds hold has to stay where it is.
+    step = least_step(known, change)
+    rest = change + known @ step
+    power = float(rest @ rest)
+    if power <= 1e-20 * float(change @ change):
+        return predict
+    shift = float(np.clip(-(rest @ own) / power, -1.0, 1.0))
+    fitted = own + shift * rest
+    if gain(own, fitted, segments(data.training)).relative < LEAST_GAIN:
+        return predict
+    columns = [model.index(name) for name in judged.free]
+    own_validation, slopes = data.validation.evaluate(model, model.theta, columns)
+    later_validation, _ = data.validation.later().evaluate(model, model.theta)
+    validation = own_validation + shift * (later_validation - own_validation + slopes @ step)
+    if gain(own_validation, validation, segments(data.validation)).relative < LEAST_GAIN:
+        return predict
+    return InTime(fitted, validation, shift)

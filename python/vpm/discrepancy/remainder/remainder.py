@@ -12,9 +12,8 @@ from functools import partial
 
 import numpy as np
 
-from vpm.discrepancy.confirmation.confirmation import Data, Judged
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, in_time
 from vpm.discrepancy.confirmation.refusal import Thresholds
-from vpm.discrepancy.noise.sample_timing import in_time
 from vpm.discrepancy.remainder.empirical_formula import Described, describe
 from vpm.discrepancy.remainder.seal_friction import Seals, seals
 from vpm.discrepancy.settings import EFFORT_SHARE, WORTH_A_NAME

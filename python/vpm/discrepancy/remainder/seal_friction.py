@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
-from vpm.discrepancy.screening.linear_step import linear_step
+from vpm.discrepancy.screening.probe import linear_step
 from vpm.discrepancy.settings import TRANSITION_SHARES
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.drives import driven, first_drives

@@ -15,23 +15,59 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtri
 
-from vpm.discrepancy.screening.candidates import Candidate, Key, acts_on, joint_at
+from vpm.discrepancy.screening.candidates import Candidate, acts_on, joint_at
 from vpm.discrepancy.screening.compliance_and_stop_start import LOSSES, in_series
-from vpm.discrepancy.screening.linear_step import is_outside, linear_step, softened, step_without
 from vpm.discrepancy.settings import OF_JOINT, RICHEST, SHORT_LIST, SIZE_LEVEL
 from vpm.errors import DivergedError
-from vpm.identify import InverseDynamicsProblem
+from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
 from vpm.identify.identifiability import Span, closest_column, column_lengths, is_alias
 from vpm.identify.response_along_motion import answers_at_once, bends
 from vpm.identify.tangent import has_tangent
-from vpm.model import Model
+from vpm.model import Model, Parameter
 from vpm.numbers import Array
 
 #: Share of the largest influence on a residual below which that of a parameter is rounding.
 ROUNDED = 1e-12
 
-#: Share by which the gain that screening predicts of two candidates may differ by rounding alone.
-TWIN = 1e-6
+
+def linear_step(data: InverseDynamicsProblem, jacobian: Array, residual: Array) -> tuple[Array, Array, Array]:
+    """Linear least-squares step, its standard deviations and the remaining residual (n,)."""
+    if jacobian.shape[1] == 0:
+        return np.zeros(0), np.zeros(0), residual
+    lengths = column_lengths(jacobian)
+    scaled = jacobian / lengths
+    step = np.linalg.lstsq(scaled, -residual, rcond=1e-10)[0]
+    left = residual + scaled @ step
+    std = np.sqrt(np.diag(robust_covariance(scaled, left, segments(data)))) / lengths
+    return step / lengths, std, left
+
+
+def step_without(
+    data: InverseDynamicsProblem, jacobian: Array, residual: Array, staying: Sequence[int]
+) -> tuple[Array, Array, Array]:
+    """Linear step in which some parameters stay where they are, without deviation."""
+    moves = [i for i in range(jacobian.shape[1]) if i not in staying]
+    values, std = np.zeros(jacobian.shape[1]), np.zeros(jacobian.shape[1])
+    values[moves], std[moves], left = linear_step(data, jacobian[:, moves], residual)
+    return values, std, left
+
+
+def is_outside(parameter: Parameter, value: float, std: float) -> bool:
+    """Whether an estimate of a linear step lies outside the physical range by more than one standard deviation."""
+    return value + std < parameter.minimum or value - std > parameter.maximum
+
+
+def softened(start: float, estimate: float, std: float) -> tuple[float, float]:
+    """Stiffness after a linear step in the compliance of a series spring, with its standard deviation.
+
+    Under an effort F it gives way by F/k, which is linear in 1/k. From a start k0, a step dk is one of -dk/k0^2 in the
+    compliance. Taken in k, a spring half as stiff as its start, or less, would come out below zero. What comes out
+    stiffer than rigid stays as it is.
+    """
+    ratio = 2.0 - estimate / start if start > 0.0 else 0.0
+    if ratio <= 0.0:
+        return estimate, std
+    return start / ratio, std / ratio**2
 
 
 @dataclass(frozen=True)
@@ -320,23 +356,6 @@ def sort_columns(
             held.append(Alias(added[i], [*names, *(added[j] for j in others)][closest]))
             keep.remove(i)
     return keep, tuple(held), invisible
-
-
-def same_models(short_list: Sequence[Probe]) -> dict[Key, Key]:
-    """Candidates for the short list with a motion of their own that are the same model as an earlier one.
-
-    A rigid link that bends at its root is a drive with joint compliance: no digit of what screening says parts the two.
-    Refits of such machines take long, so that one of each pair has to be enough where it is refused.
-    """
-    found: dict[Key, Key] = {}
-    for place, one in enumerate(short_list):
-        for other in short_list[:place]:
-            pair = one.candidate.effect, other.candidate.effect
-            heavy = all(effect.elastic for effect in pair) and pair[0].motion != pair[1].motion
-            same = len(one.free) == len(other.free) and abs(one.drop - other.drop) <= TWIN * abs(other.drop)
-            if heavy and same and other.candidate.key not in found:
-                found[one.candidate.key] = other.candidate.key
-    return found
 
 
 def most_promising(promising: Sequence[Probe]) -> list[Probe]:

@@ -9,12 +9,11 @@ from functools import cached_property, partial
 import numpy as np
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confirm, finished, gain_at
+from vpm.discrepancy.confirmation.confirmation import Data, InTime, Judged, Trial, confirm, finished, gain_at, in_time
 from vpm.discrepancy.confirmation.refusal import Thresholds, explains_most, refuse_probe, refuse_timing, refuse_trial
 from vpm.discrepancy.diagnosis import RankedCandidate
 from vpm.discrepancy.noise.noise_floor import noise_alone, only_ringing
 from vpm.discrepancy.noise.residual_structure import structure
-from vpm.discrepancy.noise.sample_timing import InTime, in_time
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.discrepancy.screening.candidates import Candidate, Key, candidates, left_out
 from vpm.discrepancy.screening.probe import (
@@ -23,7 +22,6 @@ from vpm.discrepancy.screening.probe import (
     prepare,
     probe,
     refit_effort,
-    same_models,
     screening_effort,
 )
 from vpm.discrepancy.search.candidate_choice import Accepted, choose
@@ -155,22 +153,14 @@ class Round:
         short_list = most_promising(self._promising)
         if short_list:
             self.tell(f"round {self.number}: refitting with {', '.join(p.candidate.label for p in short_list)}")
-        twins = same_models(short_list)
-        self._refit([one for one in short_list if one.candidate.key not in twins])
+        self._refit(short_list)
         supported = {trial.probe.candidate.key for trial in self._supported}
-        again = [one for one in short_list if twins.get(one.candidate.key) in supported]
-        self._refit(again)
         if any(EFFECTS[name].late for name, _ in supported):
             # Predicted gains do not discriminate delays, so that all of them compete.
             kin = [one for one in self._promising if one.candidate.effect.late]
             kin = [one for one in kin if one not in short_list]
             self._refit(kin)
             short_list = [*short_list, *kin]
-        for one in short_list:
-            key = one.candidate.key
-            if key in twins and one not in again:
-                effect, site = twins[key]
-                self.refused[key] = f"it is {effect} at {site} by another name here: {self.refused[twins[key]]}"
         tried = {one.candidate.key for one in short_list}
         for key in (p.candidate.key for p in self._promising if p.candidate.key not in tried):
             self.refused[key] = (

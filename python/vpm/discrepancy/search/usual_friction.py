@@ -11,9 +11,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, is_clear, judge, measured
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, in_time, is_clear, judge, measured
 from vpm.discrepancy.confirmation.refusal import Thresholds, refuse_trial
-from vpm.discrepancy.noise.sample_timing import in_time
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import TRANSITION, Candidate, candidates, joint_at
 from vpm.discrepancy.screening.probe import Probe
