@@ -35,8 +35,6 @@ def test_dry_friction_is_named_where_one_speed_alone_is_validated() -> None:
     one = 0.3 * np.tanh(6.0 * np.sin(1.5 * time[:1200]))
     model = vpm.Model.from_toml(SLEDGE)
     effects = ["viscous_friction", "coulomb_friction"]
-    why = vpm.diagnose(
-        model, record(many, 1, 3.0), record(one, 2, 20.0), effects=effects, names="search", check=False, workers=1
-    )
+    why = vpm.diagnose(model, record(many, 1, 3.0), record(one, 2, 20.0), effects=effects, check=False, workers=1)
     assert [effect.name for effect in why.effects] == ["coulomb_friction"]
     assert why.model.parameters["way.friction.coulomb"].value == pytest.approx(FRICTION, rel=0.05)

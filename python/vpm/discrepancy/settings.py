@@ -55,8 +55,8 @@ RANKED_JOINTS = 3
 #: Candidates refitted in one round: those of the largest predicted gain for their numbers, of the machine and of each
 #: joint, and of the largest gain of all. Without the last, several names of one regressor crowd out a richer law.
 SHORT_LIST, OF_JOINT, RICHEST = 7, 3, 2
-#: Rivals that are refitted in the place of an effect, and how many of the others that may refine it.
-RIVALS_TRIED, NESTED = 3, 2
+#: Rivals that are refitted in the place of an effect.
+RIVALS_TRIED = 3
 
 # ---- fits ------------------------------------------------------------------------------------------------------------
 

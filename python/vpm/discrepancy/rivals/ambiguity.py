@@ -11,10 +11,10 @@ from vpm.discrepancy.diagnosis import Ambiguity
 from vpm.discrepancy.parallel_candidates import Failure
 from vpm.discrepancy.screening.candidates import Candidate, Key, candidates, joint_at
 from vpm.discrepancy.screening.probe import Probe, impossible_values, probe, refit_effort, screening_effort
-from vpm.discrepancy.search.candidate_choice import Accepted, alike
+from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search import Tried
 from vpm.discrepancy.search.search_round import Request
-from vpm.discrepancy.settings import CLEAR_GAIN, CLEARLY, LEAST_SHARE, NESTED, RIVALS_TRIED
+from vpm.discrepancy.settings import CLEAR_GAIN, CLEARLY, LEAST_SHARE, RIVALS_TRIED
 from vpm.identify import gain, segments
 from vpm.identify.response_along_motion import answers_at_once, bends
 from vpm.model import Model
@@ -81,7 +81,7 @@ def rivals(
     refits, tried = [], list[tuple[Accepted, Trial]]()
     for entry, without in zip(accepted, bases, strict=True):
         done = {t.probe.candidate.key: t for t in known[entry.key].trials} if entry.key in known else {}
-        for p in _short_list(final, without, entry, [p for owner, p in seen if owner is entry]):
+        for p in _short_list(final, without, [p for owner, p in seen if owner is entry]):
             if p.candidate.key in done:
                 tried.append((entry, done[p.candidate.key]))
             elif without is not None:
@@ -152,18 +152,15 @@ def _could_do(model: Model, entry: Accepted, candidate: Candidate) -> bool:
     return _near(model, candidate, entry) and not (heavier and (rubs or bends(model)))
 
 
-def _short_list(final: Judged, without: Judged | None, entry: Accepted, probes: Sequence[Probe]) -> list[Probe]:
-    """Short list of ambiguous rivals to refit: the largest predicted gains per number, and nested laws."""
+def _short_list(final: Judged, without: Judged | None, probes: Sequence[Probe]) -> list[Probe]:
+    """Short list of ambiguous rivals to refit: those of the largest predicted gains per number."""
     if without is None:
         return []
     taken = _power(without) - _power(final)
     good = [
         p for p in probes if p.free and not impossible_values(p) and p.drop * _power(without) >= LEAST_SHARE * taken
     ]
-    good.sort(key=lambda p: -p.score)
-    own = entry.trial.probe.candidate
-    nested = [p for p in good[RIVALS_TRIED:] if alike(p.candidate, own)]
-    return good[:RIVALS_TRIED] + sorted(nested, key=lambda p: -p.drop)[:NESTED]
+    return sorted(good, key=lambda p: -p.score)[:RIVALS_TRIED]
 
 
 def _near(model: Model, candidate: Candidate, entry: Accepted) -> bool:

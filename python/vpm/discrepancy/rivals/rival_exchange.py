@@ -18,20 +18,15 @@ from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.rivals.ambiguity import Rivals, as_good
 from vpm.discrepancy.search.candidate_choice import Accepted, alike, schwarz
 from vpm.discrepancy.search.search import Search, Stage
-from vpm.discrepancy.settings import CLEAR_GAIN, LEAST_GAIN, NORMAL_95_ONE_SIDED
+from vpm.discrepancy.settings import LEAST_GAIN, NORMAL_95_ONE_SIDED
 from vpm.identify import Gain, gain, segments
-
-#: Why a rival takes the place of an effect, where validation data prefer it, and where they do not tell.
-BETTER = "in its place predicts the validation data better"
-SHOWN = "in its place leaves less than half of the training data, and validation data do not discriminate the two"
 
 
 def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search, tuple[Rivals, ...]]:
     """Exchange one effect for the rival that the validation data prefer most, if there is one.
 
     A rival counts that acts at the same site and is confused with the effect. A rival changes a name and adds none, so
-    it need not halve the residual. It only has to predict the validation data better than the effect. Where these do
-    not tell, as at one speed, training records do: there it has to leave less than half.
+    it need not halve the residual. It only has to predict the validation data better than the effect.
 
     The search is the same one if every effect stays.
 
@@ -49,38 +44,25 @@ def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search
         without = known[place].without
         whole = trial if without is None else finished(without, data, trial)
         if _preferred(found.final, found.accepted[place], whole, data, thresholds) > 0.0:
-            better = gain(found.final.validation, whole.judged.validation, segments(data.validation)).relative > 0.0
-            return exchanged(found, known, data, place, whole, BETTER if better else SHOWN)
+            return exchanged(found, known, data, place, whole)
     return found, tuple(known)
 
 
 def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresholds: Thresholds) -> float:
-    """Standard deviations by which data prefer a rival for an exchange; 0 if not in every view."""
+    """Standard deviations by which validation data prefer a rival for an exchange; 0 if not in every view."""
     if trial.probe.candidate.effect.late and entry.effect.late:
         return 0.0  # residual and simulation said which: the residual alone knows less of it
     if not alike(trial.probe.candidate, entry.trial.probe.candidate) or refuse_trial(trial, thresholds):
         return 0.0
-    fitted, validation, simulated = _gains(final, trial.judged, data)
-    more = len(trial.parameters) - len(entry.trial.parameters)
+    unseen = trial.judged.validation * shrinkage(data.validation, final, trial.judged)
+    validation = gain(final.validation, unseen, segments(data.validation))
+    fitted = gain(final.fit.residual, trial.judged.fit.residual, segments(data.training))
+    simulated = simulated_gain(final, trial.judged, data)
     worse = simulated is not None and simulated.harm > NORMAL_95_ONE_SIDED and simulated.relative < -LEAST_GAIN
-    if worse or not earned(fitted, more):
+    if worse or not earned(fitted, len(trial.parameters) - len(entry.trial.parameters)):
         return 0.0
-    shown = fitted.score >= thresholds.score(fitted.pieces)
-    silent = as_good(final, trial, data) and validation.harm < NORMAL_95_ONE_SIDED
-    if shown and silent and fitted.relative > 1.0 - CLEAR_GAIN:
-        return fitted.score
-    sure = validation.score >= thresholds.score(validation.pieces)
-    return validation.score if sure and validation.harm <= -NORMAL_95_ONE_SIDED else 0.0
-
-
-def _gains(final: Judged, judged: Judged, data: Data) -> tuple[Gain, Gain, Gain | None]:
-    """Gains of a rival for an exchange: on training and validation records, and by simulation if there is one."""
-    unseen = judged.validation * shrinkage(data.validation, final, judged)
-    return (
-        gain(final.fit.residual, judged.fit.residual, segments(data.training)),
-        gain(final.validation, unseen, segments(data.validation)),
-        simulated_gain(final, judged, data),
-    )
+    sure = validation.score >= thresholds.score(validation.pieces) and validation.harm <= -NORMAL_95_ONE_SIDED
+    return validation.score if sure else 0.0
 
 
 def _thresholds(known: Sequence[Rivals], data: Data) -> Thresholds:
@@ -101,13 +83,13 @@ def earned(fitted: Gain, more: int) -> bool:
 
 
 def exchanged(
-    found: Search, known: Sequence[Rivals], data: Data, place: int, trial: Trial, why: str
+    found: Search, known: Sequence[Rivals], data: Data, place: int, trial: Trial
 ) -> tuple[Search, tuple[Rivals, ...]]:
-    """Search after the exchange of an effect for a rival, with the rivals of that one and ``why`` in words."""
+    """Search after the exchange of an effect for a rival, with the rivals of that one."""
     entry, mine = found.accepted[place], known[place]
     new, old = trial.probe.candidate, entry.trial.probe.candidate
     incoming = Accepted(trial, ())
-    reason = f"beside the other effects {new.label} {why}"
+    reason = f"beside the other effects {new.label} in its place predicts the validation data better"
     stages = (
         *found.stages,
         *(() if mine.without is None else (Stage("removed", *entry.key, mine.without),)),
