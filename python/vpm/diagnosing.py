@@ -439,7 +439,7 @@ def _rest(known: _Known, found: Search, gap: dict[str, ChannelGap]) -> Remainder
         return None
     start = found.final if found.interrupted or not found.accepted else known.recalibrated
     workers = worker_count(request.each.workers)
-    return remainder(start, found.final, data, min(m.dt for m in data.training.motions), workers)
+    return remainder(start, found.final, data, workers)
 
 
 @dataclass(frozen=True)

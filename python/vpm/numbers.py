@@ -45,6 +45,11 @@ def short(value: float) -> str:
     return UNKNOWN if np.isnan(value) else f"{value:.4g}"
 
 
+def power(values: Array) -> float:
+    """Sum of squares of numbers."""
+    return float(values @ values)
+
+
 def rough_percent(share: float) -> str:
     """Number in percent with three digits, for texts."""
     return f"{100.0 * share:.3g} %"

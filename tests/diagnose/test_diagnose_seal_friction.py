@@ -29,7 +29,7 @@ def loaded(hidden: str, seed: int) -> tuple[Data, Judged, Judged, float]:
 
 
 def told(data: Data, without: Judged, found: Judged) -> Remainder:
-    return remainder(without, found, data, min(m.dt for m in data.training.motions))
+    return remainder(without, found, data)
 
 
 @pytest.fixture(scope="module")

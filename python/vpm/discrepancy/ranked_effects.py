@@ -29,7 +29,7 @@ from vpm.identify import gain, segments
 from vpm.identify.identifiability import Span
 from vpm.identify.response_along_motion import bends
 from vpm.model import Effect, Model
-from vpm.numbers import Array
+from vpm.numbers import Array, power
 
 if TYPE_CHECKING:
     from vpm.ranking import Ranked, Ranking
@@ -216,7 +216,7 @@ def _refitted(
     judged, diverged = judged_anyhow(model, free, data, bounds)
     if judged.simulated is None and still.simulated is not None:
         return still, stopped
-    if _power(judged) > _power(still):
+    if power(judged.fit.residual) > power(still.fit.residual):
         return still, stopped
     if data.simulation is not None and judged.simulated is not None and still.simulated is not None:
         gained = gain(still.simulated, judged.simulated, segments(data.simulation))
@@ -273,10 +273,6 @@ def _bounds(current: Judged, model: Model, candidate: Candidate, one: Ranked) ->
             value = model.parameters[name].value
             found[name] = min(low, value), max(high, value)
     return found
-
-
-def _power(judged: Judged) -> float:
-    return float(judged.fit.residual @ judged.fit.residual)
 
 
 # ---- what else would do ----------------------------------------------------------------------------------------------

@@ -38,7 +38,7 @@ from vpm.identify.parts import moves_drives
 from vpm.identify.response_along_motion import bends, has_hidden, has_own_drives
 from vpm.identify.tangent import Tangent, drives_on_tangent, estimate_on_tangent, has_tangent
 from vpm.model import Model
-from vpm.numbers import Array
+from vpm.numbers import Array, power
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,11 @@ class Data:
     training: InverseDynamicsProblem
     validation: InverseDynamicsProblem
     simulation: OutputErrorProblem | None  #: Simulation of the validation records, the second criterion.
+
+    @property
+    def interval(self) -> float:
+        """Shortest sampling interval of the training records, s."""
+        return min(m.dt for m in self.training.motions)
 
 
 @dataclass(frozen=True)
@@ -99,11 +104,6 @@ class Trial:
     def there(self) -> Gain:
         """Validation gain of a confirmation trial on the joint where the effect acts most."""
         return self.validation if self.here is None else max(self.validation, self.here, key=lambda one: one.relative)
-
-    @property
-    def score(self) -> float:
-        """Validation gain of a confirmation trial per fitted number."""
-        return self.validation.relative / max(1, len(self.parameters))
 
 
 def judge(
@@ -185,8 +185,7 @@ def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) ->
         start = start.with_parameters(dict(zip(free, map(float, rough.values), strict=True)))
         free = (*free, *released)
         origin = start.theta if moved else origin
-    cost = float(current.fit.residual @ current.fit.residual)
-    worth = Worth(min((1.0 - SLOW_GAIN) * cost, HOPELESS * rival), SLOW_EVALUATIONS)
+    worth = Worth(min((1.0 - SLOW_GAIN) * power(current.fit.residual), HOPELESS * rival), SLOW_EVALUATIONS)
     judged, diverged = judged_anyhow(start, free, data, bounds, origin, worth)
     own = free[len(current.free) :]
     return measured(current, data, probe, judged, own, (*probe.held, *held), diverged)
@@ -287,7 +286,7 @@ def _where_it_acts(current: Judged, validation: Array, problem: InverseDynamicsP
 
     Where nothing but one effort is compared, it is the whole gain.
     """
-    lost = float(validation @ validation) > float(current.validation @ current.validation)
+    lost = power(validation) > power(current.validation)
     if len(problem.blocks) == len(problem.motions) or lost:
         return None
     return gain_at(current.model, problem, site, current.validation, validation)
@@ -425,7 +424,7 @@ def _left_at(model: Model, data: InverseDynamicsProblem) -> float:
         residual, _ = data.evaluate(model, model.theta)
     except DivergedError:
         return np.inf
-    return float(residual @ residual)
+    return power(residual)
 
 
 @dataclass(frozen=True)
@@ -452,10 +451,9 @@ def in_time(judged: Judged, data: Data) -> InTime:
     # Free parameters give way to the shift and do nothing else: one that its bounds hold has to stay where it is.
     step = least_step(known, change)
     rest = change + known @ step
-    power = float(rest @ rest)
-    if power <= 1e-20 * float(change @ change):
+    if power(rest) <= 1e-20 * power(change):
         return predict
-    shift = float(np.clip(-(rest @ own) / power, -1.0, 1.0))
+    shift = float(np.clip(-(rest @ own) / power(rest), -1.0, 1.0))
     fitted = own + shift * rest
     if gain(own, fitted, segments(data.training)).relative < LEAST_GAIN:
         return predict

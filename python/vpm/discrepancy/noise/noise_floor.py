@@ -112,7 +112,7 @@ def own_log(model: Model, experiment: Experiment, setup: Setup | None) -> Experi
     own = experiment
     for column, channel in enumerate(model.output_channels):
         if channel in experiment:
-            own = own.with_channel(channel, run.outputs[:, column], _unit(experiment, channel))
+            own = own.with_channel(channel, run.outputs[:, column], experiment.unit(channel))
     return own
 
 
@@ -121,10 +121,6 @@ def _rows(problem: InverseDynamicsProblem, record: int) -> slice:
     count = len(problem.blocks) // len(problem.motions)
     mine = problem.blocks[record * count :][:count]
     return slice(mine[0].samples.start, mine[-1].samples.stop)
-
-
-def _unit(experiment: Experiment, channel: str) -> str:
-    return experiment.units[experiment.channels.index(channel)]
 
 
 def noise_alone(model: Model, data: Data, validation: Array) -> bool:

@@ -143,7 +143,7 @@ def with_noise(model: Model, log: Experiment, read: Experiment, generator: np.ra
     for channel in model.output_channels:
         if channel in read and not channel.endswith(".command"):
             values = log[channel] + drawn_noise(read, channel, generator)
-            noisy = noisy.with_channel(channel, values, read.units[read.channels.index(channel)])
+            noisy = noisy.with_channel(channel, values, read.unit(channel))
     return noisy
 
 

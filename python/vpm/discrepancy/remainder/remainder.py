@@ -20,7 +20,7 @@ from vpm.discrepancy.settings import EFFORT_SHARE, WORTH_A_NAME
 from vpm.identify import InverseDynamicsProblem, gain, segments
 from vpm.identify.parallel import in_order
 from vpm.model import Model
-from vpm.numbers import Array
+from vpm.numbers import Array, power
 
 
 @dataclass(frozen=True)
@@ -41,24 +41,23 @@ class Remainder:
         return first[0] if first and last.empirical.after >= (1.0 - WORTH_A_NAME) * first[0].empirical.after else last
 
 
-def remainder(recalibrated: Judged, final: Judged, data: Data, interval: float, workers: int = 1) -> Remainder:
+def remainder(recalibrated: Judged, final: Judged, data: Data, workers: int = 1) -> Remainder:
     """Describe the remainder of the final model, and that of the model before effects.
 
     - ``recalibrated``, ``final``: without and with the accepted effects; the same one if there is none
-    - ``interval``: sampling interval, s
     - ``workers``: models that are described at a time; the result does not depend on it
     """
     bases = [final] if recalibrated is final else [recalibrated, final]
     choices = tuple(in_order([partial(describe, base, data) for base in bases], workers))
-    view = _View(data, motion_band(data.training, final.model), Thresholds(len(bases), interval))
+    view = _View(data, motion_band(data.training, final.model), Thresholds(len(bases), data.interval))
     left = view(final)
     clear = [view.clearly_better(choice, left) for choice in choices]
     pressed = None if recalibrated is final else view.pressed(recalibrated, left)
     if not any(clear):
         return Remainder(choices, repeats=pressed is not None, open=0.0, seals=pressed)
-    power, whole = _power(in_time(final, data).validation), _power(_before(recalibrated, final, data))
+    rest, whole = power(in_time(final, data).validation), power(_before(recalibrated, final, data))
     least = min(view.leaves(choice) for choice, better in zip(choices, clear, strict=True) if better)
-    share = np.clip((power - least) / max(whole - least, 1e-300), 0.0, 1.0)
+    share = np.clip((rest - least) / max(whole - least, 1e-300), 0.0, 1.0)
     return Remainder(choices, repeats=True, open=float(share), seals=pressed)
 
 
@@ -67,10 +66,6 @@ def _before(recalibrated: Judged, final: Judged, data: Data) -> Array:
     known = {effect.key for effect in recalibrated.model.effects}
     late = any(effect.type.shifts and effect.key not in known for effect in final.model.effects)
     return recalibrated.validation if late else in_time(recalibrated, data).validation
-
-
-def _power(values: Array) -> float:
-    return float(values @ values)
 
 
 @dataclass(frozen=True)
@@ -89,7 +84,7 @@ class _View:
         """Whether a description of the remainder predicts surely more than the effects do."""
         if choice.empirical.remark:
             own = self(choice.base)
-            return _power(own) - self._said(choice, own) < (1.0 - WORTH_A_NAME) * _power(left)
+            return power(own) - self._said(choice, own) < (1.0 - WORTH_A_NAME) * power(left)
         return self.thresholds.met(gain(left, self(choice.judged), segments(self.data.validation)))
 
     def pressed(self, recalibrated: Judged, left: Array) -> Seals | None:
@@ -103,12 +98,12 @@ class _View:
     def leaves(self, choice: Described) -> float:
         """Sum of squares that a description of the remainder leaves at all frequencies."""
         own = in_time(choice.judged, self.data).validation
-        return _power(own) - self._said(choice, own) if choice.empirical.remark else _power(own)
+        return power(own) - self._said(choice, own) if choice.empirical.remark else power(own)
 
     def _said(self, choice: Described, own: Array) -> float:
         """Sum of squares that a remark on the remainder predicts, at the effort that it names."""
         blocks = (block for block in self.data.validation.blocks if block.channel == choice.empirical.channel)
-        return choice.empirical.predicted * sum(_power(own[block.samples]) for block in blocks)
+        return choice.empirical.predicted * sum(power(own[block.samples]) for block in blocks)
 
 
 def motion_band(problem: InverseDynamicsProblem, model: Model) -> float:

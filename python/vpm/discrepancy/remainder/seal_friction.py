@@ -103,8 +103,7 @@ def _per_pressure(problem: InverseDynamicsProblem, record: int, drive: str) -> A
     for name in model.actuators:
         for channel, value in zip(_pressures(name), (UNIT_PRESSURE * (name == drive), 0.0), strict=True):
             if channel in experiment:
-                unit = experiment.units[experiment.channels.index(channel)]
-                experiment = experiment.with_channel(channel, np.full(len(m.time), value), unit)
+                experiment = experiment.with_channel(channel, np.full(len(m.time), value), experiment.unit(channel))
     first = first_drives(model, model.theta, m, experiment)
     outputs, _ = driven(model, model.theta, m, experiment, (), first, problem.integrators[record])
     return outputs[:, len(model.output_channels) :] / UNIT_PRESSURE

@@ -18,6 +18,7 @@ from vpm.discrepancy.settings import CLEAR_GAIN, CLEARLY, LEAST_SHARE, RIVALS_TR
 from vpm.identify import gain, segments
 from vpm.identify.response_along_motion import answers_at_once, bends
 from vpm.model import Model
+from vpm.numbers import power
 
 
 @dataclass(frozen=True)
@@ -156,10 +157,9 @@ def _short_list(final: Judged, without: Judged | None, probes: Sequence[Probe]) 
     """Short list of ambiguous rivals to refit: those of the largest predicted gains per number."""
     if without is None:
         return []
-    taken = _power(without) - _power(final)
-    good = [
-        p for p in probes if p.free and not impossible_values(p) and p.drop * _power(without) >= LEAST_SHARE * taken
-    ]
+    whole = power(without.fit.residual)
+    least = LEAST_SHARE * (whole - power(final.fit.residual))
+    good = [p for p in probes if p.free and not impossible_values(p) and p.drop * whole >= least]
     return sorted(good, key=lambda p: -p.score)[:RIVALS_TRIED]
 
 
@@ -184,7 +184,3 @@ def as_good(final: Judged, trial: Trial, data: Data) -> bool:
         return False
     change = gain(final.validation, trial.judged.validation, segments(data.validation)).relative
     return change > -CLEARLY
-
-
-def _power(judged: Judged) -> float:
-    return float(judged.fit.residual @ judged.fit.residual)

@@ -20,6 +20,7 @@ from vpm.discrepancy.search.candidate_choice import Accepted, alike, schwarz
 from vpm.discrepancy.search.search import Search, Stage
 from vpm.discrepancy.settings import LEAST_GAIN, NORMAL_95_ONE_SIDED
 from vpm.identify import Gain, gain, segments
+from vpm.numbers import power
 
 
 def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search, tuple[Rivals, ...]]:
@@ -67,7 +68,7 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
 
 def _thresholds(known: Sequence[Rivals], data: Data) -> Thresholds:
     """Thresholds for the exchange of rivals when so many were tried."""
-    return Thresholds(max(1, sum(len(r.tried) for r in known)), min(m.dt for m in data.training.motions))
+    return Thresholds(max(1, sum(len(r.tried) for r in known)), data.interval)
 
 
 def earned(fitted: Gain, more: int) -> bool:
@@ -120,8 +121,7 @@ def in_order(found: Search, known: Sequence[Rivals]) -> tuple[Search, tuple[Riva
     An effect may have a held number that the data show only together with another effect. It comes after that one: with
     either removed, the held number would decide how they share the residual.
     """
-    power = float(found.final.validation @ found.final.validation)
-    adds = [np.inf if r.without is None else float(r.without.validation @ r.without.validation) - power for r in known]
+    adds = [np.inf if r.without is None else power(r.without.validation) for r in known]
     left, order = list(range(len(found.accepted))), list[int]()
     while left:
         ready = [n for n in left if not any(_refines(found.accepted[n], found.accepted[m]) for m in left if m != n)]

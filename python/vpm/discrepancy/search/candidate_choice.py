@@ -21,7 +21,7 @@ from vpm.discrepancy.screening.compliance_and_stop_start import coupled
 from vpm.discrepancy.settings import CLEAR_GAIN, LEAST_GAIN, NORMAL_95_ONE_SIDED, SAME, SENSOR_SHARE, TIE, WORTH_A_NAME
 from vpm.identify import Gain, InverseDynamicsProblem, gain, segments
 from vpm.model import Model
-from vpm.numbers import Array
+from vpm.numbers import Array, power
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ def preferred_sensor(chosen: Trial, equals: Sequence[Trial], data: Data) -> Tria
     if chosen.probe.candidate.effect.site == "sensor":
         return chosen
     supported = [t for t in equals if t.probe.candidate.effect.site == "sensor" and _is_supported(t, chosen, data)]
-    return min(supported, key=lambda t: _power(t.judged.validation), default=chosen)
+    return min(supported, key=lambda t: power(t.judged.validation), default=chosen)
 
 
 def _is_supported(trial: Trial, chosen: Trial, data: Data) -> bool:
@@ -175,8 +175,4 @@ def _better(problem: InverseDynamicsProblem, channels: Sequence[str], before: Ar
         own[block.samples] = block.channel in channels
     gained = gain(before * own, after * own, segments(problem))
     sure = gained.relative >= WORTH_A_NAME and gained.score >= NORMAL_95_ONE_SIDED
-    return sure and _power(after) <= _power(before)
-
-
-def _power(residual: Array) -> float:
-    return float(residual @ residual)
+    return sure and power(after) <= power(before)

@@ -29,6 +29,7 @@ from vpm.discrepancy.settings import CLEAR_GAIN, FEW, FLOOR_FACTOR, RINGING, SHO
 from vpm.identify import gain, segments
 from vpm.identify.response_along_motion import answers_at_once, bends
 from vpm.identify.tangent import drives_on_tangent
+from vpm.numbers import power
 
 #: Called with a sentence on what is being done.
 Tell = Callable[[str], None]
@@ -175,7 +176,7 @@ class Round:
             supported = len(self._supported)
             self._tried([first], np.inf)
             rest = [one for one in short_list if one is not first]
-            left = [float(t.judged.fit.residual @ t.judged.fit.residual) for t in self._supported[supported:]]
+            left = [power(t.judged.fit.residual) for t in self._supported[supported:]]
             self._tried(rest, min(left, default=np.inf))
         else:
             self._tried(short_list, np.inf)
@@ -200,7 +201,7 @@ class Round:
 
     def thresholds(self) -> Thresholds:
         """Thresholds of the round for an effect when so many have been tried."""
-        return Thresholds(self.tried * self.number, min(m.dt for m in self.data.training.motions))
+        return Thresholds(self.tried * self.number, self.data.interval)
 
     @cached_property
     def timed(self) -> InTime:

@@ -23,6 +23,7 @@ from vpm.discrepancy.settings import CLEAR_GAIN
 from vpm.errors import VpmError
 from vpm.identify.response_along_motion import answers_at_once
 from vpm.model import Model
+from vpm.numbers import power
 
 
 def with_usual_friction(found: Search, data: Data, request: Request) -> Search:
@@ -47,7 +48,7 @@ def with_usual_friction(found: Search, data: Data, request: Request) -> Search:
             unclear = [c for c in listed if not is_clear(judged, _own(judged, c))]
             trials = [] if unclear else [_beside(judged, alone, candidate) for candidate in listed]
             tried = len(usual) * len(start.model.joints)
-            leaving = unclear or _leaving(trials, Thresholds(tried, min(m.dt for m in data.training.motions)))
+            leaving = unclear or _leaving(trials, Thresholds(tried, data.interval))
             if not leaving:
                 return _begun(found, judged, alone, trials, request.each)
             listed = [c for c in listed if c not in leaving]
@@ -98,7 +99,7 @@ def _beside(judged: Judged, data: Data, candidate: Candidate) -> Trial:
     less = replace(less, fit=replace(less.fit, residual=timed.fitted), validation=timed.validation)
     values = {name: judged.model.parameters[name].value for name in own}
     spread = {name: float(judged.fit.std[judged.free.index(name)]) for name in own}
-    drop = 1.0 - float(judged.fit.residual @ judged.fit.residual) / float(timed.fitted @ timed.fitted)
+    drop = 1.0 - power(judged.fit.residual) / power(timed.fitted)
     return measured(less, data, Probe(candidate, judged.model, own, (), (), values, spread, drop), judged, own, (), "")
 
 
