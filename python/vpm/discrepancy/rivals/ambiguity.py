@@ -59,70 +59,47 @@ def rivals(
     are refitted. They have to predict the validation records as well as the effect. What the ``last`` effect competed
     with when it came in is not worked out again.
     """
-    each = request.each
     known = {last.key: last} if last is not None else {}
-    left = each("what each adds: refitting without", partial(_without, final, data, known), accepted, _label)
-    bases = [None if isinstance(one, Failure) else one for one in left]
-    jobs = [
-        _Job(entry, without, candidate)
-        for entry, without in zip(accepted, bases, strict=True)
-        if without is not None and entry.key not in known
-        for candidate in _others(without, data, entry, request.effects)
-    ]
-    probes = each(
-        "what else would do: screening",
-        lambda job: probe(job.base.baseline, data.training, job.candidate),
-        jobs,
-        lambda job: job.label,
-        lambda job: screening_effort(job.candidate),
+    left = request.each(
+        "what each adds: refitting without", partial(_without, final, data, known), accepted, lambda one: one.label
     )
-    seen = [(job.entry, p) for job, p in zip(jobs, probes, strict=True) if isinstance(p, Probe)]
+    return tuple(
+        Rivals(*entry.key, ())
+        if isinstance(without, Failure)
+        else _rivals_of(entry, final, without, data, request, known.get(entry.key))
+        for entry, without in zip(accepted, left, strict=True)
+    )
+
+
+def _rivals_of(
+    entry: Accepted, final: Judged, without: Judged, data: Data, request: Request, last: Tried | None
+) -> Rivals:
+    """Ambiguity of one accepted effect: its rivals, put in its place in the model without it."""
+    known = {} if last is None else {trial.probe.candidate.key: trial for trial in last.trials}
     if last is not None:
-        seen += [(e, p) for e in accepted if e.key == last.key for p in _beside(last, e)]
-    refits, tried = [], list[tuple[Accepted, Trial]]()
-    for entry, without in zip(accepted, bases, strict=True):
-        done = {t.probe.candidate.key: t for t in known[entry.key].trials} if entry.key in known else {}
-        for p in _short_list(final, without, [p for owner, p in seen if owner is entry]):
-            if p.candidate.key in done:
-                tried.append((entry, done[p.candidate.key]))
-            elif without is not None:
-                refits.append((_Job(entry, without, p.candidate), p))
-    trials = each(
+        probes = [one for one in last.probes if _could_do(last.without.model, entry, one.candidate)]
+    else:
+        offered = candidates(without.model, data.training, without.fit.residual, request.effects)
+        screened = request.each(
+            "what else would do: screening",
+            partial(probe, without.baseline, data.training),
+            [one for one in offered if _could_do(without.model, entry, one)],
+            lambda one: f"{one.label} for {entry.label}",
+            screening_effort,
+        )
+        probes = [one for one in screened if isinstance(one, Probe)]
+    listed = _short_list(final, without, probes)
+    trials = request.each(
         "what else would do: refitting",
-        lambda job: confirm(job[0].base, data, job[1]),
-        refits,
-        lambda job: job[0].label,
-        lambda job: refit_effort(job[1]),
+        partial(confirm, without, data),
+        [one for one in listed if one.candidate.key not in known],
+        lambda one: f"{one.candidate.label} for {entry.label}",
+        refit_effort,
     )
-    tried += [(job.entry, t) for (job, _), t in zip(refits, trials, strict=True) if isinstance(t, Trial)]
-    found = []
-    for entry, without in zip(accepted, bases, strict=True):
-        mine = tuple(t for owner, t in tried if owner is entry)
-        found.append(Rivals(*entry.key, tuple(t for t in mine if as_good(final, t, data)), mine, without))
-    return tuple(found)
-
-
-@dataclass(frozen=True)
-class _Job:
-    """Screening job for rivals: a candidate for the place of an accepted effect, and the model without that effect."""
-
-    entry: Accepted
-    base: Judged
-    candidate: Candidate
-
-    @property
-    def label(self) -> str:
-        """Label of a rival's screening for ambiguity in progress reports."""
-        return f"{self.candidate.label} for {_label(self.entry)}"
-
-
-def _label(entry: Accepted) -> str:
-    return entry.trial.probe.candidate.label
-
-
-def _beside(last: Tried, entry: Accepted) -> list[Probe]:
-    """Probes for ambiguity from the round in which an effect came in."""
-    return [p for p in last.probes if _could_do(last.without.model, entry, p.candidate)]
+    tried = [known[one.candidate.key] for one in listed if one.candidate.key in known]
+    tried += [trial for trial in trials if isinstance(trial, Trial)]
+    good = tuple(trial for trial in tried if as_good(final, trial, data))
+    return Rivals(*entry.key, good, tuple(tried), without)
 
 
 def _without(final: Judged, data: Data, known: Mapping[Key, Tried], entry: Accepted) -> Judged:
@@ -137,12 +114,6 @@ def _without(final: Judged, data: Data, known: Mapping[Key, Tried], entry: Accep
     return judge(model, free, data, bounds, linear_only=answers_at_once(final.model))
 
 
-def _others(without: Judged, data: Data, entry: Accepted, effects: Sequence[str] | None) -> list[Candidate]:
-    """Possible rivals of an accepted effect among all candidates, for its ambiguity."""
-    offered = candidates(without.model, data.training, without.fit.residual, effects)
-    return [c for c in offered if _could_do(without.model, entry, c)]
-
-
 def _could_do(model: Model, entry: Accepted, candidate: Candidate) -> bool:
     """Whether a candidate acts near enough to an accepted effect to make it ambiguous.
 
@@ -153,10 +124,8 @@ def _could_do(model: Model, entry: Accepted, candidate: Candidate) -> bool:
     return _near(model, candidate, entry) and not (heavier and (rubs or bends(model)))
 
 
-def _short_list(final: Judged, without: Judged | None, probes: Sequence[Probe]) -> list[Probe]:
+def _short_list(final: Judged, without: Judged, probes: Sequence[Probe]) -> list[Probe]:
     """Short list of ambiguous rivals to refit: those of the largest predicted gains per number."""
-    if without is None:
-        return []
     whole = power(without.fit.residual)
     least = LEAST_SHARE * (whole - power(final.fit.residual))
     good = [p for p in probes if p.free and not impossible_values(p) and p.drop * whole >= least]

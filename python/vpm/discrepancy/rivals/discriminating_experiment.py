@@ -9,7 +9,7 @@ T-optimality of A. Atkinson and V. Fedorov, "The design of experiments for discr
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -18,6 +18,7 @@ import numpy as np
 from vpm.discrepancy.confirmation.confirmation import Judged
 from vpm.discrepancy.diagnosis import ProposedExperiment
 from vpm.discrepancy.rivals.ambiguity import Rivals
+from vpm.discrepancy.screening.candidates import joint_at
 from vpm.discrepancy.settings import AMPLITUDES, DURATION, EXPERIMENT_SAMPLES, LONGEST_EXPERIMENT, RANGE_SHARE, SPEEDS
 from vpm.errors import ExcitationError
 from vpm.excitation import Excitation, JointLimits, chirp, multisine, trapezoid
@@ -46,7 +47,8 @@ def experiments(
             if has_hidden(trial.judged.model, data.motions[0].joints):
                 continue  # its residual needs a motion that no channel measures
             rival = trial.probe.candidate.label
-            joint = _joint_of(final.model, rivals.site, data.joints)
+            here = joint_at(final.model, rivals.site)
+            joint = here if here in data.joints else data.joints[0]
             best = propose(final, trial.judged, (rivals.label, rival), excitation_range(data, joint), noise)
             if best is not None:
                 found.append(best)
@@ -58,7 +60,11 @@ def propose(
 ) -> ProposedExperiment | None:
     """Propose the motion that discriminates two models best, or None if no motion is possible."""
     best: ProposedExperiment | None = None
-    for motion in _possible(seen):
+    for design in designs(seen):
+        try:
+            motion = design()
+        except ExcitationError:
+            continue  # this one does not fit into the limits
         difference, joint = _difference(first, second, motion, seen)
         channel = f"{joint}.effort"
         found = ProposedExperiment(
@@ -74,14 +80,6 @@ def propose(
         if best is None or found.ratio > best.ratio:
             best = found
     return None if best is None else _with_sentence(best, seen)
-
-
-def _possible(seen: ExcitationRange) -> Iterator[Motion]:
-    for design in designs(seen):
-        try:
-            yield design()
-        except ExcitationError:
-            continue  # this one does not fit into the limits
 
 
 def _difference(first: Judged, second: Judged, motion: Motion, seen: ExcitationRange) -> tuple[float, str]:
@@ -117,39 +115,28 @@ def _imitation(change: Array, slopes: Array, second: Judged, spread: float) -> A
 
 def _residual(model: Model, free: Sequence[str], motion: Motion, inputs: Array) -> tuple[Array, Array]:
     """Torque residual of a model along a motion of the experiment (n, joints), and its derivative."""
-    columns = [model.index(name) for name in free]
-    required, applied, jacobian = model.core.inverse_dynamics(
-        model.theta, motion.position, motion.velocity, motion.acceleration, inputs, motion.time_step, columns
-    )
+    required, applied, jacobian = _efforts(model, motion, inputs, [model.index(name) for name in free])
     return applied - required, -jacobian
+
+
+def _efforts(model: Model, motion: Motion, inputs: Array, columns: Sequence[int] = ()) -> tuple[Array, Array, Array]:
+    states, step = (motion.position, motion.velocity, motion.acceleration), motion.excitation.time_step
+    return model.core.inverse_dynamics(model.theta, *states, inputs, step, list(columns))
 
 
 def _commands(model: Model, motion: Motion, seen: ExcitationRange) -> Array:
     """Commands for an experiment: the required effort divided by the mean gain of the drives."""
     count = len(model.inputs)
     rest = np.zeros((len(motion.position), count))
-    required = model.core.inverse_dynamics(
-        model.theta, motion.position, motion.velocity, motion.acceleration, rest, motion.time_step, []
-    )[0]
+    required = _efforts(model, motion, rest)[0]
     for column in range(count):
         full = rest.copy()
         full[:, column] = seen.command
-        answer = model.core.inverse_dynamics(
-            model.theta, motion.position, motion.velocity, motion.acceleration, full, motion.time_step, []
-        )[1]
+        answer = _efforts(model, motion, full)[1]
         joint = int(np.argmax(np.abs(answer[-1])))
         if answer[-1, joint] != 0.0:
             rest[:, column] = required[:, joint] * seen.command / answer[-1, joint]
     return rest
-
-
-def _joint_of(model: Model, site: str, joints: Sequence[str]) -> str:
-    """Joint that the experiment moves for an effect at a site."""
-    if site in joints:
-        return site
-    if site in model.actuators and (driven := [j for j in model.joints_of_actuator(site) if j in joints]):
-        return driven[0]
-    return next((joint for joint in joints if joint in site), joints[0])
 
 
 def _with_sentence(found: ProposedExperiment, seen: ExcitationRange) -> ProposedExperiment:
@@ -175,11 +162,6 @@ class Motion:
     position: Array
     velocity: Array
     acceleration: Array
-
-    @property
-    def time_step(self) -> float:
-        """Time step of a designed motion, s."""
-        return self.excitation.time_step
 
 
 def designs(seen: ExcitationRange) -> list[Callable[[], Motion]]:

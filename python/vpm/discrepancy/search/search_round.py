@@ -78,18 +78,13 @@ class Round:
         model = self.current.model
         left = structure(model, self.data.training, self.data.validation, self.timed.fitted, self.timed.validation)
         quiet = not left.present and left.above_white <= FLOOR_FACTOR
-        if (quiet and self._takes_long()) or self.done():
+        if (quiet and not answers_at_once(model)) or self.done():
             return None
         self.screen(without, heavy=True)
         if quiet:
             self._promising = [one for one in self._promising if one.drop >= RINGING]
         self.confirm()
         return self.best()
-
-    @property
-    def tried(self) -> int:
-        """Candidates of the round from which those to refit were chosen."""
-        return len(self._ranking)
 
     def weak(self, best: Accepted) -> bool:
         """Whether the best candidate of the round leaves most of the error, so that a hidden motion is tried too.
@@ -99,11 +94,7 @@ class Round:
         long, and come after all others.
         """
         tried = any(EFFECTS[name].winds_up for name, _ in self._ranking)
-        return best.trial.there.relative < CLEAR_GAIN and not tried and not self._takes_long()
-
-    def _takes_long(self) -> bool:
-        """Whether probes of candidates with a motion of their own take long in this round."""
-        return not answers_at_once(self.current.model)
+        return best.trial.there.relative < CLEAR_GAIN and not tried and answers_at_once(self.current.model)
 
     def screen(self, without: set[Key], *, heavy: bool) -> None:
         """Screen all or some candidates of the round, and set aside impossible ones."""
@@ -201,7 +192,7 @@ class Round:
 
     def thresholds(self) -> Thresholds:
         """Thresholds of the round for an effect when so many have been tried."""
-        return Thresholds(self.tried * self.number, self.data.interval)
+        return Thresholds(len(self._ranking) * self.number, self.data.interval)
 
     @cached_property
     def timed(self) -> InTime:
