@@ -12,7 +12,7 @@ from vpm.catalogue.empirical import TERMS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
 from vpm.discrepancy.diagnosis import Empirical, EmpiricalTerm
 from vpm.discrepancy.remainder.sparse_formula import Formula, select
-from vpm.discrepancy.remainder.state_dependence import Rhythm, Shares, busiest_joint, rhythm, shares
+from vpm.discrepancy.remainder.state_dependence import Shares, busiest_joint, rhythm, shares
 from vpm.discrepancy.settings import MOST_NAMED, PERIOD_RANGE, WORTH_A_NAME
 from vpm.identify import Gain, gain, segments
 from vpm.model import Model
@@ -144,15 +144,16 @@ def _text(formula: Formula, model: Model, joint: str) -> str:
     return f"tau = -({body}) {unit}".rstrip() + f" at {joint}" + (f", with {with_what}" if with_what else "")
 
 
-def _in_time(states: dict[str, float], beat: Rhythm | None, formula_share: float) -> tuple[str, float]:
+def _in_time(states: dict[str, float], beat: tuple[float, float], formula_share: float) -> tuple[str, float]:
     """Sentence on a rhythm in time of the residual and its share; empty if formula or state explain it as well."""
+    period, repeats = beat
     time = max((share for name, share in states.items() if name.startswith("time")), default=0.0)
     machine = max((formula_share, *(share for name, share in states.items() if not name.startswith("time"))))
-    if beat is not None and beat.share > max(machine, time) + WORTH_A_NAME:
+    if repeats > max(machine, time) + WORTH_A_NAME:
         return (
-            f"it repeats every {beat.period:.3g} s whatever the machine does ({100 * beat.share:.0f} % of it), so that "
+            f"it repeats every {period:.3g} s whatever the machine does ({100 * repeats:.0f} % of it), so that "
             "something outside of the machine, or its controller, disturbs it"
-        ), beat.share
+        ), repeats
     if time > machine + WORTH_A_NAME:
         return (
             f"it changes with the time in the record ({100 * time:.0f} % of it), not with the state of the machine: "

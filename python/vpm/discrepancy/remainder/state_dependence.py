@@ -29,14 +29,6 @@ class Shares:
     alike: tuple[str, ...]
 
 
-@dataclass(frozen=True)
-class Rhythm:
-    """Dependence of a residual on time: a period in s, and the share of the validation residual that it predicts."""
-
-    period: float
-    share: float
-
-
 def busiest_joint(data: Data, final: Judged) -> int:
     """Joint whose validation residual is the largest part of its effort; its dependence on states is examined."""
     sums = np.zeros(len(data.validation.joints))
@@ -94,8 +86,8 @@ def _share(rest: Array, target: Array) -> float:
     return max(0.0, 1.0 - float(rest @ rest) / power) if power > 0.0 else 0.0
 
 
-def rhythm(data: Data, final: Judged, joint: int) -> Rhythm | None:
-    """Dependence on time as a rhythm: dominant frequency of the training residual, and its validation share.
+def rhythm(data: Data, final: Judged, joint: int) -> tuple[float, float]:
+    """Dependence on time as a rhythm: dominant period of the training residual, s, and its validation share.
 
     The phase is free on the validation records: nobody knows when they began in the beat of the disturbance. But a
     disturbance keeps it: each half of a record has to predict the other one. Links that ring with noise have a line of
@@ -106,14 +98,14 @@ def rhythm(data: Data, final: Judged, joint: int) -> Rhythm | None:
     step = max(float(np.median(np.diff(time))) for time, _ in series[0])
     frequencies = np.arange(FEWEST_PERIODS / shortest, 0.25 / step, 0.2 / shortest)
     if not frequencies.size:
-        return None
+        return 0.0, 0.0
     power = [sum(_line(time, values, f) for time, values in series[0]) for f in frequencies]
     best = float(frequencies[int(np.argmax(power))])
     fine = best + np.linspace(-0.2, 0.2, 41) / shortest
     best = float(fine[int(np.argmax([sum(_line(t, x, f) for t, x in series[0]) for f in fine]))])
     total = sum(float(values @ values) for _, values in series[1])
     left = sum(_other_half(time, values, best) for time, values in series[1])
-    return Rhythm(1.0 / best, max(0.0, 1.0 - left / total) if total > 0.0 else 0.0)
+    return 1.0 / best, max(0.0, 1.0 - left / total) if total > 0.0 else 0.0
 
 
 def _series(problem: InverseDynamicsProblem, residual: Array, joint: int) -> list[tuple[Array, Array]]:

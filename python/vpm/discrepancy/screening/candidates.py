@@ -192,7 +192,9 @@ def _tried(
     starts = tuple(dict(start) for start in product(*grids))
     if TRANSITION in effect.fixed:
         # What was fitted of the dry friction without it may be far too wide: it makes up for what is missing.
-        velocities = {_known_transition(model, site, seen), *(() if effect.tried else slow_speeds(seen.speed)[:1])}
+        dry = model.parameters.get(f"{site}.friction.{TRANSITION}")
+        velocities = {0.01 * seen.speed if dry is None else dry.value}
+        velocities |= set() if effect.tried else {slow_speeds(seen.speed)[0]}
         bends = sorted(velocities, reverse=True)
         starts = tuple({**start, TRANSITION: velocity} for start in starts for velocity in bends)
         bounds[TRANSITION] = slow_speeds(seen.speed)
@@ -233,12 +235,6 @@ def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
 def slow_speeds(fastest: float) -> tuple[float, float]:
     """Bounds of a candidate's transition velocity: between 1/5000 and 1/10 of the largest speed."""
     return SLOW[0] * fastest, SLOW[1] * fastest
-
-
-def _known_transition(model: Model, site: str, seen: Excitation) -> float:
-    """Transition velocity for a candidate: that of the model's Coulomb friction, else a hundredth of the speed."""
-    name = f"{site}.friction.transition_velocity"
-    return model.parameters[name].value if name in model.parameters else 0.01 * seen.speed
 
 
 def joint_at(model: Model, site: str) -> str:
