@@ -10,9 +10,8 @@ import pytest
 
 from quotients import of_residual
 from shared_cases import shared_case
-from vpm.discrepancy.noise.noise_floor import noise_floor
+from vpm.discrepancy.noise.noise_floor import noise_floor, structure
 from vpm.discrepancy.noise.noise_spectrum import noise_shapes, noise_spectrum
-from vpm.discrepancy.noise.residual_structure import structure
 from vpm.identify import InverseDynamicsProblem, gaps
 from vpm.identify.drives import SLOPE_STEP
 from vpm.identify.following import Memo

@@ -6,8 +6,7 @@ import pytest
 from synthetic import Truth, nominal, simulate_axis
 from vpm.diagnosing import diagnose
 from vpm.discrepancy.diagnosis import RankedCandidate
-from vpm.discrepancy.noise.noise_floor import white_level
-from vpm.discrepancy.noise.residual_structure import structure
+from vpm.discrepancy.noise.noise_floor import structure, white_level
 from vpm.discrepancy.search.search_round import _by_gain
 from vpm.identify import InverseDynamicsProblem
 

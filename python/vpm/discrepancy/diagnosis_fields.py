@@ -21,8 +21,7 @@ from vpm.discrepancy.diagnosis import (
     Step,
     Trace,
 )
-from vpm.discrepancy.noise.noise_floor import noise_floor
-from vpm.discrepancy.noise.residual_structure import Structure, structure
+from vpm.discrepancy.noise.noise_floor import Structure, noise_floor, structure
 from vpm.discrepancy.preparation import Records
 from vpm.discrepancy.ranked_effects import candidates_of, refused_by, tracker_gaps
 from vpm.discrepancy.rivals.ambiguity import Rivals

@@ -10,7 +10,7 @@ from scipy.special import ndtri
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
 from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RefusedEffect
-from vpm.discrepancy.noise.residual_structure import Structure
+from vpm.discrepancy.noise.noise_floor import Structure
 from vpm.discrepancy.preparation import stated
 from vpm.discrepancy.remainder.remainder import Remainder
 from vpm.discrepancy.screening.candidates import joint_at
@@ -34,8 +34,6 @@ from vpm.numbers import NORMAL_95, percent, short
 _REST = " A structured residual above the noise remains."
 #: The same where effects explain what is missing at other joints.
 _OPEN = " What is left at {joints} is structured, and no effect of the catalogue explains it."
-#: Smallest signal that divides: of a motor that is off there is none.
-TINY = 1e-300
 
 
 def main_gaps(gap: Mapping[str, ChannelGap]) -> list[ChannelGap]:
@@ -285,7 +283,7 @@ class Joints:
             if left is not None and left.present and _is_clear(efforts[joint].after, efforts[joint])
         }
         worst = max(
-            efforts, key=lambda joint: efforts[joint].recalibrated / max(efforts[joint].signal, TINY), default=""
+            efforts, key=lambda joint: efforts[joint].recalibrated / max(efforts[joint].signal, 1e-300), default=""
         )
         return cls(still, tuple(joint for joint in shares if joint not in most), worst)
 

@@ -33,7 +33,7 @@ def replaced(found: Search, known: Sequence[Rivals], data: Data) -> tuple[Search
 
     Rivals of the effect that came in are complete, those of the others are as they were.
     """
-    thresholds = _thresholds(known, data)
+    thresholds = Thresholds(max(1, sum(len(one.tried) for one in known)), data.interval)
     winners = [
         (score, place, trial)
         for place, entry in enumerate(found.accepted)
@@ -64,11 +64,6 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
         return 0.0
     sure = validation.score >= thresholds.score(validation.pieces) and validation.harm <= -NORMAL_95_ONE_SIDED
     return validation.score if sure else 0.0
-
-
-def _thresholds(known: Sequence[Rivals], data: Data) -> Thresholds:
-    """Thresholds for the exchange of rivals when so many were tried."""
-    return Thresholds(max(1, sum(len(r.tried) for r in known)), data.interval)
 
 
 def earned(fitted: Gain, more: int) -> bool:

@@ -12,8 +12,7 @@ from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Data, InTime, Judged, Trial, confirm, finished, gain_at, in_time
 from vpm.discrepancy.confirmation.refusal import Thresholds, explains_most, refuse_probe, refuse_timing, refuse_trial
 from vpm.discrepancy.diagnosis import RankedCandidate
-from vpm.discrepancy.noise.noise_floor import noise_alone, only_ringing
-from vpm.discrepancy.noise.residual_structure import structure
+from vpm.discrepancy.noise.noise_floor import noise_alone, only_ringing, structure
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.discrepancy.screening.candidates import Candidate, Key, candidates, left_out
 from vpm.discrepancy.screening.probe import (
