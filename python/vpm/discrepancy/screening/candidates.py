@@ -15,7 +15,6 @@ from vpm.catalogue.shared import SLOW
 from vpm.catalogue.traits import Seen
 from vpm.discrepancy.screening.compliance_and_stop_start import (
     beyond,
-    fine_starts,
     logged_swing,
     sites_worth_trying,
     softest,
@@ -50,7 +49,6 @@ class Candidate:
     fixed: tuple[str, ...] = ()  #: Short names of shape parameters that stay at their start.
     #: Whether the effect does nothing at its start values, so that the current residual still holds.
     neutral: bool = True
-    fine: tuple[Mapping[str, float], ...] = ()  #: Start values that are simulated along the motion, see `fine_starts`.
 
     @property
     def key(self) -> Key:
@@ -159,8 +157,7 @@ def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamic
     seen = _excitation(data, model, site, site if effect.site in {"actuator", "cylinder"} else None)
     if effect.motion:
         found = structural_starts(effect, site, model, seen.travel, logged_swing(data, model, site))
-        fine = fine_starts(effect, site, model, seen.travel)
-        return Candidate(effect, site, *found, effect.fixed, neutral=False, fine=fine)
+        return Candidate(effect, site, *found, effect.fixed, neutral=False)
     if effect.stops:
         where, _, values = _over_way(data, model, site, residual)
         return Candidate(effect, site, *stop_starts(where, values, seen.middle, seen.travel, softest(model, site)))

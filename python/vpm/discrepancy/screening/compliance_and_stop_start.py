@@ -185,8 +185,6 @@ def fine_starts(effect: EffectType, site: str, model: Model, travel: float) -> S
     The residual depends on a stiffness only near the true value, where the resonance is, and on a width only where
     flights end together. A linearised step from elsewhere predicts a gain that is not there.
     """
-    if not (effect.winds_up or effect.has_play):
-        return ()
     inertia, play = moved(model, site), effect.has_play
     stiffnesses = (inertia * (2.0 * math.pi * (CONTACTS if play else SWINGS)) ** 2).tolist()
     damping, ratios = ("contact_damping", CONTACT_RATIOS) if play else ("damping", RATIOS)

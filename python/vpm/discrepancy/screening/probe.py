@@ -16,7 +16,7 @@ import numpy as np
 from scipy.special import chdtri
 
 from vpm.discrepancy.screening.candidates import Candidate, acts_on, joint_at
-from vpm.discrepancy.screening.compliance_and_stop_start import LOSSES, in_series
+from vpm.discrepancy.screening.compliance_and_stop_start import LOSSES, fine_starts, in_series
 from vpm.discrepancy.settings import OF_JOINT, RICHEST, SHORT_LIST, SIZE_LEVEL
 from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
@@ -200,9 +200,12 @@ def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) ->
 
 def _searched(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe | None:
     """Probe at the start that leaves least along the motion, where efforts follow at once; None if none helps."""
-    measured = candidate.site in data.motions[0].joints
-    if not candidate.fine or not measured or not answers_at_once(base.model):
+    effect, joints = candidate.effect, data.motions[0].joints
+    searched = effect.winds_up or effect.has_play
+    if not searched or candidate.site not in joints or not answers_at_once(base.model):
         return None
+    way = np.concatenate([m.position[:, joints.index(candidate.site)] for m in data.motions])
+    starts = fine_starts(effect, candidate.site, base.model, 0.5 * float(np.ptp(way)))
 
     def left(start: Mapping[str, float]) -> float:
         model = base.model.with_effect(candidate.effect.name, at=candidate.site, **start)
@@ -213,13 +216,13 @@ def _searched(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate
         power = float(rest @ rest)
         return power if math.isfinite(power) else math.inf
 
-    found = _probe_start(base, data, candidate, min(candidate.fine, key=left), still=True)
+    found = _probe_start(base, data, candidate, min(starts, key=left), still=True)
     return found if found.free and found.drop > 0.0 else None
 
 
 def screening_effort(candidate: Candidate) -> float:
     """Time estimate of a `probe`, in starts that do nothing."""
-    return len(candidate.fine) + len(candidate.starts) * (1.0 if candidate.neutral else 2.0)
+    return len(candidate.starts) * (1.0 if candidate.neutral else 10.0)
 
 
 def refit_effort(probe: Probe) -> float:
