@@ -111,10 +111,7 @@ def refuse_mistakes(
 
     What keeps a log from being checked is no business of this: whoever uses it will say it.
 
-    Raises
-    ------
-    ExperimentError
-        There is a wrong unit, sign, name or clock.
+    Raises ExperimentError: there is a wrong unit, sign, name or clock.
     """
     try:
         found = check_log(model, experiments, setup=setup, workers=workers, progress=progress)

@@ -30,10 +30,7 @@ class Correction:
     def applied(self, record: Experiment) -> Experiment:
         """The record with this correction done.
 
-        Raises
-        ------
-        ExperimentError
-            The record is too short for a delay.
+        Raises ExperimentError: the record is too short for a delay.
         """
         if self.is_clock:
             return replace(record, time=record.time * self.factor)

@@ -28,16 +28,8 @@ class Delayed(TrackedRecords):
 
     It has the same samples for every delay: those at its ends, which have no values of their own, are cut.
 
-    Parameters
-    ----------
-    model : Model
-    record : Experiment
-    correction : Correction
-        Its channels are delayed; its delay is the start value of a fit.
-    longest_delay : float
-        Longest delay, s.
-    settings : Settings
-    setup : Setup
+    - ``correction``: its channels are delayed; its delay is the start value of a fit
+    - ``longest_delay``: longest delay, s
     """
 
     def __init__(

@@ -50,12 +50,7 @@ class _Trial(NamedTuple):
 class Explainer:
     """Finds the corrections of channel tables that explain what a model leaves of records.
 
-    Parameters
-    ----------
-    judge : Judge
-    units : mapping of str to str
-        Units in which the channels were read.
-    each : ParallelCandidates
+    - ``units``: units in which the channels were read
     """
 
     def __init__(self, judge: Judge, units: Mapping[str, str], each: ParallelCandidates) -> None:
@@ -65,13 +60,8 @@ class Explainer:
     def explained(self, part: Experiment, used: Sequence[str], left: Shares) -> list[Explanation]:
         """The correction that leaves least of a record, if it explains it; else two that explain it together; or none.
 
-        Parameters
-        ----------
-        part : Experiment
-        used : sequence of str
-            Channels that the model reads.
-        left : Shares
-            What is left of the record as it is.
+        - ``used``: channels that the model reads
+        - ``left``: what is left of the record as it is
         """
         ended = self._ended(part, used, left)
         if (best := self._best(ended, used)) is not None:

@@ -45,14 +45,8 @@ def wrong_scales(
 
     A machine follows the references of its controllers more or less; derivatives of a position are its acceleration.
 
-    Parameters
-    ----------
-    model : Model
-    record : Experiment
-        Its other mistakes corrected.
-    units : mapping of str to str
-        Units in which the channels, and the time, were read.
-    settings : Settings
+    - ``record``: its other mistakes corrected
+    - ``units``: units in which the channels, and the time, were read
     """
     for related in (*_references(model, record), *_accelerations(model, record)):
         before = related.error()

@@ -99,12 +99,6 @@ class Judge:
     """Measures records by a model, to which friction and other forces were added at each joint without them.
 
     A tracker of stated bandwidth keeps the model on the record, see `vpm.ranking.tracked_records.TrackedRecords`.
-
-    Parameters
-    ----------
-    model : Model
-    settings : Settings
-    setup : Setup
     """
 
     def __init__(self, model: Model, settings: Settings, setup: Setup) -> None:

@@ -22,12 +22,7 @@ def odd_stretches(
 ) -> Iterator[Finding]:
     """Odd stretches of a record's channels that the model reads, as findings.
 
-    Parameters
-    ----------
-    record : Experiment
-    outputs, inputs : sequence of str
-        Channels that sensors show, and commands.
-    settings : Settings
+    - ``outputs``, ``inputs``: channels that sensors show, and commands
     """
     for name in outputs:
         yield from _of_sensor(record, name, settings)

@@ -28,10 +28,7 @@ def corrected_lines(findings: Iterable[Finding]) -> dict[str, str]:
 def corrected_text(text: str, lines: Mapping[str, str], path: str | Path) -> str:
     """The text of a file with a channel table, in which entries were replaced; comments stay.
 
-    Raises
-    ------
-    ModelError
-        An entry does not stand on one line.
+    Raises ModelError: an entry does not stand on one line.
     """
     inner = r"\{(?:[^{}\n]|\{[^{}\n]*\})*\}"  # columns of a value, and the entry of each
     for channel, line in lines.items():

@@ -37,14 +37,8 @@ SAME = 0.02
 def scales(model: Model, used: Sequence[str], units: Mapping[str, str], settings: Settings) -> Iterator[Correction]:
     """Corrections to try: wrong units, factors and signs of channels, and exchanged channels.
 
-    Parameters
-    ----------
-    model : Model
-    used : sequence of str
-        Channels that the model reads.
-    units : mapping of str to str
-        Units in which the channels, and the time, were read.
-    settings : Settings
+    - ``used``: channels that the model reads
+    - ``units``: units in which the channels, and the time, were read
     """
     si = {name: model.channel_unit(name) for name in used}
     for group in _groups(model, used, si):
