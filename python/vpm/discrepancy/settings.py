@@ -139,9 +139,9 @@ SOFTEST, LEAST_DRIVEN = 0.5, 1e-4
 CONTACT_FREQUENCY, CONTACT, GAP_SHARES = 50.0, 0.1, (5e-4, 3e-3, 1.5e-2)
 #: Springs that are simulated along the motion: frequencies, Hz, and damping ratios.
 SWINGS, RATIOS = np.geomspace(4.0, 64.0, 16), (0.1, 0.3)
-#: Contacts of a backlash that are simulated, widths as shares of the half travel, and the share of a width over which a
-#: contact closes.
-CONTACTS, CONTACT_RATIOS, FINE_GAPS, CLOSING = np.array([10.0, 30.0]), (0.5,), np.geomspace(5e-5, 5e-2, 18), 1e-3
+#: Contact of a backlash that is simulated, Hz, and its damping ratio: between soft ones flights are independent. Widths
+#: as shares of the half travel, 1.5 times apart, and the share of a width over which a contact closes.
+SOFT_CONTACT, SOFT_RATIO, FINE_GAPS, CLOSING = 20.0, 0.5, np.geomspace(5e-5, 5e-2, 18), 1e-3
 
 # ---- discriminating experiments --------------------------------------------------------------------------------------
 

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from itertools import product
 
 import numpy as np
 
@@ -19,14 +18,14 @@ from vpm.discrepancy.settings import (
     COMPARED,
     CONTACT,
     CONTACT_FREQUENCY,
-    CONTACT_RATIOS,
-    CONTACTS,
     FINE_GAPS,
     FREQUENCIES,
     GAP_SHARES,
     LEAST_DRIVEN,
     LOOSE,
     RATIOS,
+    SOFT_CONTACT,
+    SOFT_RATIO,
     SOFTEST,
     STOP_SHARES,
     SWINGS,
@@ -185,13 +184,15 @@ def fine_starts(effect: EffectType, site: str, model: Model, travel: float) -> S
     The residual depends on a stiffness only near the true value, where the resonance is, and on a width only where
     flights end together. A linearised step from elsewhere predicts a gain that is not there.
     """
-    inertia, play = moved(model, site), effect.has_play
-    stiffnesses = (inertia * (2.0 * math.pi * (CONTACTS if play else SWINGS)) ** 2).tolist()
-    damping, ratios = ("contact_damping", CONTACT_RATIOS) if play else ("damping", RATIOS)
-    widths = [{"gap": gap, "width": CLOSING * gap} for gap in (travel * FINE_GAPS).tolist()] if play else [{}]
+    inertia = moved(model, site)
+    if effect.has_play:
+        stiffness = inertia * (2.0 * math.pi * SOFT_CONTACT) ** 2
+        contact = {"stiffness": stiffness, "contact_damping": 2.0 * SOFT_RATIO * math.sqrt(stiffness * inertia)}
+        return tuple({**contact, "gap": gap, "width": CLOSING * gap} for gap in (travel * FINE_GAPS).tolist())
     return tuple(
-        {"stiffness": k, damping: 2.0 * ratio * math.sqrt(k * inertia), **width}
-        for k, ratio, width in product(stiffnesses, ratios, widths)
+        {"stiffness": stiffness, "damping": 2.0 * ratio * math.sqrt(stiffness * inertia)}
+        for stiffness in (inertia * (2.0 * math.pi * SWINGS) ** 2).tolist()
+        for ratio in RATIOS
     )
 
 
