@@ -15,9 +15,11 @@ from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.rivals.ambiguity import Rivals
 from vpm.discrepancy.rivals.rival_exchange import earned, in_order
+from vpm.discrepancy.screening.candidates import candidates
+from vpm.discrepancy.screening.probe import Baseline, probe
 from vpm.discrepancy.search.search import Search, Stage, begin, further
 from vpm.discrepancy.search.search_round import Request
-from vpm.identify import Gain
+from vpm.identify import Gain, InverseDynamicsProblem, estimate
 
 
 @pytest.mark.nightly
@@ -35,6 +37,37 @@ def test_a_constant_force_keeps_its_name_where_finer_laws_know_nothing_more() ->
     tried = ["bias_force", "spring", "asymmetric_friction"]
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, workers=1)
     assert [effect.name for effect in why.effects] == ["bias_force"]
+
+
+@pytest.mark.nightly
+def test_a_spring_that_looked_like_a_shifted_centre_of_mass_is_found_beside_the_constant_force() -> None:
+    case = shared_case("axis_rotary", "spring", 106)
+    (hidden,) = case.truth.hidden
+    why = vpm.diagnose(
+        case.model(), case.train, case.validate, effects=["bias_force", "spring"], names="search", workers=1
+    )
+    assert [(s.change, s.effect) for s in why.steps][1:] == [
+        ("added", "bias_force"),
+        ("removed", "bias_force"),
+        ("added", "spring"),
+    ]
+    for parameter in why.effects[0].parameters:
+        assert parameter.value == pytest.approx(hidden.parameters[parameter.name], abs=3.0 * parameter.std)
+
+
+@pytest.mark.nightly
+def test_a_spring_is_screened_with_the_place_where_it_rests() -> None:
+    case = shared_case("axis_rotary", "spring", 100)
+    (hidden,) = case.truth.hidden
+    data = InverseDynamicsProblem(case.model(), case.train)
+    free = tuple(p.name for p in data.nominal.parameters.values() if p.adjustable)
+    fit = estimate(data.nominal, data, free)
+    model = data.nominal.with_parameters(dict(zip(free, map(float, fit.values), strict=True)))
+    (candidate,) = (c for c in candidates(model, data, fit.residual, ["spring"]) if c.site == "axis")
+    found = probe(Baseline(model, free, fit.residual, fit.jacobian), data, candidate)
+    assert found.drop > 0.99
+    for short, value in hidden.parameters.items():
+        assert found.values[f"axis.spring.{short}"] == pytest.approx(value, rel=0.05)
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ import numpy as np
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, finished, shrinkage, simulated_gain
 from vpm.discrepancy.confirmation.refusal import Thresholds, refuse_trial
 from vpm.discrepancy.diagnosis import RefusedEffect
-from vpm.discrepancy.rivals.ambiguity import Rivals, as_good
+from vpm.discrepancy.rivals.ambiguity import Rivals, as_good, contains
 from vpm.discrepancy.search.candidate_choice import Accepted, alike, schwarz
 from vpm.discrepancy.search.search import Search, Stage
 from vpm.discrepancy.settings import LEAST_GAIN, NORMAL_95_ONE_SIDED
@@ -62,8 +62,10 @@ def _preferred(final: Judged, entry: Accepted, trial: Trial, data: Data, thresho
     worse = simulated is not None and simulated.harm > NORMAL_95_ONE_SIDED and simulated.relative < -LEAST_GAIN
     if worse or not earned(fitted, len(trial.parameters) - len(entry.trial.parameters)):
         return 0.0
-    sure = validation.score >= thresholds.score(validation.pieces) and validation.harm <= -NORMAL_95_ONE_SIDED
-    return validation.score if sure else 0.0
+    shown = fitted.score >= thresholds.score(fitted.pieces)
+    nested = shown and contains(trial.judged, trial.parameters, final, entry.trial.parameters)
+    sure = validation.score >= thresholds.score(validation.pieces)
+    return validation.score if sure and validation.harm <= (0.0 if nested else -NORMAL_95_ONE_SIDED) else 0.0
 
 
 def earned(fitted: Gain, more: int) -> bool:
