@@ -13,7 +13,7 @@ from second_suite.logs import logged
 from second_suite.loop import simulated
 from second_suite.machine import columns_of
 from sledge import DRY, pushed
-from vpm.discrepancy.screening.candidates import slow_speeds
+from vpm.catalogue.shared import SLOW
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.ranking.parameter_priors import known
@@ -43,7 +43,7 @@ def test_seals_turn_round_at_a_speed_of_the_piston_that_nobody_knows() -> None:
     prior = known(model, shown(model, tracked), tracked)["lifter.friction.transition_velocity"]
     length, _ = boom.line({}, np.convolve(record["luff.position"], np.full(25, 0.04), "valid"))
     rate = np.abs(np.gradient(length, record.time[1] - record.time[0]))
-    assert (prior.low, prior.high) == pytest.approx(slow_speeds(float(np.quantile(rate, 0.999))), rel=0.1)
+    assert (prior.low, prior.high) == pytest.approx(np.quantile(rate, 0.999) * np.array(SLOW), rel=0.1)
     stated = model.to_dict()
     stated["actuators"]["lifter"]["friction"]["transition_velocity"] = {"value": 2e-3, "uncertainty": 1e-3}
     sure = Model.from_dict(stated)

@@ -133,9 +133,7 @@ def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[
         name = effect.parameter_names.get("transition_velocity")
         dry = effect.type.sticks and not effect.type.close_to_rest
         if dry and name is not None and effect.at in (*data.joints, *model.transmissions):
-            shares = shares_at(model, effect.at, data.joints)
-            speeds = np.concatenate([np.abs(data.state(record)[1] @ shares) for record in range(len(data.motions))])
-            found[name] = slow_speeds(float(np.quantile(speeds, 0.999)))
+            found[name] = slow_speeds(data, shares_at(model, effect.at, data.joints))
     return found
 
 

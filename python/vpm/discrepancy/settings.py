@@ -121,6 +121,10 @@ MOST_SAMPLES = 4000
 
 # ---- start values ----------------------------------------------------------------------------------------------------
 
+#: Deviations of its sensor's noise that the way of a coordinate at rest spans: four to either side.
+WITHIN_NOISE = 8.0
+#: Effort, speed and way of what stands, in SI units.
+LEAST = 1e-9
 #: Start periods that are proposed.
 PERIODS = 3
 #: Cells of the way in the shortest wave of an octave, waves in one more on the whole way, share of a wave that a slow

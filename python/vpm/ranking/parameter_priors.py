@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from vpm.catalogue import EffectParameter
-from vpm.discrepancy.screening.candidates import Candidate, joint_at, shares_at, slow_speeds
+from vpm.catalogue.shared import SLOW
+from vpm.discrepancy.screening.candidates import LEAST, Candidate, joint_at, shares_at, slow_speeds
 from vpm.discrepancy.screening.compliance_and_stop_start import moved
 from vpm.discrepancy.stuck_channels import is_moving
 from vpm.identify import InverseDynamicsProblem
@@ -18,8 +19,6 @@ from vpm.weighing.priors import FACTOR, NATURAL, NEAR, SHARE, Prior, natural_siz
 #: What an effect may amount to, as a share of the size of its kind, where that is not `SHARE`: what is near a value by
 #: nature, and what has a size that matters rather than one that records show.
 SHARES = {"one": NEAR, "channel": NEAR, "time": 1.0, "resistance": 1.0, "leakage": 1.0}
-#: Effort, speed and way of what stands, in SI units.
-LEAST = 1e-9
 
 
 class Sizes:
@@ -110,16 +109,15 @@ def known(model: Model, data: InverseDynamicsProblem, tracked: TrackedRecords) -
     for effect in model.effects:
         name = effect.parameter_names.get("transition_velocity")
         if name is not None and name not in priors and effect.at in (*data.joints, *model.transmissions):
-            shares = shares_at(model, effect.at, data.joints)
-            speeds = [np.abs(data.state(record)[1] @ shares) for record in range(len(data.motions))]
-            priors[name] = _turning(np.concatenate(speeds))
+            priors[name] = _turning(*slow_speeds(data, shares_at(model, effect.at, data.joints)))
     drives = {f"{drive}.friction.transition_velocity": model.rate_channel(drive) for drive in model.actuators}
     unknown = {name: rate for name, rate in drives.items() if name in model.parameters and name not in priors}
     rates = tracked.outputs(model, tuple(unknown.values()))
-    return priors | dict(zip(unknown, map(_turning, rates), strict=False))
+    fastest = (max(float(np.quantile(np.abs(speeds), 0.999)), LEAST) for speeds in rates)
+    turning = (_turning(*(share * speed for share in SLOW)) for speed in fastest)
+    return priors | dict(zip(unknown, turning, strict=False))
 
 
-def _turning(speeds: Array) -> Prior:
-    """Prior of the speed at which dry friction turns round, where these speeds are seen."""
-    low, high = slow_speeds(max(float(np.quantile(np.abs(speeds), 0.999)), LEAST))
+def _turning(low: float, high: float) -> Prior:
+    """Prior of the speed at which dry friction turns round, between bounds."""
     return Prior(float(np.sqrt(low * high)), 0.25 * float(np.log(high / low)), low, high, logarithmic=True)

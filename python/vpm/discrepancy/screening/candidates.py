@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
-from itertools import product
+from itertools import compress, product
 
 import numpy as np
 
@@ -23,8 +23,19 @@ from vpm.discrepancy.screening.compliance_and_stop_start import (
     structural_starts,
     thresholds,
 )
-from vpm.discrepancy.settings import CELLS, FINER, LIMITED_MOST, MOST_SAMPLES, PASSED, PERIODS, SLOWEST
+from vpm.discrepancy.settings import (
+    CELLS,
+    FINER,
+    LEAST,
+    LIMITED_MOST,
+    MOST_SAMPLES,
+    PASSED,
+    PERIODS,
+    SLOWEST,
+    WITHIN_NOISE,
+)
 from vpm.errors import DiagnosisError, near_match
+from vpm.experiment import instrument_noise
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.numbers import Array
@@ -66,6 +77,7 @@ class Excitation:
     """Excitation of one joint or actuator by the records, from which candidates take their start values."""
 
     speed: float
+    slow: tuple[float, float]  #: See `slow_speeds`.
     middle: float
     travel: float
     interval: float
@@ -191,10 +203,10 @@ def _tried(
         # What was fitted of the dry friction without it may be far too wide: it makes up for what is missing.
         dry = model.parameters.get(f"{site}.friction.{TRANSITION}")
         velocities = {0.01 * seen.speed if dry is None else dry.value}
-        velocities |= set() if effect.tried else {slow_speeds(seen.speed)[0]}
+        velocities |= set() if effect.tried else {seen.slow[0]}
         bends = sorted(velocities, reverse=True)
         starts = tuple({**start, TRANSITION: velocity} for start in starts for velocity in bends)
-        bounds[TRANSITION] = slow_speeds(seen.speed)
+        bounds[TRANSITION] = seen.slow
     neutral = all(effect.parameter(name).shape for start in starts for name in start)
     return Candidate(effect, site, starts, bounds, effect.fixed, neutral)
 
@@ -229,9 +241,21 @@ def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
     return tuple(dict(zip("xyz", place.tolist(), strict=True)) for place in places)
 
 
-def slow_speeds(fastest: float) -> tuple[float, float]:
-    """Bounds of a candidate's transition velocity: between 1/5000 and 1/10 of the largest speed."""
-    return SLOW[0] * fastest, SLOW[1] * fastest
+def slow_speeds(data: InverseDynamicsProblem, shares: Array) -> tuple[float, float]:
+    """Bounds of a candidate's transition velocity, from the largest speed of a coordinate in each record.
+
+    They are 1/5000 of the smallest of these speeds and 1/10 of the largest: a slow record shows what is a detail of
+    small speeds there, however fast another one is. A record in which the coordinate rests does not count.
+    """
+    speeds, moving = list[float](), list[bool]()
+    for record, log in enumerate(data.experiments):
+        position, velocity, _ = data.state(record)
+        channels = [f"{joint}.position" for joint in data.joints]
+        noise = np.array([instrument_noise(log, channel) if channel in log else 0.0 for channel in channels])
+        speeds.append(float(np.quantile(np.abs(velocity @ shares), 0.999)))
+        moving.append(float(np.ptp(position @ shares)) > WITHIN_NOISE * float(np.linalg.norm(shares * noise)))
+    slowest = min(compress(speeds, moving), default=max(speeds))
+    return SLOW[0] * max(slowest, LEAST), SLOW[1] * max(*speeds, LEAST)
 
 
 def joint_at(model: Model, site: str) -> str:
@@ -277,6 +301,7 @@ def _excitation(data: InverseDynamicsProblem, model: Model, site: str, actuator:
     low, high = float(position.min()), float(position.max())
     return Excitation(
         max(float(np.quantile(np.abs(velocity), 0.999)), 1e-12),
+        slow_speeds(data, shares_at(model, site, data.joints)),
         0.5 * (low + high),
         max(0.5 * (high - low), 1e-12),
         min(m.dt for m in data.motions),
