@@ -166,6 +166,7 @@ class Search:
 
         A slow tracker may lose what hangs behind a contact, or let a leg fall over. What it leaves then says nothing.
         Where one follows, fits under the next begin at its values: these hide more, and begun afar they may end early.
+        A fast one that predicts worse is left out, see `_predicts_worse`.
 
         Raises
         ------
@@ -183,7 +184,25 @@ class Search:
                     reason = error
         if not looks:
             raise reason
-        return [look for look in looks if look.follows] or looks[-1:]
+        looks = [look for look in looks if look.follows] or looks[-1:]
+        return [look for look in looks if not any(self._predicts_worse(look, other) for other in looks)]
+
+    def _predicts_worse(self, look: Look, slower: Look) -> bool:
+        """Whether a fast look of the search makes the records clearly less probable than a slower one.
+
+        A tracker moves its model by the noise of sensors, too. Where that outweighs the errors that it corrects, a
+        structure leaves less by answering less to noise, and its values lead astray. Predictions of the same samples
+        are compared, each whitened by its own spectrum (A. Dawid, *J. Royal Statistical Society A* 147, 1984).
+        """
+        if look.fitted.tracker.band <= slower.fitted.tracker.band:
+            return False
+        told = (self._predictive_density(one.fitted) for one in (look, slower))
+        return next(told) + self.settings.odds < next(told)
+
+    def _predictive_density(self, fitted: Fitted) -> float:
+        """Log-density of the fitted samples as a tracker predicts them, whitened by their own spectrum."""
+        noise = fitted_noise(fitted.residual, self.fitter.tracked.parts, self.settings.order)
+        return float(np.sum(self.fitter.log_density(fitted, noise)))
 
     def _all_looks(self, look: Look) -> list[Look]:
         return self._looks(look.fitted.structure, look)
