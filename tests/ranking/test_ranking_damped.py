@@ -61,3 +61,12 @@ def test_noise_of_a_sensor_is_no_lag_of_a_drive() -> None:
     fitted = ranking.recalibrated.parameters
     ratio = fitted["travel.friction.viscous"].value / fitted["trolley.mass"].value
     assert abs(ratio / (DROOP / MASS) - 1.0) < 0.02
+
+
+def test_dry_friction_is_named_beside_a_dashpot_of_twenty_times_its_force() -> None:
+    """A dead zone of the command takes away as much force, but not while the trolley brakes or turns round."""
+    ranking = vpm.rank(Model.from_toml(TROLLEY), [driven(1, DRY), driven(2, DRY)], workers=1)
+    assert [(one.effect, one.site) for one in ranking.effects] == [("coulomb_friction", "travel")]
+    fitted = ranking.model.parameters
+    share = fitted["travel.friction.coulomb"].value / fitted["travel.friction.viscous"].value
+    assert abs(share / (DRY / DROOP) - 1.0) < 0.03

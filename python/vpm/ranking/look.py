@@ -219,8 +219,25 @@ class Look:
         alike = [one for one in present if same_curve(key, (one.name, one.at))]
         several = (key[1], *(f"{one.name} {one.side}" for one in alike))
         if several not in self._curves:
-            self._curves[several] = self._explained(alike)
+            self._curves[several] = self._along(alike)
         return self._curves[several]
+
+    def _along(self, effects: Collection[Effect]) -> Array:
+        """Error power in a look that effects remove, in proportion to what a small part of them removes.
+
+        All other laws hold, and so do most of these: without the friction that keeps a machine in step any force would
+        carry it far away, and no other friction could count beside.
+        """
+        whole, part = self.coarse.structure, self.settings.inexact
+        if effects:
+            with contextlib.suppress(*ASTRAY):
+                bare = whole.bare(effects)
+                weaker = replace(bare, theta=whole.theta + part * (bare.theta - whole.theta))
+                same = replace(bare, theta=whole.theta)
+                tracker = self.fitted.tracker.coarse
+                now, left = (self._fitter.followed(one, tracker, ()).residual for one in (same, weaker))
+                return self._beside(now + (left - now) / part)
+        return np.zeros(len(self.view.noise.tails))
 
     def _added(self, before: Array) -> Array:
         """Error power in a look that added inexact effects remove of the error ``before`` them."""
