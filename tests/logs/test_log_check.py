@@ -408,6 +408,16 @@ def test_a_resonance_above_the_noise_of_its_sensor_is_no_filter() -> None:
     assert [one.kind for one in odd(swing(0.0) + shaken)] == ["filtered"]
 
 
+def test_a_camera_that_reads_every_second_sample_was_not_filtered_before_it_was_stored(tmp_path: Path) -> None:
+    """Splines through its readings have half of the noise's spectrum: the log is as the camera wrote it."""
+    place, angle = swing(1e-3), swing(1e-3)[::-1]
+    lines = [f"{k / 500.0},{place[k]},{'' if k % 2 else angle[k]}" for k in range(len(place))]
+    (tmp_path / "log.csv").write_text("\n".join(["time,one.position,two.position", *lines]))
+    log = vpm.Experiment.load(tmp_path / "log.csv", irregular="interpolate")
+    assert log.slower
+    assert list(odd_stretches(log, ["one.position", "two.position"], [], Settings())) == []
+
+
 def test_finds_what_was_filtered_before_it_was_stored() -> None:
     from scipy.signal import butter, sosfilt
 

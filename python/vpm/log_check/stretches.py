@@ -57,7 +57,8 @@ def _of_sensor(record: Experiment, name: str, settings: Settings) -> Iterator[Fi
             "replace these samples by their neighbours",
         )
     step, reach = quantisation_step(values), float(np.ptp(values))
-    if _cut_off(values, step or 0.0, settings):
+    told = name in record.slower or name in record.retained  # interpolation and resampling take noise, and say so
+    if not told and _cut_off(values, step or 0.0, settings):
         yield finding(
             "filtered",
             f"{name} was filtered before it was stored, which makes it late",
