@@ -20,6 +20,7 @@ from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.noise_model import fitted_noise
+from vpm.ranking.own_vibration import below_own_vibration
 from vpm.ranking.parameter_priors import Sizes, known
 from vpm.ranking.posterior import robust_probabilities
 from vpm.ranking.proposal_fits import raced
@@ -54,6 +55,7 @@ class Search:
         each: ParallelCandidates,
         say: Callable[[str], None],
     ) -> None:
+        settings = below_own_vibration(settings, model, records)
         self.names, self.settings, self.each, self.say = names, settings, each, say
         self.fitter = Fitter(TrackedRecords(model, records, settings, setup), settings)
         self.data = shown(model, self.fitter.tracked)

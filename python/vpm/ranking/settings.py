@@ -69,12 +69,13 @@ class Settings:
     """Settings that decide in a ranking."""
 
     #: Bandwidths of the trackers, Hz: a slow one, whose error is wide and easy to rank, and one that keeps a load
-    #: behind a backlash in step.
+    #: behind a backlash in step. Own vibrations of joints without a drive may make the first one slower.
     bands: tuple[float, ...] = (1.0, 10.0)
     #: Error of a step where structures are compared, relative to each state and its natural size: it must not pass for
     #: an effect.
     exact: float = 3e-5
-    #: Time at the beginning of each record that is left out, s: what a tracker makes of the first state.
+    #: Time at the beginning of each record that is left out, s: what a tracker makes of the first state. It grows with
+    #: the period of the first one of `bands`.
     settling: float = 0.5
     pieces: int = 20  #: Pieces of the held-back stretches between which an effect has to repeat.
     #: By how much a law differs from the machine, as a share of the amplitude that it explains. Another effect over the

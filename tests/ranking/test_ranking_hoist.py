@@ -1,0 +1,93 @@
+"""A load on a rope below a driven trolley, whose swing of 0.24 Hz dies away slowly: equations by hand."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import vpm
+from vpm.experiment import Experiment
+from vpm.model import Model
+from vpm.numbers import Array
+
+TROLLEY, LOAD, ROPE, DROOP = 450.0, 600.0, 4.5, 6000.0  # kg, m, N s/m
+AIR = 359.0  # N m s/rad: a hundredth of the critical damping of the swing
+STEP, FINE, COUNT = 0.04, 4, 1000
+
+CRANE = """
+name = "crane"
+gravity = [0.0, 0.0, -9.81]
+[bodies.trolley]
+mass = {{ value = 420.0, uncertainty = 60.0, min = 100.0 }}
+[bodies.load]
+mass = 600.0
+center_of_mass = [0.0, 0.0, {{ value = -4.4, uncertainty = 0.15 }}]
+inertia = [40.0, 40.0, 40.0, 0.0, 0.0, 0.0]
+[joints.travel]
+type = "prismatic"
+parent = "world"
+child = "trolley"
+axis = [1.0, 0.0, 0.0]
+[joints.sway]
+type = "revolute"
+parent = "trolley"
+child = "load"
+axis = [0.0, -1.0, 0.0]
+[actuators.inverter]
+joint = "travel"
+gain = {{ value = 5500.0, unit = "N s/m", uncertainty = 800.0 }}
+command_unit = "m/s"
+[[effects]]
+type = "viscous_friction"
+at = "travel"
+viscous = {{ value = 5500.0, uncertainty = 800.0 }}
+{air}
+"""
+DESCRIBED = '[[effects]]\ntype = "viscous_friction"\nat = "sway"\nviscous = { value = 300.0, uncertainty = 100.0 }'
+
+
+def rate(state: Array, command: float) -> Array:
+    """Lagrange's equations of the trolley and of the load, at ``x + l sin q`` and ``-l cos q``."""
+    _, angle, speed, turning = state
+    lever = LOAD * ROPE * np.cos(angle)
+    mass = np.array([[TROLLEY + LOAD, lever], [lever, 40.0 + LOAD * ROPE**2]])
+    away = LOAD * ROPE * np.sin(angle) * turning**2
+    force = np.array([DROOP * (command - speed) + away, -9.81 * LOAD * ROPE * np.sin(angle) - AIR * turning])
+    return np.append(state[2:], np.linalg.solve(mass, force))
+
+
+@cache
+def driven(seed: int) -> Experiment:
+    """Record of 40 s under held commands, with noise of a laser and of a camera."""
+    random = np.random.default_rng(seed)
+    time = STEP * np.arange(COUNT)
+    command = np.interp(time, np.linspace(0.0, 40.0, 17), random.uniform(-0.8, 0.8, 17))
+    states, h = np.zeros((COUNT, 4)), STEP / FINE
+    for k in range(COUNT - 1):
+        state = states[k]
+        for _ in range(FINE):  # the method of Runge and Kutta
+            one = rate(state, command[k])
+            two = rate(state + 0.5 * h * one, command[k])
+            three = rate(state + 0.5 * h * two, command[k])
+            four = rate(state + h * three, command[k])
+            state = state + h / 6.0 * (one + 2.0 * two + 2.0 * three + four)
+        states[k + 1] = state
+    noise = random.standard_normal((COUNT, 2)) * [3e-4, 5e-4]
+    place, angle = (states[:, :2] + noise).T
+    read = {"travel.position": place, "sway.position": angle, "inverter.command": command}
+    return Experiment.from_arrays(
+        time, read, {"travel.position": "m", "sway.position": "rad", "inverter.command": "m/s"}
+    )
+
+
+@pytest.mark.parametrize("described", [False, True])
+def test_damping_of_a_slow_swing_is_named_and_not_where_it_is_described(described: bool) -> None:
+    """A tracker of 1 Hz would hold the load in step, and damp its swing itself."""
+    model = Model.from_toml(CRANE.format(air=DESCRIBED if described else ""))
+    ranking = vpm.rank(model, [driven(1), driven(2)], workers=1)
+    named = [] if described else [("viscous_friction", "sway")]
+    assert [(one.effect, one.site) for one in ranking.effects] == named
+    fitted = ranking.model.parameters["sway.friction.viscous"].value
+    assert fitted == pytest.approx(AIR, rel=0.05)
