@@ -25,9 +25,7 @@ def told(fit: Fit) -> list[str]:
     lines += [f"noise of {channel}: {level:.4g}" for channel, level in fit.noise.items()]
     lines += [f"first states: {fit.first_states}"] if fit.first_states else []
     if fit.mode == "inverse_dynamics" and not fit.expected.size:
-        lines.append(
-            "no simulation of the model stays by the records: intervals are those of inverse dynamics alone"
-        )
+        lines.append("no simulation of the model stays by the records: intervals are those of inverse dynamics alone")
     lines += fit.warnings
     lines += [
         f"residual {channel}: {rms:.4g} {unit}, {_of_the_signal(share)}"
