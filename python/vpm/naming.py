@@ -117,7 +117,7 @@ def ranked_notes(ranking: Ranking, refused: Sequence[RefusedEffect], interrupted
     named = {one.key for one in ranking.effects}
     lost = [one for one in refused if (one.name, one.site) in named]
     told = [f"the ranking names {one.name} at {one.site}: {one.reason}" for one in lost]
-    return [RANKED, *([STOPPED] if interrupted else []), *told]
+    return [RANKED, *ranking.notes, *([STOPPED] if interrupted else []), *told]
 
 
 def _settled(found: Search, data: Data, request: Request) -> tuple[Search, tuple[Rivals, ...]]:

@@ -14,6 +14,7 @@ from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.ranking.choice_by_evidence import as_good, evidence, weighed
+from vpm.ranking.disturbed_records import disturbed
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
 from vpm.ranking.free_shape import against_free_shapes
 from vpm.ranking.judgement import Judgement
@@ -120,11 +121,17 @@ class Search:
         recalibrated = next(iter(self.first.values())).fitted.structure.repaired
         hold = self.fitter.tracked.setup.course
         effects = tuple(replace(named[key], side=found.side(key)) for key in found.effects)
-        ranking = Ranking(effects, tuple(rounds), found.repaired, recalibrated, {}, interrupted, hold)
+        ranking = Ranking(
+            effects, tuple(rounds), found.repaired, recalibrated, {}, interrupted, hold, self._notes(looks)
+        )
         try:
             return replace(ranking, gaps=self._gaps(held_out.with_hold(hold), ranking))
         except KeyboardInterrupt:
             return replace(ranking, interrupted=True)
+
+    def _notes(self, looks: list[Look]) -> tuple[str, ...]:
+        """Notes of the search on records that what it found does not explain."""
+        return tuple(disturbed(self.fitter.tracked, looks[0].fitted, self.settings))
 
     def _gaps(self, held_out: TrackedRecords, ranking: Ranking) -> dict[str, Gap]:
         """Errors of what the search found on validation records."""

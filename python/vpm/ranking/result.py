@@ -117,6 +117,8 @@ class Ranking(Result):
         Ctrl-C ended the search, where there may be more, or the measuring of what it found.
     hold : str
         What commands were taken to do between samples, see `Setup.hold`; pass it on to simulate the model.
+    notes : tuple of str
+        Records of which the model leaves an error that others do not show.
     """
 
     effects: tuple[Ranked, ...]
@@ -126,6 +128,7 @@ class Ranking(Result):
     gaps: dict[str, Gap] = field(default_factory=dict)
     interrupted: bool = False
     hold: str = HOLDS[0]
+    notes: tuple[str, ...] = ()
 
     @property
     def left(self) -> dict[str, float]:

@@ -116,6 +116,15 @@ class TrackedRecords:
         other.parts, other.held_back = [slice(int(ends[0]), int(ends[-1])) for ends in self._stretches], []
         return other
 
+    @property
+    def rows(self) -> list[slice]:
+        """Samples of each tracked record from where its first state is forgotten."""
+        parts, ends = self.whole().parts, np.cumsum([len(record.time) for record in self.records])
+        return [
+            slice(min(part.start for part in parts if part.stop > end - len(record.time)), int(end))
+            for end, record in zip(ends, self.records, strict=True)
+        ]
+
     @cached_property
     def firsts(self) -> HiddenFirstStates:
         """Unmeasured first states of tracked records, as far as the model moves them; none if it diverges."""

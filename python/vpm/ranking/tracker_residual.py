@@ -26,7 +26,7 @@ class TrackerResidual:
     def __init__(self, tracked: TrackedRecords, band: float) -> None:
         self.mode: str = OBSERVED
         self.tracked, self._tracker = tracked, Tracker(band)
-        self._rows = _settled(tracked)
+        self._rows = tracked.rows
         sizes = np.sqrt(np.mean(np.concatenate([tracked.motion[rows] for rows in self._rows]) ** 2, axis=0))
         self._weights = 1.0 / np.where(sizes > 0.0, sizes, 1.0)
         self.blocks: tuple[Block, ...] = tuple(self._blocks(sizes))
@@ -52,12 +52,3 @@ class TrackerResidual:
                 unit, moving = self.tracked.model.channel_unit(name), np.ones(len(time))
                 found.append(Block(record.name, name, unit, samples, time, float(size), float(weight), moving))
         return found
-
-
-def _settled(tracked: TrackedRecords) -> list[slice]:
-    """Samples of each record in the tracker residual, from where its first state is forgotten."""
-    parts, ends = tracked.whole().parts, np.cumsum([len(record.time) for record in tracked.records])
-    return [
-        slice(min(part.start for part in parts if part.stop > end - len(record.time)), int(end))
-        for end, record in zip(ends, tracked.records, strict=True)
-    ]
