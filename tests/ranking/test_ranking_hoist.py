@@ -11,6 +11,8 @@ import vpm
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.numbers import Array
+from vpm.ranking.own_vibration import below_own_vibration
+from vpm.ranking.settings import Settings
 
 TROLLEY, LOAD, ROPE, DROOP = 450.0, 600.0, 4.5, 6000.0  # kg, m, N s/m
 AIR = 359.0  # N m s/rad: a hundredth of the critical damping of the swing
@@ -102,3 +104,14 @@ def test_a_gust_in_one_record_is_told() -> None:
     (note,) = ranking.notes
     assert note.startswith("log 2 leaves")
     assert "times the error of log 1 in sway.position" in note
+
+
+def test_a_load_that_nothing_brings_back_keeps_the_trackers() -> None:
+    """Without gravity the rope turns freely: rounding is no stiffness, and there is no vibration to be slower than."""
+    free = Model.from_toml(CRANE.format(air=DESCRIBED).replace("-9.81", "0.0"))
+    hanging = Model.from_toml(CRANE.format(air=DESCRIBED))
+    logs = [driven(1)]
+    assert below_own_vibration(Settings(), free, logs) == Settings()
+    (slow, *_) = below_own_vibration(Settings(), hanging, logs).bands
+    inertia = 40.0 + LOAD * 4.4**2  # of the model file's rope
+    assert 2.0 * slow == pytest.approx(np.sqrt(LOAD * 9.81 * 4.4 / inertia) / (2.0 * np.pi), rel=1e-4)

@@ -33,7 +33,8 @@ def _slowest(model: Model, records: Sequence[Experiment]) -> float:
     """Lowest frequency of own vibrations of joints that are measured and not driven, Hz, while all others rest.
 
     Law: the generalised eigenvalues of stiffness and mass about the first pose (L. Meirovitch, *Fundamentals of
-    Vibrations*, 2001, section 7.2), both from inverse dynamics at rest. Infinite where nothing vibrates.
+    Vibrations*, 2001, chapter 7), both from inverse dynamics at rest. Infinite where nothing vibrates even once in the
+    longest record.
     """
     idle = [joint for joint in model.joints if joint not in {*model.driven_joints, *model.added_joints}]
     seen = [joint for joint in idle if all(f"{joint}.position" in record for record in records)]
@@ -49,8 +50,9 @@ def _slowest(model: Model, records: Sequence[Experiment]) -> float:
             _slopes(model.core.inverse_dynamics(model.theta, *motion, held, 1.0)[0][:, places] / MOVE)
             for motion in ((pose + pushed, still, still), (pose, still, pushed))
         )
-        squares = eigh(stiffness, mass, eigvals_only=True)
-        return float(np.sqrt(min(squares[squares > 0.0], default=np.inf))) / (2.0 * np.pi)
+        frequencies = np.sqrt(np.maximum(eigh(stiffness, mass, eigvals_only=True), 0.0)) / (2.0 * np.pi)
+        longest = max(float(record.time[-1] - record.time[0]) for record in records)
+        return float(min(frequencies[frequencies * longest > 1.0], default=np.inf))
     return np.inf
 
 
