@@ -86,7 +86,7 @@ def rank(
 
 
 def lines_of(ranking: Ranking) -> Iterator[str]:
-    """A ranking in lines: what was added, what was next, the gap on validation records."""
+    """A ranking in lines: what was added, what was next, the gap on validation records, notes."""
     if ranking.interrupted:
         yield "stopped before all was tried: this is what was known until then"
     if ranking.hold != "zero_order":
@@ -111,6 +111,8 @@ def lines_of(ranking: Ranking) -> Iterator[str]:
             f"{gap.before:.4g} before, {gap.recalibrated:.4g} with fitted parameters, {gap.after:.4g} {gap.unit} now"
         )
         yield f"{channel}, validation, root mean square beside a slow observer: {levels}"
+    for note in ranking.notes:
+        yield f"note: {note}"
 
 
 def _sentence(one: Ranked, model: Model) -> str:

@@ -11,6 +11,7 @@ import vpm
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.numbers import Array
+from vpm.rank_command import lines_of
 from vpm.ranking.own_vibration import below_own_vibration
 from vpm.ranking.settings import Settings
 
@@ -104,6 +105,7 @@ def test_a_gust_in_one_record_is_told() -> None:
     (note,) = ranking.notes
     assert note.startswith("log 2 leaves")
     assert "times the error of log 1 in sway.position" in note
+    assert list(lines_of(ranking))[-1] == f"note: {note}"
 
 
 def test_a_load_that_nothing_brings_back_keeps_the_trackers() -> None:
