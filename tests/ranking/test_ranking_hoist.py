@@ -13,7 +13,10 @@ from vpm.model import Model
 from vpm.numbers import Array
 from vpm.rank_command import lines_of
 from vpm.ranking.own_vibration import below_own_vibration
+from vpm.ranking.parameter_priors import Sizes
 from vpm.ranking.settings import Settings
+from vpm.ranking.substitute_records import shown
+from vpm.ranking.tracked_records import TrackedRecords
 
 TROLLEY, LOAD, ROPE, DROOP = 450.0, 600.0, 4.5, 6000.0  # kg, m, N s/m
 AIR = 359.0  # N m s/rad: a hundredth of the critical damping of the swing
@@ -117,3 +120,25 @@ def test_a_load_that_nothing_brings_back_keeps_the_trackers() -> None:
     (slow, *_) = below_own_vibration(Settings(), hanging, logs).bands
     inertia = 40.0 + LOAD * 4.4**2  # of the model file's rope
     assert 2.0 * slow == pytest.approx(np.sqrt(LOAD * 9.81 * 4.4 / inertia) / (2.0 * np.pi), rel=1e-4)
+
+
+def test_forces_at_a_load_are_as_large_as_its_inertia_where_it_moves() -> None:
+    """At zero of the winch the load hangs in the pivot and has none: friction of the swing had no size there."""
+    text = CRANE.format(air="").replace("[0.0, 0.0, { value = -4.4, uncertainty = 0.15 }]", "[0.0, 0.0, 0.0]")
+    text = text.replace("[bodies.load]", "[bodies.rope]\nmass = 1.0\n[bodies.load]").replace(
+        'child = "load"', 'child = "rope"'
+    )
+    winch = '[joints.winch]\ntype = "prismatic"\nparent = "rope"\nchild = "load"\naxis = [0.0, 0.0, -1.0]\n'
+    lift = '[actuators.lift]\njoint = "winch"\ngain = 1.0\ncommand_unit = "N"\n'
+    model = Model.from_toml(text + winch + lift)
+    time = STEP * np.arange(COUNT)
+    read = {
+        "travel.position": 0.5 * np.sin(0.7 * time),
+        "sway.position": 0.05 * np.sin(1.5 * time),
+        "winch.position": ROPE + 0.3 * np.sin(0.5 * time),
+        "inverter.command": 0.1 * np.cos(0.7 * time),
+        "lift.command": -LOAD * 9.81 + np.zeros(COUNT),
+    }
+    tracked = TrackedRecords(model, [Experiment.from_arrays(time, read, {}, name="lifted", model=model)], Settings())
+    effort, _, _ = Sizes(model, shown(model, tracked)).joints["sway"]
+    assert effort == pytest.approx((40.0 + LOAD * ROPE**2) * 0.05 * 1.5**2 / np.sqrt(2.0), rel=0.1)

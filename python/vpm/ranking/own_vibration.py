@@ -12,7 +12,6 @@ from scipy.linalg import eigh
 from vpm.experiment import Experiment
 from vpm.initial import initial_state
 from vpm.model import Model
-from vpm.numbers import Array
 from vpm.ranking.fit import ASTRAY
 from vpm.ranking.settings import MOVE, OCTAVE, Settings
 
@@ -33,31 +32,27 @@ def _slowest(model: Model, records: Sequence[Experiment]) -> float:
     """Lowest frequency of own vibrations of joints that are measured and not driven, Hz, while all others rest.
 
     Law: the generalised eigenvalues of stiffness and mass about the first pose (L. Meirovitch, *Fundamentals of
-    Vibrations*, 2001, chapter 7), both from inverse dynamics at rest. Infinite where nothing vibrates even once in the
-    longest record.
+    Vibrations*, 2001, chapter 7), from efforts at rest and the mass matrix. Infinite where nothing vibrates even once
+    in the longest record.
     """
     idle = [joint for joint in model.joints if joint not in {*model.driven_joints, *model.added_joints}]
     seen = [joint for joint in idle if all(f"{joint}.position" in record for record in records)]
     if not seen or model.loops or model.coordinates != model.joints:
         return np.inf
-    places = [model.joints.index(joint) for joint in seen]
-    count, steps = len(model.joints), MOVE * np.eye(len(model.joints))[places]
-    still, pushed = np.zeros((2 * len(places), count)), np.vstack([steps, -steps])
-    held = np.zeros((len(pushed), len(model.input_channels)))
+    places, count = [model.joints.index(joint) for joint in seen], len(model.joints)
+    ahead = MOVE * np.eye(count)[places]
+    still, held = np.zeros_like(ahead), np.zeros((len(places), len(model.input_channels)))
     with contextlib.suppress(*ASTRAY):
-        pose = np.tile(initial_state(model, records[0], model.theta)[:count], (len(pushed), 1))
-        stiffness, mass = (
-            _slopes(model.core.inverse_dynamics(model.theta, *motion, held, 1.0)[0][:, places] / MOVE)
-            for motion in ((pose + pushed, still, still), (pose, still, pushed))
+        pose = initial_state(model, records[0], model.theta)[:count]
+        before, after = (
+            model.core.inverse_dynamics(model.theta, pose + way, still, still, held, 1.0)[0][:, places]
+            for way in (-ahead, ahead)
         )
-        frequencies = np.sqrt(np.maximum(eigh(stiffness, mass, eigvals_only=True), 0.0)) / (2.0 * np.pi)
+        stiffness = 0.5 * (after - before) / MOVE
+        mass = model.mass_matrix(pose)[np.ix_(places, places)]
+        frequencies = np.sqrt(np.maximum(eigh(0.5 * (stiffness + stiffness.T), mass, eigvals_only=True), 0.0)) / (
+            2.0 * np.pi
+        )
         longest = max(float(record.time[-1] - record.time[0]) for record in records)
         return float(min(frequencies[frequencies * longest > 1.0], default=np.inf))
     return np.inf
-
-
-def _slopes(efforts: Array) -> Array:
-    """Symmetric matrix of central differences of efforts, forward ones above backward ones."""
-    ahead, behind = np.split(efforts, 2)
-    slopes = 0.5 * (ahead - behind)
-    return np.asarray(0.5 * (slopes + slopes.T))

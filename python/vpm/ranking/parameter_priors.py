@@ -7,7 +7,6 @@ import numpy as np
 from vpm.catalogue import EffectParameter
 from vpm.catalogue.shared import SLOW
 from vpm.discrepancy.screening.candidates import LEAST, Candidate, joint_at, shares_at, slow_speeds
-from vpm.discrepancy.screening.compliance_and_stop_start import moved
 from vpm.discrepancy.stuck_channels import is_moving
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
@@ -29,6 +28,8 @@ class Sizes:
         records = range(len(data.motions))
         efforts = np.concatenate([data.effort(model, model.theta, record)[1] for record in records])
         positions, velocities, accelerations = map(np.concatenate, zip(*map(data.state, records), strict=True))
+        middle = dict(zip(data.joints, np.mean(positions, axis=0).tolist(), strict=True))
+        inertias = np.diag(model.mass_matrix([middle.get(name, 0.0) for name in model.coordinates]))
         self.joints: dict[str, tuple[float, float, float]] = {}
         self.ways: dict[str, tuple[float, float]] = {}
         moving = [any(is_moving(log, f"{joint}.position") for log in data.experiments) for joint in data.joints]
@@ -40,8 +41,9 @@ class Sizes:
                 self.moving.add(site)
             self.ways[site] = float(way.min()), float(way.max())
             effort = efforts @ (shares / max(float(shares @ shares), 1e-300))
-            # Where no drive does anything, it is inertia that forces are as large as.
-            size = _strength(effort) or moved(model, site) * _strength(accelerations @ shares)
+            # Where no drive does anything, it is inertia that forces are as large as, in the middle of the way.
+            inertia = float(inertias[model.joints.index(model.joint_before(site))])
+            size = _strength(effort) or inertia * _strength(accelerations @ shares)
             self.joints[site] = size, _strength(velocities @ shares), 0.5 * float(np.ptp(way))
         self.commands = {
             name: _strength(np.concatenate([motion.inputs[:, place] for motion in data.motions]))
