@@ -100,7 +100,7 @@ def test_dry_friction_that_turns_round_biases_no_interval(some: list[Experiment]
     assert np.all(np.sum(held, axis=0) >= 32)
     assert not [warning for fit in fits for warning in fit.warnings if "repeats with the motion" in warning]
     errors = [fit["pendulum.inertia.yy"] / OWN - 1.0 for fit in fits]
-    assert np.sqrt(np.mean(np.square(errors))) < 1e-3  # 4e-3 by the plain balance
+    assert np.sqrt(np.mean(np.square(errors))) < 1e-3  # 4e-3 by the residual alone
 
 
 def test_inertias_that_nothing_shows_keep_nothing_from_being_compared(some: list[Experiment]) -> None:
@@ -125,7 +125,7 @@ SETTINGS = {"noise": Fitting(noise="estimated"), "loss": Fitting(loss="huber", s
 
 @pytest.mark.parametrize("fitting", SETTINGS.values(), ids=SETTINGS)
 def test_nor_does_it_where_settings_of_the_fit_are_given(some: list[Experiment], fitting: Fitting) -> None:
-    """Of 15 intervals fewer than 11 hold the truth with a chance of 6e-4; of the inertia the plain balance has 2."""
+    """Of 15 intervals fewer than 11 hold the truth with a chance of 6e-4; of the inertia the residual alone has 2."""
     fits = [identify(MODEL, log, FREE, fitting=fitting) for log in some[:15]]
     held = [(fit.intervals[:, 0] <= EXPECTED) & (fit.intervals[:, 1] >= EXPECTED) for fit in fits]
     assert np.all(np.sum(held, axis=0) >= 11)
@@ -171,7 +171,7 @@ def test_a_joint_without_an_encoder_is_simulated_at_rest_where_the_balance_has_i
 
 @pytest.mark.nightly
 def test_nor_does_it_behind_a_motor() -> None:
-    """Of twenty, fewer than 15 hold the truth with a chance of 3e-4; by the plain balance 17, 0 and 11 do."""
+    """Of twenty, fewer than 15 hold the truth with a chance of 3e-4; by the residual alone 17, 0 and 11 do."""
     fits = [identify(WITH_MOTOR, log, FREE) for log in logs(20, seed=73, motor=True)]
     held = [(fit.intervals[:, 0] <= EXPECTED) & (fit.intervals[:, 1] >= EXPECTED) for fit in fits]
     assert np.all(np.sum(held, axis=0) >= 15)

@@ -125,6 +125,28 @@ def test_dialects(tmp_path: Path, above: str, separator: str, comma: bool) -> No
     np.testing.assert_allclose(exp["drive.command"], -np.arange(12))
 
 
+@pytest.mark.parametrize(
+    ("separator", "thousands", "decimal"),
+    [(";", ".", ","), (";", ",", "."), ("\t", "'", "."), (";", "\u202f", ","), (";", " ", ","), (",", ",", ".")],
+)
+def test_marks_between_thousands_are_no_decimal_marks(
+    tmp_path: Path, separator: str, thousands: str, decimal: str
+) -> None:
+    """Programs of controllers write 1.234,5 or 1,234.5 by the language of their computer, in quotes where needed."""
+
+    def cell(value: float, digits: int) -> str:
+        text = f"{value:,.{digits}f}".translate({ord(","): thousands, ord("."): decimal})
+        return f'"{text}"' if separator in text else text
+
+    rows = [separator.join((cell(250 * k, 0), cell(987.125 * k, 3), cell(-1.5 * k, 1))) for k in range(12)]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join([f"t{separator}q{separator}u", *rows]), encoding="utf-8")
+    exp = Experiment.load(path, TABLE)
+    assert exp.rate == pytest.approx(4.0)
+    np.testing.assert_allclose(exp["axis.position"], 0.987125 * np.arange(12), rtol=1e-12)
+    np.testing.assert_allclose(exp["drive.command"], -1.5 * np.arange(12))
+
+
 def test_numpys_own_text_is_read(tmp_path: Path) -> None:
     np.savetxt(tmp_path / "log.txt", ROWS, header="t q u")
     np.testing.assert_allclose(Experiment.load(tmp_path / "log.txt", TABLE)["axis.position"], 0.5e-3 * np.arange(12))
@@ -315,7 +337,7 @@ def test_lines_are_counted_with_the_blank_ones(tmp_path: Path) -> None:
         (b"\x80\x81\x82", "is not a text file in UTF-8"),
         (
             b"t;q;u\n" + b"".join(b"%d.0;%d,5;0\n" % (k, k) for k in range(12)),
-            r'"0,5" in column "q" is no number; write dec',
+            r'"0,5" in column "q" is no number; numbers of this file have decimal points and commas',
         ),
         (b"t,q,u\n" + b"".join(b"%d,%d,5,0\n" % (k, k) for k in range(12)), r"line 2: there are 4 cells"),
     ],

@@ -424,6 +424,19 @@ def test_finds_what_was_filtered_before_it_was_stored() -> None:
     assert [one.kind for one in odd(np.asarray(sosfilt(butter(4, 0.3, output="sos"), swing())))] == ["filtered"]
 
 
+def test_what_loading_interpolated_was_not_filtered_before(tmp_path: Path) -> None:
+    """A slow bus reads a position in every second row: its noise is white up to half of the slower rate."""
+    values, rate = swing(1e-3), 500.0
+    rows = [f"{k / rate:.3f},{'' if k % 2 else f'{value:.9f}'},{value:.9f}" for k, value in enumerate(values)]
+    path = tmp_path / "bus.csv"
+    path.write_text("\n".join(["time,slide.position,drive.command", *rows]) + "\n")
+    log = vpm.Experiment.load(path, irregular="interpolate")
+    assert log.read_rate("slide.position") == pytest.approx(0.5 * rate)
+    assert list(odd_stretches(log, ["slide.position"], [], Settings())) == []
+    stored = vpm.Experiment.from_arrays(log.time, {"slide.position": log["slide.position"]})
+    assert [one.kind for one in odd_stretches(stored, ["slide.position"], [], Settings())] == ["filtered"]
+
+
 @pytest.mark.parametrize(
     "correction",
     [

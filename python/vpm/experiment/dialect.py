@@ -1,4 +1,4 @@
-"""How a text file writes a table: letters, remarks above the names, separators, decimal commas, a row of units."""
+"""How a text file writes a table: letters, remarks above the names, separators, marks in numbers, a row of units."""
 
 import csv
 import re
@@ -21,6 +21,8 @@ PREAMBLE, MOST_BEFORE = 1000, 1 << 20
 #: Bytes of no text: what controls terminals and printers, but for tabulators, ends of lines and of pages.
 _CONTROLS = bytes({*range(32)} - {*b"\t\n\r\f\x1b"})
 _ENCODINGS = ("utf-8-sig", "cp1252")
+#: Marks that group the digits of a number in threes: point and comma if the other one is decimal, apostrophes, blanks.
+_GROUPS = (".", ",", "'", "\u2019", "\u00a0", "\u202f", " ")
 
 
 @dataclass(frozen=True)
@@ -34,6 +36,7 @@ class Dialect:
     skipped: int  #: Lines above the numbers.
     delimiter: str | None  #: None where blanks separate.
     comma: bool  #: Numbers have decimal commas.
+    group: str = ""  #: Mark between thousands, as the point in 1.234,5; empty where there is none.
 
     def rows(self, path: str | PathLike[str]) -> Iterator[tuple[int, list[str]]]:
         """Cells of each row of numbers in a dialect, as they stand there, with its line."""
@@ -47,8 +50,9 @@ class Dialect:
             yield from ((number, row) for number, row in split if any(cell.strip() for cell in row))
 
     def number(self, cell: str) -> str:
-        """Cell of a dialect with a decimal point."""
-        return cell.replace(",", ".") if self.comma else cell
+        """Cell of a dialect with a decimal point and no marks between thousands."""
+        plain = cell.replace(self.group, "") if self.group else cell
+        return plain.replace(",", ".") if self.comma else plain
 
 
 def read_dialect(path: str | PathLike[str]) -> Dialect:
@@ -56,7 +60,7 @@ def read_dialect(path: str | PathLike[str]) -> Dialect:
 
     Remarks and blank lines may stand above the names, and the names may be a remark themselves, as ``numpy.savetxt``
     writes them. Blanks separate where the names hold no other separator. Commas are decimal ones where another
-    separator is there, and no number has a point; dates are no numbers.
+    separator is there, or quotes, and no number has a point but between thousands; dates are no numbers.
     """
     content = _content(path)
     encoding = _encoding(path, content)
@@ -70,9 +74,25 @@ def read_dialect(path: str | PathLike[str]) -> Dialect:
     below = next((place for place in told if place > named), None)
     units = () if below is None else _units(_cells(lines[below], separator), len(header))
     skipped = below + 1 if units and below is not None else named + 1
-    numbers = STAMP_BYTES.sub(b"", content.split(b"\n", skipped)[-1]) if separator != "," else b""
-    comma = re.search(rb"\d,\d", numbers) is not None and re.search(rb"\d\.\d", numbers) is None
-    return Dialect(encoding, header, units, named + 1, skipped, separator, comma)
+    numbers = content.split(b"\n", skipped)[-1]
+    if separator == ",":  # then a comma within a number needs quotes
+        numbers = b"\n".join(re.findall(rb'"([^"\n]*)"', numbers))
+    text = STAMP_BYTES.sub(b"", numbers).decode(encoding)
+    group = next((mark for mark in _GROUPS if _groups(mark, text, separator)), "")
+    text = text.replace(group, "")
+    comma = re.search(r"\d,\d", text) is not None and re.search(r"\d\.\d", text) is None
+    return Dialect(encoding, header, units, named + 1, skipped, separator, comma, group)
+
+
+def _groups(mark: str, text: str, separator: str | None) -> bool:
+    """Whether a mark stands between the thousands of numbers in a dialect, and nowhere else in a number."""
+    if mark not in text or (mark == " " and separator is None):
+        return False
+    decimal = {".": ",", ",": r"\."}.get(mark, "")
+    code = re.escape(mark)
+    whole = rf"(?<![\d.,])\d{{1,3}}(?:{code}\d{{3}})+{decimal}"
+    elsewhere = rf"\d{{4}}{code}\d|\d{code}(?!\d{{3}}(?!\d))\d"
+    return re.search(whole, text) is not None and re.search(elsewhere, text) is None
 
 
 def _content(path: str | PathLike[str]) -> bytes:

@@ -118,15 +118,19 @@ def _dates(path: str | PathLike[str], lines: NDArray[np.int64], cells: Sequence[
 
 
 def _numbers(path: str | PathLike[str], dialect: Dialect, places: Sequence[int]) -> Array:
-    """Columns of numbers of a text table; decimal commas become points."""
+    """Columns of numbers of a text table, whose marks become those of Python."""
     source: str | PathLike[str] | Iterable[str] = path
-    if dialect.comma:
-        lines = Path(path).read_text(encoding=dialect.encoding).splitlines()
-        source = map(dialect.number, lines)
+    skipped = dialect.skipped
+    if dialect.comma or dialect.group:
+        if dialect.delimiter == ",":
+            # Within quotes a comma is part of a number.
+            source, skipped = (",".join(map(dialect.number, row)) for _, row in dialect.rows(path)), 0
+        else:
+            source = map(dialect.number, Path(path).read_text(encoding=dialect.encoding).splitlines())
     return np.loadtxt(
         source,
         delimiter=dialect.delimiter,
-        skiprows=dialect.skipped,
+        skiprows=skipped,
         usecols=places,
         ndmin=2,
         comments=None,
@@ -188,7 +192,8 @@ def _row_problem(row: Sequence[str], dialect: Dialect, places: Sequence[int], cl
         if not is_number(dialect.number(cell)) and not (place == clock and is_date(cell)):
             comma = is_number(cell.replace(",", ".", 1))
             other = "or a date such as 2026-03-14 09:26:53.120" if place == clock else "or do not map this column"
-            repair = "write decimal points" if comma else f"write a number, {other}"
+            mixed = "numbers of this file have decimal points and commas; write one of them alone"
+            repair = mixed if comma else f"write a number, {other}"
             return f'"{cell}" in column "{header[place]}" is no number; {repair}'
     return ""
 
