@@ -23,11 +23,13 @@ from vpm.experiment import Experiment, Motion, choose_cutoff, joints_from_sensor
 from vpm.experiment.cutoff import HIGHEST
 from vpm.experiment.signal import UNDISTORTED_BAND
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
+from vpm.identify.between_records import changed_between
 from vpm.identify.comparison import relative_to_drives
 from vpm.identify.moments import on_the_border
 from vpm.identify.parallel import worker_count
 from vpm.identify.response_along_motion import answers_at_once
 from vpm.identify.sample_mask import STANDSTILL_SHARE
+from vpm.identify.settings import Checks
 from vpm.model import Model, Parameter
 from vpm.numbers import NORMAL_95, short
 from vpm.simulate import Setup
@@ -119,6 +121,10 @@ def recalibrated_of(
         recalibrated, stopped = judged_anyhow(start, (*free, *transitions), alone, bounds)
     if stopped:
         notes.append(f"the recalibrated model could not simulate the validation records: {stopped}")
+    fit, units = recalibrated.fit, [model.parameters[name].unit for name in recalibrated.fit.names]
+    blind = {name for one in fit.unseen for name in one.names}
+    blocks = data.training.blocks
+    notes.extend(changed_between(fit.names, fit.values, fit.residual, fit.jacobian, blocks, units, blind, Checks()))
     notes.extend(moved_far(model, recalibrated))
     return recalibrated
 

@@ -266,8 +266,10 @@ class _Counter:
 def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Array:
     """Bounded linear step of an estimation, if it is better than the start."""
     residual, jacobian = counter(start)
+    moving = low < high  # a rod's two moments are equal: their difference is zero
+    jacobian = jacobian[:, moving]
     lengths = column_lengths(jacobian)
-    if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(lengths))):
+    if not (np.all(np.isfinite(residual)) and np.all(np.isfinite(lengths)) and np.any(moving)):
         return start
     orthogonal, square = np.linalg.qr(jacobian / lengths)
     left, values, directions = np.linalg.svd(square, full_matrices=False)
@@ -276,11 +278,13 @@ def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Ar
     least = RANK_TOLERANCE * values[0]
     blind = values < least
     square = np.maximum(values, least)[:, None] * directions
-    bounds = ((low - start) * lengths, (high - start) * lengths)
+    bounds = tuple((edge - start)[moving] * lengths for edge in (low, high))
     # By active sets, which end: the reflective method may halve its steps for ever.
     target = np.where(blind, 0.0, -left.T @ (orthogonal.T @ residual))
     step = lsq_linear(square, target, bounds, method="bvls", tol=1e-14)
-    candidate = np.clip(start + step.x / lengths, low, high)
+    candidate = start.copy()
+    candidate[moving] += step.x / lengths
+    candidate = np.clip(candidate, low, high)
     better = np.sum(counter.residual(candidate) ** 2) <= np.sum(residual**2)
     return candidate if better else start
 
@@ -323,24 +327,31 @@ def _refine(
         return start
     if descends and unseen_combinations(jacobian, counter.names):
         return _descended(counter, start, low, high, most)
-    inside = _strictly_inside(start, low, high)
+    moving = low < high
+
+    def whole(part: Array) -> Array:
+        x = start.copy()
+        x[moving] = part
+        return x
+
+    inside = _strictly_inside(start[moving], low[moving], high[moving])
     if not np.all(
-        np.isfinite(counter.residual(inside))
+        np.isfinite(counter.residual(whole(inside)))
     ):  # a bound that the simulation does not bear, such as no friction
         return start
     result = least_squares(
-        counter.residual,
+        lambda part: counter.residual(whole(part)),
         inside,
-        jac=counter.jacobian,
-        bounds=(low, high),
+        jac=lambda part: counter.jacobian(whole(part))[:, moving],
+        bounds=(low[moving], high[moving]),
         method="trf",
-        x_scale=1.0 / lengths,
+        x_scale=1.0 / lengths[moving],
         max_nfev=most,
         xtol=tolerance,
         ftol=tolerance,
         gtol=1e-12,
     )
-    solution: Array = result.x
+    solution = whole(np.asarray(result.x))
     return solution if np.sum(counter.residual(solution) ** 2) <= np.sum(residual**2) else start
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from vpm.errors import IdentificationError
 from vpm.experiment import Experiment, as_records, joints_from_sensors
+from vpm.identify.between_records import changed_between
 from vpm.identify.closed_loop_prediction import Own
 from vpm.identify.comparison import comparison
 from vpm.identify.diagnostics import (
@@ -128,7 +129,13 @@ def identify(
     if isinstance(found, Found):
         fit = with_offsets(fit, data, found.weights)
     fit = _judged(fit, data, found, records, checks, settled, own)
-    return replace(fit, warnings=_told(model, records, data, fit, checks))
+    blind = {name for combination in fit.unidentifiable for name in combination.names}
+    changed = changed_between(
+        fit.names, fit.values, found.residual, found.jacobian, data.blocks, fit.units, blind, checks
+    )
+    # What such a record leaves repeats with its motion, too, and no effect is missing.
+    told = _told(model, records, data, fit, checks, effects=not changed)
+    return replace(fit, warnings=(*changed, *told))
 
 
 def _names(model: Model, free: Sequence[str] | None) -> tuple[str, ...]:
@@ -259,12 +266,15 @@ def _with_details(fit: Fit, data: Problem, found: Found) -> Fit:
     )
 
 
-def _told(model: Model, records: Sequence[Experiment], data: Problem, fit: Fit, checks: Checks) -> tuple[str, ...]:
+def _told(
+    model: Model, records: Sequence[Experiment], data: Problem, fit: Fit, checks: Checks, *, effects: bool
+) -> tuple[str, ...]:
+    """Diagnostics of a fit, and where ``effects``, of effects that may be missing."""
     replaced = (fit.fitting or Fitting()).bounds
     box = dict(zip(fit.names, zip(*limits(model, fit.names, replaced), strict=True), strict=True))
     border = on_the_border(fit.model, fit.names)
     held = {name: box[name] for name in resting(fit, box) if not any(name in names for names, _ in border)}
-    told = missing_effects(fit.whiteness, checks)
+    told = missing_effects(fit.whiteness, checks) if effects else []
     if fit.fitting is None or not fit.fitting.log or fit.fitting.priors:  # logarithms are for starts wrong by decades
         told += contradictions(model, fit, checks)
     others = len(fit.states) + len(offset_blocks(data))

@@ -119,7 +119,7 @@ def _step(at: Point, box: Box, damping: float) -> tuple[Array, float] | None:
     """Damped step of the solver inside the box and its predicted fall of cost; None at a minimum."""
     low, high, reach = box.low, box.high, np.broadcast_to(box.reach, at.x.shape)
     gradient = at.jacobian.T @ at.residual
-    held = ((at.x <= low) & (gradient > 0.0)) | ((at.x >= high) & (gradient < 0.0))
+    held = (low >= high) | ((at.x <= low) & (gradient > 0.0)) | ((at.x >= high) & (gradient < 0.0))
     lengths = np.linalg.norm(at.jacobian, axis=0)
     free = np.flatnonzero(~held & (lengths > 0.0))
     if free.size == 0:
