@@ -5,7 +5,19 @@ from typing import Annotated
 
 import typer
 
-from vpm.command import Integrator, ModelPath, Plot, Share, console, load_model, load_pair, progress, save_plot
+from vpm.command import (
+    Channels,
+    Integrator,
+    Interpolate,
+    ModelPath,
+    Plot,
+    Share,
+    console,
+    load_model,
+    load_pair,
+    progress,
+    save_plot,
+)
 from vpm.command_output import give
 
 EXAMPLES = "Example:  vpm budget examples/emps/model.toml --rate 1000"
@@ -21,6 +33,8 @@ def budget(
     log: Annotated[
         Path | None, typer.Option(help="Record whose commands drive the model; by default a sum of sines.")
     ] = None,
+    channels: Channels = None,
+    interpolate: Interpolate = False,
     latency: Annotated[
         float, typer.Option(help="Time to watch how late an idle loop at this rate wakes up, s; 0 for not at all.")
     ] = 2.0,
@@ -38,7 +52,7 @@ def budget(
     """Time one step of the model against a controller's period; exit code 1 if it does not fit."""
     from vpm.budget import budget as time_steps
 
-    machine, record = (load_model(model), None) if log is None else load_pair(model, log, None, False)
+    machine, record = (load_model(model), None) if log is None else load_pair(model, log, channels, interpolate)
     with progress() as tell:
         report = time_steps(
             machine,

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from command_line import ran, vpm
 from places import EXAMPLES
 from synthetic import Truth, nominal, simulate_axis
 from vpm import Model
@@ -71,6 +72,30 @@ def test_a_record_drives_the_model_at_its_own_speed_whatever_the_rate(record: Ex
     np.testing.assert_array_equal(faster, np.repeat(command, 4))
     np.testing.assert_array_equal(slower, command[::5][: len(slower)])
     assert len(slower) * 5 == pytest.approx(len(command), abs=5)
+
+
+def test_a_log_with_a_lost_sample_drives_the_model_as_elsewhere(tmp_path: Path) -> None:
+    rows = [f"{2 * k},{np.sin(0.01 * k):.6f},{np.cos(0.01 * k):.6f}" for k in range(500) if k != 200]
+    path = tmp_path / "log.csv"
+    path.write_text("\n".join(["t_ms,q_mm,u_V", *rows]) + "\n")
+    table = tmp_path / "table.toml"
+    table.write_text(
+        'time = { column = "t_ms", unit = "ms" }\n"axis.position" = { column = "q_mm", unit = "mm" }\n'
+        '"drive.command" = { column = "u_V", unit = "V" }\n'
+    )
+    words = ["budget", str(EXAMPLES / "emps" / "model.toml"), "--log", str(path), "--channels", str(table)]
+    words += ["--steps", "1000", "--latency", "0", "--share", "1000"]
+    refused = vpm(*words)
+    assert (refused.returncode, "--interpolate" in refused.stderr) == (1, True)
+    assert "the budget holds" in ran(*words, "--interpolate").stdout
+
+
+def test_a_machine_that_sines_drive_into_a_singular_place_needs_a_record() -> None:
+    """The cranks of a parallelogram lie in one line with its coupler where they turn over."""
+    content = Model.load(EXAMPLES / "loops" / "parallelogram.toml").to_dict()
+    content["actuators"]["motor"]["gain"] = {"value": 200.0, "unit": "N m"}
+    with pytest.raises(SimulationError, match=r"singular.*; sums of sines drove it, so give a record .*--log"):
+        budget(Model.from_dict(content), steps=5000)
 
 
 def test_report_saves_and_loads(report: BudgetReport, tmp_path: Path) -> None:

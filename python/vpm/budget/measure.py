@@ -90,18 +90,25 @@ def budget(
     setup = Setup(integrator, substeps)
     inputs = commands(model, rate, experiment)
     start = start_state(model, experiment)
-    timed = time_steps(
-        model,
-        rate,
-        setup,
-        steps,
-        inputs,
-        states=STATES,
-        tell=tell,
-        priority=priority,
-        start=start,
-        compiled=compiled,
-    )
+    try:
+        timed = time_steps(
+            model,
+            rate,
+            setup,
+            steps,
+            inputs,
+            states=STATES,
+            tell=tell,
+            priority=priority,
+            start=start,
+            compiled=compiled,
+        )
+    except SimulationError as error:
+        if experiment is not None or not inputs.any():
+            raise
+        raise SimulationError(
+            f"{error}; sums of sines drove it, so give a record of its own commands, experiment= (--log)"
+        ) from error
     median = float(np.median(timed.seconds))
     counted = count_instructions(model, rate, setup, inputs, median, tell, compiled=compiled) if instructions else None
     return BudgetReport(
