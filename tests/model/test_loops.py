@@ -22,7 +22,7 @@ from vpm.identify import identify
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.scenario import Scenario
-from vpm.simulate import Setup
+from vpm.simulate import Setup, simulate
 
 G = 9.81
 
@@ -662,3 +662,40 @@ def test_the_command_tells_the_assembly_or_that_there_are_two(tmp_path: Path) ->
         told.append(done.stdout)
     assert "closed from their start with shoulder = -0.6435 rad, elbow = 1.571 rad" in told[0]
     assert "and as near to their start with" in told[1]
+
+
+def test_a_log_of_driven_joints_begins_where_they_stand() -> None:
+    """A palletiser's parallelograms, upper arm and forearm logged: rods and plates follow, and no reading moves.
+
+    The other joints begin far from any closure, so that two assemblies may be as near: this says nothing of the log.
+    """
+    bodies = {name: {"mass": 1.0, "inertia": [0.1, 0.1, 0.1, 0.0, 0.0, 0.0]} for name in ("upper", "plate", "fore")}
+    bodies |= {name: dict(bodies["plate"]) for name in ("wrist", "rod", "bar")}
+    places: dict[str, tuple[str, str, list[float]]] = {
+        "shoulder": ("world", "upper", [0.35, 0.0, 0.0]),
+        "knee": ("upper", "plate", [0.0, 0.0, 1.2]),
+        "forearm": ("plate", "fore", [0.0, 0.0, 0.0]),
+        "level": ("fore", "wrist", [1.35, 0.0, 0.0]),
+        "rear": ("world", "rod", [0.15, 0.0, 0.0]),
+        "top": ("plate", "bar", [0.0, 0.0, 0.2]),
+    }
+    joints = {
+        name: {"type": "revolute", "parent": parent, "child": child, "translation": at, "axis": [0.0, 1.0, 0.0]}
+        for name, (parent, child, at) in places.items()
+    }
+    ends = {
+        "elbow": ({"parent": "plate", "point": [-0.2, 0.0, 0.0]}, {"parent": "rod", "point": [0.0, 0.0, 1.2]}),
+        "hand": ({"parent": "wrist", "point": [0.0, 0.0, 0.2]}, {"parent": "bar", "point": [1.35, 0.0, 0.0]}),
+    }
+    loops = {name: {"type": "revolute", "axis": [0.0, 1.0, 0.0], "a": a, "b": b} for name, (a, b) in ends.items()}
+    drives = {f"{name}_drive": {"joint": name, "gain": 1.0, "command_unit": "N m"} for name in ("shoulder", "forearm")}
+    content = {"name": "palletiser", "gravity": [0.0, 0.0, 0.0], "bodies": bodies, "joints": joints, "loops": loops}
+    model = Model.from_dict({**content, "actuators": drives})
+    still = np.ones(20)
+    values = {"shoulder.position": 0.2 * still, "forearm.position": 0.275 * still}
+    record = Experiment.from_arrays(
+        0.01 * np.arange(20), values | {f"{drive}.command": 0.0 * still for drive in drives}
+    )
+    began = simulate(model, record)
+    found = [began[f"{name}.position"][0] for name in ("shoulder", "knee", "forearm", "level", "rear", "top")]
+    np.testing.assert_allclose(found, [0.2, -0.2, 0.275, -0.275, 0.2, 0.275], atol=1e-9)

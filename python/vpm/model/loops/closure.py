@@ -103,17 +103,17 @@ class Loops:
             Or two assemblies are as near to where the others begin, as from a stretched pose; the message tells both.
         """
         held = held or {}
-        q = np.zeros(len(self._model.coordinates))
-        for name, value in {**self._starts, **(guess or {})}.items():
-            q[self.place(name)] = number_of(value, f"{self._model.name}: {name}", ModelError)
-        fixed = {
-            self.place(name): number_of(value, f"{self._model.name}: {name}", ModelError)
-            for name, value in held.items()
-        }
+        q, fixed = self._begun(held, guess or {})
         closed = assembled(self, q, fixed, len(self._model.joints))
         self._complain(closed, held)
         if {*self._model.joints} - {*held} - {*(guess or {})}:
             self._refuse_two(closed, q, fixed)
+        return closed
+
+    def near(self, guess: Mapping[str, float]) -> Array:
+        """Coordinates next to a guess (m, rad) at which all loop closures hold; of two as near, one of them."""
+        closed = assembled(self, self._begun({}, guess)[0], {}, len(self._model.joints))
+        self._complain(closed, {})
         return closed
 
     def velocities(self, q: ArrayLike, held: Mapping[str, float]) -> Array:
@@ -332,6 +332,17 @@ class Loops:
         model = self._model
         direct = [name for name in model.actuators if model.line_of_actuator(name) is None]
         return tuple(dict.fromkeys(joint for name in direct for joint in model.joints_of_actuator(name)))
+
+    def _begun(self, held: Mapping[str, float], guess: Mapping[str, float]) -> tuple[Array, dict[int, float]]:
+        """Coordinates from which a closure is sought, and by place those that stay."""
+        q = np.zeros(len(self._model.coordinates))
+        for name, value in {**self._starts, **guess}.items():
+            q[self.place(name)] = number_of(value, f"{self._model.name}: {name}", ModelError)
+        fixed = {
+            self.place(name): number_of(value, f"{self._model.name}: {name}", ModelError)
+            for name, value in held.items()
+        }
+        return q, fixed
 
     def place(self, name: str) -> int:
         """Number of a coordinate in the closure equations.

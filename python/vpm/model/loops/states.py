@@ -129,7 +129,7 @@ def measured(model: Evaluations, position: Array, velocity: Array, seen: Sequenc
     """
     names, loops = model.coordinates, model.loops
     start = {name: value for name, value in zip(names, position.tolist(), strict=True) if name in seen}
-    kept = [name for name in loops.independent(loops.assembled(guess=start), seen) if name in seen]
+    kept = [name for name in loops.independent(loops.near(start), seen) if name in seen]
     q = loops.assembled({name: start[name] for name in kept}, start)
     return q, loops.velocities(q, {name: float(velocity[names.index(name)]) for name in kept})
 
