@@ -9,6 +9,7 @@ import vpm
 from vpm import Experiment, Model
 from vpm.errors import ExperimentError
 from vpm.experiment import joints_from_lengths
+from vpm.identify import judged_on
 
 #: Distances of both pins from the axis, m, and the angle between them at zero, rad.
 BASE, LEVER, ANGLE = 1.9, 0.43, 2.2
@@ -102,3 +103,56 @@ def test_a_run_starts_where_the_cylinder_is() -> None:
     model = boom()
     run = vpm.simulate(model, record(length(MOVED), model))
     assert run["foot.position"][0] == pytest.approx(MOVED[0], abs=2e-3)  # a parabola through the first samples
+
+
+HANGING = """
+    name = "hanging arm"
+    gravity = [0.0, 0.0, -9.81]
+    [bodies.arm]
+    mass = { value = 18.0, uncertainty = 3.0 }
+    center_of_mass = [0.6, 0.0, 0.0]
+    inertia = [0.0, { value = 2.4, uncertainty = 0.6 }, { value = 2.4, uncertainty = 0.6 }, 0.0, 0.0, 0.0]
+    [joints.hinge]
+    type = "revolute"
+    parent = "world"
+    child = "arm"
+    axis = [0.0, -1.0, 0.0]
+    [lines.ram]
+    from = { parent = "world", point = [0.3, 0.0, -0.3] }
+    to = { parent = "arm", point = [0.8, 0.0, 0.1] }
+    [actuators.drive]
+    line = "ram"
+    gain = 1.0
+    command_unit = "N"
+"""
+
+
+def hanging(model: vpm.Model) -> vpm.Experiment:
+    """An arm between 80 and 137 degrees below the horizontal: J q'' + m g c cos(q) is its ram's force by the lever."""
+    time, drawn = np.arange(4000) / 200.0, np.random.default_rng(8)
+    angle = -1.9 + 0.4 * np.sin(1.7 * time) + 0.1 * np.sin(4.1 * time)
+    acceleration = -0.4 * 1.7**2 * np.sin(1.7 * time) - 0.1 * 4.1**2 * np.sin(4.1 * time)
+    to = 0.8 + 0.1j  # up is the imaginary part
+    way = to * np.exp(1j * angle) - (0.3 - 0.3j)
+    lever = np.real(np.conj(way) * 1j * to * np.exp(1j * angle)) / np.abs(way)
+    force = ((2.0 + 20.0 * 0.6**2) * acceleration + 20.0 * 9.81 * 0.6 * np.cos(angle)) / lever
+    values = {
+        "ram.length": np.abs(way) + 2e-5 * drawn.standard_normal(time.size),
+        "drive.command": force + 0.5 * drawn.standard_normal(time.size),
+    }
+    return vpm.Experiment.from_arrays(time, values, name="log", model=model)
+
+
+def test_an_angle_beyond_the_dead_centre_is_found_by_its_weight() -> None:
+    model = vpm.Model.from_toml(HANGING)
+    (mistake,) = vpm.check_log(model, hanging(model), workers=1).mistakes
+    assert (mistake.kind, mistake.channels) == ("side", ("ram.length",))
+    # The line passes the hinge where the directions of both ends agree.
+    centre = np.arctan2(-0.3, 0.3) - np.arctan2(0.1, 0.8)
+    assert f"dead centre of ram at {centre:.3g} rad" in mistake.sentence
+    assert mistake.repair.endswith("rotation = [0, 1.9, 0]")
+    other = vpm.Model.from_toml(HANGING.replace('child = "arm"', 'child = "arm"\n    rotation = [0.0, 1.9, 0.0]'))
+    assert not vpm.check_log(other, hanging(other), workers=1).mistakes
+    # A validation record has the length alone, too.
+    before, after = judged_on(vpm.identify(other, hanging(other)), other, hanging(other))
+    assert after["hinge.effort"][0] < 0.05 * before["hinge.effort"][0]

@@ -43,17 +43,35 @@ def joints_from_lengths(
     free : collection of str
         Parameters that are to be fitted to the result.
     """
+    values, told = model.theta if theta is None else theta, experiment
+    for joint, line in lines_that_tell(experiment, model).items():
+        told = _told(told, model, values, line, joint, free)
+    return told
+
+
+def lines_that_tell(experiment: Experiment, model: Model) -> dict[str, str]:
+    """Logged lines whose lengths tell joints without a position, by joint."""
     lacking = [joint for joint in model.joints if f"{joint}.position" not in experiment]
     logged = [line for line in model.lines if f"{line}.length" in experiment]
     if not lacking or not logged or len(model.coordinates) > len(model.joints):
-        return experiment
-    values = model.theta if theta is None else theta
-    told = experiment
+        return {}
+    found: dict[str, str] = {}
     for line in logged:
         moved = [joint for joint in model.joints if _moves(model, line, joint)]
-        if len(moved) == 1 and f"{moved[0]}.position" not in told:
-            told = _told(told, model, values, line, moved[0], free)
-    return told
+        if len(moved) == 1 and moved[0] in lacking:
+            found.setdefault(moved[0], line)
+    return found
+
+
+def dead_centre(model: Model, line: str, joint: str) -> float:
+    """Angle of a revolute joint, next to zero, at which a line that it moves is longest or shortest, rad.
+
+    The square of the length is a constant and a cosine of the angle from there (law of cosines), so that the angle
+    mirrored at the dead centre has the same length.
+    """
+    squares = _lengths(model, line, joint, np.array([0.0, np.pi, 0.5 * np.pi, -0.5 * np.pi])) ** 2
+    longest = np.arctan2(squares[2] - squares[3], squares[0] - squares[1])
+    return float(longest - np.pi * np.round(longest / np.pi))
 
 
 def _told(

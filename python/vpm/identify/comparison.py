@@ -6,7 +6,7 @@ from functools import partial
 import numpy as np
 
 from vpm.errors import IdentificationError
-from vpm.experiment import Experiment
+from vpm.experiment import Experiment, joints_from_sensors
 from vpm.identify.first_states import OF_PARAMETER, difference
 from vpm.identify.input_error import InputErrorProblem
 from vpm.identify.inverse_dynamics import InverseDynamicsProblem
@@ -24,8 +24,17 @@ from vpm.simulate import MODES, Setup
 FIT_MODES = (*MODES, "input_error", "prediction_error")
 #: Those that compare outputs of a simulation.
 OUTPUT_ERROR = tuple(mode for mode in MODES if mode != "inverse_dynamics")
+#: Those in which the model follows the measured motion of its joints.
+FOLLOWING = frozenset({"inverse_dynamics", "prescribed_motion", "input_error"})
 #: The problems of these modes.
 Compared = InverseDynamicsProblem | OutputErrorProblem | InputErrorProblem | PredictionErrorProblem
+
+
+def followed(model: Model, records: Sequence[Experiment], mode: str, free: Sequence[str] = ()) -> list[Experiment]:
+    """Records for a comparison, with positions of joints from lengths and shafts where the mode follows these."""
+    if mode not in FOLLOWING:
+        return list(records)
+    return [joints_from_sensors(record, model, free=free) for record in records]
 
 
 def problem(

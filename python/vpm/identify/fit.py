@@ -8,10 +8,10 @@ from functools import partial
 import numpy as np
 
 from vpm.errors import IdentificationError
-from vpm.experiment import Experiment, as_records, joints_from_sensors
+from vpm.experiment import Experiment, as_records
 from vpm.identify.between_records import changed_between
 from vpm.identify.closed_loop_prediction import Own
-from vpm.identify.comparison import comparison
+from vpm.identify.comparison import comparison, followed
 from vpm.identify.diagnostics import (
     constant_channels,
     contradictions,
@@ -47,8 +47,6 @@ from vpm.numbers import Array
 from vpm.one_thread import in_one_thread
 from vpm.simulate import Setup
 
-#: Modes in which the model follows the measured motion of its joints.
-FOLLOWING = frozenset({"inverse_dynamics", "prescribed_motion", "input_error"})
 #: Times that an observer gets gains of the values that it led to, and the move (in deviations) after which it need not.
 RENEWALS, SETTLED = 4, 0.1
 #: A first estimate, and what gives another one of other data from a model at an estimate.
@@ -111,8 +109,7 @@ def identify(
         Nothing is free, a name is unknown, a channel that the mode needs is missing, or a tie has no single meaning.
     """
     records, names, ties, checks = as_records(experiments), _names(model, free), dict(ties or {}), checks or Checks()
-    if mode in FOLLOWING:
-        records = [joints_from_sensors(record, model, free=names) for record in records]
+    records = followed(model, records, mode, names)
     data = comparison(model, records, mode, cutoff=cutoff, setup=setup, ties=ties, fitting=fitting, free=names)
     check_ties(model, ties, names)
     data = _with_own_gains(model, data, names, tolerance)

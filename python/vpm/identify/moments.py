@@ -6,7 +6,7 @@ moments of mass along the axes, ``xx = Y + Z``, are positive and nothing else (P
 Robotics and Automation Letters* 3, 2018); beside one known moment, sum and difference of the others have bounds.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -80,13 +80,28 @@ def real_bodies(model: Model, free: Sequence[str], low: Array, high: Array) -> t
     return Coordinates(None if np.array_equal(matrix, np.eye(len(free))) else matrix), low, high
 
 
+def rods(model: Model, free: Collection[str]) -> list[tuple[str, str]]:
+    """Pairs of free moments of slender rods: the third one is known and zero, so that both are equal."""
+    found = []
+    for body in dict.fromkeys(name.rpartition(".inertia.")[0] for name in free if ".inertia." in name):
+        moments = [f"{body}.inertia.{axis}" for axis in AXES]
+        mine, known = [n for n in moments if n in free], [n for n in moments if n not in free]
+        products = [f"{body}.inertia.{pair}" for pair in PAIRS]
+        straight = not any(name in free or model.parameters[name].value != 0.0 for name in products)
+        if len(mine) == 2 and straight and model.parameters[known[0]].value == 0.0:
+            found.append((mine[0], mine[1]))
+    return found
+
+
 def on_the_border(model: Model, free: Sequence[str]) -> list[tuple[list[str], str]]:
     """Free moments, and a sentence, of bodies whose moments of inertia are as unequal as any body's can be."""
-    told = []
+    told, equal = [], {name for pair in rods(model, free) for name in pair}
     for body in dict.fromkeys(name.rpartition(".inertia.")[0] for name in free if ".inertia." in name):
         largest, *others = sorted((model.parameters[f"{body}.inertia.{axis}"].value, axis) for axis in AXES)[::-1]
         beside = sum(value for value, _ in others)
         moved = [f"{body}.inertia.{axis}" for _, axis in (largest, *others) if f"{body}.inertia.{axis}" in free]
+        if equal.issuperset(moved):
+            continue
         if moved and beside > 0.0 and largest[0] >= (1.0 - TOUCHING) * beside:
             sentence = (
                 f"{', '.join(moved)}: the moment {largest[1]}, {largest[0]:.6g} kg m^2, is as large as the other two "

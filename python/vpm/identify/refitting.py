@@ -9,7 +9,7 @@ import numpy as np
 from vpm.errors import VpmError
 from vpm.experiment import Experiment, as_records
 from vpm.identify.closed_loop_prediction import Noise, Own, noisy, own_residual
-from vpm.identify.comparison import comparison
+from vpm.identify.comparison import comparison, followed
 from vpm.identify.estimation import Estimate
 from vpm.identify.first_states import BegunAnywhere, begun_likeliest, matters
 from vpm.identify.fit_result import Fit
@@ -145,7 +145,7 @@ def judged_on(
     """Errors of model and validation records before and after a refit, in the fit's own mode.
 
     First states that the fit found belong to its own records; here they begin as for any simulation of a log, but for
-    those that are known, and for those that nobody measures along a motion: a balance is beside these.
+    those that are known, and for those that nobody measures along a motion: a residual is beside these.
 
     Parameters
     ----------
@@ -164,7 +164,7 @@ def judged_on(
     DivergedError
         The simulation leaves the finite numbers.
     """
-    records = as_records(experiments)
+    records = followed(model, as_records(experiments), fit.mode)
     fitting = fit.fitting and replace(fit.fitting, states=())
     result = []
     for machine in (model, fit.model):

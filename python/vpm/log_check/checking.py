@@ -11,6 +11,7 @@ from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
 from vpm.errors import ExperimentError, VpmError
 from vpm.experiment import Experiment, as_records, joints_from_shafts
 from vpm.log_check.correction import TIME, Correction
+from vpm.log_check.dead_centres import beyond_dead_centres
 from vpm.log_check.explanation import Explainer, Explanation
 from vpm.log_check.finding import Finding, LogCheck
 from vpm.log_check.related import Related, wrong_scales
@@ -132,6 +133,7 @@ class _Begun:
     record: Experiment
     part: Experiment
     left: Shares
+    sides: list[Finding]  #: Joints that are on the other side of a dead centre, which the record has put right.
 
 
 class _Check:
@@ -143,8 +145,9 @@ class _Check:
     def begun(self, record: Experiment) -> _Begun:
         """Beginning of a check: what is left of a record as it is."""
         record = joints_from_shafts(record, self.judge.model)
+        record, sides = beyond_dead_centres(self.judge, record, self.settings)
         part = _beginning(record, measured_outputs(self.judge.model, record), self.settings)
-        return _Begun(record, part, self.judge.fitted(part))
+        return _Begun(record, part, self.judge.fitted(part), sides)
 
     def known(self, begun: Sequence[_Begun]) -> Array | None:
         """Values by which the model explains the record of which a check leaves least; None if it explains none."""
@@ -183,7 +186,7 @@ class _Check:
         tangent = self.judge.tangent(part, left)
         if tangent is not None and (undetermined := self.judge.undetermined(tangent)):
             stretches.append(_of_parameters(undetermined, record.name))
-        return [*found, *stretches], left
+        return [*begun.sides, *found, *stretches], left
 
 
 def doubted(found: Finding, others: Collection[str]) -> Finding:

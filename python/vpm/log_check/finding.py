@@ -15,7 +15,8 @@ class Finding(Storable):
     Attributes
     ----------
     kind : str
-        ``unit``, ``scale``, ``sign``, ``swap``, ``clock`` or ``delay`` of channels; ``constant``, ``frozen``,
+        ``unit``, ``scale``, ``sign``, ``swap``, ``clock`` or ``delay`` of channels, ``side`` of a dead centre;
+        ``constant``, ``frozen``,
         ``clipped``, ``spikes``, ``filtered`` or ``coarse`` of one by itself; ``unseen`` of parameters.
     channels : tuple of str
     records : tuple of str

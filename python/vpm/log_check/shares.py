@@ -15,7 +15,7 @@ from vpm.catalogue import EFFECTS
 from vpm.catalogue.effects import BUILT_IN
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
-from vpm.identify.response_along_motion import answers_at_once
+from vpm.identify.response_along_motion import answers_at_once, bends
 from vpm.initial import initial_state
 from vpm.log_check.correction import Correction
 from vpm.log_check.delay import Delayed, with_delay, without_delay
@@ -127,6 +127,17 @@ class Judge:
         near = self._regressed(record, self._structure(record))
         return {} if near is None else near.efforts
 
+    def efforts_read(self, record: Experiment) -> Mapping[str, float]:
+        """Such a residual also where drives have states, if the pressures of both chambers tell what they give."""
+        chambers = {name: {f"{name}.pressure_a", f"{name}.pressure_b"} for name in self.model.actuators}
+        told = {*record.channels}
+        if bends(self.model) or not all(
+            self.model.follows_command(name) or pair <= told for name, pair in chambers.items()
+        ):
+            return {}
+        near = self._regressed(record, self._structure(record), read=True)
+        return {} if near is None else near.efforts
+
     def guessed(self, record: Experiment) -> Shares:
         """Shares where a fit would begin, whichever leaves least: at the values of the model, with friction or without.
 
@@ -189,7 +200,7 @@ class Judge:
         """Regression on a record; None where the model as it is follows the record, by its ``plain`` shares."""
         return self._regressed(record, structure) if plain.above(self.settings.doubtful) else None
 
-    def _regressed(self, record: Experiment, structure: Structure) -> _Regressed | None:
+    def _regressed(self, record: Experiment, structure: Structure, *, read: bool = False) -> _Regressed | None:
         """Values that leave least of the inverse-dynamics residual of a record, see `vpm.ranking.regression`.
 
         None where no efforts follow from the motion. Values that the model file rules out are none: commands that are
@@ -201,7 +212,8 @@ class Judge:
         try:
             problem = InverseDynamicsProblem(self.model, [record])
             found = regressed(replace(structure, priors=priors), problem)
-            left = _left_of_efforts(problem, self.model, found.theta) if answers_at_once(self.model) else {}
+            efforts = read or answers_at_once(self.model)
+            left = _left_of_efforts(problem, self.model, found.theta) if efforts else {}
             return _Regressed(found.theta, left)
         except ASTRAY:
             return None

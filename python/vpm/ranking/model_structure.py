@@ -11,6 +11,7 @@ import numpy as np
 
 from vpm.catalogue.kinds import ANY, Side
 from vpm.discrepancy.screening.candidates import Key
+from vpm.identify.moments import rods
 from vpm.model import Effect, Model
 from vpm.numbers import Array
 from vpm.ranking.settings import MOVE, OVERTONE
@@ -143,7 +144,14 @@ class Structure:
         theta = self.theta.copy()
         for prior, column, z in zip(self.priors.values(), self.columns, inside, strict=True):
             theta[column] = prior.value(float(z))
+        for pair in self._rods:
+            theta[pair] = float(np.mean(theta[pair]))
         return replace(self, theta=theta)
+
+    @cached_property
+    def _rods(self) -> list[list[int]]:
+        """Places of unknown moments of inertia in a structure that are equal, for no body has others."""
+        return [[self.place(name) for name in pair] for pair in rods(self.model, self.priors)]
 
     @cached_property
     def leaning(self) -> list[tuple[int, int]]:
