@@ -77,6 +77,15 @@ def test_nothing_beats_the_front(ladder: Ladder) -> None:
         assert any(best.seconds <= rung.seconds and best.error <= rung.error for best in front)
 
 
+def test_a_choice_that_is_the_full_model_is_as_fast_as_that(ladder: Ladder) -> None:
+    """One time faster is no gain; a choice beside which others took less time says why it was made."""
+    full = replace(ladder, chosen=ladder.full, holds=True)
+    assert full.verdict.endswith("and is as fast as the full model")
+    told = str(full)
+    faster = any(one.loss <= ladder.tolerance and one.seconds < ladder.full.seconds for one in ladder.rungs)
+    assert ("the most exact of those that a clock cannot tell apart" in told) == faster
+
+
 def test_the_verdict_names_what_breaks_the_period_and_the_best_compromise(ladder: Ladder) -> None:
     # Whether the steps of the slowest thousandth were in time is a matter of what else the machine did.
     assert "it holds 500 Hz" in replace(ladder, holds=True).verdict

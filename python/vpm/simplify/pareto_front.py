@@ -133,7 +133,8 @@ class Ladder(Result):
         taken = f"{100 * self.chosen.slowest * self.rate:.3g} % of the period at p99.9, {100 * self.share:g} % allowed"
         if self.holds:
             gain = self.full.seconds / self.chosen.seconds
-            return f"it holds {self.rate:g} Hz ({taken}) and is {gain:.3g} times faster than the full model"
+            times = "" if abs(gain - 1.0) < 0.05 else f"{gain:.3g} times "
+            return f"it holds {self.rate:g} Hz ({taken}) and is {times}as fast as the full model"
         breaks = f"; most of the full model's step goes to {self.dearest[0][0]}" if self.dearest else ""
         other = self.compromise
         if other is None:
@@ -146,11 +147,13 @@ class Ladder(Result):
     def __str__(self) -> str:
         """Text of the Pareto front: the choice, the verdict, and its models."""
         chosen = self.chosen
+        within = [r for r in self.rungs if r.loss <= self.tolerance and r.seconds < chosen.seconds]
+        alike = ", the most exact of those that a clock cannot tell apart" if within else ""
         cut = f" ({self.cut} models were cut after coarse timing)" if self.cut else ""
         lines = [
             f"cheapest within {100 * self.tolerance:g} %: {', '.join(chosen.removed) or 'the full model'}; "
             f"{chosen.stepping}; error {100 * chosen.error:.2f} % of {chosen.worst} (loss {100 * chosen.loss:.2f} %), "
-            f"{1e6 * chosen.seconds:.3g} us a step",
+            f"{1e6 * chosen.seconds:.3g} us a step{alike}",
             self.verdict,
             f"{len(self.rungs)} ways were tried in {self.mode} against the {self.against}{cut}; nothing beats these:",
         ]
