@@ -35,8 +35,12 @@ def measured_states(
     Joints that effects have split off are where the measured motion of the others takes them. The motion of all joints
     may be ``given``.
     """
-    m = given or whole_motion(model, experiment, theta, cutoff)
     gain, offset = sensor_errors(model, theta)
+    m = given or (
+        _closed_motion(model, experiment, (gain, offset), rows, cutoff)
+        if model.loops and len(model.joints) == len(model.coordinates) and not model.added_joints
+        else whole_motion(model, experiment, theta, cutoff)
+    )
     states = np.zeros((len(rows), model.core.n_states))
     followed = commanded_states(model, theta, m.inputs, m.dt)
     joints, coordinates = len(model.joints), len(model.coordinates)
@@ -130,6 +134,26 @@ def whole_motion(model: Model, experiment: Experiment, theta: Array, cutoff: flo
     m = motion(experiment, _Joints(model.name, own, model.input_channels, tuple(model.optional_inputs)), cutoff=cutoff)
     position, velocity, acceleration = _worked_out(model, theta, m)
     return replace(m, joints=model.joints, position=position, velocity=velocity, acceleration=acceleration)
+
+
+def _closed_motion(
+    model: Model, experiment: Experiment, errors: tuple[Array, Array], rows: NDArray[np.int64], cutoff: float | None
+) -> Motion:
+    """Motion for states of closed loops: at these rows all joints as the loops join them to those that are logged."""
+    experiment, (gain, offset) = joints_from_sensors(experiment, model), errors
+    seen = tuple(name for name in model.joints if f"{name}.position" in experiment)
+    inputs = (model.input_channels, tuple(model.optional_inputs))
+    m = motion(experiment, _Joints(model.name, seen or model.joints, *inputs), cutoff=cutoff)
+    coordinates, places = len(model.coordinates), [model.joints.index(name) for name in m.joints]
+    readings = np.zeros((2, len(m.time), coordinates))
+    readings[0][:, places] = (m.position - offset[places]) / gain[places]
+    readings[1][:, places] = m.velocity / gain[places]
+    whole = np.zeros((2, len(m.time), len(model.joints)))
+    remembers = any(name.endswith(".memory") for name in model.internal_names)
+    for row in range(len(m.time)) if remembers else rows:
+        position, velocity = measured(model, readings[0][row], readings[1][row], m.joints)
+        whole[:, row] = gain * position[: len(gain)] + offset, gain * velocity[: len(gain)]
+    return replace(m, joints=model.joints, position=whole[0], velocity=whole[1], acceleration=np.zeros_like(whole[0]))
 
 
 def _worked_out(model: Model, theta: Array, m: Motion) -> tuple[Array, Array, Array]:
