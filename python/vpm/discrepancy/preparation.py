@@ -15,12 +15,13 @@ import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
-from vpm.discrepancy.screening.candidates import shares_at, slow_speeds
+from vpm.discrepancy.screening.candidates import shares_at, slow_share, slow_speeds
 from vpm.discrepancy.settings import FAR, HELD_OUT, QUICKER, REACH
 from vpm.discrepancy.stuck_channels import check_moving, check_stuck
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, Motion, choose_cutoff, joints_from_sensors
 from vpm.experiment.cutoff import HIGHEST
+from vpm.experiment.lengths import line_rates
 from vpm.experiment.signal import UNDISTORTED_BAND
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
 from vpm.identify.between_records import changed_between
@@ -140,7 +141,19 @@ def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[
         dry = effect.type.sticks and not effect.type.close_to_rest
         if dry and name is not None and effect.at in (*data.joints, *model.transmissions):
             found[name] = slow_speeds(data, shares_at(model, effect.at, data.joints))
+    for drive in model.actuators:  # seals rub as joints do
+        name = f"{drive}.friction.transition_velocity"
+        if name in model.parameters and f"{drive}.friction.coulomb" in model.parameters:
+            found[name] = _speeds_of_seals(model, drive, data)
     return found
+
+
+def _speeds_of_seals(model: Model, drive: str, data: InverseDynamicsProblem) -> tuple[float, float]:
+    """Prepared bounds of the transition velocity of a drive's own friction, see `slow_speeds`."""
+    if (line := model.line_of_actuator(drive)) is None:
+        return slow_speeds(data, shares_at(model, model.joint_of_actuator(drive), data.joints))
+    states = [data.state(record) for record in range(len(data.motions))]
+    return slow_share([line_rates(model, line, data.joints, *state[:2]) for state in states])
 
 
 def _within_reach(model: Model, free: Sequence[str]) -> dict[str, tuple[float, float]]:

@@ -1,6 +1,6 @@
 """Positions of joints that follow from lengths of lines, where a log holds the strokes of cylinders alone."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import lru_cache
 
@@ -14,6 +14,8 @@ from vpm.numbers import Array
 
 #: Places of a joint at which the length of a line is worked out, over a turn or over the way that the length allows.
 PLACES = 4097
+#: Time before and after a pose in a difference quotient along its velocity, s.
+STEP = 1e-5
 #: A length that a joint moves by a smaller share of itself does not depend on that joint.
 UNMOVED = 1e-9
 
@@ -108,6 +110,20 @@ def _told(
         {**one, position: one[channel]} if channel in one else one for one in (experiment.slower, experiment.retained)
     )
     return replace(told, slower=slower, retained=retained)
+
+
+def line_rates(model: Model, line: str, joints: Sequence[str], position: Array, velocity: Array) -> Array:
+    """Rates (N,) of the length of a line along a motion (N, joints), m/s, by difference quotients."""
+    bones = _bones(model, line)
+    known = [name for name in bones.joints if name in joints]
+    places, columns = ([of.index(name) for name in known] for of in (bones.joints, list(joints)))
+    lengths = []
+    for shift in (-STEP, STEP):
+        q = np.zeros((len(position), len(bones.joints)))
+        q[:, places] = (position + shift * velocity)[:, columns]
+        start, end = (bones.forward_kinematics(marker, q)[:, :3, 3] for marker in ("start", "end"))
+        lengths.append(np.linalg.norm(end - start, axis=1))
+    return np.asarray((lengths[1] - lengths[0]) / (2.0 * STEP))
 
 
 @lru_cache(maxsize=64)

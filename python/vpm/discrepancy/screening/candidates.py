@@ -242,19 +242,28 @@ def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
 
 
 def slow_speeds(data: InverseDynamicsProblem, shares: Array) -> tuple[float, float]:
-    """Bounds of a candidate's transition velocity, from the largest speed of a coordinate in each record.
+    """Bounds of a candidate's transition velocity, from the speeds of a coordinate in each record, see `slow_share`.
 
-    They are 1/5000 of the smallest of these speeds and 1/10 of the largest: a slow record shows what is a detail of
-    small speeds there, however fast another one is. A record in which the coordinate rests does not count.
+    A record in which the coordinate rests does not count.
     """
-    speeds, moving = list[float](), list[bool]()
+    rates, moving = list[Array](), list[bool]()
     for record, log in enumerate(data.experiments):
         position, velocity, _ = data.state(record)
         channels = [f"{joint}.position" for joint in data.joints]
         noise = np.array([instrument_noise(log, channel) if channel in log else 0.0 for channel in channels])
-        speeds.append(float(np.quantile(np.abs(velocity @ shares), 0.999)))
+        rates.append(velocity @ shares)
         moving.append(float(np.ptp(position @ shares)) > WITHIN_NOISE * float(np.linalg.norm(shares * noise)))
-    slowest = min(compress(speeds, moving), default=max(speeds))
+    return slow_share(rates, moving)
+
+
+def slow_share(rates: Sequence[Array], moving: Sequence[bool] = ()) -> tuple[float, float]:
+    """Bounds of a candidate's transition velocity: shares of the largest speed in the records that are ``moving``.
+
+    They are 1/5000 of the smallest of these speeds and 1/10 of the largest: a slow record shows what is a detail of
+    small speeds there, however fast another one is.
+    """
+    speeds = [float(np.quantile(np.abs(rate), 0.999)) for rate in rates]
+    slowest = min(compress(speeds, moving or [True] * len(speeds)), default=max(speeds))
     return SLOW[0] * max(slowest, LEAST), SLOW[1] * max(*speeds, LEAST)
 
 
