@@ -18,6 +18,8 @@ FAR = 3.0
 #: Share of a signal below which neither a residual nor an instrument's error means anything: links are cut into pieces
 #: and gauges calibrated to no better. A candidate that promises less of the training error is not refitted.
 NEGLIGIBLE = 0.005
+#: An effect that does less than this share of what was measured is none: no law is as exact, nor a lever or a ratio.
+SLIGHT = 0.003
 #: Gain below which a change is none, also one by shifted samples.
 LEAST_GAIN = 0.02
 #: Gain that a second description of the same thing has to add to a simpler one.

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from vpm.discrepancy.settings import SLIGHT
 from vpm.ranking.calibration import shipped
 
 # ---- what a tracker is, and what of the records is fitted ------------------------------------------------------
@@ -84,7 +85,7 @@ class Settings:
     inexact: float = 0.01
     #: An effect that does less than this share of the amplitude of all effects of the model is none. Those whose law is
     #: exact do not count here, see `EffectType.exact`.
-    slight: float = 0.003
+    slight: float = SLIGHT
     second: float = 0.05  #: The same of the amplitude of effects that were added, of whose laws less is known.
     #: Share of the error power above which an effect counts beside those all the same. Errors of laws do not have the
     #: shape of another law by chance.

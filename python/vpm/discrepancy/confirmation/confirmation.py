@@ -98,6 +98,7 @@ class Trial:
     diverged: str  #: Why the simulation of the validation records stopped, or "".
     clear: bool  #: Whether the effect's size differs from zero on the training data.
     error: float = 0.0  #: Largest share of its signal that the model without the effect leaves of a validation channel.
+    size: float = np.inf  #: Largest amplitude that the effect takes of a validation channel, as a share of its signal.
     here: Gain | None = None  #: The validation gain at the joint where the effect acts, if nothing is lost elsewhere.
 
     @property
@@ -212,6 +213,10 @@ def measured(
     """Confirmed gain of a refit on all data."""
     fitted = judged.fit.residual * shrinkage(data.training, current, judged)
     validation = judged.validation * shrinkage(data.validation, current, judged)
+    before, after = (
+        [share for _, share, _ in gaps(data.validation, residual).values()]
+        for residual in (current.validation, judged.validation)
+    )
     return Trial(
         probe,
         judged,
@@ -222,7 +227,8 @@ def measured(
         simulated_gain(current, judged, data),
         diverged,
         is_clear(judged, own),
-        error=max(share for _, share, _ in gaps(data.validation, current.validation).values()),
+        error=max(before),
+        size=max(float(np.sqrt(max(one**2 - other**2, 0.0))) for one, other in zip(before, after, strict=True)),
         here=_where_it_acts(current, validation, data.validation, probe.candidate.site),
     )
 

@@ -19,6 +19,7 @@ from vpm.discrepancy.settings import (
     NEGLIGIBLE,
     NORMAL_95_ONE_SIDED,
     SAMPLED,
+    SLIGHT,
     WORTH_A_NAME,
 )
 from vpm.identify import Gain
@@ -73,6 +74,7 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
         _no_place(trial),
         _no_way(trial),
         _trifling_size(trial),
+        _slight(trial),
         _only_training(trial),
         _not_clear(trial),
         worse_in_simulation(trial),
@@ -217,6 +219,13 @@ def _trifling_size(trial: Trial) -> str:
         f"{name} comes out as {value:.4g}: less than {percent(NEGLIGIBLE)} of the signal is no more "
         "than an error of the model"
     )
+
+
+def _slight(trial: Trial) -> str:
+    """Refusal of an effect that does less than the laws of the model are wrong by, unless its own law is exact."""
+    if trial.size > SLIGHT or trial.probe.candidate.effect.exact or trial.validation.relative < 0.0:
+        return ""
+    return f"it does {percent(trial.size)} of what was measured of any channel, and no law is as exact as that"
 
 
 def _only_training(trial: Trial) -> str:
