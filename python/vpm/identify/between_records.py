@@ -69,9 +69,9 @@ def changed_between(
         return []
     common = float(values[k] - weights[k] / lengths[k])
     own = float(common - weights[-1] / lengths[k])
-    unit, others = units[k], ", ".join(other for other in records if other != records[number])
+    unit, others = units[k], ", ".join(name for name in records if name != records[number])
+    rest = 100.0 * np.sqrt(least / power)
     return [
-        f"{names[k]} is another one in {records[number]}: {own:.6g} {unit} there and {common:.6g} {unit} in "
-        f"{others} leave {100.0 * np.sqrt(least / power):.2g} % of this fit's residual; fit records apart between "
-        "which a load or a setting was changed"
+        f"{names[k]} differs between records: {own:.6g} {unit} in {records[number]} and {common:.6g} {unit} in "
+        f"{others} leave {rest:.2g} % of the residual; fit records apart between which a load or a setting was changed"
     ]
