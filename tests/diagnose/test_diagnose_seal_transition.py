@@ -40,7 +40,7 @@ def plant(time: float, state: np.ndarray, rhythm: float) -> list[float]:
     command = np.clip(ahead * AREA / (GAIN * np.sqrt(8e6)) + 200.0 * (wanted - x), -100.0, 100.0)
 
     def flow(drop: float) -> float:
-        return GAIN * z * np.sign(drop) * np.sqrt(abs(drop))
+        return float(GAIN * z * np.sign(drop) * np.sqrt(abs(drop)))
 
     into, out = (flow(SUPPLY - pa), flow(pb - TANK)) if z > 0.0 else (flow(pa - TANK), flow(SUPPLY - pb))
     force = AREA * (pa - RATIO * pb) - VISCOUS * v - DRY * np.tanh(v / TURNING)

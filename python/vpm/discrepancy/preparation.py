@@ -68,7 +68,7 @@ def as_recorded(model: Model, training: Sequence[Experiment], cutoff: float | No
     for hold in HOLDS[:2]:
         problem = InverseDynamicsProblem(model, training, cutoff=cutoff, hold=hold)
         left.append(estimate(model, problem, model.adjustable, linear_only=True).residual)
-    read = gain(*left, segments(problem))
+    read = gain(left[0], left[1], segments(problem))
     sure = read.relative >= LEAST_GAIN and read.score >= Thresholds(1, 0.0).score(read.pieces)
     return replace(setup, hold=HOLDS[1]) if sure else setup
 

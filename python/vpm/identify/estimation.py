@@ -278,7 +278,7 @@ def _linear_step(counter: _Counter, start: Array, low: Array, high: Array) -> Ar
     least = RANK_TOLERANCE * values[0]
     blind = values < least
     square = np.maximum(values, least)[:, None] * directions
-    bounds = tuple((edge - start)[moving] * lengths for edge in (low, high))
+    bounds = ((low - start)[moving] * lengths, (high - start)[moving] * lengths)
     # By active sets, which end: the reflective method may halve its steps for ever.
     target = np.where(blind, 0.0, -left.T @ (orthogonal.T @ residual))
     step = lsq_linear(square, target, bounds, method="bvls", tol=1e-14)
@@ -334,15 +334,19 @@ def _refine(
         x[moving] = part
         return x
 
+    def residual_of(part: Array) -> Array:
+        return counter.residual(whole(part))
+
+    def slopes_of(part: Array) -> Array:
+        return counter.jacobian(whole(part))[:, moving]
+
     inside = _strictly_inside(start[moving], low[moving], high[moving])
-    if not np.all(
-        np.isfinite(counter.residual(whole(inside)))
-    ):  # a bound that the simulation does not bear, such as no friction
+    if not np.all(np.isfinite(residual_of(inside))):  # a bound that the simulation does not bear, such as no friction
         return start
     result = least_squares(
-        lambda part: counter.residual(whole(part)),
+        residual_of,
         inside,
-        jac=lambda part: counter.jacobian(whole(part))[:, moving],
+        jac=slopes_of,
         bounds=(low[moving], high[moving]),
         method="trf",
         x_scale=1.0 / lengths[moving],
