@@ -50,6 +50,7 @@ def trial(value: float) -> Trial:
             diverged="",
             clear=True,
             error=NEGLIGIBLE,
+            size=NEGLIGIBLE,
         ),
     )
 
