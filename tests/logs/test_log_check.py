@@ -1,6 +1,6 @@
 """Logs with a wrong unit, sign, name or clock, of a machine that was written by a textbook's equations."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +10,7 @@ import geared_turntables
 import textbook_arm
 import vpm
 from command_line import vpm as run_vpm
+from flexible_link import one_flexible_link
 from nightly import at_night
 from vpm import demo
 from vpm.errors import ExperimentError, ModelError
@@ -259,6 +260,44 @@ def test_two_mistakes_are_found_one_after_the_other(logs: dict[str, Columns]) ->
     log = record(both(scaled("q1", 180.0 / np.pi), scaled("i2", 1e3))(logs["none"]))
     found = vpm.check_log(MODEL, log, workers=1).mistakes
     assert {one.channels for one in found} == {("one.position",), ("m2.command",)}
+
+
+def swung_link(changed: Mapping[str, float]) -> tuple[vpm.LogCheck, list[str]]:
+    """Check of a bending link that rubs and carries more than its file allows; channels ``changed`` by factors."""
+    text = one_flexible_link("strain(2)", young="2.1e11", section=(0.03, 0.004), damping=1.0, gains=(40.0, 4.0))
+    loaded = text.replace("mass = 0.2", "mass = 0.23")
+    machine = vpm.Model.from_toml(loaded).with_effect("coulomb_friction", "shoulder", coulomb=0.15)
+    time = 0.002 * np.arange(3000)
+    swing = np.minimum(time, 1.0) * (0.6 * np.sin(np.pi * time) + 0.2 * np.sin(2.6 * np.pi * time))
+    asked = vpm.Experiment.from_arrays(time, {"motor.reference": swing}, {}, name="swing", model=machine)
+    run = vpm.simulate(machine, asked, mode="closed_loop")
+    noise = np.random.default_rng(3).normal(size=(2, len(time)))
+    columns = {
+        "shoulder.position": run["shoulder.position"] + 1e-5 * noise[0],
+        "root.strain": run["root.strain"] + 1e-7 * noise[1],
+        "motor.command": run["motor.command"],
+    }
+    columns |= {name: factor * columns[name] for name, factor in changed.items()}
+    log = vpm.Experiment.from_arrays(time, columns, {}, name="swing", model=machine)
+    stated = vpm.Model.from_toml(text.replace("mass = 0.2", "mass = { value = 0.2, uncertainty = 0.002 }"))
+    tried: list[str] = []
+    return vpm.check_log(stated, log, workers=1, progress=lambda _, name, *_counts: tried.append(name)), tried
+
+
+def test_no_unit_of_a_bending_link_is_tried_whose_efforts_follow_from_its_motion() -> None:
+    check, tried = swung_link({})
+    assert not check.mistakes
+    # A slow tracker needs a load that the file rules out; what bends along the motion does not.
+    assert not [name for name in tried if " in " in name or " times " in name]
+
+
+@pytest.mark.parametrize(
+    ("channel", "factor", "kind"),
+    [("shoulder.position", np.degrees(1.0), "unit"), ("root.strain", -1.0, "sign"), ("motor.command", 1e3, "unit")],
+)
+def test_names_the_mistake_of_a_bending_link(channel: str, factor: float, kind: str) -> None:
+    check, _ = swung_link({channel: factor})
+    assert [(one.kind, one.channels) for one in check.mistakes] == [(kind, (channel,))]
 
 
 def test_what_leaves_another_joint_unexplained_is_told_and_not_believed() -> None:

@@ -12,6 +12,7 @@ import numpy as np
 
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.experiment import Experiment
+from vpm.identify.response_along_motion import answers_at_once
 from vpm.log_check.correction import Correction, Pair
 from vpm.log_check.shares import FORCES, Judge, Shares, Tangent, mean_logarithm
 from vpm.log_check.tried_corrections import delays, of_two, scales
@@ -172,13 +173,17 @@ class Explainer:
         # The mirror image of a machine explains most of a log as well as the machine does.
         tried += self._about((one for one in everything if one.is_mirror), some, left)
         tried = self._leaving_less_effort(list(dict.fromkeys(tried)), part, left)
-        return self._hopeful(tried, part, self.judge.guessed(part)) if tried else []
+        few = self._hopeful(tried, part, self.judge.guessed(part)) if tried else []
+        return few if answers_at_once(self.model) else self._leaving_less_effort(few, part, left)
 
     def _leaving_less_effort(self, corrections: Sequence[Change], part: Experiment, left: Shares) -> list[Change]:
         """Corrections with which less is left of the efforts that they affect, and of all; all where none follow.
 
-        That takes no run of the model, and what a slow tracker makes of a force that is missing does not enter.
+        What a slow tracker makes of a force that is missing does not enter. Where links bend or drives have states it
+        takes a run along the motion, so that many corrections are tried by the tracker alone.
         """
+        if len(corrections) > self.settings.finalists and not answers_at_once(self.model):
+            return list(corrections)
 
         def better(correction: Change) -> bool:
             affected = {name for one in correction.each for name in self._affected(one, left)} & set(left.efforts)

@@ -6,7 +6,6 @@ import math
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,7 +14,7 @@ from vpm.catalogue import EFFECTS
 from vpm.catalogue.effects import BUILT_IN
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
-from vpm.identify.response_along_motion import answers_at_once, bends
+from vpm.identify.response_along_motion import bends
 from vpm.initial import initial_state
 from vpm.log_check.correction import Correction
 from vpm.log_check.delay import Delayed, with_delay, without_delay
@@ -66,7 +65,7 @@ class Shares:
     unlikely: float = 0.0
     chance: float = 1.0  #: Of deviations as large as these.
     floor: float = 0.0  #: Shares below this are as good as nothing.
-    #: Inverse-dynamics residual of the effort at each position, by channel; none where it takes a run of the model.
+    #: Inverse-dynamics residual of the effort at each position, and of all else that is compared along the motion.
     efforts: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -88,11 +87,21 @@ class Shares:
         return self.cost, self.logarithm(self.by_channel)
 
 
-class _Regressed(NamedTuple):
-    """Values that leave least of the inverse-dynamics residual, and what they leave of efforts."""
+@dataclass(frozen=True, eq=False)
+class _Regressed:
+    """Values that leave least of the inverse-dynamics residual of a record."""
 
+    model: Model
+    problem: InverseDynamicsProblem
     values: Array
-    efforts: dict[str, float]
+
+    @cached_property
+    def left(self) -> dict[str, float]:
+        """What they leave of efforts, see `Shares.efforts`; nothing where links or drives diverge along the motion."""
+        try:
+            return _left_of_efforts(self.problem, self.model, self.values)
+        except ASTRAY:
+            return {}
 
 
 class Judge:
@@ -122,8 +131,6 @@ class Judge:
 
     def efforts_left(self, record: Experiment) -> Mapping[str, float]:
         """Inverse-dynamics residual of the effort at each position as a share; see `Shares.efforts`."""
-        if not answers_at_once(self.model):
-            return {}
         near = self._regressed(record, self._structure(record))
         return {} if near is None else near.efforts
 
@@ -135,8 +142,8 @@ class Judge:
             self.model.follows_command(name) or pair <= told for name, pair in chambers.items()
         ):
             return {}
-        near = self._regressed(record, self._structure(record), read=True)
-        return {} if near is None else near.efforts
+        near = self._regressed(record, self._structure(record))
+        return {} if near is None else {name: left for name, left in near.left.items() if name.endswith(".position")}
 
     def guessed(self, record: Experiment) -> Shares:
         """Shares where a fit would begin, whichever leaves least: at the values of the model, with friction or without.
@@ -152,7 +159,7 @@ class Judge:
             parameter = self.model.effect(*key).parameter_names["coulomb"]
             values[self.model.index(parameter)] = structure.priors[parameter].spread
         tried = [plain, self.measured(record, values)]
-        if (near := self._regressed_if_lost(record, structure, plain)) is not None:
+        if self._is_lost(plain) and (near := self._regressed(record, structure)) is not None:
             tried.append(self.measured(record, near.values))
         return min(tried, key=lambda shares: shares.order)
 
@@ -163,8 +170,8 @@ class Judge:
         the record, another fit begins where the inverse-dynamics residual is least.
         """
         structure, plain = self._structure(record), self.measured(record)
-        starts = [(structure, plain)]
-        if (near := self._regressed_if_lost(record, structure, plain)) is not None:
+        starts, near = [(structure, plain)], self._regressed(record, structure)
+        if near is not None and self._is_lost(plain):
             starts.append((replace(structure, theta=near.values), self.measured(record, near.values)))
         found = [self._fitted(record, *start) or plain for start in starts]
         best = min(found, key=lambda shares: shares.order)
@@ -196,11 +203,11 @@ class Judge:
         shares = self._shares(tracked, found.residual, tracker, found.structure.theta)
         return self._with_departure(shares, found.structure)
 
-    def _regressed_if_lost(self, record: Experiment, structure: Structure, plain: Shares) -> _Regressed | None:
-        """Regression on a record; None where the model as it is follows the record, by its ``plain`` shares."""
-        return self._regressed(record, structure) if plain.above(self.settings.doubtful) else None
+    def _is_lost(self, plain: Shares) -> bool:
+        """Whether the model as it is does not follow a record, by its ``plain`` shares."""
+        return bool(plain.above(self.settings.doubtful))
 
-    def _regressed(self, record: Experiment, structure: Structure, *, read: bool = False) -> _Regressed | None:
+    def _regressed(self, record: Experiment, structure: Structure) -> _Regressed | None:
         """Values that leave least of the inverse-dynamics residual of a record, see `vpm.ranking.regression`.
 
         None where no efforts follow from the motion. Values that the model file rules out are none: commands that are
@@ -211,10 +218,7 @@ class Judge:
         priors = {name: self._within(name, prior) for name, prior in structure.priors.items()}
         try:
             problem = InverseDynamicsProblem(self.model, [record])
-            found = regressed(replace(structure, priors=priors), problem)
-            efforts = read or answers_at_once(self.model)
-            left = _left_of_efforts(problem, self.model, found.theta) if efforts else {}
-            return _Regressed(found.theta, left)
+            return _Regressed(self.model, problem, regressed(replace(structure, priors=priors), problem).theta)
         except ASTRAY:
             return None
 
@@ -455,7 +459,7 @@ def rows_of(part: Experiment, record: Experiment) -> NDArray[np.intp]:
 
 
 def _left_of_efforts(problem: InverseDynamicsProblem, model: Model, values: Array) -> dict[str, float]:
-    """Inverse-dynamics residual of the effort at each position, as a share of its variance, by channel.
+    """Inverse-dynamics residual of the effort at each position, and of each channel beside, as a share of its variance.
 
     Of the variance, for what holds a weight says nothing of the scale of a motion.
     """
@@ -468,6 +472,10 @@ def _left_of_efforts(problem: InverseDynamicsProblem, model: Model, values: Arra
         found[f"{problem.joints[place]}.position"] = (
             _share(left, float(np.sum((moved - moved.mean()) ** 2))) if moved.size else 1.0
         )
+    residual, _ = problem.evaluate(model, values) if problem.shown else (applied, None)
+    for block in problem.blocks[len(found) :]:
+        error, size = residual[block.samples], block.weight * block.scale
+        found[block.channel] = _share(float(np.sum(error**2)), len(error) * size**2)
     return found
 
 
