@@ -129,9 +129,12 @@ WITHIN_NOISE = 8.0
 LEAST = 1e-9
 #: Start periods that are proposed.
 PERIODS = 3
-#: Cells of the way in the shortest wave of an octave, waves in one more on the whole way, share of a wave that a slow
-#: sample may pass until the next one, and fewest of them: a wave has two sizes and is told from a mean.
-CELLS, FINER, PASSED, SLOWEST = 32, 4, 0.4, 16
+#: Most waves on the whole way that all samples are asked for.
+MOST_WAVES = 400.0
+#: Cells of the way in the shortest wave of an octave, for a twentieth of its power; waves in one more on the whole way;
+#: share of a wave that a slow sample may pass until the next one, and fewest of them: a wave has two sizes and is told
+#: from a mean.
+CELLS, FINER, PASSED, SLOWEST = 8, 4, 0.4, 16
 #: Places of a stop, or limits of a drive, that are compared; fewest samples beyond one; largest share of them beyond a
 #: stop and beyond a limit.
 COMPARED, BEYOND_LEAST, BEYOND_MOST, LIMITED_MOST = 30, 3, 0.3, 0.5

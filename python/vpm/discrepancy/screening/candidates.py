@@ -23,17 +23,8 @@ from vpm.discrepancy.screening.compliance_and_stop_start import (
     structural_starts,
     thresholds,
 )
-from vpm.discrepancy.settings import (
-    CELLS,
-    FINER,
-    LEAST,
-    LIMITED_MOST,
-    MOST_SAMPLES,
-    PASSED,
-    PERIODS,
-    SLOWEST,
-    WITHIN_NOISE,
-)
+from vpm.discrepancy.screening.ripple_periods import ripple_periods
+from vpm.discrepancy.settings import LEAST, LIMITED_MOST, WITHIN_NOISE
 from vpm.errors import DiagnosisError, near_match
 from vpm.experiment import instrument_noise
 from vpm.identify import InverseDynamicsProblem
@@ -318,54 +309,6 @@ def _excitation(data: InverseDynamicsProblem, model: Model, site: str, actuator:
         column,
         max(m.dt * len(m.time) for m in data.motions),
     )
-
-
-def ripple_periods(position: Array, values: Array, fewest: float) -> list[float]:
-    """Start periods of candidates in position: peaks of the residual's least-squares periodogram.
-
-    Evenly spaced frequencies up to what the decimated samples resolve, from ``fewest`` periods per travel; friction
-    changes its sign with the motion, and half a period suffices for it; N. Lomb, *Astrophysics and Space Science* 39,
-    1976. Shorter waves than these come from slow samples, see `_short_waves`.
-    """
-    short = _short_waves(position, values)
-    thin = max(1, len(values) // MOST_SAMPLES)
-    position, values = position[::thin], values[::thin]
-    travel = max(float(np.ptp(position)), 1e-12)
-    step = float(np.median(np.abs(np.diff(position)))) or travel / 1e3
-    highest = min(1.0 / (2.5 * step), 400.0 / travel)
-    frequencies = np.arange(fewest, max(highest * travel, 4.0), 0.25) / travel
-    phase = 2.0 * np.pi * np.outer(frequencies, position - position.mean())
-    centred = values - values.mean()
-    power = (np.cos(phase) @ centred) ** 2 + (np.sin(phase) @ centred) ** 2
-    peaks = [i for i in range(1, len(power) - 1) if power[i] >= power[i - 1] and power[i] > power[i + 1]]
-    best = sorted(peaks or [int(np.argmax(power))], key=lambda i: -power[i])[:PERIODS]
-    return [float(1.0 / frequencies[i]) for i in best] + [one for one in short if one * frequencies[-1] < 1.0]
-
-
-def _short_waves(position: Array, values: Array) -> list[float]:
-    """Start periods of candidates whose waves most samples pass at once: only slow samples show them.
-
-    Each octave takes those that pass less than ``PASSED`` of a wave until the next sample. What a wave explains of
-    their sum of squares counts. Sums of values over the way give all waves of an octave at once.
-    """
-    travel = max(float(np.ptp(position)), 1e-12)
-    place = (position - position.min()) / travel
-    steps = np.abs(np.gradient(place))
-    found, shortest = [np.zeros((2, 0))], PASSED / max(float(np.median(steps)), 1.0 / len(values))
-    while shortest <= len(values):
-        first, shortest = shortest, 2.0 * shortest
-        slow = steps * shortest < PASSED
-        if np.count_nonzero(slow) < SLOWEST:
-            break
-        cells = int(CELLS * shortest)
-        centred = values[slow] - np.mean(values[slow])
-        sums = np.bincount((place[slow] * cells).astype(np.int64), centred, cells + 1)
-        spectrum = np.abs(np.fft.rfft(sums, FINER * cells)) ** 2 * 2.0 / np.count_nonzero(slow)
-        inside = slice(int(FINER * first), int(FINER * shortest))
-        found.append(np.array([np.arange(spectrum.size)[inside] / FINER, spectrum[inside]]))
-    waves, power = np.concatenate(found, axis=1)
-    peaks = [i for i in range(1, len(power) - 1) if power[i] >= power[i - 1] and power[i] > power[i + 1]]
-    return [travel / float(waves[i]) for i in sorted(peaks, key=lambda i: -power[i])[:PERIODS]]
 
 
 def _over_way(data: InverseDynamicsProblem, model: Model, site: str, residual: Array) -> tuple[Array, Array, Array]:
