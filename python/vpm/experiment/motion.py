@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Protocol
 
 import numpy as np
@@ -132,15 +133,19 @@ class Motion(Result):
         Result: shape (n,) or (n, k), one row for each of `retained`.
         """
         retained = self.retained
-        begin = 0 if self._rests(slice(None, self.edge)) else int(retained[0])
-        end = self.time.size if self._rests(slice(self.time.size - self.edge, None)) else self.time.size - self.edge
+        begins, ends = self._rests
+        begin = 0 if begins else int(retained[0])
+        end = self.time.size if ends else self.time.size - self.edge
         filtered = parallel_filter(values[begin:end], self.decimation)
         return np.ascontiguousarray(filtered[(retained - begin) // self.decimation])
 
-    def _rests(self, end: slice) -> bool:
-        """Whether the motion rests within one end of the record."""
+    @cached_property
+    def _rests(self) -> tuple[bool, bool]:
+        """Whether the motion rests within the first and the last edge of the record."""
         speed = np.abs(self.velocity)
-        return bool(np.all(speed[end].max(axis=0, initial=0.0) <= REST_SHARE * speed[self.kept].max(axis=0)))
+        slow, last = REST_SHARE * speed[self.kept].max(axis=0), self.time.size - self.edge
+        begins, ends = (speed[edge].max(axis=0, initial=0.0) <= slow for edge in (slice(self.edge), slice(last, None)))
+        return bool(np.all(begins)), bool(np.all(ends))
 
     def _headline(self) -> Mapping[str, object]:
         return {
