@@ -159,21 +159,34 @@ def prepare(base: Baseline, data: InverseDynamicsProblem, listed: Sequence[Candi
     """
     if not bends(base.model) or not has_tangent(base.model, data):
         return base
-    pool = [c for c in listed if c.neutral and len(c.starts) == 1 and c.effect.site not in {"joint", "actuator"}]
-    models = [base.model.with_effect(c.effect.name, at=c.site, **c.starts[0]) for c in pool]
+    pool = [c for c in listed if c.neutral and c.effect.site not in {"joint", "actuator"}]
+    residual, jacobian = _simulate_together(base, data, [(c, c.starts[0]) for c in pool], base.free)
+    for more in range(1, max((len(c.starts) for c in pool), default=1)):
+        _simulate_together(base, data, [(c, c.starts[more]) for c in pool if len(c.starts) > more], ())
+    return replace(base, residual=residual, jacobian=jacobian)
+
+
+def _simulate_together(
+    base: Baseline,
+    data: InverseDynamicsProblem,
+    begun: Sequence[tuple[Candidate, Mapping[str, float]]],
+    known: Sequence[str],
+) -> tuple[Array, Array]:
+    """Simulate candidates that do nothing at these starts for their probes; residual, and regressor of ``known``."""
+    models = [base.model.with_effect(c.effect.name, at=c.site, **start) for c, start in begun]
     whole = base.model
-    for c in pool:
-        whole = whole.with_effect(c.effect.name, at=c.site, **c.starts[0])
+    for c, start in begun:
+        whole = whole.with_effect(c.effect.name, at=c.site, **start)
+    own = [_added(model, c) for (c, _), model in zip(begun, models, strict=True)]
     sizes = [
         name
-        for c, model in zip(pool, models, strict=True)
-        for name in _added(model, c)
+        for (c, _), model, added in zip(begun, models, own, strict=True)
+        for name in added
         if not c.effect.parameter(_short(model, c, name)).shape
     ]
-    residual, jacobian = data.evaluate(whole, whole.theta, [whole.index(name) for name in (*base.free, *sizes)])
-    own = [_added(model, c) for c, model in zip(pool, models, strict=True)]
+    residual, jacobian = data.evaluate(whole, whole.theta, [whole.index(name) for name in (*known, *sizes)])
     data.share(whole, [(base.model, ()), *zip(models, own, strict=True)])
-    return replace(base, residual=residual, jacobian=jacobian[:, : len(base.free)])
+    return residual, jacobian[:, : len(known)]
 
 
 def _short(model: Model, candidate: Candidate, name: str) -> str:
