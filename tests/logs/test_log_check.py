@@ -241,6 +241,12 @@ def test_a_reference_that_is_hardly_followed_has_no_scale() -> None:
     assert not mistakes_of(model, {**columns, "drive.reference": 0.1 * np.sign(np.sin(9.0 * columns["time"]))})
 
 
+def test_a_sensor_that_stands_still_says_nothing_of_other_channels() -> None:
+    model, columns = held_slide()
+    found = mistakes_of(model, {**columns, "slide.position": np.full_like(columns["time"], -1e-5)})
+    assert not {"drive.reference", "slide.acceleration"} & {name for _, channels, _ in found for name in channels}
+
+
 @pytest.mark.parametrize("samples", [25, 220, 500])
 def test_a_short_log_says_nothing_of_delays(logs: dict[str, Columns], samples: int) -> None:
     short = record({name: column[:samples] for name, column in logs["friction"].items()})

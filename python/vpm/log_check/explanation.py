@@ -12,7 +12,7 @@ import numpy as np
 
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.experiment import Experiment
-from vpm.identify.response_along_motion import answers_at_once
+from vpm.identify.response_along_motion import bends
 from vpm.log_check.correction import Correction, Pair
 from vpm.log_check.shares import FORCES, Judge, Shares, Tangent, mean_logarithm
 from vpm.log_check.tried_corrections import delays, of_two, scales
@@ -174,15 +174,15 @@ class Explainer:
         tried += self._about((one for one in everything if one.is_mirror), some, left)
         tried = self._leaving_less_effort(list(dict.fromkeys(tried)), part, left)
         few = self._hopeful(tried, part, self.judge.guessed(part)) if tried else []
-        return few if answers_at_once(self.model) else self._leaving_less_effort(few, part, left)
+        return self._leaving_less_effort(few, part, left) if bends(self.model) else few
 
     def _leaving_less_effort(self, corrections: Sequence[Change], part: Experiment, left: Shares) -> list[Change]:
         """Corrections with which less is left of the efforts that they affect, and of all; all where none follow.
 
-        What a slow tracker makes of a force that is missing does not enter. Where links bend or drives have states it
-        takes a run along the motion, so that many corrections are tried by the tracker alone.
+        What a slow tracker makes of a force that is missing does not enter. Where links bend it takes a run along the
+        motion, so that many corrections are tried by the tracker alone.
         """
-        if len(corrections) > self.settings.finalists and not answers_at_once(self.model):
+        if len(corrections) > self.settings.finalists and bends(self.model):
             return list(corrections)
 
         def better(correction: Change) -> bool:

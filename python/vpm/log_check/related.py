@@ -65,7 +65,7 @@ def wrong_scales(
 def _references(model: Model, record: Experiment) -> Iterator[Related]:
     for actuator, held in model.held_channels.items():
         reference = f"{actuator}.reference"
-        if reference in record and held in record:
+        if reference in record and _moves(record, held):
             yield Related(reference, held, record[reference], record[held])
 
 
@@ -73,7 +73,7 @@ def _accelerations(model: Model, record: Experiment) -> Iterator[Related]:
     """Related accelerations: measured, and of the filtered positions, without the ends."""
     for joint in model.joints:
         position, acceleration = f"{joint}.position", f"{joint}.acceleration"
-        if position not in record or acceleration not in record:
+        if acceleration not in record or not _moves(record, position):
             continue
         read, retained = [record.read_rate(position)], [record.retained.get(position, np.inf)]
         cutoff = choose_cutoff(record[position][:, None], record.rate, read, retained).cutoff
@@ -83,3 +83,8 @@ def _accelerations(model: Model, record: Experiment) -> Iterator[Related]:
         rate = differentiate(lowpass(record[position], record.rate, cutoff), record.dt)
         expected, values = differentiate(rate, record.dt), lowpass(record[acceleration], record.rate, cutoff)
         yield Related(acceleration, f"the second derivative of {position}", values[inside], expected[inside])
+
+
+def _moves(record: Experiment, channel: str) -> bool:
+    """Whether a record holds a channel that tells a related one: where a sensor stands still, it tells nothing."""
+    return channel in record and bool(np.ptp(record[channel]) > 0.0)

@@ -14,7 +14,7 @@ from vpm.catalogue import EFFECTS
 from vpm.catalogue.effects import BUILT_IN
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
-from vpm.identify.response_along_motion import bends
+from vpm.identify.response_along_motion import bends, has_own_drives
 from vpm.initial import initial_state
 from vpm.log_check.correction import Correction
 from vpm.log_check.delay import Delayed, with_delay, without_delay
@@ -65,7 +65,8 @@ class Shares:
     unlikely: float = 0.0
     chance: float = 1.0  #: Of deviations as large as these.
     floor: float = 0.0  #: Shares below this are as good as nothing.
-    #: Inverse-dynamics residual of the effort at each position, and of all else that is compared along the motion.
+    #: Inverse-dynamics residual of the effort at each position, and of strains along the motion; none where drives have
+    #: states of their own.
     efforts: Mapping[str, float] = field(default_factory=dict)
 
     @property
@@ -102,6 +103,11 @@ class _Regressed:
             return _left_of_efforts(self.problem, self.model, self.values)
         except ASTRAY:
             return {}
+
+    @property
+    def efforts(self) -> dict[str, float]:
+        """What tells of commands too: behind measured pressures of drives with states nobody knows of these."""
+        return {} if has_own_drives(self.model) else self.left
 
 
 class Judge:
