@@ -20,7 +20,7 @@ from vpm.numbers import Array
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.noise_model import Colour, NoiseModel, Structured, fitted_noise, log_student, scale_of, white_noise
 from vpm.ranking.settings import DAMPING, PARTS, Settings
-from vpm.ranking.tracked_records import TrackedRecords, Tracker, tracker_gain
+from vpm.ranking.tracked_records import TrackedRecords, Tracker, tracker_gains
 
 
 def test_an_autoregression_is_found_again_and_its_density_is_the_exact_one() -> None:
@@ -158,7 +158,7 @@ def test_channels_are_whitened_each_by_its_own_past() -> None:
 def test_the_error_of_a_tracker_dies_away_with_its_bandwidth(band: float) -> None:
     """Poles of a free mass under the gain, against ``w (-d +- i sqrt(1 - d^2))`` of continuous time."""
     model = Model.from_toml(SLEDGE)
-    gain = tracker_gain(model, ("way.position",), band, 1e-4, model.theta)
+    (gain,) = tracker_gains(model, ("way.position",), (band, band), (1, 1e-4), model.theta)
     free = np.array([[1.0, 1e-4], [0.0, 1.0]])
     poles = np.log(np.linalg.eigvals(free @ (np.eye(2) - gain @ [[1.0, 0.0]]))) / 1e-4
     wanted = 2.0 * np.pi * band * (-DAMPING + 1j * np.sqrt(1.0 - DAMPING**2))
@@ -168,9 +168,9 @@ def test_the_error_of_a_tracker_dies_away_with_its_bandwidth(band: float) -> Non
 def test_what_a_sensor_multiplies_leaves_the_bandwidth_as_it_is() -> None:
     """Else the best gain of a sensor would be the one that makes the tracker quick."""
     model = Model.from_toml(SEEN)
-    plain = tracker_gain(model, ("way.position",), 2.0, 1e-3, model.theta)
+    plain = tracker_gains(model, ("way.position",), (2.0, 10.0), (500, 1e-3), model.theta)
     tripled = model.with_effect("sensor_gain", "encoder", value=3.0)
-    gain = tracker_gain(tripled, ("way.position",), 2.0, 1e-3, tripled.theta)
+    gain = tracker_gains(tripled, ("way.position",), (2.0, 10.0), (500, 1e-3), tripled.theta)
     assert 3.0 * gain == pytest.approx(plain, rel=1e-12)
 
 

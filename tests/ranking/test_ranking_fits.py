@@ -31,7 +31,7 @@ from vpm.ranking.ranking_search import Search, _is_worse
 from vpm.ranking.settings import PLACES, Settings
 from vpm.ranking.start_values import started
 from vpm.ranking.structure_extensions import Extensions
-from vpm.ranking.tracked_records import TrackedRecords, Tracker, tracker_gain
+from vpm.ranking.tracked_records import TrackedRecords, Tracker, tracker_gains
 from vpm.weighing import Prior
 
 #: An arm on a vertical hinge, without friction.
@@ -127,7 +127,7 @@ def test_derivatives_without_those_of_the_matrix_miss_the_exact_ones_by_the_orde
     channels = [f"{joint}.position" for joint in model.joints]
     time = 0.004 * np.arange(150)
     swing = np.sin(np.outer(time, 4.0 + np.arange(6.0)))
-    gain = np.tile(tracker_gain(model, channels, 3.0, 0.004, model.theta).ravel(), (len(time), 1))
+    gain = tracker_gains(model, channels, (3.0, 3.0), (len(time), 0.004), model.theta).reshape(len(time), -1)
     places = [model.output_channels.index(channel) for channel in channels]
     columns = [model.index(name) for name in ("link3.mass", "m2.gain", "m4.gain")]
 

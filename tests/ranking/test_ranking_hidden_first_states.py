@@ -46,6 +46,8 @@ viscous = {DAMPING}
 )
 #: Where the load begins, m: friction holds it within 1.2 N / 400 N/m.
 BEGINS = (2.5e-3, -2e-3)
+#: Seeds of pairs of records.
+PAIRS = range(0, 24, 2)
 
 
 @lru_cache
@@ -107,13 +109,25 @@ def test_derivatives_by_first_states_are_those_of_differences() -> None:
         assert not slopes[other, :, place].any()
 
 
-def test_a_fit_makes_as_much_of_balance_as_of_the_true_first_states() -> None:
+def test_a_fit_makes_of_balance_most_of_what_the_true_first_states_make() -> None:
     """Before the settled part of a record, several pairs of place and speed lead to the same rest.
 
-    The slower tracker leaves so much of what friction does that a fit may end on the way.
+    Friction that sticks makes steps of what a fit sees of them, so that it may end on the way.
     """
+    made = [fitted_firsts([carried(begins, seed + pair) for seed, begins in enumerate(BEGINS)]) for pair in PAIRS]
+    assert np.mean([share for share, _ in made]) > 0.8
+    assert min(share for share, _ in made) > 0.5
+    for _, found in made:
+        assert found.values == {}
+        rest = found.carried(Model.from_toml(CARRYING))
+        assert rest.theta[-4:] == pytest.approx(found.theta[-4:])
+        assert rest.columns == [len(rest.model.theta) + place for place in range(4)]
+
+
+def fitted_firsts(pair: list[Experiment]) -> tuple[float, Structure]:
+    """Share that a fit from balance gains of what one from the true first states gains, and where it ends."""
     model, tracker = rubbing(), Tracker(Settings().bands[-1])
-    fitter = Fitter(TrackedRecords(model, records(), Settings()), Settings())
+    fitter = Fitter(TrackedRecords(model, pair, Settings()), Settings())
     firsts = fitter.tracked.firsts.priors
     balanced = Structure(model, model.theta.copy(), {})
     begun = [
@@ -122,12 +136,7 @@ def test_a_fit_makes_as_much_of_balance_as_of_the_true_first_states() -> None:
     ]
     view = View(fitter.noise_of(balanced, tracker))
     known, found, true = (fitter.finished(fitter.fitted(one, tracker, view), view) for one in (balanced, *begun))
-    assert found.cost < known.cost - 200.0
-    assert known.cost - found.cost > 0.99 * (known.cost - true.cost)
-    assert found.structure.values == {}
-    rest = found.structure.carried(Model.from_toml(CARRYING))
-    assert rest.theta[-4:] == pytest.approx(found.structure.theta[-4:])
-    assert rest.columns == [len(rest.model.theta) + place for place in range(4)]
+    return (known.cost - found.cost) / (known.cost - true.cost), found.structure
 
 
 @pytest.mark.nightly

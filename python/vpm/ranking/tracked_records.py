@@ -329,8 +329,9 @@ class TrackedRecords:
         """
         known = [column for column, name in enumerate(record.channels) if name in model.output_channels]
         channels = [record.channels[column] for column in known]
-        gain = tracker_gain(model, channels, tracker.band, record.dt, theta)
-        gain[:, [name not in self.drawn_to for name in channels]] = 0.0
+        bands = tracker.band, max(tracker.band, *self.settings.bands)
+        gains = tracker_gains(model, channels, bands, (len(record.time), record.dt), theta)
+        gains[:, :, [name not in self.drawn_to for name in channels]] = 0.0
         method, steps = self.stepping(model, tracker, record.dt)
         outputs, states, slopes = model.core.observe(
             theta,
@@ -338,7 +339,7 @@ class TrackedRecords:
             record.inputs,
             [model.output_channels.index(name) for name in channels],
             record.readings[:, known],
-            np.tile(gain.ravel(), (len(record.time), 1)),
+            gains.reshape(len(record.time), -1),
             record.dt,
             self.setup.substeps * steps,
             method,
@@ -394,22 +395,40 @@ def _divided(stretches: Sequence[NDArray[np.int_]], held: int) -> tuple[Parts, P
     return fitted, [slice(int(ends[held]), int(ends[held + 1])) for ends in stretches]
 
 
-def tracker_gain(model: Model, channels: Sequence[str], band: float, dt: float, theta: Array) -> Array:
-    """Gain of a tracker: by how much each channel's error moves each state at a sample (nx, m).
+def tracker_gains(
+    model: Model, channels: Sequence[str], bands: tuple[float, float], grid: tuple[int, float], theta: Array
+) -> Array:
+    """Gains of a tracker: by how much each channel's error moves each state at each sample of a grid (N, nx, m).
 
-    The gain of a mass without friction whose error dies away with the bandwidth (Hz) and `DAMPING`. A sensor that shows
-    a multiple of what it measures is corrected for it: else it would change the bandwidth, and pass for a better model.
+    In the end those of a mass without friction whose error dies away with the first of the ``bands`` (Hz) and
+    `DAMPING`. No smoothed beginning tells the velocity with which a controller that is switched on throws a machine:
+    at first they are those of the second one, and become smaller as a line through more and more readings tells the
+    first states (expanding memory; N. Morrison, *Introduction to Sequential Smoothing and Prediction*, 1969). A sensor
+    that shows a multiple of what it measures is corrected for it: else it would change the bandwidth, and pass for a
+    better model.
     """
-    gain = np.zeros((len(model.state_names), len(channels)))
-    coordinates = model.coordinates
+    (samples, dt), coordinates = grid, model.coordinates
+    # A line through more readings than these gives less weight to the last one than a tracker does in the end.
+    count = np.arange(1.0, min(samples, int(2.0 / (np.pi * bands[0] * dt)) + 1) + 1.0)
+    gains = np.zeros((samples, len(model.state_names), len(channels)))
     for column, channel in enumerate(channels):
         joint, _, quantity = channel.rpartition(".")
         if joint not in coordinates or quantity not in {"position", "velocity"}:
             continue
         place = coordinates.index(joint)
-        moved = np.array(_gains(channel, band, dt)) / _factor(model, channel, theta)
-        gain[[place, len(coordinates) + place], column] = moved
-    return gain
+        slow, quick = (np.array(_gains(channel, band, dt)) for band in bands)
+        places, factor = [place, len(coordinates) + place], _factor(model, channel, theta)
+        gains[:, places, column] = slow / factor
+        gains[: len(count), places, column] = np.clip(_gains_of_line(channel, count, dt), slow, quick) / factor
+    return gains
+
+
+def _gains_of_line(channel: str, count: Array, dt: float) -> Array:
+    """Gains (N, 2) as `_gains` gives them, for a tracker by a line through so many readings."""
+    if channel.endswith(".velocity"):
+        return np.column_stack([np.zeros_like(count), 1.0 / count])
+    rate = 6.0 / (count * (count + 1.0))
+    return np.column_stack([rate * (2.0 * count - 1.0) / 3.0, rate / dt])
 
 
 def is_position(model: Model, channel: str) -> bool:
