@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from vpm.discrepancy.noise.residual_structure import ABOVE_WHITE, NEW
+from vpm.discrepancy.settings import ABOVE_WHITE, NEW
 from vpm.ranking.fit import Fitted
 from vpm.ranking.settings import Settings
 from vpm.ranking.tracked_records import TrackedRecords

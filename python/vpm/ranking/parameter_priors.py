@@ -6,7 +6,8 @@ import numpy as np
 
 from vpm.catalogue import EffectParameter
 from vpm.catalogue.shared import SLOW
-from vpm.discrepancy.screening.candidates import LEAST, Candidate, joint_at, shares_at, slow_speeds
+from vpm.discrepancy.screening.candidates import Candidate, joint_at, shares_at, slow_speeds
+from vpm.discrepancy.settings import LEAST
 from vpm.discrepancy.stuck_channels import is_moving
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
