@@ -25,7 +25,7 @@ from vpm.discrepancy.diagnosis_fields import (
 from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.noise.sensor_drift import Drift, sensor_drifts, without_drifts
 from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
-from vpm.discrepancy.preparation import Records, as_recorded, data_of, nominal_of, recalibrated_of, records_of
+from vpm.discrepancy.preparation import Records, data_of, nominal_of, recalibrated_of, records_of
 from vpm.discrepancy.provenance import own_settings, provenance
 from vpm.discrepancy.ranked_effects import tracker_gaps
 from vpm.discrepancy.remainder.empirical_formula import beside
@@ -296,9 +296,6 @@ def _measured(job: _Job, ranking: Ranking | None) -> Diagnosis | list[Drift]:
         told = diagnosed_by_tracker(ranking, model, job.records, asked, job.setup, reason)
         more = ranked_notes(ranking, told.refused, told.interrupted)
         return replace(told, notes=(*told.notes, *more))
-    if ranking is None and (read := as_recorded(model, training, job.cutoff, job.setup)) != job.setup:
-        notes.append(FOUND_HOLD.format(hold=read.course))
-        job = replace(job, setup=read)
     data = data_of(model, training, validation, job.mode, job.cutoff, job.setup, notes)
     request.tell("comparing the nominal model with the data")
     nominal = nominal_of(model, data, notes)

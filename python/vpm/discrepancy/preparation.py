@@ -14,20 +14,18 @@ from dataclasses import replace
 import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
-from vpm.discrepancy.confirmation.refusal import Thresholds
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import shares_at, slow_share, slow_speeds
-from vpm.discrepancy.settings import FAR, HELD_OUT, LEAST_GAIN, QUICKER, REACH
+from vpm.discrepancy.settings import FAR, HELD_OUT, QUICKER, REACH
 from vpm.discrepancy.stuck_channels import check_moving, check_stuck
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, Motion, choose_cutoff, joints_from_sensors
 from vpm.experiment.cutoff import HIGHEST
 from vpm.experiment.lengths import line_rates
 from vpm.experiment.signal import UNDISTORTED_BAND
-from vpm.identify import InverseDynamicsProblem, OutputErrorProblem, gain, segments
+from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
 from vpm.identify.between_records import changed_between
 from vpm.identify.comparison import relative_to_drives
-from vpm.identify.estimation import estimate
 from vpm.identify.moments import on_the_border
 from vpm.identify.parallel import worker_count
 from vpm.identify.response_along_motion import answers_at_once
@@ -35,7 +33,7 @@ from vpm.identify.sample_mask import STANDSTILL_SHARE
 from vpm.identify.settings import Checks
 from vpm.model import Model, Parameter
 from vpm.numbers import NORMAL_95, short
-from vpm.simulate import AUTOMATIC, HOLDS, Setup
+from vpm.simulate import Setup
 
 #: Records to fit, records to judge on, and notes on both.
 Records = tuple[tuple[Experiment, ...], tuple[Experiment, ...], list[str]]
@@ -54,23 +52,6 @@ def records_of(model: Model, experiments: Sequence[Experiment], validate: Sequen
     pairs = [e.split(1.0 - HELD_OUT) for e in training]
     note = f"no validation record was given: the last {100 * HELD_OUT:.0f} % of each record was kept out of the fit"
     return tuple(p[0] for p in pairs), tuple(p[1] for p in pairs), [note]
-
-
-def as_recorded(model: Model, training: Sequence[Experiment], cutoff: float | None, setup: Setup) -> Setup:
-    """Setup prepared with what commands do between samples, where nobody said it: hold, or run on as readings do.
-
-    Held commands act half a sample late in the mean. That is no effect of the machine, and comes before all effects,
-    whose absence leaves a residual of its own: commands run on if the residual is clearly smaller with that.
-    """
-    if setup.hold != AUTOMATIC or not answers_at_once(model) or not model.adjustable:
-        return setup
-    left = []
-    for hold in HOLDS[:2]:
-        problem = InverseDynamicsProblem(model, training, cutoff=cutoff, hold=hold)
-        left.append(estimate(model, problem, model.adjustable, linear_only=True).residual)
-    read = gain(left[0], left[1], segments(problem))
-    sure = read.relative >= LEAST_GAIN and read.score >= Thresholds(1, 0.0).score(read.pieces)
-    return replace(setup, hold=HOLDS[1]) if sure else setup
 
 
 def data_of(

@@ -30,7 +30,8 @@ class Sizes:
         efforts = np.concatenate([data.effort(model, model.theta, record)[1] for record in records])
         positions, velocities, accelerations = map(np.concatenate, zip(*map(data.state, records), strict=True))
         middle = dict(zip(data.joints, np.mean(positions, axis=0).tolist(), strict=True))
-        inertias = np.diag(model.mass_matrix([middle.get(name, 0.0) for name in model.coordinates]))
+        masses = np.diag(model.mass_matrix([middle.get(name, 0.0) for name in model.coordinates]))
+        inertias = masses[[model.coordinates.index(joint) for joint in data.joints]]
         self.joints: dict[str, tuple[float, float, float]] = {}
         self.ways: dict[str, tuple[float, float]] = {}
         moving = [any(is_moving(log, f"{joint}.position") for log in data.experiments) for joint in data.joints]
@@ -41,10 +42,10 @@ class Sizes:
             if np.any(shares[moving]):
                 self.moving.add(site)
             self.ways[site] = float(way.min()), float(way.max())
-            effort = efforts @ (shares / max(float(shares @ shares), 1e-300))
+            along = shares / max(float(shares @ shares), 1e-300)
             # Where no drive does anything, it is inertia that forces are as large as, in the middle of the way.
-            inertia = float(inertias[model.joints.index(model.joint_before(site))])
-            size = _strength(effort) or inertia * _strength(accelerations @ shares)
+            inertia = float(inertias @ along**2)
+            size = _strength(efforts @ along) or inertia * _strength(accelerations @ shares)
             self.joints[site] = size, _strength(velocities @ shares), 0.5 * float(np.ptp(way))
         self.commands = {
             name: _strength(np.concatenate([motion.inputs[:, place] for motion in data.motions]))
