@@ -44,6 +44,7 @@ from vpm.experiment.signal import check_cutoff
 from vpm.identify.fit_result import fit_of
 from vpm.identify.parallel import worker_count
 from vpm.log_check import refuse_mistakes
+from vpm.log_check.checking import UNCHECKED
 from vpm.model import Model
 from vpm.naming import BROKEN, FAILED, RANKING, STOPPED, Names, named, ranked_notes, ranking_of, until_stopped
 from vpm.observer import measured_outputs
@@ -221,9 +222,14 @@ def diagnosed(
     each = ParallelCandidates(workers, progress)
     odd: list[str] = []
     if asked.get("check", True):
-        if tell is not None:
-            tell("checking the channels of the logs")
-        found = refuse_mistakes(model, [*experiments, *validate], setup=setup, workers=workers, progress=progress)
+        logs = [*experiments, *validate]
+        try:
+            if tell is not None:
+                tell("checking the channels of the logs")
+            found = refuse_mistakes(model, logs, setup=setup, workers=workers, progress=progress)
+        except KeyboardInterrupt as stop:
+            # Also where Ctrl-C came before the first record was looked at.
+            raise KeyboardInterrupt(*(stop.args or (UNCHECKED.format(record=logs[0].name),))) from None
         odd = [str(one) for one in found if one.kind in NOTED]
     most = max(LEAST_LIMIT, 2 * len(model.joints)) if limit is None else limit
     names = asked.get("names", RANKING)
