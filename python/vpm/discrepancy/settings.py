@@ -123,6 +123,8 @@ MOST_SAMPLES = 4000
 
 # ---- start values ----------------------------------------------------------------------------------------------------
 
+#: Two equal steps of a place change the column of its size alike, to rounding.
+EVEN = 1e-6
 #: Deviations of its sensor's noise that the way of a coordinate at rest spans: four to either side.
 WITHIN_NOISE = 8.0
 #: Effort, speed and way of what stands, in SI units.

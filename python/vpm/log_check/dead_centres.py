@@ -18,6 +18,7 @@ from vpm.log_check.finding import Finding
 from vpm.log_check.settings import Settings
 from vpm.log_check.shares import Judge
 from vpm.model import Model
+from vpm.numbers import rough_percent
 
 #: Digits of the zero that is proposed, rad: somewhere in the motion will do.
 _DIGITS = 1
@@ -69,8 +70,8 @@ def _finding(
     (joint, line), angle = names, turned[f"{names[0]}.position"]
     sentence = (
         f"{joint} is beyond the dead centre of {line} at {centre:.3g} rad, from {angle.min():.3g} to {angle.max():.3g} "
-        f"rad: of its effort the model leaves {100.0 * share[0]:.3g} % unexplained on the side of zero, and "
-        f"{100.0 * share[1]:.3g} % there"
+        f"rad: of its effort the model leaves {rough_percent(share[0])} unexplained on the side of zero, and "
+        f"{rough_percent(share[1])} there"
     )
     repair = _repair(model, joint, round(float(np.mean(angle)), _DIGITS))
     return Finding("side", (f"{line}.length",), (record.name,), sentence, repair, True, share=share)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 
+from vpm.numbers import rough_percent
 from vpm.ranking.settings import Settings
 from vpm.results import Storable
 
@@ -53,8 +54,8 @@ class Judgement(Storable):
     def words(self) -> str:
         """Text of a judgement: ``removes 3 % of the error power``, or adds it where the share is negative."""
         if self.least < 0.0:
-            return f"adds {_percent(-self.least)} to the error power"
-        return f"removes {_percent(self.least)} of the error power"
+            return f"adds {rough_percent(-self.least)} to the error power"
+        return f"removes {rough_percent(self.least)} of the error power"
 
     def counts(self, settings: Settings) -> bool:
         """Whether a judgement counts: more than chance, and more than errors of laws."""
@@ -72,35 +73,32 @@ class Judgement(Storable):
     def lacks(self, settings: Settings) -> str:
         """Text on what a judgement lacks to count; "" where it counts."""
         if self.least <= settings.worth:
-            return f"it {self.words}; {_percent(settings.worth)} have to go"
+            return f"it {self.words}; {rough_percent(settings.worth)} have to go"
         if self.score <= settings.score:
             return (
                 f"it {self.words}, but not from piece after piece: "
                 f"{self.score:.2g} standard deviations, {settings.score:g} are needed"
             )
         if self.size <= settings.slight:
-            return f"it does {_percent(self.size)} of what all effects of the model do, and no law is as exact as that"
+            done = rough_percent(self.size)
+            return f"it does {done} of what all effects of the model do, and no law is as exact as that"
         if self.beside <= settings.second and self.least <= settings.clear:
             return (
-                f"it does {_percent(self.beside)} of what the effects that were found do, "
-                f"and {_percent(settings.second)} may be what their laws are wrong by"
+                f"it does {rough_percent(self.beside)} of what the effects that were found do, "
+                f"and {rough_percent(settings.second)} may be what their laws are wrong by"
             )
         if self.shape <= settings.inexact:
             return (
-                f"it does {_percent(self.shape)} of what effects over the same states do there, "
+                f"it does {rough_percent(self.shape)} of what effects over the same states do there, "
                 "and no law is as exact as that"
             )
         if self.alone >= 1.0 - settings.worth:
             return (
-                f"it leaves {_percent(self.alone)} of the error power of a mass on which nothing acts: it makes the "
-                "machine too heavy for its forces"
+                f"it leaves {rough_percent(self.alone)} of the error power of a mass on which nothing acts: it makes "
+                "the machine too heavy for its forces"
             )
         if self.overtone:
             return "it repeats along a whole fraction of the period of another effect there, and is an overtone of that"
         if self.reshaped:
             return f"{self.reshaped} does as well by another shape of its law"
         return ""
-
-
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.3g} %"

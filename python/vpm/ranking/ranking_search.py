@@ -13,6 +13,7 @@ from vpm.discrepancy.screening.candidates import Key
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
+from vpm.numbers import rough_percent
 from vpm.ranking.choice_by_evidence import as_good, evidence, weighed
 from vpm.ranking.disturbed_records import disturbed
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
@@ -165,7 +166,7 @@ class Search:
             return []
         judgement, self.fitter, fitted = ways[told.index(max(told))]
         self.say(
-            f"commands that run on from sample to sample remove {100 * judgement.removed:.3g} % of the error power"
+            f"commands that run on from sample to sample remove {rough_percent(judgement.removed)} of the error power"
         )
         self.first = {look.fitted.tracker.band: look for look in self._looks(self.start)}
         return self._all_looks(self._look(fitted))
@@ -428,7 +429,7 @@ class Search:
 
 
 def _removing(trial: Trial) -> str:
-    return f"removes {100.0 * trial.judgement.removed:.3g} % of the error power"
+    return f"removes {rough_percent(trial.judgement.removed)} of the error power"
 
 
 def _is_worse(now: Sequence[Look], before: Sequence[Look]) -> bool:

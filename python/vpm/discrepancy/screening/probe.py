@@ -18,7 +18,7 @@ from scipy.special import chdtri
 from vpm.catalogue.kinds import ANY
 from vpm.discrepancy.screening.candidates import Candidate, acts_on, joint_at
 from vpm.discrepancy.screening.compliance_and_stop_start import LOSSES, fine_starts, in_series
-from vpm.discrepancy.settings import OF_JOINT, RICHEST, SHORT_LIST, SIZE_LEVEL
+from vpm.discrepancy.settings import EVEN, OF_JOINT, RICHEST, SHORT_LIST, SIZE_LEVEL
 from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
 from vpm.identify.identifiability import Span, closest_column, column_lengths, is_alias
@@ -230,7 +230,7 @@ def free_location(
         moved = model.with_parameters({added[where]: start + steps * step})
         columns.append(data.evaluate(moved, moved.theta, [moved.index(added[size])])[1][:, 0])
     first, second = columns[1] - columns[0], columns[2] - columns[1]
-    if not np.any(first) or np.linalg.norm(second - first) > 1e-6 * np.linalg.norm(first):
+    if not np.any(first) or np.linalg.norm(second - first) > EVEN * np.linalg.norm(first):
         return None
     return Place(size, where, first / step)
 
