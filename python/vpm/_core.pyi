@@ -26,7 +26,6 @@ __all__ = [
     "narx_candidates",
     "narx_fit",
     "narx_select",
-    "soft_flights",
     "step_all",
     "stop_when",
     "zero_phase",
@@ -53,14 +52,6 @@ def stop_when(asked: Callable[[], bool] | None) -> None:
     """Let long computations of the calling thread stop with ``KeyboardInterrupt`` when ``asked()`` is true.
 
     Ctrl-C reaches Python's main thread only; this is how it tells the threads that work for it. None ends it.
-    """
-
-def soft_flights(
-    pull: ArrayLike, gaps: ArrayLike, rates: ArrayLike, dampings: ArrayLike, interval: float
-) -> NDArray[np.float64]:
-    """Acceleration (N, k) of a link against the motor in k plays, ``pull`` (N,) moving it within them.
-
-    Beyond a gap (m or rad) a spring and a damper hold it: it would swing at ``rates`` (rad/s) with these ``dampings``.
     """
 
 def zero_phase(sections: ArrayLike, values: ArrayLike, padding: int, every: int) -> NDArray[np.float64]:

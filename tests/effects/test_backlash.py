@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 
 from vpm import Experiment, Model, diagnose
-from vpm._core import soft_flights
 from vpm.discrepancy.screening.candidates import candidates
 from vpm.discrepancy.screening.probe import Baseline, probe
 from vpm.identify import InverseDynamicsProblem
-from vpm.numbers import Array
 
 GAP, MASS, ROTOR, VISCOUS = 4e-4, 12.0, 3.0, 30.0
 STIFFNESS, DAMPING = 1.5e6, 900.0
@@ -103,25 +101,3 @@ def test_play_is_named_and_none_is_seen_where_there_is_none(loose: tuple[Experim
     assert gap.value == pytest.approx(GAP, rel=0.15)
     tight = record(1e-9, 1), record(1e-9, 2)
     assert "backlash" not in {effect.name for effect in diagnose(model, tight[:1], tight[1:], effects=effects).effects}
-
-
-def test_flights_are_those_of_one_step_after_the_other() -> None:
-    generator = np.random.default_rng(5)
-    pull = np.cumsum(generator.standard_normal(3000)) * 0.05
-    gaps, rates, dampings = np.array([1e-5, 3e-4, 2e-3]), np.array([50.0, 90.0, 200.0]), np.array([0.5, 1.0, 0.2])
-    swing = soft_flights(pull, gaps, rates, dampings, 1e-3)
-    np.testing.assert_allclose(swing, step_by_step(pull, 0.5 * gaps, rates, dampings, 1e-3), rtol=1e-9, atol=1e-9)
-    with pytest.raises(ValueError, match="give one of each"):
-        soft_flights(pull, gaps, rates[:2], dampings, 1e-3)
-
-
-def step_by_step(pull: Array, half: Array, rates: Array, dampings: Array, interval: float) -> Array:
-    """All plays together, one sample after the other."""
-    place, speed, swing = np.zeros_like(half), np.zeros_like(half), np.zeros((pull.size, half.size))
-    for k, acceleration in enumerate(pull.tolist()):
-        beyond = place - np.clip(place, -half, half)
-        new = speed + interval * (acceleration - rates**2 * beyond)
-        new = np.where(beyond == 0.0, new, new / (1.0 + 2.0 * interval * dampings * rates))
-        swing[k], speed = (new - speed) / interval, new
-        place = place + interval * speed
-    return swing

@@ -23,7 +23,6 @@ pub mod effect;
 pub mod error;
 pub mod evaluate;
 pub mod filter;
-pub mod flight;
 pub mod graph;
 pub mod integrator;
 pub mod inverse;

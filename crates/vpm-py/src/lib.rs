@@ -8,7 +8,6 @@ mod arrays;
 mod dynamics;
 mod errors;
 mod filter;
-mod flight;
 mod interrupt;
 mod linkage;
 mod narx;
@@ -26,8 +25,6 @@ mod _core {
     use crate::errors::Diverged;
     #[pymodule_export]
     use crate::filter::zero_phase;
-    #[pymodule_export]
-    use crate::flight::soft_flights;
     #[pymodule_export]
     use crate::interrupt::stop_when;
     #[pymodule_export]
