@@ -55,24 +55,6 @@ def trial(value: float) -> Trial:
     )
 
 
-@pytest.mark.parametrize("error", [-0.8 * NEGLIGIBLE, 0.8 * NEGLIGIBLE])
-def test_a_gain_that_no_instrument_keeps_is_no_finding(error: float) -> None:
-    reason = refuse_trial(trial(1.0 + error), Thresholds(30, 1e-3))
-    assert reason.startswith(f"encoder.gain.value comes out as {1.0 + error:.4g}: less than 0.50 % of the signal")
-
-
-@pytest.mark.parametrize("error", [-1.2 * NEGLIGIBLE, 1.2 * NEGLIGIBLE])
-def test_a_gain_beyond_that_is_one(error: float) -> None:
-    assert refuse_trial(trial(1.0 + error), Thresholds(30, 1e-3)) == ""
-
-
-@pytest.mark.parametrize(("error", "after", "accepted"), [(0.08, 0.3, True), (0.08, 0.9, False), (0.01, 0.3, False)])
-def test_a_gain_that_shows_magnified_in_a_balance_is_one(error: float, after: float, accepted: bool) -> None:
-    parts = {"error": error, "validation": Gain(before=1.0, after=after, weight=1.0, score=50.0, pieces=40)}
-    one = cast("Trial", SimpleNamespace(**{**vars(trial(1.0 + 0.8 * NEGLIGIBLE)), **parts}))
-    assert (refuse_trial(one, Thresholds(30, 1e-3)) == "") == accepted
-
-
 @pytest.mark.parametrize(
     ("way", "std", "dry", "accepted"),
     [

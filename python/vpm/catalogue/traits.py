@@ -52,8 +52,6 @@ class Traits:
     """What its first parameter is in other descriptions of robots, where it stands for a joint as a number alone."""
     late: Late = ""
     """How what it passes on comes late."""
-    scales: bool = False
-    """Whether it scales a reading, with all that the model has not quite right of it."""
     damps: bool = False
     """Whether all that it does is to damp vibrations of links that bend."""
     motor_side_alone: bool = False

@@ -48,8 +48,6 @@ SENSOR_SHARE = 0.25
 SAME = 1.5
 #: Difference of two logarithms of evidence that says nothing.
 TIE = 0.01
-#: An error of an instrument shows so many times as large in the residual that it is more than an error of the model.
-MAGNIFIED = 4.0
 #: Samples that what builds up over a way has to last, to be seen to build up.
 SAMPLED = 2.0
 #: Most joints of a machine that a ranking covers, beside those that effects split off.

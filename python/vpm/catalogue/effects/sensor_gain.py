@@ -30,7 +30,6 @@ EFFECT = EffectType(
         "payload": "both scale the effort that an acceleration needs; a record with a known load discriminates",
         "viscous_friction": "both scale the effort that a speed needs; a reference length discriminates",
     },
-    scales=True,
     signature=Signature(
         ("effort", "position"), "A straight line over the effort that the motion needs", "A way of known length"
     ),

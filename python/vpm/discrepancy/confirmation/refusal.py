@@ -13,7 +13,6 @@ from vpm.discrepancy.settings import (
     CLEAR_GAIN,
     FALSE_ALARM_LEVEL,
     LEAST_GAIN,
-    MAGNIFIED,
     MODEST_FACTOR,
     MODEST_GAIN,
     NEGLIGIBLE,
@@ -73,7 +72,6 @@ def refuse_trial(trial: Trial, thresholds: Thresholds) -> str:
         _too_short(trial, thresholds.interval),
         _no_place(trial),
         _no_way(trial),
-        _trifling_size(trial),
         _slight(trial),
         _only_training(trial),
         _not_clear(trial),
@@ -199,25 +197,6 @@ def _no_way(trial: Trial) -> str:
     return (
         f"{parameter_text(trial.judged.model, name, std)}, and the joint passes {least:.3g} "
         f"{parameter.unit} between two samples: what builds up within two of them is like dry friction"
-    )
-
-
-def _trifling_size(trial: Trial) -> str:
-    """Refusal of a sensor gain that is nearer to one than any sensor or link model is accurate to.
-
-    An effort may be the small difference of large readings, as of the pressures on both sides of a piston. A small
-    error of a gain then leaves a large error of the effort; a gain that explains most of it is accepted.
-    """
-    if not trial.probe.candidate.effect.scales:
-        return ""
-    name = trial.parameters[0]
-    value = trial.judged.model.parameters[name].value
-    magnified = trial.validation.relative >= CLEAR_GAIN and trial.error > MAGNIFIED * abs(value - 1.0)
-    if abs(value - 1.0) >= NEGLIGIBLE or magnified:
-        return ""
-    return (
-        f"{name} comes out as {value:.4g}: less than {percent(NEGLIGIBLE)} of the signal is no more "
-        "than an error of the model"
     )
 
 
