@@ -32,8 +32,6 @@ MODEST_GAIN, MODEST_FACTOR = 0.3, 3.0
 #: From this gain on an effect does most of the work: on a machine of several joints, where errors of two missing
 #: effects cancel in a simulation, the residual decides alone; a delay is named whatever the timing of samples.
 CLEAR_GAIN = 0.5
-#: Where so much of what could be explained remains, what was found is not the explanation.
-MOSTLY_OPEN = 0.15
 #: A rival that takes less than this share of what the effect takes from the training residual is none.
 LEAST_SHARE = 0.8
 #: Predicted gain asked of a spring more where links bend already: noise of the motion rings in them. How many are
@@ -106,6 +104,8 @@ FOLDS, MOST_TERMS = 5, 5
 TERM_GAIN = 0.03
 #: Transition velocity of dry terms as shares of the largest speed, where no friction of the model has one.
 TRANSITION_SHARES = (0.002, 0.01, 0.04)
+#: Pressure under which the effort of a piston is asked for, Pa.
+UNIT_PRESSURE = 1e5
 #: Longest period that is looked for, in multiples of the travel, and factor by which a fit may move one.
 LONGEST_PERIOD, PERIOD_RANGE = 1.5, 1.15
 #: Share of the power of the efforts that lies in the band in which the remainder is compared.
@@ -123,6 +123,8 @@ MOST_SAMPLES = 4000
 
 #: Two equal steps of a place change the column of its size alike, to rounding.
 EVEN = 1e-6
+#: Share of the largest influence on a residual below which that of a parameter is rounding.
+ROUNDED = 1e-12
 #: Deviations of its sensor's noise that the way of a coordinate at rest spans: four to either side.
 WITHIN_NOISE = 8.0
 #: Effort, speed and way of what stands, in SI units.

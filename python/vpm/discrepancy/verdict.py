@@ -22,11 +22,11 @@ from vpm.discrepancy.settings import (
     FAR,
     FLOOR_FACTOR,
     LEAST_GAIN,
-    MOSTLY_OPEN,
     NEGLIGIBLE,
 )
 from vpm.errors import VpmError
 from vpm.identify import gain, segments
+from vpm.identify.settings import MOSTLY_OPEN
 from vpm.model import Model
 from vpm.numbers import NORMAL_95, percent, short
 

@@ -11,12 +11,9 @@ import numpy as np
 
 from vpm.identify.identifiability import column_lengths
 from vpm.identify.problem import Block
-from vpm.identify.settings import Checks
+from vpm.identify.settings import MOSTLY_OPEN, Checks
 from vpm.identify.whiteness import DEPENDENT, basis, explained_by
 from vpm.numbers import Array
-
-#: Share of the residual that may be left where a parameter of its own explains a record: as where an effect does.
-LEFT = 0.15
 
 
 def changed_between(
@@ -60,7 +57,7 @@ def changed_between(
     split = np.column_stack([slopes / lengths, slopes[:, k] * inside[number] / lengths[k]])
     weights = np.linalg.lstsq(split, residual, rcond=None)[0]
     least = float(np.sum((residual - split @ weights) ** 2))
-    if not power > 0.0 or least > LEFT**2 * power:
+    if not power > 0.0 or least > MOSTLY_OPEN**2 * power:
         return []
     size = np.sqrt((power - least) / max(int(moving.sum()), 1))
     largest = max(block.weight * block.scale for block in blocks)

@@ -9,6 +9,9 @@ from vpm.results import Storable
 LOSSES = ("squares", "huber", "soft_l1")
 NOISES = ("spread", "estimated", "given")
 
+#: Where so much of what could be explained remains, what was found is not the explanation.
+MOSTLY_OPEN = 0.15
+
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Fitting(Storable):

@@ -9,12 +9,13 @@ import numpy as np
 
 from vpm.discrepancy.screening.candidates import acts_on
 from vpm.discrepancy.screening.compliance_and_stop_start import ends_apart
-from vpm.discrepancy.screening.probe import ROUNDED, Alias, Baseline, Probe, size_is_clear
+from vpm.discrepancy.screening.probe import Alias, Baseline, Probe, size_is_clear
 from vpm.discrepancy.settings import (
     FAR_AWAY,
     FEW_EVALUATIONS,
     HOPELESS,
     LEAST_GAIN,
+    ROUNDED,
     SLOW_EVALUATIONS,
     SLOW_GAIN,
     TOLERANCE,

@@ -15,15 +15,12 @@ import numpy as np
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.screening.probe import linear_step
-from vpm.discrepancy.settings import TRANSITION_SHARES
+from vpm.discrepancy.settings import TRANSITION_SHARES, UNIT_PRESSURE
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.drives import driven, first_drives
 from vpm.identify.response_along_motion import has_hidden
 from vpm.model import Model
 from vpm.numbers import NORMAL_95, Array
-
-#: Pressure under which the effort of a piston is asked for, Pa.
-UNIT_PRESSURE = 1e5
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ from scipy.special import chdtri
 from vpm.catalogue.kinds import ANY
 from vpm.discrepancy.screening.candidates import Candidate, acts_on, joint_at
 from vpm.discrepancy.screening.compliance_and_stop_start import LOSSES, fine_starts, in_series
-from vpm.discrepancy.settings import EVEN, OF_JOINT, RICHEST, SHORT_LIST, SIZE_LEVEL
+from vpm.discrepancy.settings import EVEN, OF_JOINT, RICHEST, ROUNDED, SHORT_LIST, SIZE_LEVEL
 from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
 from vpm.identify.identifiability import Span, closest_column, column_lengths, is_alias
@@ -26,9 +26,6 @@ from vpm.identify.response_along_motion import answers_at_once, bends
 from vpm.identify.tangent import has_tangent
 from vpm.model import Model, Parameter
 from vpm.numbers import Array
-
-#: Share of the largest influence on a residual below which that of a parameter is rounding.
-ROUNDED = 1e-12
 
 
 def linear_step(data: InverseDynamicsProblem, jacobian: Array, residual: Array) -> tuple[Array, Array, Array]:
