@@ -1,14 +1,11 @@
 """The low-frequency part of a residual, and what a bound lets a candidate do in screening."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 from model_texts import on_rail
 from vpm import Experiment, Model
-from vpm.catalogue import EFFECTS
-from vpm.discrepancy.screening.candidates import Candidate, candidates
+from vpm.discrepancy.screening.candidates import candidates
 from vpm.discrepancy.screening.probe import Baseline, probe
 from vpm.identify import InverseDynamicsProblem
 
@@ -57,12 +54,3 @@ def test_asymmetric_friction_is_screened_with_a_change_of_direction_as_sharp_as_
     found = probe(Baseline(model, free, residual, jacobian), data, candidate)
     assert found.model.parameters["axis.friction.asymmetric_transition_velocity"].value < 0.01
     assert found.values["axis.friction.coulomb_difference"] == pytest.approx(0.8, rel=0.1)
-
-
-def test_no_candidate_is_credited_with_what_a_bound_forbids(problem: InverseDynamicsProblem) -> None:
-    model = Model.from_toml(TEXT).with_parameters({"body.mass": 1e-9})
-    residual, jacobian = problem.evaluate(model, model.theta, [model.index("body.mass")])
-    base = Baseline(model, ("body.mass",), residual, jacobian)
-    constant = Candidate(EFFECTS["bias_force"], "axis", ({},))
-    for side in ({}, {"body.mass": -1}, {"body.mass": 1}):  # a mass below zero explains all of it
-        assert abs(probe(replace(base, pushed=side), problem, constant).drop) < 0.01

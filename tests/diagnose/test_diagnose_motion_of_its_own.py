@@ -8,7 +8,6 @@ import pytest
 
 import vpm
 from vpm.discrepancy.confirmation.confirmation import is_clear
-from vpm.discrepancy.screening.probe import Baseline, _stepped, softened
 from vpm.discrepancy.search.search_round import Request, Round
 from vpm.identify import Estimate, InverseDynamicsProblem, Worth, estimate
 
@@ -38,38 +37,6 @@ def record(truth: vpm.Model) -> vpm.Experiment:
     run = vpm.simulate(held, given)
     data = {"drive.command": torque, "axis.position": run["axis.position"]}
     return vpm.Experiment.from_arrays(time, data, units=units)
-
-
-@pytest.mark.parametrize("start", [150.0, 1e3, 1e5])
-def test_a_spring_in_series_is_found_from_starts_far_stiffer(start: float) -> None:
-    """Where nothing swings, one step finds it exactly; taken in the stiffness it would end below zero from 200 on."""
-    effort, stiffness = np.sin(np.linspace(0.0, 9.0, 50)), 100.0
-    slope = -effort / start**2
-    step = float(slope @ (effort / stiffness - effort / start) / (slope @ slope))
-    assert (start + step > 0.0) == (start < 200.0)
-    found, std = softened(start, start + step, 2.0)
-    assert found == pytest.approx(stiffness, rel=1e-9)
-    assert std / found**2 == pytest.approx(2.0 / start**2, rel=1e-9), "the same uncertainty of the compliance"
-
-
-def test_what_comes_out_stiffer_than_rigid_stays_as_it_is() -> None:
-    assert softened(100.0, 250.0, 3.0) == (250.0, 3.0)
-
-
-@pytest.mark.parametrize(("loss", "stays"), [(-3.0, True), (3.0, False)])
-def test_a_loss_that_one_step_has_negative_stays_at_its_start(loss: float, stays: bool) -> None:
-    """Stiffness and loss from a start at (10, 1), where a loss of -3 would end below zero."""
-    phase = np.linspace(0.0, 60.0, 3000)
-    columns = np.column_stack([np.sin(phase), np.cos(phase)])
-    noise = 0.1 * np.random.default_rng(0).standard_normal(phase.size)
-    residual = -columns @ np.array([-4.0, loss]) + noise
-    data: Any = SimpleNamespace(blocks=[SimpleNamespace(samples=slice(0, phase.size))])
-    base = Baseline(vpm.Model.from_toml(AXIS), (), residual, np.zeros((phase.size, 0)))
-    values, std, left = _stepped(base, data, columns, residual, np.array([10.0, 1.0]), [1])
-    assert values[0] == pytest.approx(-4.0, abs=0.02)
-    assert (values[1] == 0.0) == np.isinf(std[1]) == stays
-    share = float(left @ left) / float(residual @ residual)
-    assert share > 0.2 if stays else share < 0.01
 
 
 def test_a_joint_that_winds_up_is_balanced_with_the_memory_of_its_motor_side() -> None:

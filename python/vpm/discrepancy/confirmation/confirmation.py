@@ -75,13 +75,13 @@ class Judged:
 
     @property
     def baseline(self) -> Baseline:
-        """Baseline for the next screening round, from a judged model of the confirmation."""
-        pushed = {}
-        for name in self.fit.at_bounds:
-            parameter = self.model.parameters[name]
-            low, high = self.bounds.get(name, (parameter.minimum, parameter.maximum))
-            pushed[name] = 1 if high - parameter.value < parameter.value - low else -1
-        return Baseline(self.model, self.free, self.fit.residual, self.fit.jacobian, pushed)
+        """Baseline for the next screening round, from a judged model of the confirmation.
+
+        What a bound holds stays there: beyond it, it would seem to explain what no fit can.
+        """
+        inside = [place for place, name in enumerate(self.free) if name not in self.fit.at_bounds]
+        names, columns = tuple(self.free[place] for place in inside), self.fit.jacobian[:, inside]
+        return Baseline(self.model, names, self.fit.residual, columns)
 
 
 @dataclass(frozen=True)

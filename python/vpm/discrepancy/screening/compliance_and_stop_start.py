@@ -37,12 +37,6 @@ from vpm.model import Model
 from vpm.model.splitting import name_behind
 from vpm.numbers import Array
 
-#: Springs in series with a motion of their own, which lie between motor and link, so that a softer one does more.
-SERIES = "stiffness"
-#: What of these springs turns motion into heat, by short names.
-LOSSES = ("damping", "time")
-
-
 Starts = tuple[Mapping[str, float], ...]
 Bounds = Mapping[str, tuple[float, float]]
 
@@ -102,11 +96,6 @@ def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str],
         if _joint(whole, at) == _joint(whole, site):
             return f"the joint is split already by {name} at {at}, and no inertia is between"
     return ""
-
-
-def in_series(effect: EffectType) -> tuple[str, ...]:
-    """Short names of compliance parameters in series: the larger they are, the less they do."""
-    return (SERIES,) if effect.motion else ()
 
 
 def coupled(model: Model) -> bool:

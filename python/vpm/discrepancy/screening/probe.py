@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -17,7 +17,7 @@ from scipy.special import chdtri
 
 from vpm.catalogue.kinds import ANY
 from vpm.discrepancy.screening.candidates import Candidate, acts_on, joint_at
-from vpm.discrepancy.screening.compliance_and_stop_start import LOSSES, fine_starts, in_series
+from vpm.discrepancy.screening.compliance_and_stop_start import fine_starts
 from vpm.discrepancy.settings import EVEN, OF_JOINT, RICHEST, ROUNDED, SHORT_LIST, SIZE_LEVEL
 from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
@@ -40,32 +40,9 @@ def linear_step(data: InverseDynamicsProblem, jacobian: Array, residual: Array) 
     return step / lengths, std, left
 
 
-def step_without(
-    data: InverseDynamicsProblem, jacobian: Array, residual: Array, staying: Sequence[int]
-) -> tuple[Array, Array, Array]:
-    """Linear step in which some parameters stay where they are, without deviation."""
-    moves = [i for i in range(jacobian.shape[1]) if i not in staying]
-    values, std = np.zeros(jacobian.shape[1]), np.zeros(jacobian.shape[1])
-    values[moves], std[moves], left = linear_step(data, jacobian[:, moves], residual)
-    return values, std, left
-
-
 def is_outside(parameter: Parameter, value: float, std: float) -> bool:
     """Whether an estimate of a linear step lies outside the physical range by more than one standard deviation."""
     return value + std < parameter.minimum or value - std > parameter.maximum
-
-
-def softened(start: float, estimate: float, std: float) -> tuple[float, float]:
-    """Stiffness after a linear step in the compliance of a series spring, with its standard deviation.
-
-    Under an effort F it gives way by F/k, which is linear in 1/k. From a start k0, a step dk is one of -dk/k0^2 in the
-    compliance. Taken in k, a spring half as stiff as its start, or less, would come out below zero. What comes out
-    stiffer than rigid stays as it is.
-    """
-    ratio = 2.0 - estimate / start if start > 0.0 else 0.0
-    if ratio <= 0.0:
-        return estimate, std
-    return start / ratio, std / ratio**2
 
 
 @dataclass(frozen=True)
@@ -99,16 +76,12 @@ class Probe:
 
 @dataclass(frozen=True)
 class Baseline:
-    """Baseline of probes: the model to which candidates are added, with its training residual and regressor.
-
-    ``pushed`` says of parameters that a bound holds on which side: 1 at the upper one, -1 at the lower one.
-    """
+    """Baseline of probes: the model to which candidates are added, with its training residual and regressor."""
 
     model: Model
     free: tuple[str, ...]
     residual: Array
     jacobian: Array
-    pushed: Mapping[str, int] = field(default_factory=dict)
 
     @cached_property
     def span(self) -> Span:
@@ -116,36 +89,9 @@ class Baseline:
         return Span.of(self.jacobian)
 
     @cached_property
-    def _inverse(self) -> Array:
-        lengths = column_lengths(self.jacobian)
-        return np.asarray(np.linalg.pinv(self.jacobian / lengths, rcond=1e-10) / lengths[:, None])
-
-    def without_pushed(self, residual: Array) -> Span:
-        """Span of known columns without those that a step against a probe's residual would push beyond a bound.
-
-        What a bound holds stays there: beyond it, it would seem to explain what no fit can.
-        """
-        if not self.pushed:
-            return self.span
-        steps = -(self._inverse @ residual)
-        kept = tuple(self.pushed.get(name, 0) * step <= 0.0 for name, step in zip(self.free, steps, strict=True))
-        if kept not in self._spans:
-            self._spans[kept] = Span.of(self.jacobian[:, kept])
-        return self._spans[kept]
-
-    def left(self, residual: Array) -> Array:
-        """Part of a probe's residual (n,) that a linear step in the known parameters alone leaves."""
-        return self.without_pushed(residual).rest(residual)
-
-    @cached_property
     def unexplained(self) -> Array:
         """Part of the residual (n,) that known parameters would leave; bounds may keep a fit from that."""
-        return self.left(self.residual)
-
-    @cached_property
-    def _spans(self) -> dict[tuple[bool, ...], Span]:
-        """Spans of some known columns, by which of them these are; most probes ask for the same ones."""
-        return {(True,) * len(self.free): self.span}
+        return self.span.rest(self.residual)
 
 
 def prepare(base: Baseline, data: InverseDynamicsProblem, listed: Sequence[Candidate]) -> Baseline:
@@ -261,7 +207,7 @@ def _searched(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate
     def left(start: Mapping[str, float]) -> float:
         model = base.model.with_effect(candidate.effect.name, at=candidate.site, **start)
         try:
-            rest = base.left(data.evaluate(model, model.theta)[0])
+            rest = base.span.rest(data.evaluate(model, model.theta)[0])
         except DivergedError:
             return math.inf
         power = float(rest @ rest)
@@ -326,9 +272,13 @@ def _probe_start(
         invisible = (*invisible, added[place.where])
     free = tuple(added[i] for i in keep)
     start_values = model.theta[[columns[i] for i in keep]]
-    values, std, left = _stepped(base, data, fresh[:, keep], residual, start_values, _losses(model, candidate, free))
+    values, std, left = linear_step(data, base.span.rest(fresh[:, keep]), base.span.rest(residual))
     if still:
-        values, left = np.zeros_like(values), base.left(residual)
+        left = base.span.rest(residual)
+    if (
+        candidate.effect.motion
+    ):  # far from linear in a stiffness or loss: the step tells a gain, the grid where to begin
+        values = np.zeros_like(values)
     estimates = dict(zip(free, (values + start_values).tolist(), strict=True))
     deviations = dict(zip(free, std.tolist(), strict=True))
     drop, here = _lowered(base, data, candidate, left) if free else (0.0, 0.0)
@@ -340,11 +290,6 @@ def _probe_start(
             first = model.parameters[where].value
             estimates[where] = first + (estimates[where] - first) / estimates[size]
             deviations[where] /= abs(estimates[size])
-    for name in free:
-        if _short(model, candidate, name) in in_series(candidate.effect):
-            estimates[name], deviations[name] = softened(
-                model.parameters[name].value, estimates[name], deviations[name]
-            )
     return Probe(candidate, model, free, held, invisible, estimates, deviations, drop, here)
 
 
@@ -355,33 +300,6 @@ def _lowered(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate,
     here = acts_on(base.model, data, candidate.site)
     own = float(here * before @ before)
     return drop, 1.0 - float(here * left @ left) / own if own > 0.0 and not np.all(here) else 0.0
-
-
-def _stepped(
-    base: Baseline, data: InverseDynamicsProblem, fresh: Array, residual: Array, start: Array, losses: Sequence[int]
-) -> tuple[Array, Array, Array]:
-    """Linear step of a probe in new parameters beside the known ones, see `linear_step`; some of them stay.
-
-    A negative loss of a spring in series stays at its ``start``. It depends on the square of the compliance, so a step
-    from a clearly stiffer or softer start gives a wrong value, even a wrong sign. A refit finds it; whether there is a
-    spring at all, its stiffness tells.
-    """
-    values, std, left = linear_step(data, base.span.rest(fresh), base.span.rest(residual))
-    known = base.without_pushed(residual + fresh @ values)
-    if known is not base.span:
-        values, std, left = linear_step(data, known.rest(fresh), known.rest(residual))
-    negative = [i for i in losses if start[i] + values[i] + std[i] < 0.0]
-    if negative:
-        values, std, left = step_without(data, known.rest(fresh), known.rest(residual), negative)
-        std[negative] = np.inf
-    return values, std, left
-
-
-def _losses(model: Model, candidate: Candidate, free: Sequence[str]) -> list[int]:
-    """Indices of the loss parameters of a spring in series among those of a probe."""
-    if not in_series(candidate.effect):
-        return []
-    return [i for i, name in enumerate(free) if _short(model, candidate, name) in LOSSES]
 
 
 def _sizes(model: Model, candidate: Candidate, known: Sequence[str], added: Sequence[str]) -> tuple[Array, Array]:
