@@ -10,8 +10,7 @@ from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.ranked_effects import free_joints, searched, why_not_ranked
 from vpm.discrepancy.ranked_effects import notes as notes_of
-from vpm.discrepancy.rivals.ambiguity import Rivals, rivals
-from vpm.discrepancy.rivals.rival_exchange import in_order, replaced
+from vpm.discrepancy.rivals.ambiguity import Rivals, in_order, rivals
 from vpm.discrepancy.search.search import Search, begin, further
 from vpm.discrepancy.search.search_round import Request
 from vpm.discrepancy.search.usual_friction import with_usual_friction
@@ -121,20 +120,9 @@ def ranked_notes(ranking: Ranking, refused: Sequence[RefusedEffect], interrupted
 
 
 def _settled(found: Search, data: Data, request: Request) -> tuple[Search, tuple[Rivals, ...]]:
-    """Names and their order, with the rivals of each, after it was removed again.
-
-    Where something takes the place of an effect, the search goes on beside that.
-    """
+    """Names in their order, with the rivals of each, after it was removed again."""
     request.tell("looking for what else would do in the place of each effect")
-    known = rivals(found.final, data, found.accepted, request, found.last)
-    for _ in range(request.limit):
-        changed, known = replaced(found, known, data)
-        if changed is found:
-            break
-        found = changed if found.interrupted else further(changed, data, request)
-        if len(found.accepted) != 1 or len(known) != 1 or found.final is not changed.final:
-            known = rivals(found.final, data, found.accepted, request, found.last)
-    return in_order(found, known)
+    return in_order(found, rivals(found.final, data, found.accepted, request, found.last))
 
 
 def until_stopped(work: Callable[[], Found], nothing: Found) -> tuple[Found, bool]:

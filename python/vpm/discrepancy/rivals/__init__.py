@@ -1,1 +1,1 @@
-"""Rivals of an accepted effect: found, exchanged for it, or discriminated from it by an experiment."""
+"""Rivals of an accepted effect: found, or discriminated from it by an experiment."""

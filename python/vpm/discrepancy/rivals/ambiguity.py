@@ -12,17 +12,15 @@ from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, confi
 from vpm.discrepancy.diagnosis import Ambiguity
 from vpm.discrepancy.parallel_candidates import Failure
 from vpm.discrepancy.screening.candidates import Candidate, Key, candidates, joint_at
-from vpm.discrepancy.screening.probe import Probe, impossible_values, linear_step, probe, refit_effort, screening_effort
-from vpm.discrepancy.search.candidate_choice import Accepted, alike
-from vpm.discrepancy.search.search import Tried
+from vpm.discrepancy.screening.probe import Probe, impossible_values, probe, refit_effort, screening_effort
+from vpm.discrepancy.search.candidate_choice import Accepted
+from vpm.discrepancy.search.search import Search, Tried
 from vpm.discrepancy.search.search_round import Request
 from vpm.discrepancy.settings import CLEAR_GAIN, CLEARLY, LEAST_SHARE, RIVALS_TRIED
-from vpm.errors import DivergedError
-from vpm.identify import InverseDynamicsProblem, gain, segments
-from vpm.identify.identifiability import COPY_SHARE, Span
+from vpm.identify import gain, segments
 from vpm.identify.response_along_motion import answers_at_once, bends
 from vpm.model import Model
-from vpm.numbers import NORMAL_95, power
+from vpm.numbers import power
 
 
 @dataclass(frozen=True)
@@ -32,7 +30,6 @@ class Rivals:
     effect: str
     site: str
     trials: tuple[Trial, ...]  #: Those that predict the validation data as well.
-    tried: tuple[Trial, ...] = ()  #: All that were refitted in its place.
     without: Judged | None = None  #: The model without it; None where that cannot be computed.
 
     @property
@@ -92,7 +89,6 @@ def _rivals_of(
             screening_effort,
         )
         probes = [one for one in screened if isinstance(one, Probe)]
-    probes = [probe_beside(final, without, data.training, entry, one) for one in probes]
     listed = _short_list(final, without, probes)
     trials = request.each(
         "what else would do: refitting",
@@ -104,7 +100,7 @@ def _rivals_of(
     tried = [known[one.candidate.key] for one in listed if one.candidate.key in known]
     tried += [trial for trial in trials if isinstance(trial, Trial)]
     good = tuple(trial for trial in tried if as_good(final, trial, data))
-    return Rivals(*entry.key, good, tuple(tried), without)
+    return Rivals(*entry.key, good, without)
 
 
 def _without(final: Judged, data: Data, known: Mapping[Key, Tried], entry: Accepted) -> Judged:
@@ -160,68 +156,22 @@ def as_good(final: Judged, trial: Trial, data: Data) -> bool:
     return change > -CLEARLY
 
 
-def probe_beside(final: Judged, without: Judged, data: InverseDynamicsProblem, entry: Accepted, probe: Probe) -> Probe:
-    """Probe of a nested rival beside the accepted effect whose law it contains.
+def in_order(found: Search, known: Sequence[Rivals]) -> tuple[Search, tuple[Rivals, ...]]:
+    """Accepted effects and their rivals, ordered by what each effect adds to validation beside all others.
 
-    - ``final``, ``without``: the model with all accepted effects, and without this one
-    - ``data``: training records
-    - ``probe``: of the rival, on the model without the effect
-
-    It is to be refitted from the size that one step beside the effect says; ``probe`` itself if it was not held, is not
-    confused with the effect at its site, cannot be computed beside it, or has no clear size there (95 %).
+    An effect may have a held number that the data show only together with another effect. It comes after that one: with
+    either removed, the held number would decide how they share the residual.
     """
-    candidate = probe.candidate
-    if probe.free or not probe.held or not candidate.neutral or not alike(candidate, entry.trial.probe.candidate):
-        return probe
-    names = tuple(alias.parameter for alias in probe.held)
-    model = final.model.with_effect(candidate.effect.name, at=candidate.site, **candidate.starts[0])
-    try:
-        residual, fresh = data.evaluate(model, model.theta, [model.index(name) for name in names])
-    except DivergedError:
-        return probe  # beside the effect it cannot be balanced, as a rotor's inertia behind a joint with a memory
-    values, std, left = linear_step(data, np.column_stack([final.fit.jacobian, fresh]), residual)
-    count = len(names)
-    sizes, spread = values[-count:], std[-count:]
-    if not np.all(np.isfinite(spread)) or not np.all(np.abs(sizes) > NORMAL_95 * spread):
-        return probe
-    start, fixed = probe.model.parameters, set(_held_at_start(probe))
-    shapes = tuple(name for name in probe.invisible if name not in fixed)
-    power = float(without.fit.residual @ without.fit.residual)
-    return replace(
-        probe,
-        free=(*names, *shapes),
-        held=(),
-        invisible=(),
-        values={
-            **{name: start[name].value for name in shapes},
-            **{name: start[name].value + float(size) for name, size in zip(names, sizes, strict=True)},
-        },
-        std={**dict.fromkeys(shapes, np.inf), **dict(zip(names, map(float, spread), strict=True))},
-        drop=1.0 - float(left @ left) / power if power > 0.0 else 0.0,
-    )
+    adds = [np.inf if r.without is None else power(r.without.validation) for r in known]
+    left, order = list(range(len(found.accepted))), list[int]()
+    while left:
+        ready = [n for n in left if not any(_refines(found.accepted[n], found.accepted[m]) for m in left if m != n)]
+        best = max(ready or left, key=lambda n: adds[n])
+        order.append(best)
+        left.remove(best)
+    return replace(found, accepted=tuple(found.accepted[n] for n in order)), tuple(known[n] for n in order)
 
 
-def contains(rival: Judged, parameters: tuple[str, ...], final: Judged, own: tuple[str, ...]) -> bool:
-    """Whether a rival is a richer law in which the accepted effect is nested.
-
-    Then the effect is the rival with one number at zero. The distance of that number from zero on the training records
-    counts as evidence, so validation records, which are fewer, only have to improve. Of laws that are different, and of
-    friction whose fit makes up for reversals that filters smooth, neither holds.
-
-    - ``rival``: the model with the rival in the place of the effect
-    - ``parameters``: the rival's own
-    - ``final``: the model with the effect
-    - ``own``: the effect's own parameters
-    """
-    if len(parameters) <= len(own):
-        return False
-    columns = rival.fit.jacobian[:, [rival.fit.names.index(name) for name in parameters]]
-    plain = (final.fit.jacobian[:, final.fit.names.index(name)] for name in own)
-    within = Span.of(columns)
-    return all(within.share(column) > COPY_SHARE for column in plain)
-
-
-def _held_at_start(probe: Probe) -> list[str]:
-    candidate = probe.candidate
-    effect = probe.model.effect(*candidate.key)
-    return [effect.parameter_names[short] for short in candidate.fixed]
+def _refines(entry: Accepted, other: Accepted) -> bool:
+    """Whether a parameter of an ambiguous effect was held for another one, so that their order is given."""
+    return bool({alias.partner for alias in entry.trial.held} & set(other.trial.parameters))

@@ -62,12 +62,6 @@ class Search:
     within_laws: bool = False
 
     @property
-    def gone(self) -> set[Key]:
-        """Effects that the search removed again, which do not come back."""
-        removed = {(stage.effect, stage.site) for stage in self.stages if stage.change == "removed"}
-        return removed - {entry.key for entry in self.accepted}
-
-    @property
     def final(self) -> Judged:
         """Final model of the search."""
         return self.stages[-1].judged
@@ -82,8 +76,6 @@ def further(found: Search, data: Data, request: Request) -> Search:
     """Continue a search: add effects one at a time and drop replaced ones, until none is accepted any more.
 
     Removed effects do not come back.
-    A new effect in the place of another one leaves what the other one had covered. A second effect that was refused
-    before may be clear in that.
     """
     going = _Going(found, data, request)
     interrupted = False
@@ -100,11 +92,12 @@ class _Going:
 
     def __init__(self, found: Search, data: Data, request: Request) -> None:
         self.data, self.request = data, request
-        self.stages, self.accepted, self.ranking = list(found.stages), list(found.accepted), list(found.ranking)
-        self.dropped = {(r.name, r.site): r.reason for r in found.refused if (r.name, r.site) in found.gone}
+        self.stages, self.accepted = list(found.stages), list(found.accepted)
+        self.ranking = list[RankedCandidate]()
+        self.dropped: dict[Key, str] = {}
         self.last: Tried | None = None
         self.round: Round | None = None
-        self.number = max((candidate.round for candidate in found.ranking), default=0)
+        self.number = 0
 
     def another(self) -> bool:
         """Whether one more effect comes in; those that it makes needless are dropped."""
