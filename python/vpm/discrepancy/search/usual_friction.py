@@ -13,7 +13,6 @@ from dataclasses import replace
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, in_time, is_clear, judge, measured
 from vpm.discrepancy.confirmation.refusal import Thresholds, refuse_trial
-from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import TRANSITION, Candidate, candidates, joint_at
 from vpm.discrepancy.screening.probe import Probe
 from vpm.discrepancy.search.candidate_choice import Accepted
@@ -50,7 +49,10 @@ def with_usual_friction(found: Search, data: Data, request: Request) -> Search:
             tried = len(usual) * len(start.model.joints)
             leaving = unclear or _leaving(trials, Thresholds(tried, data.interval))
             if not leaving:
-                return _begun(found, judged, alone, trials, request.each)
+                trials.sort(key=lambda trial: -trial.there.relative)
+                stages = [Stage("added", *trial.probe.candidate.key, judged) for trial in trials]
+                accepted = [Accepted(trial, ()) for trial in trials]
+                return replace(found, stages=(*found.stages, *stages), accepted=(*found.accepted, *accepted))
             listed = [c for c in listed if c not in leaving]
             judged = _fitted(start, data, listed)
     except VpmError:
@@ -94,7 +96,9 @@ def _beside(judged: Judged, data: Data, candidate: Candidate) -> Trial:
 
     Commands may then hold up to a sample later or earlier, so that what is lost by it is no less than it says.
     """
-    less, own = _reduced(judged, [candidate], data), _own(judged, candidate)
+    model, own = judged.model.without_effect(*candidate.key), _own(judged, candidate)
+    free, bounds = judged.kept_in(model)
+    less = judge(model, free, data, bounds, linear_only=True)
     timed = in_time(less, data)
     less = replace(less, fit=replace(less.fit, residual=timed.fitted), validation=timed.validation)
     values = {name: judged.model.parameters[name].value for name in own}
@@ -109,15 +113,6 @@ def _sizes(model: Model, candidate: Candidate) -> list[str]:
     return [name for short, name in names.items() if not candidate.effect.parameter(short).shape]
 
 
-def _reduced(judged: Judged, gone: Sequence[Candidate], data: Data) -> Judged:
-    """Model without some of its friction, all else fitted again by one step."""
-    model = judged.model
-    for candidate in reversed(gone):
-        model = model.without_effect(*candidate.key)
-    free, bounds = judged.kept_in(model)
-    return judge(model, free, data, bounds, linear_only=True)
-
-
 def _leaving(trials: Sequence[Trial], thresholds: Thresholds) -> list[Candidate]:
     """Friction that validation records do not ask for, or that does not do most of the work where it acts.
 
@@ -129,20 +124,3 @@ def _leaving(trials: Sequence[Trial], thresholds: Thresholds) -> list[Candidate]
             joint = joint_at(trial.judged.model, trial.probe.candidate.site)
             least[joint] = min(trial, least.get(joint, trial), key=lambda one: one.there.relative)
     return [trial.probe.candidate for trial in least.values()]
-
-
-def _begun(found: Search, judged: Judged, data: Data, trials: Sequence[Trial], each: ParallelCandidates) -> Search:
-    """Search with friction that was judged, the clearest first."""
-    ordered = sorted(trials, key=lambda trial: -trial.there.relative)
-    listed = [trial.probe.candidate for trial in ordered]
-    places = range(1, len(listed))
-    fits = each(
-        "friction: refitting one after the other",
-        lambda place: _reduced(judged, listed[place:], data),
-        places,
-        lambda place: listed[place - 1].label,
-    )
-    reached = [one if isinstance(one, Judged) else judged for one in fits] + [judged]
-    stages = [Stage("added", *one.key, fit) for one, fit in zip(listed, reached, strict=True)]
-    accepted = [Accepted(trial, ()) for trial in ordered]
-    return replace(found, stages=(*found.stages, *stages), accepted=(*found.accepted, *accepted))
