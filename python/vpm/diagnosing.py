@@ -9,15 +9,13 @@ from itertools import chain
 from typing import Any, TypedDict, get_args
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
-from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis, Empirical
+from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis
 from vpm.discrepancy.diagnosis_fields import (
-    accepted_effect,
-    classes,
     examined,
     gaps_of,
     of_search,
     pictures,
-    step,
+    so_far,
     traces,
     unmeasured,
     where,
@@ -30,11 +28,10 @@ from vpm.discrepancy.provenance import own_settings, provenance
 from vpm.discrepancy.ranked_effects import tracker_gaps
 from vpm.discrepancy.remainder.empirical_formula import beside
 from vpm.discrepancy.remainder.remainder import Remainder, remainder
-from vpm.discrepancy.rivals.ambiguity import Rivals, listed
+from vpm.discrepancy.rivals.ambiguity import Rivals
 from vpm.discrepancy.rivals.discriminating_experiment import experiments as experiments_for
 from vpm.discrepancy.screening.candidates import asked_for
-from vpm.discrepancy.search.candidate_choice import Accepted
-from vpm.discrepancy.search.search import Search, ambiguities
+from vpm.discrepancy.search.search import Search
 from vpm.discrepancy.search.search_round import Request, Tell
 from vpm.discrepancy.settings import FLOOR_FACTOR
 from vpm.discrepancy.verdict import is_negligible, only_where_closed, verdict
@@ -310,16 +307,16 @@ def _measured(job: _Job, ranking: Ranking | None) -> Diagnosis | list[Drift]:
     recalibrated = recalibrated_of(model, data, notes, request.each, start)
     found, ambiguous, late = named(ranking, recalibrated, data, request, notes)
     known = _Known(job, data, nominal, recalibrated, ranking, ambiguous, late)
-    so_far = partial(of_search, model, job.records, recalibrated, found, data.training)
+    bare = partial(of_search, model, job.records, recalibrated, found, (data.training, data.validation), ambiguous)
     try:
         return _told(known, found)
     except BROKEN as error:
         notes.append(FAILED.format(what="what follows the search", error=error))
-        return so_far()
+        return bare()
     except KeyboardInterrupt:
         notes.append(STOPPED_UNJUDGED)
         gap = gaps_of(data, nominal, recalibrated, found.final, {})
-        return replace(so_far(), verdict="effect_found" if found.accepted else "interrupted", gap=gap, interrupted=True)
+        return replace(bare(), verdict="effect_found" if found.accepted else "interrupted", gap=gap, interrupted=True)
 
 
 @dataclass(frozen=True)
@@ -333,18 +330,6 @@ class _Known:
     ranking: Ranking | None
     ambiguous: tuple[Rivals, ...]
     late: bool  #: Whether Ctrl-C left open what else would do.
-
-
-@dataclass(frozen=True)
-class _Concluded:
-    """Verdict of `diagnose`, and the model with effects on which it stands."""
-
-    word: str
-    summary: str
-    gap: dict[str, ChannelGap]
-    final: Judged
-    empirical: Empirical | None
-    accepted: tuple[Accepted, ...]
 
 
 def _told(known: _Known, found: Search) -> Diagnosis | list[Drift]:
@@ -362,11 +347,11 @@ def _told(known: _Known, found: Search) -> Diagnosis | list[Drift]:
         pairs = ((data.training, found.final.fit.residual), (data.validation, found.final.validation))
         if drifts := sensor_drifts(found.final.model, pairs, gap, FLOOR_FACTOR):
             return drifts
-    concluded = _concluded(known, found, said, gap, floor, rest)
     if stopped or known.late:
         job.records[2].append(STOPPED_LATE)
-    concluded = replace(concluded, gap=concluded.gap | beyond)
-    return _whole(known, found, concluded, floor, interrupted=found.interrupted or stopped or known.late)
+    told, found, final = _concluded(known, found, said, gap, floor, rest)
+    interrupted = found.interrupted or stopped or known.late
+    return _with_pictures(known, found, replace(told, gap=told.gap | beyond, interrupted=interrupted), final, floor)
 
 
 def _concluded(
@@ -376,51 +361,32 @@ def _concluded(
     gap: dict[str, ChannelGap],
     floor: dict[str, float],
     rest: Remainder | None,
-) -> _Concluded:
-    """Verdict of `diagnose` on the final model, or on that with a formula for the rest."""
-    word, summary, described = said
-    if not described or rest is None:
-        return _Concluded(word, summary, gap, found.final, None, found.accepted)
-    chosen = rest.best if word == "unexplained" else rest.choices[-1]
-    final, empirical = chosen.judged, chosen.empirical
-    accepted = found.accepted if chosen.base is found.final else ()
-    if accepted:
-        empirical, final = beside(found.final, chosen, known.data)
-    gap = gaps_of(known.data, known.nominal, known.recalibrated, final, floor)
-    summary = f"{summary} {empirical.sentence}" + (f" {rest.seals.sentence}" if rest.seals is not None else "")
-    return _Concluded(word, summary, gap, final, empirical, accepted)
+) -> tuple[Diagnosis, Search, Judged]:
+    """Diagnosis with its verdict, the search on which it stands, and its model, perhaps with a formula for the rest."""
+    (word, summary, described), data, nominal = said, known.data, known.nominal
+    final, empirical = found.final, None
+    if described and rest is not None:
+        chosen = rest.best if word == "unexplained" else rest.choices[-1]
+        final, empirical = chosen.judged, chosen.empirical
+        if chosen.base is not found.final:
+            found = replace(found, accepted=())
+        elif found.accepted:
+            empirical, final = beside(found.final, chosen, data)
+        gap = gaps_of(data, nominal, known.recalibrated, final, floor)
+        summary = f"{summary} {empirical.sentence}" + (f" {rest.seals.sentence}" if rest.seals is not None else "")
+    records, ambiguous = known.job.records, known.ambiguous if found.accepted else ()
+    told = of_search(known.job.model, records, nominal, found, (data.training, data.validation), ambiguous)
+    fit = fit_of(final.model, data.training, final.fit, nominal.fit.residual, list(told.training))
+    summary = so_far(found, summary)
+    told = replace(told, verdict=word, summary=summary, gap=gap, model=final.model, fit=fit, empirical=empirical)
+    return told, found, final
 
 
-def _whole(
-    known: _Known, found: Search, concluded: _Concluded, floor: dict[str, float], *, interrupted: bool
-) -> Diagnosis:
+def _with_pictures(known: _Known, found: Search, told: Diagnosis, final: Judged, floor: dict[str, float]) -> Diagnosis:
     """Result of `diagnose` with its evidence and pictures, as far as Ctrl-C leaves time for them."""
-    data, nominal, (training, validation, notes) = known.data, known.nominal, known.job.records
-    final, accepted, summary = concluded.final, concluded.accepted, concluded.summary
-    ambiguous = known.ambiguous if accepted else ()
-    told = Diagnosis(
-        concluded.word,
-        f"Stopped before every candidate was tried. {summary}" if found.interrupted else summary,
-        tuple(accepted_effect(entry, found.final) for entry in accepted),
-        concluded.gap,
-        found.refused,
-        found.ranking,
-        listed(ambiguities(accepted), ambiguous),
-        {},
-        tuple(step(data.training, data.validation, stage) for stage in found.stages),
-        tuple(e.name for e in training),
-        tuple(e.name for e in validation),
-        tuple(notes),
-        final.model,
-        fit_of(final.model, data.training, final.fit, nominal.fit.residual, [e.name for e in training]),
-        (),
-        0.0,
-        interrupted,
-        empirical=concluded.empirical,
-        classes=classes(accepted, ambiguous),
-        stated={name: parameter.value for name, parameter in known.job.model.parameters.items()},
-    )
-    at_motors = [entry.key for entry in accepted if entry.side == "motor"]
+    data, nominal = known.data, known.nominal
+    ambiguous = known.ambiguous if found.accepted else ()
+    at_motors = [entry.key for entry in found.accepted if entry.side == "motor"]
     more: dict[str, Callable[[], Any]] = {
         "where": lambda: where(known.recalibrated.model, data.validation),
         "pictures": lambda: pictures(data, nominal, known.recalibrated, final),

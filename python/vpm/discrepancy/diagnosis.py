@@ -76,6 +76,14 @@ class AcceptedEffect(Storable):
     evidence_nats: float = float("nan")
     class_probability: float = float("nan")
 
+    def to_dict(self) -> dict[str, object]:
+        """Plain numbers and text of an accepted effect, its parameters by name."""
+        parameters = {
+            p.name: {"value": plain(p.value), "unit": p.unit, "std": plain(p.std), "path": p.dotted}
+            for p in self.parameters
+        }
+        return {**super().to_dict(), "parameters": parameters}
+
 
 @dataclass(frozen=True, repr=False, eq=False)
 class RefusedEffect(Storable):
@@ -122,6 +130,10 @@ class Ambiguity(Storable):
     site: str
     others: tuple[str, ...]
     reason: str
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain text of an ambiguity."""
+        return {"name": self.name, "site": self.site, "with": list(self.others), "reason": self.reason}
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -201,6 +213,11 @@ class ChannelGap(Storable):
     def share(self, value: float) -> float:
         """Share of an error in the measured signal of a diagnosed channel; NaN without one."""
         return value / self.signal if self.signal > 0.0 else float("nan")
+
+    def to_dict(self) -> dict[str, object]:
+        """Plain numbers and text of a channel error, with its shares in the signal."""
+        stages = ("before", "recalibrated", "after")
+        return {**super().to_dict(), **{f"{name}_relative": plain(self.share(getattr(self, name))) for name in stages}}
 
 
 @dataclass(frozen=True, repr=False, eq=False)
@@ -403,52 +420,13 @@ class Diagnosis(Result):
 
     def to_dict(self) -> dict[str, object]:
         """Content of a diagnosis for ``report.json``: plain numbers and text, SI; unknown values are null."""
-        effects = [
-            {
-                "name": e.name,
-                "site": e.site,
-                "sentence": e.sentence,
-                "parameters": {
-                    p.name: {"value": p.value, "unit": p.unit, "std": p.std, "path": p.dotted} for p in e.parameters
-                },
-                "gain": e.gain,
-                "score": e.score,
-                "probability": e.probability,
-                "class_probability": e.class_probability,
-                "evidence_nats": e.evidence_nats,
-                "notes": list(e.notes),
-            }
-            for e in self.effects
-        ]
-        document: dict[str, object] = {
-            "verdict": self.verdict,
-            "summary": self.summary,
-            "model": self.model.name,
-            "training": list(self.training),
-            "unseen": list(self.unseen),
-            "effects": effects,
-            "gap": {channel: _gap(gap) for channel, gap in self.gap.items()},
-            "refused": [{"name": r.name, "site": r.site, "reason": r.reason} for r in self.refused],
-            "candidates": [c.to_dict() for c in self.candidates],
-            "ambiguous_with": [
-                {"name": a.name, "site": a.site, "with": list(a.others), "reason": a.reason}
-                for a in self.ambiguous_with
-            ],
-            "classes": [list(members) for members in self.classes],
-            "where": {channel: list(sentences) for channel, sentences in self.where.items()},
-            "steps": [step.to_dict() for step in self.steps],
-            "notes": list(self.notes),
-            "empirical": None if self.empirical is None else self.empirical.to_dict(),
-            "experiments": [e.to_dict() for e in self.experiments],
-            "seconds": self.seconds,
-            "interrupted": self.interrupted,
-            "provenance": None if self.provenance is None else self.provenance.to_dict(),
-        }
-        return document
+        apart = {"model", "fit", "pictures", "evidence", "traces", "stated"}
+        content = {name: plain(value) for name, value in self.to_stored().items() if name not in apart}
+        return {**content, "model": self.model.name}
 
     def save_json(self, path: Path) -> Path:
         """Write a diagnosis to ``report.json``."""
-        return write_text(path, json.dumps(plain(self.to_dict()), indent=2, allow_nan=False) + "\n")
+        return write_text(path, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n")
 
     def _headline(self) -> Mapping[str, object]:
         names = ", ".join(f"{e.name} at {e.site}" for e in self.effects) or "no effect"
@@ -467,11 +445,3 @@ class Diagnosis(Result):
         from vpm.plot.findings import plot_traces
 
         return plot_pictures(self.pictures) if self.pictures or not self.traces else plot_traces(self.traces)
-
-
-def _gap(gap: ChannelGap) -> dict[str, object]:
-    relative = {
-        f"{stage}_relative": getattr(gap, stage) / gap.signal if gap.signal > 0.0 else None
-        for stage in ("before", "recalibrated", "after")
-    }
-    return {**gap.to_dict(), **relative}

@@ -24,10 +24,10 @@ from vpm.discrepancy.diagnosis import (
 from vpm.discrepancy.noise.noise_floor import Structure, noise_floor, structure
 from vpm.discrepancy.preparation import Records
 from vpm.discrepancy.ranked_effects import candidates_of, refused_by, tracker_gaps
-from vpm.discrepancy.rivals.ambiguity import Rivals
+from vpm.discrepancy.rivals.ambiguity import Rivals, listed
 from vpm.discrepancy.screening.candidates import Key
 from vpm.discrepancy.search.candidate_choice import Accepted
-from vpm.discrepancy.search.search import Search, Stage
+from vpm.discrepancy.search.search import Search, Stage, ambiguities
 from vpm.identify import Fit, InverseDynamicsProblem, OutputErrorProblem, Problem, gaps
 from vpm.identify.fit_result import fit_of
 from vpm.model import Model
@@ -42,34 +42,51 @@ if TYPE_CHECKING:
 ALIKE = "predicts the validation data as well"
 
 
-def of_search(model: Model, records: Records, start: Judged, found: Search, fitted: Problem) -> Diagnosis:
-    """Diagnosis with the fields of the search alone, where what follows it could not be computed or was stopped.
+def of_search(
+    model: Model,
+    records: Records,
+    start: Judged,
+    found: Search,
+    problems: tuple[Problem, Problem],
+    ambiguous: Sequence[Rivals] = (),
+) -> Diagnosis:
+    """Diagnosis with the fields of the search alone: all there is where what follows it failed or was stopped.
 
     - ``start``: what the last fit is compared with
-    - ``fitted``: what was fitted
+    - ``problems``: residuals of training and validation records
     """
     training, validation, notes = records
     names = ", ".join(entry.label for entry in found.accepted) or "no effect"
-    stopped = "Stopped before every candidate was tried. " if found.interrupted else ""
     return Diagnosis(
         "effect_found" if found.accepted else "interrupted" if found.interrupted else "unexplained",
-        f"{stopped}The search accepts {names} in {model.name}; what is left on validation records is not judged.",
+        so_far(found, f"The search accepts {names} in {model.name}; what is left on validation records is not judged."),
         tuple(accepted_effect(entry, found.final) for entry in found.accepted),
         {},
         found.refused,
         found.ranking,
-        (),
+        listed(ambiguities(found.accepted), ambiguous),
         {},
-        (),
+        tuple(step(*problems, stage) for stage in found.stages),
         tuple(e.name for e in training),
         tuple(e.name for e in validation),
         tuple(notes),
         found.final.model,
-        fit_of(found.final.model, fitted, found.final.fit, start.fit.residual, [e.name for e in training]),
+        fit_of(found.final.model, problems[0], found.final.fit, start.fit.residual, [e.name for e in training]),
         (),
         0.0,
         found.interrupted,
+        classes=classes(found.accepted, ambiguous),
+        stated=_values(model),
     )
+
+
+def so_far(found: Search, summary: str) -> str:
+    """Summary of a diagnosis whose search Ctrl-C may have ended."""
+    return f"Stopped before every candidate was tried. {summary}" if found.interrupted else summary
+
+
+def _values(model: Model) -> dict[str, float]:
+    return {name: parameter.value for name, parameter in model.parameters.items()}
 
 
 def gaps_of(
@@ -211,7 +228,7 @@ def unmeasured(model: Model, records: Records, ranking: Ranking, settings: Ranki
         0.0,
         interrupted=True,
         classes=tuple((f"{one.effect} at {one.site}", *one.rivals) for one in effects if one.rivals),
-        stated={name: parameter.value for name, parameter in model.parameters.items()},
+        stated=_values(model),
     )
 
 

@@ -10,13 +10,11 @@ import numpy as np
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Judged, Trial, is_clear
 from vpm.discrepancy.diagnosis import Diagnosis, Trace
-from vpm.discrepancy.diagnosis_fields import classes, of_search, step
+from vpm.discrepancy.diagnosis_fields import of_search, so_far
 from vpm.discrepancy.preparation import Records, moved_far
 from vpm.discrepancy.ranked_effects import fitted_in, staged, tracker_gaps
-from vpm.discrepancy.rivals.ambiguity import listed
 from vpm.discrepancy.screening.candidates import Candidate, asked_for, candidates
 from vpm.discrepancy.screening.probe import Probe
-from vpm.discrepancy.search.search import ambiguities
 from vpm.discrepancy.verdict import verdict
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
@@ -89,22 +87,13 @@ def diagnosed_by_tracker(
         settings,
     )
     notes.extend([BY_TRACKER.format(reason=reason, band=band), *moved_far(model, recalibrated)])
-    told = of_search(model, records, nominal, found, data.training)
+    told = of_search(model, records, nominal, found, (data.training, data.validation))
     if not ranking.gaps:
         return told
     gap = tracker_gaps(ranking, None)
     word, summary, _ = verdict(None, nominal, recalibrated, found, gap, None, None)
-    return replace(
-        told,
-        verdict=word,
-        summary=f"Stopped before every candidate was tried. {summary}" if found.interrupted else summary,
-        gap=gap,
-        ambiguous_with=listed(ambiguities(found.accepted), ()),
-        steps=tuple(step(data.training, data.validation, stage) for stage in found.stages),
-        classes=classes(found.accepted, ()),
-        traces=_traces(data.validation, nominal, found.final),
-        stated={name: parameter.value for name, parameter in model.parameters.items()},
-    )
+    traced = _traces(data.validation, nominal, found.final)
+    return replace(told, verdict=word, summary=so_far(found, summary), gap=gap, traces=traced)
 
 
 def _followed(
