@@ -69,19 +69,13 @@ class Round:
         return self.best()
 
     def heavy(self, without: set[Key]) -> Accepted | None:
-        """Best candidate of the round among those with a motion of their own, if more than noise is left.
-
-        A spring that swings within the whole band leaves a residual as white as noise. On rigid machines, one with a
-        large predicted gain is refitted all the same.
-        """
+        """Best candidate of the round among those with a motion of their own, if more than noise is left."""
         model = self.current.model
         left = structure(model, self.data.training, self.data.validation, self.timed.fitted, self.timed.validation)
         quiet = not left.present and left.above_white <= FLOOR_FACTOR
-        if (quiet and not answers_at_once(model)) or self.done():
+        if quiet or self.done():
             return None
         self.screen(without, heavy=True)
-        if quiet:
-            self._promising = [one for one in self._promising if one.drop >= RINGING]
         self.confirm()
         return self.best()
 
