@@ -65,8 +65,6 @@ TOLERANCE = 1e-6
 SLOW_GAIN, SLOW_EVALUATIONS = 0.01, 10
 #: Of two candidates, one that leaves so many times what the other leaves is not the one that comes in.
 HOPELESS = 10.0
-#: So many ranges of what the data reach, a place is nowhere.
-FAR_AWAY = 1e3
 #: Share of each record that is kept out of the fit when no validation record is given.
 HELD_OUT = 0.3
 #: Stated uncertainties, on a logarithmic scale, that a recalibration may move what the model is not linear in.

@@ -11,7 +11,6 @@ from vpm.discrepancy.screening.candidates import acts_on
 from vpm.discrepancy.screening.compliance_and_stop_start import ends_apart
 from vpm.discrepancy.screening.probe import Alias, Baseline, Probe, size_is_clear
 from vpm.discrepancy.settings import (
-    FAR_AWAY,
     FEW_EVALUATIONS,
     HOPELESS,
     LEAST_GAIN,
@@ -314,19 +313,8 @@ def simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:
 
 def _bounds(probe: Probe) -> dict[str, tuple[float, float]]:
     """Bounds of a candidate's shape from the data, by dotted name, for its confirmation."""
-    given, short = probe.candidate.bounds, _short_names(probe)
-    away = _out_of_reach(probe)
-    return {dotted: given[s] for s, dotted in short.items() if s in given and dotted not in away}
-
-
-def _out_of_reach(probe: Probe) -> set[str]:
-    """Start positions in a confirmation that no joint reaches in the records, such as another end stop.
-
-    Moved to the rim of what was seen they would stand where no sample of the training contradicts them.
-    """
-    given, values = probe.candidate.bounds, probe.model.parameters
-    bounded = {dotted: given[short] for short, dotted in _short_names(probe).items() if short in given}
-    return {dotted for dotted, (low, high) in bounded.items() if abs(values[dotted].value) >= FAR_AWAY * (high - low)}
+    given = probe.candidate.bounds
+    return {dotted: given[short] for short, dotted in _short_names(probe).items() if short in given}
 
 
 def _short_names(probe: Probe) -> dict[str, str]:
@@ -349,7 +337,7 @@ def _release(
 ) -> tuple[tuple[str, ...], tuple[Alias, ...]]:
     """Parameters to release in a second confirmation refit: they matter once the size is not zero."""
     fixed = {dotted for short, dotted in _short_names(probe).items() if short in probe.candidate.fixed}
-    asleep = [name for name in probe.invisible if name not in fixed | _out_of_reach(probe)]
+    asleep = [name for name in probe.invisible if name not in fixed]
     theta = model.theta.copy()
     theta[[model.index(name) for name in free]] = fit.values
     _, fresh = data.evaluate(model, theta, [model.index(name) for name in asleep])
