@@ -1,1 +1,1 @@
-"""The search: rounds that accept one effect or a pair, backward elimination and forward steps."""
+"""The search: rounds that accept one effect each, and backward elimination."""
