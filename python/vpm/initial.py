@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -170,13 +169,7 @@ def _worked_out(model: Model, theta: Array, m: Motion) -> tuple[Array, Array, Ar
 
 
 def _along(model: Model, theta: Array, given: tuple[Array, Array, Array], joints: tuple[str, ...], dt: float) -> Array:
-    """Outputs (N, channels) along a motion of some joints, the others passive, for an initial state.
-
-    What a followed joint remembers of its way changes the effort that it takes, not how the others move. One behind a
-    spring moves what nobody measures, and stays.
-    """
-    model, places = _without_memories(model, tuple(name for name in model.joints if name not in joints))
-    theta = theta[places]
+    """Outputs (N, channels) along a motion of some joints, the others passive, for an initial state."""
     followed = [place for place, name in enumerate(model.joints) if name in joints]
     passive = [place for place in range(len(model.joints)) if place not in followed]
     whole = np.zeros((3, len(given[0]), len(model.joints)))
@@ -188,29 +181,8 @@ def _along(model: Model, theta: Array, given: tuple[Array, Array, Array], joints
     return outputs
 
 
-@lru_cache(maxsize=128)
-def _without_memories(model: Model, kept: tuple[str, ...] = ()) -> tuple[Model, NDArray[np.int64]]:
-    """Machine for an initial state without memories, but for joints to keep; and its parameters."""
-    bare = model
-    for effect in model.effects:
-        behind = model.joint_behind(effect.at) if effect.side == "link" else None
-        if effect.type.memory and (behind or effect.at) not in kept:
-            bare = bare.without_effect(*effect.key)
-    return bare, np.array([model.index(name) for name in bare.parameter_names], dtype=np.int64)
-
-
-def invertible(model: Model, measured: Sequence[str]) -> Model:
-    """Machine with known inverse dynamics, for initial states: without memories at unmeasured joints.
-
-    ``measured``: joints whose motion is known.
-    """
-    return model if set(model.joints) == set(measured) else _without_memories(model)[0]
-
-
 def _settled(model: Model, theta: Array, positions: Array, dt: float) -> Array:
     """Initial positions with split-off joints at rest under gravity, remembering nothing."""
-    model, places = _without_memories(model)
-    theta = theta[places]
     own = [place for place, name in enumerate(model.joints) if name not in model.added_joints]
     held = np.tile(positions[own], (2, 1))
     still = np.zeros_like(held)

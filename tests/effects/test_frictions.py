@@ -1,5 +1,7 @@
 """Effects of joints that no search tries: in every mode of a simulation, along records, in fits and files."""
 
+from typing import Literal
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from test_sides import TIMES, elastic, force
 from test_split_joints import commanded, slide
 from vpm import EFFECTS, Experiment, Model, simulate
 from vpm.discrepancy.screening.candidates import candidates
-from vpm.errors import ModelError, SimulationError
+from vpm.errors import ModelError
 from vpm.identify import InverseDynamicsProblem, identify
 
 #: Values that matter beside forces of 20 N on 2 kg.
@@ -109,14 +111,16 @@ def test_runs_that_start_within_a_record_remember_what_was_before(name: str) -> 
 
 
 @pytest.mark.parametrize("name", ["lugre_friction", "warming_friction"])
-def test_what_remembers_is_balanced_before_a_spring_and_refused_behind_it(name: str) -> None:
-    truth = elastic().with_effect(name, at="axis", **VALUES[name])
+@pytest.mark.parametrize("side", ["motor", "link"])
+def test_what_remembers_leaves_no_residual_on_either_side_of_a_spring(
+    name: str, side: Literal["motor", "link"]
+) -> None:
+    """A motion that is prescribed at the motor carries memories along, also of what nobody measures."""
+    truth = elastic().with_effect(name, at="axis", side=side, **VALUES[name])
     data = InverseDynamicsProblem(slide(), [commanded(truth)], cutoff=150.0)
-    left, without = (np.linalg.norm(data.evaluate(model, model.theta)[0]) for model in (truth, slide()))
-    assert left < 0.01 * without
-    behind = elastic().with_effect(name, at="axis", side="link", **VALUES[name])
-    with pytest.raises(SimulationError, match="joint `axis` has an effect that remembers"):
-        data.evaluate(behind, behind.theta)
+    left, without, rigid = (np.linalg.norm(data.evaluate(m, m.theta)[0]) for m in (truth, elastic(), slide()))
+    assert left < 0.01 * rigid
+    assert left < 0.1 * without
 
 
 def test_the_cold_joint_is_cold_at_the_first_sample_alone() -> None:

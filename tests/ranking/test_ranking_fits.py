@@ -20,7 +20,6 @@ from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import candidates
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
-from vpm.initial import invertible
 from vpm.model import Model
 from vpm.ranking.fit import Fitter, View, by_secant
 from vpm.ranking.judgement import Judgement
@@ -499,16 +498,6 @@ def test_what_repeats_along_a_whole_fraction_of_a_period_is_an_overtone(period: 
     told = Judgement(0.9, 0.9, 9.0, 0.1, 0.1, 0.1, overtone=overtone)
     assert told.counts(Settings()) != overtone
     assert ("an overtone of that" in told.lacks(Settings())) == overtone
-
-
-def test_a_split_joint_has_inverse_dynamics_without_what_remembers() -> None:
-    model = Model.from_toml(SLEDGE).with_effect("hysteresis", "way", force=1.0, displacement=0.05)
-    assert invertible(model, ["way"]) is model
-    friction = structure_of(model).beside("way", "link").model.with_effect("joint_compliance", "way", stiffness=1e5)
-    warm = friction.with_effect("warming_friction", "way", coulomb=1.0, time_constant=5.0)
-    assert [effect.name for effect in invertible(warm, ["way"]).effects] == ["viscous_friction", "joint_compliance"]
-    data = InverseDynamicsProblem(Model.from_toml(SLEDGE), records())
-    assert np.isfinite(data.evaluate(invertible(warm, ["way"]), invertible(warm, ["way"]).theta)[0]).all()
 
 
 def test_a_fit_stays_where_bodies_are_real() -> None:

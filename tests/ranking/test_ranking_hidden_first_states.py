@@ -12,7 +12,6 @@ from vpm.catalogue import EFFECTS
 from vpm.discrepancy.screening.candidates import candidates
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
-from vpm.initial import invertible
 from vpm.model import Model
 from vpm.ranking.fit import Fitter, View
 from vpm.ranking.hidden_first_states import hidden_states
@@ -147,17 +146,12 @@ def test_friction_that_held_a_load_is_named_alone() -> None:
 
 
 def test_what_remembers_is_tried_beside_a_joint_that_nobody_measures() -> None:
-    """A run carries memories along; only a balance along measured joints cannot."""
     model = Model.from_toml(CARRYING)
     data = InverseDynamicsProblem(model, records()[:1])
     residual = data.evaluate(model, model.theta)[0]
-    balanced = {one.key for one in candidates(model, data, residual, tuple(EFFECTS))}
-    simulated = {one.key for one in candidates(model, data, residual, tuple(EFFECTS), simulated=True)}
+    tried = {one.key for one in candidates(model, data, residual, tuple(EFFECTS))}
     remembering = {name for name, effect in EFFECTS.items() if effect.memory}
-    assert simulated - balanced == {(name, joint) for name in remembering for joint in ("way", "tail")}
-    warm = model.with_effect("warming_friction", "way", coulomb=1.0, time_constant=5.0)
-    bare = invertible(warm, ["way"])
-    assert [effect.name for effect in bare.effects] == [effect.name for effect in model.effects]
+    assert tried >= {(name, joint) for name in remembering for joint in ("way", "tail")}
 
 
 def test_a_wave_may_be_as_long_as_the_way_that_is_seen() -> None:

@@ -109,15 +109,6 @@ pub enum Error {
         /// Name of the first such beam.
         beam: String,
     },
-    /// A prescribed motion of a machine with an effect that remembers.
-    #[error(
-        "{site} has an effect that remembers, whose memory a simulation with prescribed motion does not carry; balance the efforts \
-         of the joints (inverse dynamics) or simulate it on its commands"
-    )]
-    Memory {
-        /// The first such joint or transmission.
-        site: String,
-    },
     /// A payload sits on a body that does not exist.
     #[error(
         "payload number {payload} sits on body number {body}, but the model has {bodies} bodies; use a number below {bodies}"

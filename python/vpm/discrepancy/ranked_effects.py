@@ -99,7 +99,7 @@ def searched(
     known: tuple[Rivals, ...] = ()
 
     def offered(final: Judged) -> tuple[Candidate, ...]:
-        return candidates(final.model, data.training, final.fit.residual, asked_for(effects), simulated=True)
+        return candidates(final.model, data.training, final.fit.residual, asked_for(effects), either_side=True)
 
     def beside(current: Judged, model: Model, one: Ranked) -> Trial:
         return _beside(current, model, one, data)
@@ -227,7 +227,7 @@ def _refitted(
 
 def _candidate(current: Judged, one: Ranked, data: Data) -> Candidate:
     """Candidate of the search for a ranked effect, with the bounds that data give its shape, or None."""
-    listed = candidates(current.model, data.training, current.fit.residual, [one.effect], simulated=True)
+    listed = candidates(current.model, data.training, current.fit.residual, [one.effect], either_side=True)
     plain = Candidate(EFFECTS[one.effect], one.site, ({},))
     return next((each for each in listed if each.key == one.key), plain)
 

@@ -102,13 +102,11 @@ def moves_drives(model: Model, name: str) -> bool:
     return owner not in model.joints and owner not in model.bodies and owner != "world"
 
 
-def bending(model: Model, joints: tuple[str, ...], *, wound: bool | None = None) -> Bending | None:
+def bending(model: Model, joints: tuple[str, ...], *, wound: bool = False) -> Bending | None:
     """Parts of a machine that bend or fly, if its measured ``joints`` are all others; else None.
 
-    Joints that are ``wound`` up count as plays do. By default they do where a joint remembers its way: a motion that is
-    worked out carries no memory along, and the measured joint, on the side of the motor, is the one that remembers.
+    Joints that are ``wound`` up count as plays do, if asked for.
     """
-    wound = any(effect.type.memory for effect in model.effects) if wound is None else wound
     splitting = [e for e in model.effects if e.type.has_play or (wound and e.type.splits)]
     plays = [e for e in splitting if model.joint_behind(e.at)]
     flying = {model.joint_behind(e.at) for e in plays}

@@ -241,7 +241,7 @@ def read_where_bent(joints: Sequence[str], channels: Sequence[str]) -> tuple[str
     return (*channels, *(f"{joint}.effort" for joint in joints))
 
 
-def bending_of(model: Model, joints: tuple[str, ...], known: Following, *, wound: bool | None = None) -> Bending | None:
+def bending_of(model: Model, joints: tuple[str, ...], known: Following, *, wound: bool = False) -> Bending | None:
     """`vpm.identify.parts.bending`, built once for the responses of all models of one structure."""
     return known.memo.once(("bending", model.structure, joints, wound), partial(bending, model, joints, wound=wound))
 

@@ -20,7 +20,6 @@ from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import Estimate, InverseDynamicsProblem, estimate, gain, gaps, segments
 from vpm.identify.estimation import standing
-from vpm.initial import invertible
 from vpm.model import Model
 from vpm.ranking.result import Ranked, Ranking
 from vpm.ranking.settings import Settings
@@ -181,9 +180,8 @@ def _beside(current: Judged, model: Model, one: Ranked, data: _Followed, *, refi
 
 def _offered(final: Judged, data: _Followed, effects: Sequence[str] | None) -> tuple[Candidate, ...]:
     """All candidate effects that could still be missing in a diagnosis by tracker."""
-    bare = invertible(final.model, data.stand_in.joints)
-    residual, _ = data.stand_in.evaluate(bare, bare.theta)
-    return candidates(final.model, data.stand_in, residual, asked_for(effects), simulated=True)
+    residual, _ = data.stand_in.evaluate(final.model, final.model.theta)
+    return candidates(final.model, data.stand_in, residual, asked_for(effects), either_side=True)
 
 
 def _traces(problem: TrackerResidual, nominal: Judged, final: Judged) -> tuple[Trace, ...]:

@@ -14,7 +14,6 @@ from vpm.catalogue.kinds import Side
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.discrepancy.screening.candidates import Candidate, Key, candidates
 from vpm.identify import InverseDynamicsProblem
-from vpm.initial import invertible
 from vpm.numbers import Array
 from vpm.ranking.fit import ASTRAY, Fitter, Followed, View
 from vpm.ranking.look import Look
@@ -60,9 +59,8 @@ def proposals(
 ) -> list[Proposal]:
     """Best few proposals of effects beside a structure that are worth a fit under its tracker."""
     found = look.fitted.structure.repaired
-    bare = invertible(found, data.joints)
-    residual = data.evaluate(bare, bare.theta)[0]
-    listed = with_short_waves(candidates(found, data, residual, effects, simulated=True), found, bands)
+    residual = data.evaluate(found, found.theta)[0]
+    listed = with_short_waves(candidates(found, data, residual, effects, either_side=True), found, bands)
     listed = [started(one, found, extensions.sizes) for one in listed]
     extended = _extended(look.fitted.structure, listed, extensions)
     groups = _side_by_side([one for one in extended if one.candidate.neutral], look)

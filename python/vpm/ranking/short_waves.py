@@ -9,7 +9,6 @@ from vpm.discrepancy.screening.candidates import Candidate, candidates
 from vpm.experiment.cutoff import HIGHEST
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.response_along_motion import has_own_drives
-from vpm.initial import invertible
 from vpm.model import Model
 
 
@@ -37,11 +36,10 @@ def with_short_waves(
     names = {one.effect.name for one in listed if "period" in one.starts[0]}
     if not names:
         return list(listed)
-    bare = invertible(model, bands[0].joints) if bands else model
     wider = [
         one
         for band in bands
-        for one in candidates(model, band, band.evaluate(bare, bare.theta)[0], sorted(names), simulated=True)
+        for one in candidates(model, band, band.evaluate(model, model.theta)[0], sorted(names), either_side=True)
     ]
     return [_joined(candidate, [one for one in wider if one.key == candidate.key]) for candidate in listed]
 

@@ -26,7 +26,7 @@ def with_usual_friction(
     structure, usual = look.fitted.structure, [name for name in names if EFFECTS[name].usual == "friction"]
     model = structure.repaired
     residual, _ = data.evaluate(model, model.theta)
-    listed = [started(one, model, sizes) for one in candidates(model, data, residual, usual, simulated=True)]
+    listed = [started(one, model, sizes) for one in candidates(model, data, residual, usual, either_side=True)]
     if not 1 < len(listed) <= most:
         return None
     for candidate in listed:

@@ -65,6 +65,7 @@ impl Guide<'_> {
             joints: (0..description.n_joints()).filter(|joint| !self.passive.contains(joint)).collect(),
             gauges: gains.filter(|&(gauge, gain)| *gain > 0.0 && bends(gauge)).map(|(gauge, _)| gauge).collect(),
             drives: self.drives.is_some(),
+            memories: description.remembering().count(),
         }
     }
 }

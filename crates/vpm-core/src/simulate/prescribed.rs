@@ -1,7 +1,6 @@
 //! Joints that follow a given motion, and what answers to it: beams, and joints that nobody drives.
 
 use super::guide::Guide;
-use super::names::site;
 use super::{Run, Setting, check_structure};
 use crate::error::{Error, Result};
 use crate::motion::{JointMotion, StrainRates};
@@ -45,9 +44,6 @@ pub fn observed(
     }
     if !departure.is_empty() {
         Table::vector("departure", departure, 2 * setting.description.n_coordinates(), "coordinate and rate")?;
-    }
-    if let Some(seat) = setting.description.remembering().next() {
-        return Err(Error::Memory { site: site(setting.description, seat) });
     }
     let mut passive = passive.to_vec();
     passive.sort_unstable();

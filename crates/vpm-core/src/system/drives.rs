@@ -64,8 +64,13 @@ impl<S: Scalar> Dynamics<S> {
         let (q, v) = x[..2 * self.coordinates()].split_at(self.coordinates());
         self.locate(q, v);
         self.actuate(x, dxdt);
-        let first = self.first_memory();
-        self.memories.rates(&x[first..], v, &mut dxdt[first..]);
+        self.remember(x, dxdt);
+    }
+
+    /// Rates of the memories at state `x`, written into `dxdt`; the memories are held.
+    pub(super) fn remember(&mut self, x: &[S], dxdt: &mut [S]) {
+        let (n, first) = (self.coordinates(), self.first_memory());
+        self.memories.rates(&x[first..], &x[n..2 * n], &mut dxdt[first..]);
     }
 
     /// Holds input `number` of the drives, see [`super::System::input`].

@@ -15,8 +15,8 @@ use crate::scalar::Scalar;
 /// Size of a coordinate, rad or m, that a step control counts as small; rates have 1.
 const COORDINATE_SCALE: f64 = 1e-2;
 
-/// What answers to the motion of some joints, see [`Guided`], as an [`Ode`] in numbers `S`: free coordinates, their rates, states of drives
-/// and supplies, time since the last sample.
+/// What answers to the motion of some joints, see [`Guided`], as an [`Ode`] in numbers `S`: free coordinates, their rates, states of drives,
+/// supplies and memories, time since the last sample.
 ///
 /// Plain numbers go through the laws themselves, or through machine code where it pays. Numbers with derivatives, and exact derivatives of
 /// the rates, go through the recorded functions.
@@ -118,13 +118,14 @@ impl<S: Scalar> Following<S> {
 
     /// Index of a state of the following machine in the whole machine; the time has none.
     pub(crate) fn place(&self, state: usize) -> usize {
-        let (n, count) = (self.laws.dynamics.coordinates(), self.free().len());
+        let (n, count, dim) = (self.laws.dynamics.coordinates(), self.free().len(), self.laws.dynamics.dim());
+        let last = self.laws.rates.len() - 1;
         let place = match state.checked_sub(2 * count) {
-            Some(internal) => 2 * n + internal,
+            Some(_) => dim + state - last,
             None if state < count => self.free()[state],
             None => n + self.free()[state - count],
         };
-        place.min(self.laws.dynamics.dim() - 1)
+        place.min(dim - 1)
     }
 
     /// Holds command `number` of a following machine over the interval from sample `k`.

@@ -16,8 +16,10 @@ pub struct Guidance {
     pub joints: Vec<usize>,
     /// Gauges that hold their beams.
     pub gauges: Vec<usize>,
-    /// Whether drives, supplies and memories answer, to their inputs too; otherwise they do nothing.
+    /// Whether drives and supplies answer, to their inputs too; otherwise they do nothing.
     pub drives: bool,
+    /// Number of effects that remember. Their memories always answer.
+    pub memories: usize,
 }
 
 /// What a program of such a machine gives.
@@ -48,11 +50,16 @@ impl Guidance {
         1 + 6 * self.joints.len()
     }
 
+    /// Number of a guided machine's states beside its motion, of `all` that the whole machine has.
+    fn internal(&self, all: usize) -> usize {
+        if self.drives { all } else { self.memories }
+    }
+
     /// Places of the inputs of a guided machine's programs. Free coordinates and their rates come first, then states of
-    /// drives, time since the sample before, inputs of the machine, given values and parameters.
+    /// drives and memories, time since the sample before, inputs of the machine, given values and parameters.
     pub(super) fn places(&self, machine: Places) -> Places {
         let coordinates = machine.coordinates - self.joints.len();
-        let internal = if self.drives { machine.states - 2 * machine.coordinates } else { 0 };
+        let internal = self.internal(machine.states - 2 * machine.coordinates);
         Places { coordinates, states: 2 * coordinates + internal + 1, inputs: machine.inputs + self.given(), ..machine }
     }
 }
@@ -71,7 +78,7 @@ struct Hold<S> {
 /// The equations of what answers, with its buffers.
 ///
 /// Law: `M_ff a_f = (effects - bias - K q - D v)_f - M_fj a_j` and `ds/dt = f(s, q, v, u)`, j the joints that follow, f the free coordinates
-/// and s the states of drives and supplies.
+/// and s the states of drives, supplies and memories.
 #[derive(Clone, Debug)]
 pub(crate) struct Guided<S> {
     pub(super) dynamics: Dynamics<S>,
@@ -104,7 +111,7 @@ impl<S: Scalar> Guided<S> {
         let strips = guidance.gauges.iter().map(|&gauge| &dynamics.model.gauges()[gauge]);
         let hold = |strip: &Strip| Hold { first: strip.first, row: strip.row(), strain: [S::zero(); 3] };
         let (zeros, count) = (|count: usize| vec![S::zero(); count], free.len());
-        let internal = if guidance.drives { dim - 2 * n } else { 0 };
+        let internal = guidance.internal(dim - 2 * n);
         Self {
             guidance: guidance.clone(),
             holds: strips.map(hold).collect(),
@@ -136,7 +143,7 @@ impl<S: Scalar> Guided<S> {
 
     /// Whether [`Guided::stiff`] suffices for an implicit step of a guided machine.
     pub(super) fn is_stiff_by_beams_alone(&self) -> bool {
-        !self.guidance.drives && self.dynamics.connections.is_free()
+        !self.guidance.drives && self.guidance.memories == 0 && self.dynamics.connections.is_free()
     }
 
     /// Evaluates the rates of a guided machine at `y`.
@@ -184,9 +191,13 @@ impl<S: Scalar> Guided<S> {
         for (k, &place) in free.iter().enumerate() {
             (x[place], x[n + place], rate[n + place]) = (y[k], y[count + k], S::zero());
         }
+        let internal = &y[2 * count..y.len() - 1];
+        let first = x.len() - internal.len();
+        x[first..].copy_from_slice(internal);
         if guidance.drives {
-            x[2 * n..].copy_from_slice(&y[2 * count..y.len() - 1]);
             dynamics.drive(x, rate);
+        } else {
+            dynamics.remember(x, rate);
         }
     }
 
@@ -225,8 +236,8 @@ impl<S: Scalar> Guided<S> {
         for (k, &place) in free.iter().enumerate() {
             (rates[k], rates[count + k]) = (x[n + place], rate[n + place]);
         }
-        let internal = last - 2 * count;
-        rates[2 * count..last].copy_from_slice(&rate[2 * n..2 * n + internal]);
+        let first = rate.len() - (last - 2 * count);
+        rates[2 * count..last].copy_from_slice(&rate[first..]);
         rates[last] = S::one();
     }
 

@@ -95,10 +95,14 @@ impl<S: Scalar> Dynamics<S> {
         self.drive_scales(internal);
     }
 
-    /// Natural sizes of the states of drives and supplies, in SI units.
+    /// Natural sizes of the last states of drives, supplies and memories, in SI units.
     pub(crate) fn drive_scales(&self, scales: &mut [f64]) {
+        let mut others = self.dim() - 2 * self.coordinates() - scales.len();
         let mut scales = scales.iter_mut();
-        self.drive_sizes(|[size, _]| scales.next().into_iter().for_each(|scale| *scale = size));
+        self.drive_sizes(|[size, _]| match others.checked_sub(1) {
+            Some(left) => others = left,
+            None => scales.next().into_iter().for_each(|scale| *scale = size),
+        });
     }
 
     /// State of a drive, supply or memory that is out of reach in `states`, and the limit of its law. It may be no more

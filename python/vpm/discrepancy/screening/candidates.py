@@ -114,7 +114,7 @@ def candidates(
     residual: Array,
     effects: Sequence[str] | None = None,
     *,
-    simulated: bool = False,
+    either_side: bool = False,
 ) -> tuple[Candidate, ...]:
     """List the candidates: all effects that could be missing from ``model``, at each site.
 
@@ -122,21 +122,18 @@ def candidates(
     - ``data``: gives speeds, travel and commands for the start values
     - ``residual``: residual of ``model`` on ``data``; periods of a ripple are read from it
     - ``effects``: restrict the search to these; to those that a diagnosis tries if not given
-    - ``simulated``: whether motion that no channel measures is simulated with the memories of effects. Then both
-      sides of a joint that is split may have the same effect, each its own
+    - ``either_side``: whether both sides of a joint that is split may have the same effect, each its own
     """
     return tuple(
         _candidate(effect, site, model, data, residual)
-        for effect, site in _absent(model, effects, either_side=simulated)
-        if not beyond(effect, site, model, data.joints, simulated=simulated)
+        for effect, site in _absent(model, effects, either_side=either_side)
+        if not beyond(effect, site, model)
     )
 
 
-def left_out(model: Model, data: InverseDynamicsProblem, effects: Sequence[str] | None = None) -> dict[Key, str]:
+def left_out(model: Model, effects: Sequence[str] | None = None) -> dict[Key, str]:
     """Reasons why some effects are not among the `candidates` of ``model``."""
-    reasons = {
-        (effect.name, site): beyond(effect, site, model, data.joints) for effect, site in _absent(model, effects)
-    }
+    reasons = {(effect.name, site): beyond(effect, site, model) for effect, site in _absent(model, effects)}
     return {key: reason for key, reason in reasons.items() if reason}
 
 

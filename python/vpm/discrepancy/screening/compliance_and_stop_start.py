@@ -32,7 +32,6 @@ from vpm.discrepancy.settings import (
 )
 from vpm.experiment.signal import differentiate
 from vpm.identify import InverseDynamicsProblem
-from vpm.identify.response_along_motion import has_own_drives
 from vpm.model import Model
 from vpm.model.splitting import name_behind
 from vpm.numbers import Array
@@ -70,24 +69,10 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
     return sites
 
 
-def beyond(effect: EffectType, site: str, model: Model, measured: Sequence[str], *, simulated: bool = False) -> str:
-    """Why a model with one more compliance or effect cannot be built or computed along the ``measured`` joints.
-
-    A motion with joints that no channel measures is integrated, and there effects with a memory are refused. They work
-    on the motor side of a split joint where that is measured, see `vpm.identify.parts.bending`, and where all is
-    ``simulated``.
-    """
-    remembering = [f"{entry.type.title} at {entry.at}" for entry in model.effects if entry.type.memory]
-    split_off = {model.joint_behind(entry.at) for entry in model.effects if entry.type.splits}
-    alone = tuple(joint for joint in model.joints if joint not in split_off) == tuple(measured)
-    lone = alone and not has_own_drives(model) and not any(entry.type.rotor for entry in model.effects)
-    known = simulated or lone
-    if effect.memory and tuple(model.joints) != tuple(measured) and not known:
-        return "its memory cannot be balanced beside joints in this model that no channel measures"
+def beyond(effect: EffectType, site: str, model: Model) -> str:
+    """Why a model with one more compliance cannot be built."""
     if not effect.motion:
         return ""
-    if remembering and not (known and effect.splits):
-        return f"a joint that no channel measures cannot be balanced beside the memory of the {remembering[0]}"
     split = [(entry.name, entry.at) for entry in model.effects if entry.type.motion]
     whole = model
     for key in split:

@@ -94,7 +94,7 @@ class Round:
         current, data, effects = self.current, self.data, self.request.effects
         self._promising = []
         found = candidates(current.model, data.training, current.fit.residual, effects)
-        self.refused.update(left_out(current.model, data.training, effects))
+        self.refused.update(left_out(current.model, effects))
         listed = [c for c in found if c.key not in without and self._is_heavy(c) == heavy]
         self.tell(f"round {self.number}: screening {len(listed)} candidates")
         screen = partial(probe, prepare(current.baseline, data.training, listed), data.training)

@@ -21,6 +21,11 @@ const PLAY: usize = 1;
 
 /// A driven joint, a joint that is the play of its gear, a beam, and a hand that a spring holds.
 fn geared(gap: f64) -> Description {
+    remembering(gap, &[])
+}
+
+/// The same with a hysteresis of some joints, each with its force.
+fn remembering(gap: f64, forces: &[(usize, f64)]) -> Description {
     let random = &mut Random::new(5);
     let mut parts: Parts<f64> = Parts { gravity: [0.0, 0.0, -9.81], ..Parts::default() };
     for (name, on) in [("gear", Mount::World), ("hub", Mount::Body(0))] {
@@ -45,6 +50,13 @@ fn geared(gap: f64) -> Description {
         push(content, "effects", entry);
         let [stiffness, rest] = [("spring", 30.0), ("rest", 0.1)].map(|(name, value)| parameter(content, name, value));
         push(content, "effects", json!({"type": "spring", "joint": 2, "stiffness": stiffness, "rest": rest}));
+        for &(joint, force) in forces {
+            let [force, way, shape] = [("force", force), ("way", 0.05), ("shape", 0.8)]
+                .map(|(name, value)| parameter(content, &format!("{name} {joint}"), value));
+            let entry =
+                json!({"type": "hysteresis", "joint": joint, "force": force, "displacement": way, "shape": shape});
+            push(content, "effects", entry);
+        }
     })
 }
 
@@ -87,6 +99,30 @@ fn passive_joints_move_as_in_the_free_machine() -> Result<()> {
     let play: Vec<f64> = run.states.chunks(d.n_states()).map(|state| state[PLAY]).collect();
     let span = play.iter().fold(0.0_f64, |most, q| most.max((q - play[0]).abs()));
     assert!(span > 0.01, "the play must be crossed: {span} rad");
+    Ok(())
+}
+
+#[test]
+fn memories_go_along_as_in_the_free_machine() -> Result<()> {
+    // One joint that follows and one that does not remember their way; a third one does not.
+    let d = remembering(0.02, &[(0, 0.6), (2, 0.3)]);
+    let stepping = Stepping::new(0.002, 4, Method::Rosenbrock)?;
+    let setting = Setting { description: &d, theta: &d.parameters, stepping, sensitivities: &[], interrupt: &|| false };
+    let mut start = guided(&d, stepping, &[vec![0.3, 0.0, 0.0], vec![0.0; 3], vec![0.0; 3]], &[PLAY, 2], &[])?.states;
+    start[d.n_coordinates()] = 4.0;
+    let run = free_run(setting, &start, Table::new("inputs", &[], 401, 0)?)?;
+    let column = |offset: usize| -> Vec<f64> {
+        run.outputs.chunks(d.n_outputs()).flat_map(|row| [row[offset], 7.0, -3.0]).collect()
+    };
+    let followed = guided(&d, stepping, &[column(0), column(1), column(2)], &[2, PLAY], &[])?;
+    let state = followed.states.iter().zip(&run.states).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+    let effort = followed.outputs.chunks(d.n_outputs()).fold(0.0_f64, |most, row| most.max(row[3].abs()));
+    assert!(state < 2e-3 && effort < 2e-2, "state {state}, effort {effort} N m");
+    let memories: Vec<&[f64]> = followed.states.chunks(d.n_states()).map(|state| &state[d.n_states() - 2..]).collect();
+    for k in 0..2 {
+        let most = memories.iter().fold(0.0_f64, |most, values| most.max(values[k].abs()));
+        assert!(most > 0.1, "memory {k} must matter: {most}");
+    }
     Ok(())
 }
 
