@@ -15,7 +15,7 @@ from vpm.numbers import Array
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.noise_model import NoiseModel, Parts, white_noise
 from vpm.ranking.posterior import log_volume
-from vpm.ranking.settings import FAINT, NEARER, RETREAT, Settings
+from vpm.ranking.settings import FAINT, NEARER, RETREAT, TRIALS, TRIALS_BY_SECANTS, Settings
 from vpm.ranking.tracked_records import NOTHING, By, TrackedRecords, Tracker
 
 #: Residuals and derivatives that no record has; their squares are still numbers.
@@ -124,7 +124,8 @@ class Fitter:
             move, gain = self._step(now.structure, view, errors, slopes)
             hopeful = before - self.settings.patience * gain <= goal
             worth = hopeful and gain >= self.settings.tolerance
-            better = self._better(now, view.noise, (move, errors, slopes @ move), before) if worth else None
+            step, trials = (move, errors, slopes @ move), TRIALS if fresh else TRIALS_BY_SECANTS
+            better = self._better(now, view.noise, step, before, trials) if worth else None
             slow = better is None or before - better[2] < self.settings.tolerance
             if better is not None:
                 move = better[0].standard - now.structure.standard
@@ -211,27 +212,31 @@ class Fitter:
         return move, gain + 0.5 * (float(z @ z) - float((z + move) @ (z + move)))
 
     def _better(
-        self, now: Followed, noise: NoiseModel, step: tuple[Array, Array, Array], before: float
+        self, now: Followed, noise: NoiseModel, step: tuple[Array, Array, Array], before: float, trials: int
     ) -> tuple[Structure, Array, float] | None:
         """Whole step, or its best share, if that improves the fit, with residual and cost; it needs no derivatives.
 
         Along a step errors are a parabola, given by their values and slope where it begins and by their values at its
-        end. Where the model runs away from the records there, a small share of the step is tried.
+        end. Where no parabola is true so far away, the next one ends where the last one was best. Where the model runs
+        away from the records, a small share of the step is tried.
         """
         move, errors, along = step
         share = 1.0
-        for _ in range(2):
+        for _ in range(trials):
             tried = now.structure.moved(share * move)
             try:
                 residual, _ = self._pass(tried, now.tracker)
             except ASTRAY:
-                share = RETREAT
+                share *= RETREAT
                 continue
             after = self.cost(tried, residual, noise)
             if after < before:
                 return tried, residual, after
-            bent = noise.whitened(residual, self.tracked.parts) - errors - along
-            share = min(NEARER, key=lambda part: noise.cost(errors + part * along + part**2 * bent))
+            bent = (noise.whitened(residual, self.tracked.parts) - errors - share * along) / share**2
+            costs = [(noise.cost(errors + part * along + part**2 * bent), part) for part in share * NEARER]
+            least, share = min(costs)
+            if noise.cost(errors) - least < self.settings.tolerance:
+                break
         return None
 
     def _pass(self, structure: Structure, tracker: Tracker, by: By = NOTHING) -> tuple[Array, Array]:
