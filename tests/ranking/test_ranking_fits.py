@@ -493,8 +493,8 @@ def test_what_repeats_along_a_whole_fraction_of_a_period_is_an_overtone(period: 
     """One tone stands for what a motor cogs; its second and third harmonic are no ripple of the current."""
     cogging = Model.from_toml(SLEDGE).with_effect("torque_ripple", "way", period=0.4, cosine=1.0)
     both = structure_of(cogging.with_effect("current_ripple", "way", period=period, cosine=0.1))
-    assert both.is_overtone(("current_ripple", "way")) == overtone
-    assert not both.is_overtone(("viscous_friction", "way"))
+    assert both.is_overtone(("current_ripple", "way"), 20.0) == overtone
+    assert not both.is_overtone(("viscous_friction", "way"), 20.0)
     told = Judgement(0.9, 0.9, 9.0, 0.1, 0.1, 0.1, overtone=overtone)
     assert told.counts(Settings()) != overtone
     assert ("an overtone of that" in told.lacks(Settings())) == overtone

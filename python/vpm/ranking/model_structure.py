@@ -14,7 +14,7 @@ from vpm.discrepancy.screening.candidates import Key
 from vpm.identify.moments import rods
 from vpm.model import Effect, Model
 from vpm.numbers import Array
-from vpm.ranking.settings import MOVE, OVERTONE
+from vpm.ranking.settings import MOVE
 from vpm.weighing.priors import Prior
 
 
@@ -81,15 +81,17 @@ class Structure:
         values = {name: float(self.theta[self.model.index(name)]) for name in self.range_limited if name in own}
         return all(self.priors[name].low < value < self.priors[name].high for name, value in values.items())
 
-    def is_overtone(self, key: Key) -> bool:
+    def is_overtone(self, key: Key, way: float) -> bool:
         """Whether an effect's period in a structure is a whole fraction of another's at its place.
 
         A law that repeats along the way has one tone, and what it stands for has overtones: those are no other effect.
+        Waves are told apart that differ by one along the whole ``way`` (Lord Rayleigh, *Philosophical Magazine* 8,
+        1879).
         """
         own = self._period(self.model.effect(*key, self.side(key)))
         others = [self._period(one) for one in self.model.effects if one.at == key[1] and one.name != key[0]]
-        ratios = [other / own for other in others if own and other]
-        return any(round(ratio) > 1 and abs(ratio / round(ratio) - 1.0) < OVERTONE for ratio in ratios)
+        tones = [(other / own, way / other) for other in others if own and other]
+        return any(round(ratio) > 1 and abs(ratio - round(ratio)) * waves < 1.0 for ratio, waves in tones)
 
     def _period(self, effect: Effect) -> float:
         """Period of an effect in a structure; zero without one."""

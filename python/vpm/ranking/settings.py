@@ -58,9 +58,6 @@ DELAY = 5e-3
 
 # ---- what is another effect --------------------------------------------------------------------------------------
 
-#: Share by which periods may be off that are found in whole fractions of each other: one wave in fifty, which few
-#: ways are long enough to tell.
-OVERTONE = 0.02
 #: Factor between neighbouring shapes of a law whose shape is free: closer ones are nearly one, wider ones leave gaps.
 OCTAVE = 2.0
 

@@ -98,6 +98,13 @@ class TrackedRecords:
         #: Samples that are fitted, and those that are held back.
         self.parts, self.held_back = _divided(self._stretches, PARTS - 1)
 
+    def way(self, site: str) -> float:
+        """Way along which a joint moves in all tracked records; infinite where no channel shows it."""
+        channels, name = self.records[0].channels, f"{site}.position"
+        if name not in channels:
+            return np.inf
+        return float(np.ptp(np.concatenate([record.readings[:, channels.index(name)] for record in self.records])))
+
     def with_hold(self, hold: str) -> TrackedRecords:
         """Tracked records with another hold of commands between samples."""
         if hold == self.setup.course:
