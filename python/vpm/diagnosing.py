@@ -25,7 +25,7 @@ from vpm.discrepancy.noise.sensor_drift import Drift, sensor_drifts, without_dri
 from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
 from vpm.discrepancy.preparation import Records, data_of, nominal_of, recalibrated_of, records_of
 from vpm.discrepancy.provenance import own_settings, provenance
-from vpm.discrepancy.ranked_effects import tracker_gaps
+from vpm.discrepancy.ranked_effects import NoResidualError, tracker_gaps
 from vpm.discrepancy.remainder.empirical_formula import beside
 from vpm.discrepancy.remainder.remainder import Remainder, remainder
 from vpm.discrepancy.rivals.ambiguity import Rivals
@@ -293,19 +293,19 @@ def _measured(job: _Job, ranking: Ranking | None) -> Diagnosis | list[Drift]:
         notes.append(FOUND_HOLD.format(hold=ranking.hold))
         job = replace(job, setup=replace(job.setup, hold=ranking.hold))
     if ranking is not None and (reason := why_unbalanced(model, training)):
-        request.tell("measuring what was named on validation records")
-        notes.extend([] if job.cutoff is None else [UNFILTERED])
-        asked = request.effects, request.limit
-        told = diagnosed_by_tracker(ranking, model, job.records, asked, job.setup, reason)
-        more = ranked_notes(ranking, told.refused, told.interrupted)
-        return replace(told, notes=(*told.notes, *more))
+        return _measured_by_tracker(job, ranking, reason)
     data = data_of(model, training, validation, job.mode, job.cutoff, job.setup, notes)
     request.tell("comparing the nominal model with the data")
     nominal = nominal_of(model, data, notes)
     request.tell("recalibrating the nominal parameters")
     start = None if ranking is None else ranking.recalibrated
     recalibrated = recalibrated_of(model, data, notes, request.each, start)
-    found, ambiguous, late = named(ranking, recalibrated, data, request, notes)
+    try:
+        found, ambiguous, late = named(ranking, recalibrated, data, request, notes)
+    except NoResidualError as error:
+        if ranking is None:
+            raise
+        return _measured_by_tracker(job, ranking, str(error))
     known = _Known(job, data, nominal, recalibrated, ranking, ambiguous, late)
     bare = partial(of_search, model, job.records, recalibrated, found, (data.training, data.validation), ambiguous)
     try:
@@ -317,6 +317,15 @@ def _measured(job: _Job, ranking: Ranking | None) -> Diagnosis | list[Drift]:
         notes.append(STOPPED_UNJUDGED)
         gap = gaps_of(data, nominal, recalibrated, found.final, {})
         return replace(bare(), verdict="effect_found" if found.accepted else "interrupted", gap=gap, interrupted=True)
+
+
+def _measured_by_tracker(job: _Job, ranking: Ranking, reason: str) -> Diagnosis:
+    """Diagnosis from a ranking, measured by its tracker for a ``reason`` why there is no inverse-dynamics residual."""
+    job.request.tell("measuring what was named on validation records")
+    job.records[-1].extend([] if job.cutoff is None else [UNFILTERED])
+    asked = job.request.effects, job.request.limit
+    told = diagnosed_by_tracker(ranking, job.model, job.records, asked, job.setup, reason)
+    return replace(told, notes=(*told.notes, *ranked_notes(ranking, told.refused, told.interrupted)))
 
 
 @dataclass(frozen=True)

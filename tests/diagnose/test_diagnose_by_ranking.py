@@ -12,7 +12,6 @@ import two_link_arm
 import vpm
 from hopper import HOPPER
 from places import EXAMPLES
-from second_suite.cases import make_case
 from sledge import MASS, SLEDGE, swung
 from synthetic import Truth, nominal, simulate_axis
 from vpm import naming
@@ -208,19 +207,20 @@ def test_where_a_ranking_fails_a_search_names(monkeypatch: pytest.MonkeyPatch, r
     assert "runs away" in note
 
 
-def test_a_name_that_no_balance_can_carry_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A load that nobody measures hangs on a lift: no balance follows the memory of a friction that warms up."""
-    case = make_case("hoist", "none", 3)
-    model = case.model()
-    warm = model.with_effect("warming_friction", "lift", time_constant=3.0)
-    values = {
-        name: warm.parameters[name].value for name in warm.effect("warming_friction", "lift").parameter_names.values()
-    }
-    one = replace(tried("warming_friction", values, 0.9, evidence=900.0, probability=0.99), site="lift")
-    monkeypatch.setattr(naming, "rank", lambda *_, **__: Ranking((one,), ((one,),), warm, model))
-    why = diagnose(model, case.train, case.holdout, names="ranking", workers=1)
-    (told,) = [note for note in why.notes if note.startswith("the ranking names warming_friction at lift")]
-    assert "no residual can be computed" in told
+def test_a_name_without_inverse_dynamics_is_measured_by_its_tracker(
+    monkeypatch: pytest.MonkeyPatch, records: list[Experiment]
+) -> None:
+    """What a ranking found is not lost where no residual can be computed with it."""
+
+    def lost(*_: object) -> None:
+        raise VpmError("the efforts run away")
+
+    monkeypatch.setattr(ranked_effects, "_beside", lost)
+    why = diagnose(nominal(), records[0], records[1], names="ranking", workers=1)
+    assert why.verdict == "effect_found"
+    assert {effect.name for effect in why.effects} == {"coulomb_friction", "bias_force"}
+    assert all("(observed)" in channel for channel in why.gap)
+    assert any("the efforts run away: all is measured by what an observer" in note for note in why.notes)
 
 
 def test_machines_that_a_ranking_does_not_cover_say_why() -> None:

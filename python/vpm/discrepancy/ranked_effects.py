@@ -59,6 +59,10 @@ def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
     return f"records hold {held[0]}" if held else ""
 
 
+class NoResidualError(VpmError):
+    """Ranked effect with which no inverse-dynamics residual can be computed: only a tracker measures it."""
+
+
 def free_joints(model: Model) -> tuple[str, ...]:
     """Joints without a drive: only the tracker of a ranking measures effects there, no inverse-dynamics residual."""
     return tuple(name for name in model.joints if name not in {*model.driven_joints, *model.added_joints})
@@ -95,6 +99,8 @@ def searched(
     - ``settings``: of the ranking
 
     Ctrl-C gives the effects that were refitted until then; before the first one was, it raises.
+
+    Raises NoResidualError: no efforts can be computed with an effect that was ranked.
     """
     known: tuple[Rivals, ...] = ()
 
@@ -102,7 +108,10 @@ def searched(
         return candidates(final.model, data.training, final.fit.residual, asked_for(effects), either_side=True)
 
     def beside(current: Judged, model: Model, one: Ranked) -> Trial:
-        return _beside(current, model, one, data)
+        try:
+            return _beside(current, model, one, data)
+        except VpmError as error:
+            raise NoResidualError(str(error)) from error
 
     found = staged(ranking, recalibrated, beside, offered, settings)
     try:
@@ -137,6 +146,8 @@ def staged(
             gone = [other for other in ranking.effects if other.key in outside] + list(ranking.effects[place + 1 :])
             try:
                 trial = beside(stages[-1].judged, _without(ranking.model, gone), one)
+            except NoResidualError:
+                raise
             except VpmError as error:
                 outside[one.key] = f"it {_removes(one)}, but no residual can be computed: {error}"
                 continue
