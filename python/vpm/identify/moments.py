@@ -62,10 +62,10 @@ def real_bodies(model: Model, free: Sequence[str], low: Array, high: Array) -> t
       products of inertia beside them, stay coordinates.
     """
     matrix, low, high = np.eye(len(free)), low.copy(), high.copy()
-    for body in dict.fromkeys(name.rpartition(".inertia.")[0] for name in free if ".inertia." in name):
-        mine = [k for k, name in enumerate(free) if name in {f"{body}.inertia.{axis}" for axis in AXES}]
-        products = [f"{body}.inertia.{pair}" for pair in PAIRS]
-        if any(name in free or model.parameters[name].value != 0.0 for name in products):
+    for names in free_moments(model, free):
+        mine = [free.index(name) for name in names]
+        if ends := beside_known(model, names):
+            low[mine], high[mine] = np.maximum(low[mine], ends[0]), np.minimum(high[mine], ends[1])
             continue
         if any(low[k] > 0.0 or np.isfinite(high[k]) for k in mine):
             continue
@@ -73,24 +73,52 @@ def real_bodies(model: Model, free: Sequence[str], low: Array, high: Array) -> t
             matrix[np.ix_(mine, mine)] = 1.0 - np.eye(3)
             low[mine], high[mine] = 0.0, np.inf
         elif len(mine) == 2:
-            known = next(n for a in AXES if (n := f"{body}.inertia.{a}") not in free)
-            third = model.parameters[known].value
+            third = next(model.parameters[name].value for name in moments_of(names[0]) if name not in free)
             matrix[np.ix_(mine, mine)] = [[0.5, 0.5], [0.5, -0.5]]
             low[mine], high[mine] = [third, -third], [np.inf, third]
     return Coordinates(None if np.array_equal(matrix, np.eye(len(free))) else matrix), low, high
 
 
-def rods(model: Model, free: Collection[str]) -> list[tuple[str, str]]:
-    """Pairs of free moments of slender rods: the third one is known and zero, so that both are equal."""
+def free_moments(model: Model, free: Collection[str]) -> list[list[str]]:
+    """Free moments of inertia of each body whose axes are its principal ones, and stay so."""
     found = []
     for body in dict.fromkeys(name.rpartition(".inertia.")[0] for name in free if ".inertia." in name):
-        moments = [f"{body}.inertia.{axis}" for axis in AXES]
-        mine, known = [n for n in moments if n in free], [n for n in moments if n not in free]
         products = [f"{body}.inertia.{pair}" for pair in PAIRS]
-        straight = not any(name in free or model.parameters[name].value != 0.0 for name in products)
-        if len(mine) == 2 and straight and model.parameters[known[0]].value == 0.0:
-            found.append((mine[0], mine[1]))
+        mine = [name for axis in AXES if (name := f"{body}.inertia.{axis}") in free]
+        if mine and not any(name in free or model.parameters[name].value != 0.0 for name in products):
+            found.append(mine)
     return found
+
+
+def beside_known(model: Model, names: Sequence[str]) -> tuple[float, float] | None:
+    """Ends of the one free moment of inertia of a body beside two that are known; none where they leave no room."""
+    known = [model.parameters[name].value for name in moments_of(names[0]) if name not in names]
+    if len(known) != 2 or min(known) <= 0.0:
+        return None
+    return abs(known[0] - known[1]), known[0] + known[1]
+
+
+def moments_of(moment: str) -> list[str]:
+    """All three moments of inertia of a body, from the name of one."""
+    body = moment.rpartition(".inertia.")[0]
+    return [f"{body}.inertia.{axis}" for axis in AXES]
+
+
+def to_the_border(before: Array, after: Array) -> Array:
+    """Moments of inertia (3,) on the way from those of a real body to others, as far as a body can have them."""
+    room, left = (np.sum(moments) - 2.0 * moments for moments in (before, after))
+    shares = [r / (r - gone) for r, gone in zip(np.maximum(room, 0.0), left, strict=True) if gone < 0.0]
+    return np.asarray(before + min(shares, default=1.0) * (after - before))
+
+
+def rods(model: Model, free: Collection[str]) -> list[tuple[str, str]]:
+    """Pairs of free moments of slender rods: the third one is known and zero, so that both are equal."""
+
+    def third(pair: Sequence[str]) -> float:
+        return next(model.parameters[name].value for name in moments_of(pair[0]) if name not in pair)
+
+    pairs = [mine for mine in free_moments(model, free) if len(mine) == 2]
+    return [(one, other) for one, other in pairs if third((one, other)) == 0.0]
 
 
 def on_the_border(model: Model, free: Sequence[str]) -> list[tuple[list[str], str]]:

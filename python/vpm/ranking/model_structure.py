@@ -11,7 +11,7 @@ import numpy as np
 
 from vpm.catalogue.kinds import ANY, Side
 from vpm.discrepancy.screening.candidates import Key
-from vpm.identify.moments import rods
+from vpm.identify.moments import free_moments, moments_of, rods, to_the_border
 from vpm.model import Effect, Model
 from vpm.numbers import Array
 from vpm.ranking.settings import MOVE
@@ -120,6 +120,11 @@ class Structure:
         pairs = zip(self.priors.values(), self.columns, strict=True)
         return np.array([prior.slope(float(self.theta[column])) for prior, column in pairs])
 
+    def is_far(self, most: float) -> bool:
+        """Whether a structure without effects lies more than so many deviations from what its model file states."""
+        stated = [place for place, name in enumerate(self.priors) if name in self.model.adjustable]
+        return not self.effects and bool(np.any(np.abs(self.standard[stated]) > most))
+
     def moves(self, names: Sequence[str]) -> Array:
         """Step of each parameter of a structure for a difference quotient (len(names),)."""
         slopes = dict(zip(self.priors, np.abs(self.slopes), strict=True))
@@ -148,7 +153,14 @@ class Structure:
             theta[column] = prior.value(float(z))
         for pair in self._rods:
             theta[pair] = float(np.mean(theta[pair]))
+        for moments in self._moments:
+            theta[moments] = to_the_border(self.theta[moments], theta[moments])
         return replace(self, theta=theta)
+
+    @cached_property
+    def _moments(self) -> list[list[int]]:
+        """Places of all three moments of inertia in a structure, of each body of which some are unknown."""
+        return [[self.place(one) for one in moments_of(names[0])] for names in free_moments(self.model, self.priors)]
 
     @cached_property
     def _rods(self) -> list[list[int]]:

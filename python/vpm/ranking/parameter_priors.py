@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from vpm.catalogue import EffectParameter
@@ -10,6 +12,7 @@ from vpm.discrepancy.screening.candidates import Candidate, joint_at, shares_at,
 from vpm.discrepancy.settings import LEAST
 from vpm.discrepancy.stuck_channels import is_moving
 from vpm.identify import InverseDynamicsProblem
+from vpm.identify.moments import beside_known, free_moments
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.ranking.settings import DELAY
@@ -95,12 +98,17 @@ def _strength(values: Array) -> float:
 
 
 def stated(model: Model) -> dict[str, Prior]:
-    """Priors of a model's parameters as its file states them."""
-    return {
+    """Priors of a model's parameters as its file states them, and within what bodies can have."""
+    found = {
         p.name: Prior(p.value, p.uncertainty, p.minimum, p.maximum)
         for p in model.parameters.values()
         if p.adjustable and p.uncertainty and np.isfinite(p.uncertainty)
     }
+    for names in free_moments(model, found):
+        if ends := beside_known(model, names):
+            one = found[names[0]]
+            found[names[0]] = replace(one, low=max(one.low, ends[0]), high=min(one.high, ends[1]))
+    return found
 
 
 def known(model: Model, data: InverseDynamicsProblem, tracked: TrackedRecords) -> dict[str, Prior]:

@@ -1,0 +1,47 @@
+"""Moments of inertia that a real body can have."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from vpm import Model
+from vpm.identify.moments import beside_known, free_moments, real_bodies, to_the_border
+
+BODY = """
+name = "arm"
+gravity = [0, 0, -9.81]
+bodies.arm.mass = 1.0
+bodies.arm.inertia = [%s, %s, %s, 0.0, 0.0, 0.0]
+joints.hinge = { type = "revolute", parent = "world", child = "arm", axis = [0, 0, 1] }
+"""
+SIZES = st.tuples(*[st.floats(1e-3, 10.0)] * 3)
+
+
+def of_points(sizes: tuple[float, float, float]) -> np.ndarray:
+    """Moments (3,) of a body from its second moments of mass along the axes, which are positive and nothing else."""
+    return np.asarray(np.sum(sizes) - np.array(sizes))
+
+
+@given(SIZES, SIZES, st.floats(0.0, 10.0))
+def test_moments_go_as_far_as_a_body_can_have_them(first: tuple[float, float, float], way: object, far: float) -> None:
+    before = of_points(first)
+    after = before + far * (np.array(way) - 3.0)
+    there = to_the_border(before, after)
+    room = np.sum(there) - 2.0 * there
+    assert np.all(room > -1e-9 * np.sum(before))
+    if np.all(np.sum(after) - 2.0 * after >= 0.0):
+        assert there == pytest.approx(after)
+    else:
+        assert np.min(room) == pytest.approx(0.0, abs=1e-9 * np.sum(np.abs(after) + before))
+
+
+def test_one_free_moment_lies_between_difference_and_sum_of_the_others() -> None:
+    free = "{ value = 0.25, uncertainty = 0.1 }"
+    model = Model.from_toml(BODY % (0.1, free, 0.2))
+    (names,) = free_moments(model, model.adjustable)
+    assert beside_known(model, names) == pytest.approx((0.1, 0.3))
+    _, low, high = real_bodies(model, names, np.zeros(1), np.full(1, np.inf))
+    assert (low[0], high[0]) == pytest.approx((0.1, 0.3))
+    several = Model.from_toml(BODY % (free, free, 0.2))
+    assert beside_known(several, *free_moments(several, several.adjustable)) is None
