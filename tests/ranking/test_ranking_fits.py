@@ -486,6 +486,24 @@ def test_fits_under_the_next_tracker_begin_where_the_first_one_ended(monkeypatch
     assert then == pytest.approx(MASS, rel=0.02)
 
 
+@pytest.mark.parametrize(("share", "begins"), [(0.5, [MASS, 3.3]), (2.0, [MASS])])
+def test_fits_begin_at_the_file_where_nothing_counts_from_afar(
+    monkeypatch: pytest.MonkeyPatch, share: float, begins: list[float]
+) -> None:
+    """Known parameters that stand in for what is missing need not lead back to the machine."""
+    model, begun = Model.from_toml(SLEDGE), list[float]()
+
+    def nothing(_: Search, __: Look, start: Look) -> list[Any]:
+        begun.append(float(start.fitted.structure.theta[model.index("sledge.mass")]))
+        return []
+
+    monkeypatch.setattr(Search, "_tried", nothing)
+    monkeypatch.setattr(Look, "has_room", lambda *_: True)
+    gone = abs(MASS - 3.3) / float(model.parameters["sledge.mass"].uncertainty or 0.0)
+    vpm.rank(model, pushed(seed=1, duration=2.0), effects=["spring"], settings=Settings(reach=share * gone))
+    assert begun == pytest.approx(begins, rel=0.02)
+
+
 @pytest.mark.parametrize(
     ("period", "overtone"), [(0.2, True), (0.1333, True), (0.2 * 1.01, True), (0.4, False), (0.23, False), (0.8, False)]
 )

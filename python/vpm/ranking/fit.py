@@ -171,6 +171,18 @@ class Fitter:
                 return Followed(structure, tracker, tuple(names), residual, jacobian)
         return Followed(structure, tracker, tuple(names), *self._pass(structure, tracker, by))
 
+    def unfitted(self, structure: Structure, tracker: Tracker) -> Fitted:
+        """Structure as it is in the place of a fit.
+
+        Raises
+        ------
+        VpmError
+            The structure runs away from the records.
+        """
+        residual, _ = self._pass(structure, tracker)
+        cost = self.cost(structure, residual, white_noise(residual, self.tracked.parts))
+        return Fitted(structure, tracker, residual, cost)
+
     def noise_of(self, structure: Structure, tracker: Tracker) -> NoiseModel:
         """White noise model for the start of a fit: root mean square residual of each channel.
 
@@ -217,12 +229,12 @@ class Fitter:
         """Whole step, or its best share, if that improves the fit, with residual and cost; it needs no derivatives.
 
         Along a step errors are a parabola, given by their values and slope where it begins and by their values at its
-        end. Where no parabola is true so far away, the next one ends where the last one was best. Where the model runs
-        away from the records, a small share of the step is tried.
+        end. Where that is no parabola, the next one ends where the last one was best, if it then still promises a gain.
+        Where the model runs away from the records, a small share of the step is tried.
         """
         move, errors, along = step
         share = 1.0
-        for _ in range(trials):
+        for trial in range(trials):
             tried = now.structure.moved(share * move)
             try:
                 residual, _ = self._pass(tried, now.tracker)
@@ -235,7 +247,7 @@ class Fitter:
             bent = (noise.whitened(residual, self.tracked.parts) - errors - share * along) / share**2
             costs = [(noise.cost(errors + part * along + part**2 * bent), part) for part in share * NEARER]
             least, share = min(costs)
-            if noise.cost(errors) - least < self.settings.tolerance:
+            if trial and noise.cost(errors) - least < self.settings.tolerance:
                 break
         return None
 

@@ -226,11 +226,28 @@ class Search:
         return self.fitter.finished(self.fitter.fitted(structure, tracker, view), view)
 
     def _round(self, looks: Sequence[Look]) -> tuple[Trial | None, list[Trial]]:
-        """Round of the search: the best additional effect, if one counts, and all that were tried."""
+        """Round of the search: the best additional effect, if one counts, and all that were tried.
+
+        Where much is missing, known parameters go far astray to make up for it, and fits from there need not lead back.
+        Where nothing counts then, fits begin at what the model file states.
+        """
+        best, tried = self._best(looks, looks)
+        if best is not None or not looks[0].fitted.structure.is_far(self.settings.reach):
+            return best, tried
+        with contextlib.suppress(*ASTRAY):
+            stated = [self._look(self.fitter.unfitted(self.start, look.fitted.tracker)) for look in looks]
+            best, more = self._best(looks, stated)
+            tried = [*more, *tried]
+        return best, tried
+
+    def _best(self, looks: Sequence[Look], begun: Sequence[Look]) -> tuple[Trial | None, list[Trial]]:
+        """Best additional effect of a search by fits from what was ``begun`` under each tracker, and all tried ones."""
         tried: list[Trial] = []
         counting: list[Trial] = []
-        for look in (look for look in looks if look.has_room()):
-            seen = self._tried(look)
+        for look, start in zip(looks, begun, strict=True):
+            if not look.has_room():
+                continue
+            seen = self._tried(look, start)
             ends = [against_free_shapes(trial, self.fitter) for trial in self._finished(seen) if trial.counts]
             tried += [*(trial for trial in ends if not trial.counts), *seen]
             counting += [trial for trial in ends if trial.counts]
@@ -300,10 +317,10 @@ class Search:
         """Whether a weighed effect of the search counts and is more probable than chance."""
         return trial.counts and trial.evidence > self.settings.odds
 
-    def _tried(self, look: Look) -> list[Trial]:
-        """Most promising effects of a search round, fitted under one tracker."""
-        chosen = proposals(look, self.fitter, self.data, self.extensions, self.each, self.names, self.bands)
-        return [Trial.of(fitted, look, ended=False) for fitted in raced(chosen, look, self.fitter, self.each)]
+    def _tried(self, look: Look, begun: Look) -> list[Trial]:
+        """Most promising effects of a search round, fitted under one tracker from the structure that was ``begun``."""
+        chosen = proposals(begun, self.fitter, self.data, self.extensions, self.each, self.names, self.bands)
+        return [Trial.of(fitted, look, ended=False) for fitted in raced(chosen, begun, self.fitter, self.each)]
 
     def _finished(self, tried: Sequence[Trial]) -> list[Trial]:
         """Fits of one tracker in a search round that are worth it, finished to the end."""
