@@ -48,7 +48,7 @@ REGRESSIONS, QUIET = 3, 0.01
 #: before, and the one that is tried where the model runs away at its end.
 NEARER, RETREAT = 0.7 ** np.arange(1, 10), 0.08
 #: Shares of a step that are tried, and of one by secants, which may point elsewhere: new derivatives help more there.
-TRIALS, TRIALS_BY_SECANTS = 5, 2
+TRIALS, TRIALS_BY_SECANTS = 4, 2
 #: Weight of the prior of a place in a step beside a size, see `Structure.leaning`: it leads elsewhere than it points.
 FAINT = 1e-6
 #: Share of its force by which a stop is stronger against the fastest impact, to begin with.
