@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
 from math import sqrt
 from typing import TYPE_CHECKING
 
@@ -25,6 +27,13 @@ FEWEST_SAMPLES = 20
 
 #: Frequencies at which the gain of differences is averaged.
 LINES = 1000
+
+#: Differences that take the motion out of a spectrum, and pieces of a record that each have one.
+ORDER, PIECES = 4, 5
+#: Factor within which powers of noise are equal.
+ALIKE = 2.0
+#: Shares of half of the rate up to which noise may be white below a filter, and bands above in which it falls.
+EDGES, ABOVE = (1 / 2, 5 / 8, 3 / 4), 4
 
 
 def noise_std(values: Array, retained: float = 1.0) -> float:
@@ -101,13 +110,51 @@ def read_noise(record: Experiment, channel: str, frequency: Array) -> Array:
     """Power of a channel's noise by frequency (n,), in cycles per sample of the record, as a share of white noise.
 
     Noise of the readings is white. What is interpolated between two of them has none above half of their rate, and
-    what was filtered has none above the filter.
+    what was filtered has none above the filter. A filter of the logger shows in the noise itself.
     """
     ratio = record.rate / record.read_rate(channel)
     below = (frequency * record.rate <= record.retained.get(channel, np.inf)).astype(float)
     if ratio == 1.0:
-        return below
+        return below if channel in record.retained else _left_by_logger(record[channel], frequency)
     return below * interpolation_gain(frequency * ratio, smooth=is_smooth(channel)) ** 2
+
+
+def _left_by_logger(values: Array, frequency: Array) -> Array:
+    """Power of a channel's noise that the filter of its logger has left (n,), as a share of white noise.
+
+    A logger that decimates filters first, and takes the noise next to half of its rate. Motion falls with frequency
+    down to the noise of the sensor, which stays as loud. So it was filtered if it falls where it was white before.
+
+    ``values``: shape (N,); ``frequency``: shape (n,), cycles per sample. Result: ones where no such filter shows.
+    """
+    if len(values) < FEWEST_SAMPLES * PIECES:
+        return np.ones(len(frequency))
+    for edge in EDGES:
+        ends = np.linspace(edge, 1.0, ABOVE + 1)
+        powers, _ = band_powers(values, (0.5 * edge, 0.75 * edge, *ends))
+        levels, noise = np.median(powers, axis=0), powers[:, :2]
+        white = float(np.mean(levels[:2]))
+        if np.all(np.max(noise, axis=0) < ALIKE**2 * np.min(noise, axis=0)) and levels[0] < ALIKE * levels[1]:
+            left = np.minimum(levels[2:] / white, 1.0) if levels[-1] * ALIKE < white else np.ones(ABOVE)
+            return np.asarray(np.interp(frequency, 0.25 * (ends[:-1] + ends[1:]), left, left=1.0))
+    return np.ones(len(frequency))
+
+
+def band_powers(values: Array, ends: Sequence[float]) -> tuple[Array, float]:
+    """Power of a channel's noise by piece and band, and that of white noise of variance one.
+
+    ``values``: shape (N,); ``ends``: shares of half of the rate at which bands end.
+    """
+    pieces = np.array_split(np.diff(values, n=ORDER), PIECES)
+    count = len(pieces[-1])
+    window = np.hanning(count) ** 3  # its leakage falls fast enough beside noise
+    lines = np.array([np.abs(np.fft.rfft(piece[:count] * window)) ** 2 for piece in pieces])
+    most = lines.shape[1]
+    # Differences weigh white noise by frequency, which is taken out again.
+    turns = np.pi * np.arange(1, most) / (2 * (most - 1))
+    lines[:, 1:] /= (2.0 * np.sin(turns)) ** (2 * ORDER)
+    bands = [lines[:, int(low * most) : int(high * most)] for low, high in pairwise(ends)]
+    return np.stack([np.median(band, axis=1) for band in bands], axis=1), float(np.sum(window**2))
 
 
 def quantisation_step(values: Array) -> float | None:

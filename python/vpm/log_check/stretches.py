@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vpm.experiment import Experiment, noise_std, quantisation_step
+from vpm.experiment.noise import PIECES, band_powers
 from vpm.log_check.finding import Finding
 from vpm.log_check.settings import Settings
 from vpm.numbers import Array
 
-#: Differences that take the motion out of a spectrum, its octaves that are looked at, and pieces of the record.
-ORDER, OCTAVES, PIECES = 4, 4, 5
+#: Where the bands of a spectrum that are looked at end: octaves, and halves of the last one, as shares of its end.
+BANDS = (1 / 16, 1 / 8, 1 / 4, 1 / 2, 3 / 4, 1.0)
 
 
 def odd_stretches(
@@ -83,7 +83,7 @@ def _cut_off(values: Array, step: float, settings: Settings) -> bool:
     """
     if len(values) < settings.judged * PIECES:
         return False
-    powers, window = _powers(values)
+    powers, window = band_powers(values, BANDS)
     levels, last = np.median(powers, axis=0), powers[:, -1]
     steady = np.max(powers, axis=0) < settings.level**2 * np.min(powers, axis=0)
     digits = len(values) / PIECES * (settings.digits * np.finfo(np.float64).eps * float(np.max(np.abs(values)))) ** 2
@@ -99,28 +99,6 @@ def _cut_off(values: Array, step: float, settings: Settings) -> bool:
         if steady[place - 2 : place].all() and _is_flat(noise, settings) and noise[-1] > digits and falls:
             return True
     return False
-
-
-def _powers(values: Array) -> tuple[Array, float]:
-    """Spectral power of stretches by piece and octave, and that of white noise of variance one."""
-    pieces = np.array_split(np.diff(values, n=ORDER), PIECES)
-    found = [_octaves(piece, len(pieces[-1])) for piece in pieces]
-    return np.array(found), float(np.sum(_window(len(pieces[-1])) ** 2))
-
-
-def _window(count: int) -> Array:
-    """Window (count,) for stretches whose leakage falls fast enough beside noise."""
-    return np.asarray(np.hanning(count) ** 3)
-
-
-def _octaves(piece: Array, count: int) -> list[float]:
-    lines = np.abs(np.fft.rfft(piece[:count] * _window(count))) ** 2
-    # Differences weigh white noise by frequency, which is taken out again.
-    turns = np.pi * np.arange(1, len(lines)) / (2 * (len(lines) - 1))
-    lines[1:] /= (2.0 * np.sin(turns)) ** (2 * ORDER)
-    most = len(lines)
-    ends = [most >> octave for octave in range(OCTAVES, 0, -1)] + [3 * most // 4, most]
-    return [float(np.median(lines[low:high])) for low, high in pairwise(ends)]
 
 
 def _is_flat(levels: Array, settings: Settings) -> bool:

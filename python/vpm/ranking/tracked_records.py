@@ -217,7 +217,7 @@ class TrackedRecords:
         """Share of white sensor noise that a tracker passes to the residual, by frequency.
 
         It draws the model to what is slow, noise among that: less than all of it is left there. Of a channel that was
-        read more slowly than its record there is none between two readings.
+        read more slowly than its record there is none between two readings, and what a logger filtered is left out.
         """
         ends = np.cumsum([len(record.time) for record in self.records])
         found = []
