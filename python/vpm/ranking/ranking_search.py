@@ -135,8 +135,12 @@ class Search:
         return tuple(disturbed(self.fitter.tracked, looks[0].fitted, self.settings))
 
     def _gaps(self, held_out: TrackedRecords, ranking: Ranking) -> dict[str, Gap]:
-        """Errors of what the search found on validation records."""
-        return gaps(held_out, (self.start.model, ranking.recalibrated, ranking.model), self.settings.bands[0])
+        """Errors of what the search found on validation records, under the fastest tracker that an effect came in by.
+
+        A slow one lets a machine stick and slip where its own controller held it.
+        """
+        band = max((one.band for one in ranking.effects), default=self.settings.bands[0])
+        return gaps(held_out, (self.start.model, ranking.recalibrated, ranking.model), band)
 
     def _held(self, looks: list[Look], best: Trial | None) -> list[Look]:
         """Search again with commands that change between samples, where no effect does as well; else none.
