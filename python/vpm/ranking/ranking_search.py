@@ -14,6 +14,7 @@ from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.numbers import rough_percent
+from vpm.ranking.both_sides import on_both_sides
 from vpm.ranking.choice_by_evidence import as_good, evidence, weighed
 from vpm.ranking.disturbed_records import disturbed
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
@@ -93,7 +94,7 @@ class Search:
                     looks = smooth
                     continue
                 before.append(frozenset(present))
-                looks, together = self._at_several_places(looks, best, tried)
+                looks, together = self._several_at_once(looks, best, tried)
                 rounds.append(self._listed(None if together else best, tried))
                 if together:
                     rounds += together
@@ -268,6 +269,13 @@ class Search:
             counting = [trial for trial in counting if trial.fitted is not best.fitted]
         return None, told + tried
 
+    def _several_at_once(
+        self, looks: list[Look], best: Trial | None, tried: Sequence[Trial]
+    ) -> tuple[list[Look], list[tuple[Ranked, ...]]]:
+        """Search round with several effects at once, where no effect alone does as well."""
+        looks, together = self._at_several_places(looks, best, tried)
+        return (looks, together) if best or together else self._rubbing_on_both_sides(looks)
+
     def _at_several_places(
         self, looks: list[Look], best: Trial | None, tried: Sequence[Trial]
     ) -> tuple[list[Look], list[tuple[Ranked, ...]]]:
@@ -295,16 +303,36 @@ class Search:
         with contextlib.suppress(*ASTRAY):
             most = self.settings.effects
             structure = with_usual_friction(looks[0], self.data, self.extensions, self.sizes, self.names, most)
-            while structure is not None and structure.effects:
-                look = self._look(self._fitted(structure, looks[0].fitted.tracker))
-                found = [self._weighed_beside_others(key, look) for key in structure.effects]
-                needless = [one.key for one in found if not self._stands(one)]
-                if not needless:
-                    self.say(f"{' and '.join(one.label for one in found)} bring the model back to its records")
-                    return self._all_looks(look), [self._listed(one, [one]) for one in found]
-                structure = look.fitted.structure
-                for key in needless:
-                    structure = structure.without(key)
+            if structure is not None:
+                return self._with_needed(structure, looks, self._stands, "bring the model back to its records")
+        return looks, []
+
+    def _rubbing_on_both_sides(self, looks: list[Look]) -> tuple[list[Look], list[tuple[Ranked, ...]]]:
+        """Search with friction on both sides of split joints, where that makes the records more probable.
+
+        Masses and springs that the model file rules out may stand for friction that is on the wrong side. They leave no
+        error, and only the evidence knows of the file.
+        """
+        with contextlib.suppress(*ASTRAY):
+            structure = on_both_sides(looks[0].fitted.structure, self.extensions, self.names, self.settings.effects)
+            return self._with_needed(structure, looks, self._is_probable, "act on both sides of what gives way")
+        return looks, []
+
+    def _with_needed(
+        self, structure: Structure, looks: list[Look], stands: Callable[[Trial], bool], done: str
+    ) -> tuple[list[Look], list[tuple[Ranked, ...]]]:
+        """Searched structure with several effects at once, but for those that do not stand beside the others."""
+        before = looks[0].fitted.structure.effects
+        while new := [key for key in structure.effects if key not in before]:
+            look = self._look(self._fitted(structure, looks[0].fitted.tracker))
+            found = [self._weighed_beside_others(key, look) for key in new]
+            needless = [one.key for one in found if not stands(one)]
+            if not needless:
+                self.say(f"{' and '.join(one.label for one in found)} {done}")
+                return self._all_looks(look), [self._listed(one, [one]) for one in found]
+            structure = look.fitted.structure
+            for key in needless:
+                structure = structure.without(key)
         return looks, []
 
     def _is_likelier(self, trial: Trial, other: Trial) -> bool:
@@ -319,7 +347,11 @@ class Search:
 
     def _stands(self, trial: Trial) -> bool:
         """Whether a weighed effect of the search counts and is more probable than chance."""
-        return trial.counts and trial.evidence > self.settings.odds
+        return trial.counts and self._is_probable(trial)
+
+    def _is_probable(self, trial: Trial) -> bool:
+        """Whether a weighed effect of the search is more probable than chance."""
+        return trial.evidence > self.settings.odds
 
     def _tried(self, look: Look, begun: Look) -> list[Trial]:
         """Most promising effects of a search round, fitted under one tracker from the structure that was ``begun``."""
