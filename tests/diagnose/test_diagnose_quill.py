@@ -57,7 +57,7 @@ coulomb = {{ value = 0.016, uncertainty = 0.004 }}
 """
 
 
-def moved(seed: int) -> Experiment:
+def moved(seed: int, load: float = 0.0) -> Experiment:
     """Record of sums of sines; a command that is held for a sample is that in its middle."""
     rng = np.random.default_rng(seed)
     phases, tones = rng.uniform(0.0, 2.0 * np.pi, (2, 4)), 2.0 * np.pi * np.array([0.3, 0.8, 1.7, 3.1])
@@ -69,7 +69,7 @@ def moved(seed: int) -> Experiment:
 
     time = STEP * np.arange(COUNT)
     (rate, spin), (lifting, turning) = (motion(time + 0.5 * STEP, order) for order in (1, 2))
-    screw = MASS * (lifting + GRAVITY) / SCREW[0]
+    screw = (MASS + load) * (lifting + GRAVITY) / SCREW[0]
     spline = (INERTIA * turning - SCREW[1] * screw) / SPLINE[1]
     efforts = []
     for torque, (stroke, turn) in zip((screw, spline), (SCREW, SPLINE), strict=True):
@@ -92,3 +92,12 @@ def test_nothing_is_named_where_friction_of_shafts_turns_round_more_softly() -> 
     for shaft in ("screw", "spline"):
         assert why.model.parameters[f"{shaft}.friction.coulomb"].value == pytest.approx(DRY, rel=0.03)
         assert why.model.parameters[f"{shaft}.friction.transition_velocity"].value == pytest.approx(SMOOTH, rel=0.2)
+
+
+def test_a_load_that_the_file_rules_out_is_said_with_the_verdict() -> None:
+    """On a body of free mass a load is that mass, but none whose mass was weighed to 0.15 kg."""
+    load, model, tried = 1.2, Model.from_toml(FILE), ["coulomb_friction"]
+    why = vpm.diagnose(model, moved(1, load), moved(2, load), effects=tried, names="search", check=False, workers=1)
+    away = (MASS + load - model.parameters["quill.mass"].value) / 0.15
+    assert why.verdict == "parameters_only"
+    assert f"quill.mass is {away:.1f} times its stated uncertainty away" in why.summary

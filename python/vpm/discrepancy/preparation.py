@@ -211,15 +211,12 @@ def quickest(record: Experiment, m: Motion, joints: Sequence[str]) -> float:
 
 def moved_far(model: Model, recalibrated: Judged) -> list[str]:
     """Notes on parameters that a recalibration moved far from their prior, alone or together, or to a border."""
-    notes = []
-    for name, std in zip(recalibrated.free, recalibrated.fit.std, strict=True):
-        before, after = model.parameters[name], recalibrated.model.parameters[name]
-        spread = stated(before)
-        if abs(after.value - before.value) - NORMAL_95 * float(std) > FAR * spread:
-            notes.append(
-                f"recalibration moved {name} from {short(before.value)} to {short(after.value)} {before.unit}, "
-                f"{abs(after.value - before.value) / spread:.1f} times its stated uncertainty"
-            )
+    notes = [
+        f"recalibration moved {name} from {short(model.parameters[name].value)} to "
+        f"{short(recalibrated.model.parameters[name].value)} {model.parameters[name].unit}, "
+        f"{times:.1f} times its stated uncertainty"
+        for name, times in ruled_out(model, recalibrated).items()
+    ]
     together = {name: away for name, away in _least_departures(model, recalibrated).items() if away > FAR}
     if together:
         notes.append(
@@ -230,6 +227,17 @@ def moved_far(model: Model, recalibrated: Judged) -> list[str]:
     known = [names for names, _ in on_the_border(model, recalibrated.free)]
     found = on_the_border(recalibrated.model, recalibrated.free)
     return notes + [f"recalibration stopped at {sentence}" for names, sentence in found if names not in known]
+
+
+def ruled_out(model: Model, recalibrated: Judged) -> dict[str, float]:
+    """Stated uncertainties by which a recalibration clearly moved parameters far from their prior."""
+    found = {}
+    for name, std in zip(recalibrated.free, recalibrated.fit.std, strict=True):
+        before = model.parameters[name]
+        away, spread = abs(recalibrated.model.parameters[name].value - before.value), stated(before)
+        if away - NORMAL_95 * float(std) > FAR * spread:
+            found[name] = away / spread
+    return found
 
 
 def _least_departures(model: Model, recalibrated: Judged) -> dict[str, float]:

@@ -11,7 +11,7 @@ from scipy.special import ndtri
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
 from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RefusedEffect
 from vpm.discrepancy.noise.noise_floor import Structure
-from vpm.discrepancy.preparation import stated
+from vpm.discrepancy.preparation import ruled_out, stated
 from vpm.discrepancy.remainder.remainder import Remainder
 from vpm.discrepancy.screening.candidates import joint_at
 from vpm.discrepancy.search.candidate_choice import Accepted
@@ -228,9 +228,21 @@ def _nothing_missing(
         return (
             "parameters_only",
             "Nothing is missing: other values of the known parameters close the gap. "
-            f"Error on validation data: {numbers}.",
+            f"Error on validation data: {numbers}.{_doubt(nominal.model, recalibrated)}",
         )
     return "no_disagreement", f"The nominal model agrees with the data. Error on validation data: {numbers}."
+
+
+def _doubt(nominal: Model, recalibrated: Judged) -> str:
+    """Sentence of the verdict on the parameter that closes the gap farthest from the model file, or ""."""
+    away = ruled_out(nominal, recalibrated)
+    if not away:
+        return ""
+    name = max(away, key=lambda one: away[one])
+    return (
+        f" But {name} is {away[name]:.1f} times its stated uncertainty away from the model file: the file is wrong "
+        "there, or what is missing acts as that parameter does."
+    )
 
 
 def _is_better(nominal: Judged, recalibrated: Judged, data: Data) -> bool:
