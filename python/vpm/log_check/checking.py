@@ -289,7 +289,8 @@ def _evidence(found: Explanation, place: str) -> str:
 
 def _of_parameters(undetermined: Sequence[str], record: str) -> Finding:
     sentence = f"the beginning of its motion says next to nothing of {', '.join(undetermined)}"
-    return Finding("unseen", (), (record,), sentence, "fit other parameters, or move the machine so that they matter")
+    repair = "see by vpm identify whether the rest says more; else fit others, or move the machine so that they matter"
+    return Finding("unseen", (), (record,), sentence, repair)
 
 
 def _together(findings: Sequence[Finding]) -> list[Finding]:
