@@ -16,8 +16,8 @@ def told(elbow: float) -> str:
     """Verdict on a structured residual with a strain of 2 ‰ at twice its noise, and so much at the elbow."""
     noise = np.random.default_rng(1).normal(0.0, 1.0, 400)
     data: Any = SimpleNamespace(validation=SimpleNamespace(blocks=(SimpleNamespace(samples=slice(0, 400)),)))
-    nominal: Any = SimpleNamespace(validation=3.0 * noise)
-    recalibrated: Any = SimpleNamespace(validation=noise)
+    nominal: Any = SimpleNamespace(validation=3.0 * noise, model=None)
+    recalibrated: Any = SimpleNamespace(validation=noise, free=(), fit=SimpleNamespace(std=()))
     found: Any = SimpleNamespace(accepted=(), left={}, within_laws=False, interrupted=False)
     left: Any = SimpleNamespace(present=True)
     gap = {
@@ -51,8 +51,8 @@ def test_an_error_that_grew_is_not_told_as_a_gap_that_closed() -> None:
     """Of two channels the one farthest above its noise became worse: the other one is told, and that this one grew."""
     noise = np.random.default_rng(0).standard_normal(2000)
     data: Any = SimpleNamespace(validation=SimpleNamespace(blocks=(SimpleNamespace(samples=slice(0, 2000)),)))
-    nominal: Any = SimpleNamespace(validation=5.0 * noise)
-    recalibrated: Any = SimpleNamespace(validation=noise)
+    nominal: Any = SimpleNamespace(validation=5.0 * noise, model=None)
+    recalibrated: Any = SimpleNamespace(validation=noise, free=(), fit=SimpleNamespace(std=()))
     closed = ChannelGap(0.5, 0.1, 0.1, 0.01, "N", 1.0, "inverse_dynamics")
     grew = ChannelGap(0.19, 0.2, 0.2, 0.01, "N", 1.0, "inverse_dynamics")
     word, summary = _nothing_missing(data, nominal, recalibrated, ([closed, grew], []), grew)

@@ -315,7 +315,7 @@ class Search:
         """
         with contextlib.suppress(*ASTRAY):
             structure = on_both_sides(looks[0].fitted.structure, self.extensions, self.names, self.settings.effects)
-            return self._with_needed(structure, looks, self._is_probable, "act on both sides of what gives way")
+            return self._with_needed(structure, looks, self._is_probable, "on the other side of what gives way, too")
         return looks, []
 
     def _with_needed(
