@@ -157,3 +157,13 @@ def test_a_named_effect_is_measured_by_a_tracker_that_follows_it() -> None:
     assert [(one.effect, one.side) for one in ranking.effects] == [("stribeck_friction", "link")]
     for gap in ranking.gaps.values():
         assert gap.after < 0.2 * gap.recalibrated
+
+
+def test_a_backlash_where_the_file_has_a_spring_is_refused_with_the_way_to_try_it() -> None:
+    why = vpm.diagnose(
+        SPLIT, logged(SPLIT, *moved(1)), logged(SPLIT, *moved(2)), effects=["backlash"], check=False, workers=1
+    )
+    (refused,) = why.refused
+    assert (refused.name, refused.site) == ("backlash", "axis")
+    assert "joint_compliance at axis" in refused.reason
+    assert "take that out of the model file" in refused.reason

@@ -19,6 +19,7 @@ from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, judge
 from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RankedCandidate, RefusedEffect
 from vpm.discrepancy.rivals.ambiguity import Rivals
 from vpm.discrepancy.screening.candidates import Candidate, Key, asked_for, candidates
+from vpm.discrepancy.screening.compliance_and_stop_start import beyond
 from vpm.discrepancy.screening.probe import Probe, sort_columns
 from vpm.discrepancy.search.candidate_choice import Accepted
 from vpm.discrepancy.search.search import Search, Stage
@@ -114,6 +115,7 @@ def searched(
             raise NoResidualError(str(error)) from error
 
     found = staged(ranking, recalibrated, beside, offered, settings)
+    found = replace(found, refused=(*found.refused, *_split_already(recalibrated.model, effects, data)))
     try:
         if found.interrupted == ranking.interrupted:
             known = _rivals(ranking, found.final, found.accepted, data)
@@ -354,6 +356,23 @@ def _unpromising(ranking: Ranking, model: Model, offered: Sequence[Candidate]) -
     reason = "the first step of a fit predicted less evidence than others did, or too little for a fit"
     left = [candidate for candidate in offered if candidate.key not in tried]
     return {candidate.key: _why_unbuilt(model, candidate) or reason for candidate in left}
+
+
+def _split_already(model: Model, effects: Sequence[str] | None, data: Data) -> tuple[RefusedEffect, ...]:
+    """Effects that a ranking cannot offer, for the model file has another one that gives way at their joint."""
+    splitting = [EFFECTS[name] for name in asked_for(effects) if EFFECTS[name].splits]
+    there = {(one.name, one.at) for one in model.effects}
+    joints = [joint for joint in model.driven_joints if model.joint_behind(joint)]
+    return tuple(
+        RefusedEffect(
+            effect.name,
+            joint,
+            f"{beyond(effect, joint, model, data.training.joints)}; take that out of the model file to try this one",
+        )
+        for effect in splitting
+        for joint in joints
+        if (effect.name, joint) not in there
+    )
 
 
 def _why_unbuilt(model: Model, candidate: Candidate) -> str:
