@@ -159,7 +159,7 @@ def test_values_over_columns(log: Path) -> None:
     ("line", "words"),
     [
         (f'value = "a * b", {FORCES}, unit = "N"', r'channel x: "a \* b" is in kg\^2 m\^2/s\^4, but its unit is N'),
-        ('value = "360 * n", columns = { n = "n" }, unit = "deg"', r'comes out in rad or 1, .* write unit = "rad"'),
+        ('value = "360 * n", columns = { n = "n" }, unit = "deg"', r"in rad or 1, .* give its columns the units"),
         ('value = "a + n", columns = { a = { column = "F_l", unit = "N" }, n = "n" }, unit = "N"', "takes .* together"),
         ('value = "a - q", columns = { a = "F_l", q = "F_q" }, unit = "1"', r'has no column "F_q" for the channel "x"'),
         ('value = "zeroed(n, s)", columns = { n = "n", s = "one" }, unit = "1"', "has no index pulse in this record"),

@@ -170,7 +170,10 @@ def _built(source: Source, content: Table, channel: str, entry: ChannelEntry, co
             raise VpmError(f'"{entry.value}" is in {kind}, but its unit is {entry.unit}; correct one of them')
         if value.dimension == PURE and given.factor != 1.0 and all(unit.factor == 1.0 for unit in units.values()):
             # Nobody can tell whether 360 x of turns x is meant in degrees already.
-            raise VpmError(f'"{entry.value}" comes out in rad or 1, but its unit is {entry.unit}; write unit = "rad"')
+            raise VpmError(
+                f'"{entry.value}" comes out in rad or 1, but its unit is {entry.unit}; give its columns the units that '
+                'they have, and write unit = "rad"'
+            )
     except VpmError as error:
         raise ExperimentError(
             f"{source.name}, channel {channel}: {error}", path=source.path, channel=channel
