@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from vpm.catalogue.kinds import Side, in_words
+from vpm.discrepancy.settings import FLOOR_FACTOR
 from vpm.model import Model
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.settings import Settings
@@ -96,6 +97,11 @@ class Gap(Storable):
         """Whether a channel error in a ranking result is within the errors of the model's laws."""
         return self.after <= settings.slight * self.explained
 
+    @property
+    def is_noise(self) -> bool:
+        """Whether a channel error in a ranking result is no more than its noise."""
+        return self.after <= FLOOR_FACTOR * self.noise
+
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Ranking(Result):
@@ -144,8 +150,9 @@ class Ranking(Result):
         return found
 
     def is_within_laws(self, settings: Settings) -> bool:
-        """Whether all channel errors of a ranking result are within the errors of laws."""
-        return bool(self.gaps) and all(gap.is_within_laws(settings) for gap in self.gaps.values())
+        """Whether channel errors of a ranking result are within the errors of laws, but for channels of noise alone."""
+        within = [gap.is_within_laws(settings) for gap in self.gaps.values()]
+        return any(within) and all(fine or gap.is_noise for fine, gap in zip(within, self.gaps.values(), strict=True))
 
     def _headline(self) -> Mapping[str, object]:
         return {f"{one.effect} at {one.place}": one.judgement.removed for one in self.effects} or {"effects": "none"}
