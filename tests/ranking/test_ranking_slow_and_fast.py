@@ -1,4 +1,7 @@
-"""A turntable with dry friction that sticks, in a slow record and in one three thousand times as fast."""
+"""A turntable with dry friction that sticks, in a slow record and in one three thousand times as fast.
+
+Beside that friction it may have cogging, as of a motor behind a worm, or stand upright with a weight aside of its axis.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,12 @@ import numpy as np
 import vpm
 from vpm.experiment import Experiment
 from vpm.model import Model
+from vpm.ranking import Settings
 
 INERTIA, DRY, OIL = 80.0, 14.0, 9.0  # kg m^2, N m, N m s/rad
 NOISE = 2.5e-7  # rad
+COGGING, PITCH = 2.5, 2.0 * np.pi / 720.0  # N m; rad: four times in a turn of a motor behind 180 : 1
+WEIGHT, WHERE = 12.0, 0.4  # N m: of a mass aside of the axis; rad: where that is at zero
 FINE = 1e-3  # s: the controller's sample; torques are held for it
 
 TURNTABLE = """
@@ -41,22 +47,36 @@ coulomb = { value = 12.0, uncertainty = 4.0 }
 
 
 @cache
-def turned(size: float, period: float, rate: int, seconds: float) -> Experiment:
-    """Record under speed control: ``INERTIA v' = u - OIL v - DRY sign(v)``; it sticks at rest."""
+def turned(
+    size: float,
+    period: float,
+    rate: int,
+    seconds: float,
+    *,
+    cogging: float = 0.0,
+    weight: float = 0.0,
+    jogged: float = 0.0,
+) -> Experiment:
+    """Record under speed control: ``INERTIA v' = u - load - OIL v - DRY sign(v)``; it sticks at rest.
+
+    The goal is a sine, and one 6.5 times as fast that is ``jogged`` by, rad.
+    """
     random = np.random.default_rng(1)
     each, count = round(1.0 / (rate * FINE)), round(seconds * rate)
     place = speed = total = torque = 0.0
     read = np.empty((count, 2))
     for k in range(count * each):
         time = k * FINE
-        goal = size * np.sin(2.0 * np.pi * time / period)
-        rate_of_goal = 2.0 * np.pi / period * size * np.cos(2.0 * np.pi * time / period)
+        turn = 2.0 * np.pi / period
+        goal = size * np.sin(turn * time) + jogged * np.sin(6.5 * turn * time)
+        rate_of_goal = turn * (size * np.cos(turn * time) + 6.5 * jogged * np.cos(6.5 * turn * time))
         error = rate_of_goal + 8.0 * (goal - place) - speed
         if k % each == 0:  # the log holds what the motor does until its next line
             total += error * each * FINE
             torque = 480.0 * error + 2400.0 * total
             read[k // each] = place, torque
-        before, free = speed, speed + FINE * (torque - OIL * speed) / INERTIA
+        load = cogging * np.sin(2.0 * np.pi * place / PITCH) + weight * np.cos(place + WHERE)
+        before, free = speed, speed + FINE * (torque - load - OIL * speed) / INERTIA
         speed = np.sign(free) * max(abs(free) - FINE * DRY / INERTIA, 0.0)
         place += 0.5 * FINE * (before + speed)
     place_read = read[:, 0] + NOISE * random.standard_normal(count)
@@ -71,3 +91,15 @@ def test_a_slow_record_tells_where_dry_friction_turns_round_beside_a_fast_one() 
     assert not ranking.effects
     assert abs(ranking.recalibrated.parameters["axis.friction.coulomb"].value / DRY - 1.0) < 0.005
     assert ranking.gaps["axis.position"].recalibrated < 0.01 * np.std(slow["axis.position"])
+
+
+def test_a_weight_aside_of_the_axis_of_a_known_mass_is_a_payload() -> None:
+    """At the axis a payload does nothing, and where the centre of mass is there, one has to begin aside of it."""
+    logs = [turned(*motion, weight=WEIGHT) for motion in ((0.02, 80.0, 100, 80.0), (0.6, 4.0, 200, 20.0))]
+    upright = Model.from_toml(TURNTABLE.replace("gravity = [0.0, 0.0, 0.0]", "gravity = [0.0, -9.81, 0.0]"))
+    tried = ["payload", "bias_force", "spring", "cubic_spring"]
+    ranking = vpm.rank(upright, logs, logs[1:], effects=tried, workers=1)
+    assert [(one.effect, one.site) for one in ranking.effects] == [("payload", "table")]
+    mass, x, y = (ranking.effects[0].values[f"table.payload.{name}"] for name in ("mass", "x", "y"))
+    moment = 9.81 * mass * np.array([x, y])
+    assert np.allclose(moment, WEIGHT * np.array([np.cos(WHERE), np.sin(WHERE)]), atol=0.05 * WEIGHT)

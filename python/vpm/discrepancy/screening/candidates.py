@@ -213,8 +213,8 @@ def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
     """Start positions of a candidate payload: origin of the body, its centre of mass, and twice as far out.
 
     Beside an unknown mass of the body only what is off the ray from the origin through its centre of mass shows. So the
-    other two are to all sides of the centre of mass there, as far as that is from the origin; where it is the origin,
-    as far as its own masses are, by the radius of gyration.
+    other two are to all sides of the centre of mass there, as far as that is from the origin. Where it is the origin,
+    they are as far as the body's own masses are, by the radius of gyration: at an axis a payload does nothing.
     """
     if body in model.beams:  # in the frame of its tip
         return ({},)
@@ -222,7 +222,7 @@ def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
     centre = np.array([values[f"{body}.center_of_mass.{axis}"].value for axis in "xyz"])
     reach = float(np.linalg.norm(centre))
     places = [factor * centre for factor in ((0.0, 1.0, 2.0) if reach else (0.0,))]
-    if f"{body}.mass" in model.adjustable:
+    if f"{body}.mass" in model.adjustable or not reach:
         moments = sum(values[f"{body}.inertia.{axis}"].value for axis in ("xx", "yy", "zz"))
         aside = reach or float(np.sqrt(0.5 * moments / values[f"{body}.mass"].value))
         places = [np.zeros(3), *(centre + aside * np.vstack([np.eye(3), -np.eye(3)]))] if aside else places
