@@ -93,6 +93,19 @@ def test_a_slow_record_tells_where_dry_friction_turns_round_beside_a_fast_one() 
     assert ranking.gaps["axis.position"].recalibrated < 0.01 * np.std(slow["axis.position"])
 
 
+def test_derivatives_hold_where_friction_sticks() -> None:
+    """Under a fast tracker approximate derivatives of this motion grow to 3e14 rad: half of the cogging was missed."""
+    slow = turned(0.03, 80.0, 100, 80.0, cogging=COGGING, jogged=0.006)
+    logs, tried = [slow, turned(0.6, 4.0, 500, 20.0, cogging=COGGING)], ["torque_ripple", "quadratic_drag"]
+    fast = Settings(bands=(10.0,))
+    ranking = vpm.rank(Model.from_toml(TURNTABLE), logs, logs[:1], effects=tried, settings=fast, workers=1)
+    assert [one.effect for one in ranking.effects] == ["torque_ripple"]
+    found = ranking.effects[0].values
+    # Seven waves on the slow way tell the period to a quarter of a wave at least.
+    assert abs(found["axis.ripple.period"] / PITCH - 1.0) < 0.25 / 7.0
+    assert abs(np.hypot(found["axis.ripple.cosine"], found["axis.ripple.sine"]) / COGGING - 1.0) < 0.1
+
+
 def test_a_weight_aside_of_the_axis_of_a_known_mass_is_a_payload() -> None:
     """At the axis a payload does nothing, and where the centre of mass is there, one has to begin aside of it."""
     logs = [turned(*motion, weight=WEIGHT) for motion in ((0.02, 80.0, 100, 80.0), (0.6, 4.0, 200, 20.0))]

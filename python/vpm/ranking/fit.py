@@ -15,7 +15,7 @@ from vpm.numbers import Array
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.noise_model import NoiseModel, Parts, white_noise
 from vpm.ranking.posterior import log_volume
-from vpm.ranking.settings import FAINT, NEARER, RETREAT, TRIALS, TRIALS_BY_SECANTS, Settings
+from vpm.ranking.settings import FAINT, MOVE, NEARER, RETREAT, TRIALS, TRIALS_BY_SECANTS, Settings
 from vpm.ranking.tracked_records import NOTHING, By, TrackedRecords, Tracker
 
 #: Residuals and derivatives that no record has; their squares are still numbers.
@@ -253,9 +253,22 @@ class Fitter:
 
     def _pass(self, structure: Structure, tracker: Tracker, by: By = NOTHING) -> tuple[Array, Array]:
         residual, jacobian = self.tracked.follow(structure.model, structure.theta, tracker, *by)
+        if self._is_beyond_motion(jacobian, *by):
+            residual, jacobian = self.tracked.follow(structure.model, structure.theta, tracker, by[0])
         if not all(np.max(np.abs(numbers), initial=0.0) < RUNAWAY for numbers in (residual, jacobian)):
             raise VpmError(f"{structure.model.name} runs away from the records")
         return residual, jacobian
+
+    def _is_beyond_motion(self, jacobian: Array, columns: Sequence[int], moves: Array | None) -> bool:
+        """Whether approximate derivatives of a fit move the model by a deviation farther than the records move.
+
+        A tracker allows no such thing, but steps that pass a sharp bend of dry friction do, where derivatives take
+        their matrices as constant: from step to step these then grow without end.
+        """
+        if moves is None or not columns:
+            return False
+        farthest = np.max(np.abs(jacobian), axis=0) * moves / MOVE
+        return bool(np.any(farthest > np.max(np.abs(self.tracked.motion), axis=0)[:, None]))
 
 
 def in_roots(errors: Array, slopes: Array, roots: Array) -> tuple[Array, Array]:
