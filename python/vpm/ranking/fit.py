@@ -253,22 +253,32 @@ class Fitter:
 
     def _pass(self, structure: Structure, tracker: Tracker, by: By = NOTHING) -> tuple[Array, Array]:
         residual, jacobian = self.tracked.follow(structure.model, structure.theta, tracker, *by)
-        if self._is_beyond_motion(jacobian, *by):
+        if self._is_unstable(structure, tracker, by, residual, jacobian):
             residual, jacobian = self.tracked.follow(structure.model, structure.theta, tracker, by[0])
         if not all(np.max(np.abs(numbers), initial=0.0) < RUNAWAY for numbers in (residual, jacobian)):
             raise VpmError(f"{structure.model.name} runs away from the records")
         return residual, jacobian
 
-    def _is_beyond_motion(self, jacobian: Array, columns: Sequence[int], moves: Array | None) -> bool:
-        """Whether approximate derivatives of a fit move the model by a deviation farther than the records move.
+    def _is_unstable(self, structure: Structure, tracker: Tracker, by: By, residual: Array, jacobian: Array) -> bool:
+        """Whether approximate derivatives of a fit move the model farther than the records move, and a move does not.
 
-        A tracker allows no such thing, but steps that pass a sharp bend of dry friction do, where derivatives take
-        their matrices as constant: from step to step these then grow without end.
+        Steps that pass a sharp bend of dry friction are stable. Derivatives that take their matrices as constant are
+        not, and grow there from step to step without end.
         """
+        columns, moves = by
         if moves is None or not columns:
             return False
-        farthest = np.max(np.abs(jacobian), axis=0) * moves / MOVE
-        return bool(np.any(farthest > np.max(np.abs(self.tracked.motion), axis=0)[:, None]))
+        motion = np.maximum(np.max(np.abs(self.tracked.motion), axis=0), 1e-300)
+        farthest = np.max(np.abs(jacobian), axis=0) * moves / MOVE / motion[:, None]  # by one deviation
+        channel, number = np.unravel_index(np.argmax(farthest), farthest.shape)
+        if farthest[channel, number] <= 1.0:
+            return False
+        theta = structure.theta.copy()
+        theta[columns[number]] += moves[number]
+        with contextlib.suppress(*ASTRAY):
+            moved, _ = self.tracked.follow(structure.model, theta, tracker)
+            return bool(np.max(np.abs(moved - residual)[:, channel]) / MOVE <= motion[channel])
+        return False
 
 
 def in_roots(errors: Array, slopes: Array, roots: Array) -> tuple[Array, Array]:
