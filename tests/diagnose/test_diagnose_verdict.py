@@ -37,7 +37,7 @@ def test_without_efforts_an_effect_that_leaves_the_error_explains_nothing(after:
     """An observer alone tells what is left: a share of 0.81 of the error power is no explanation."""
     effect: Any = SimpleNamespace(key=("lugre_friction", "shaft"), trial=SimpleNamespace())
     effect.trial.probe = SimpleNamespace(candidate=SimpleNamespace(label="lugre_friction at shaft"))
-    model: Any = SimpleNamespace(effects=(), bodies=(), joints=("shaft",), parameters={})
+    model: Any = SimpleNamespace(effects=(), bodies=(), joints=("shaft",), parameters={}, joint_behind={}.get)
     final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=()))
     found: Any = SimpleNamespace(
         accepted=(effect,), left={"shaft": after**2}, within_laws=False, interrupted=False, final=final, ranked=None
@@ -45,6 +45,32 @@ def test_without_efforts_an_effect_that_leaves_the_error_explains_nothing(after:
     judged: Any = SimpleNamespace(model=model)
     gap = {"shaft.velocity": ChannelGap(1.0, 1.0, after, NOISE, "rad/s", SIGNAL, "observed")}
     assert verdict(None, judged, judged, found, gap, None, None)[0] == word
+
+
+@pytest.mark.parametrize(("after", "word"), [(2.1e-4, "effect_found"), (1.403e-3, "unexplained")])
+def test_an_effect_that_leaves_the_deflection_behind_its_joint_explains_nothing(after: float, word: str) -> None:
+    """A series-elastic knee with a spring a fifth too stiff in its file: a force at the motor hides it from the motor.
+
+    Errors are those of its record; the noise of the link's encoder is 2e-4 rad.
+    """
+    effect: Any = SimpleNamespace(key=("cubic_spring", "knee"), trial=SimpleNamespace())
+    effect.trial.probe = SimpleNamespace(candidate=SimpleNamespace(label="cubic_spring at knee"))
+    model: Any = SimpleNamespace(
+        effects=(), bodies=(), joints=("knee",), parameters={}, joint_behind=lambda joint: f"{joint}_deflection"
+    )
+    final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=()))
+    shares = {"knee": 0.04, "knee_deflection": (after / 1.449e-3) ** 2}
+    found: Any = SimpleNamespace(
+        accepted=(effect,), left=shares, within_laws=False, interrupted=False, final=final, ranked=None
+    )
+    judged: Any = SimpleNamespace(model=model)
+    data: Any = SimpleNamespace(training=SimpleNamespace(joints=("knee",)))
+    gap = {
+        "knee.effort": ChannelGap(0.772, 0.4033, 0.2701, 0.09834, "N m", 7.27, "inverse_dynamics"),
+        "knee_deflection.position (observed)": ChannelGap(2e-3, 1.449e-3, after, 1.969e-4, "rad", 9.24e-3, "observed"),
+    }
+    left: Any = SimpleNamespace(present=True)
+    assert verdict(data, judged, judged, found, gap, left, None)[0] == word
 
 
 def test_an_error_that_grew_is_not_told_as_a_gap_that_closed() -> None:

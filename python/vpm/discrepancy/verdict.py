@@ -165,15 +165,19 @@ def _of_named(
 
 
 def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], tracked: float) -> bool:
-    """Whether the verdict on named effects is spoiled: they leave most of a measured effort where they act.
+    """Whether the verdict on named effects is spoiled: they leave most of an effort where they act, or of a deflection.
 
-    No noise excuses that: the floor of a drive that gives next to nothing is as large as its effort. A backlash is hard
-    to balance: where little is left of what a tracker sees, that says more.
+    No noise excuses that of an effort: the floor of a drive that gives next to nothing is as large. A backlash is hard
+    to balance: where little is left of what a tracker sees, that says more. A deflection behind their joint is told by
+    a tracker alone, and what it leaves of that as it was is no law on either side.
     """
     if tracked <= MOSTLY_OPEN and any(effect.type.has_play for effect in found.final.model.effects):
         return False
     efforts = [gap[channel] for joint in _joints(found) if (channel := f"{joint}.effort") in gap]
     most = any(g.after**2 > CLEAR_GAIN * g.signal**2 for g in efforts)
+    behind = {found.final.model.joint_behind(joint) for joint in _joints(found) if joint}
+    bent = [g for channel, g in gap.items() if g.mode == OBSERVED and channel.rpartition(".")[0] in behind]
+    most = most or any(g.after**2 > CLEAR_GAIN * g.recalibrated**2 and _is_clear(g.after, g) for g in bent)
     # A model without any force would leave less.
     return most or any(g.recalibrated < g.signal < g.after for g in main_gaps(gap))
 
