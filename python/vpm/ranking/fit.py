@@ -270,7 +270,7 @@ class Fitter:
             return False
         motion = np.maximum(np.max(np.abs(self.tracked.motion), axis=0), 1e-300)
         farthest = np.max(np.abs(jacobian), axis=0) * moves / MOVE / motion[:, None]  # by one deviation
-        channel, number = np.unravel_index(np.argmax(farthest), farthest.shape)
+        channel, number = map(int, np.unravel_index(np.argmax(farthest), farthest.shape))
         if farthest[channel, number] <= 1.0:
             return False
         theta = structure.theta.copy()
