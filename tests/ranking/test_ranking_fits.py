@@ -600,3 +600,27 @@ def test_an_effect_that_makes_another_one_needless_has_to_do_its_work() -> None:
     assert _is_worse([look(2, 10.0, 1.4)], was)
     assert not _is_worse([look(2, 10.0, 0.8)], was)
     assert not _is_worse([look(3, 10.0, 1.4)], was)
+
+
+def test_values_that_only_scale_return_to_what_is_known_beside_a_false_derivative() -> None:
+    """Motion tells ratios of gain, mass and friction alone; one derivative that leads nowhere must not keep the rest.
+
+    All three begin at 1.3 times what fits, six deviations of the gain away, and friction at rest has a derivative that
+    promises to take all of the error.
+    """
+    model = Model.from_toml(SLEDGE).with_effect("coulomb_friction", "way", coulomb=0.0)
+    scaled = {"sledge.mass": 1.3 * MASS, "way.friction.viscous": 1.3 * OIL, "motor.gain": 1.3 * GAIN}
+    theta = model.with_parameters(scaled).theta
+    priors = {
+        "sledge.mass": Prior(MASS, 0.1 * MASS, 0.1, np.inf),
+        "way.friction.viscous": Prior(OIL, 0.1 * OIL, 0.0, np.inf),
+        "motor.gain": Prior(GAIN, 0.05 * GAIN, 0.0, np.inf),
+        "way.friction.coulomb": Prior(0.0, 1.0, -np.inf, np.inf),
+    }
+    fitter, tracker = fitter_of(model), Tracker(1.0, fine=False)
+    start = fitter.followed(Structure(model, theta, priors), tracker, tuple(priors))
+    false = start.jacobian.copy()
+    false[:, :, -1] = -start.residual
+    noise = fitter.noise_of(start.structure, tracker)
+    fitted, _ = fitter.moved(replace(start, jacobian=false), View(noise))
+    assert np.abs(fitted.structure.standard).max() < 1.0

@@ -126,6 +126,8 @@ class Fitter:
             worth = hopeful and gain >= self.settings.tolerance
             step, trials = (move, errors, slopes @ move), TRIALS if fresh else TRIALS_BY_SECANTS
             better = self._better(now, view.noise, step, before, trials) if worth else None
+            if better is None:
+                better = self._pulled(now, view, (errors, slopes), before)
             slow = better is None or before - better[2] < self.settings.tolerance
             if better is not None:
                 move = better[0].standard - now.structure.standard
@@ -249,6 +251,26 @@ class Fitter:
             least, share = min(costs)
             if trial and noise.cost(errors) - least < self.settings.tolerance:
                 break
+        return None
+
+    def _pulled(
+        self, now: Followed, view: View, linear: tuple[Array, Array], before: float
+    ) -> tuple[Structure, Array, float] | None:
+        """Step of a fit to likelier values that the errors do not tell from its own, if it is worth a pass.
+
+        Where only ratios of parameters show, as of a drive and of all that it moves, one false derivative else keeps
+        all of them far from what is known.
+        """
+        weighted, slopes = view.weighted(*linear)
+        variance, z = float(np.mean(weighted**2)), now.structure.standard
+        move = bounded_step(now.structure, np.zeros_like(weighted), slopes, self.settings.reach, variance)
+        if 0.5 * (float(z @ z) - float((z + move) @ (z + move))) < self.settings.tolerance:
+            return None
+        tried = now.structure.moved(move)
+        with contextlib.suppress(*ASTRAY):
+            residual, _ = self._pass(tried, now.tracker)
+            after = self.cost(tried, residual, view.noise)
+            return (tried, residual, after) if after < before else None
         return None
 
     def _pass(self, structure: Structure, tracker: Tracker, by: By = NOTHING) -> tuple[Array, Array]:
