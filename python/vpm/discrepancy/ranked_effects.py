@@ -115,7 +115,7 @@ def searched(
             raise NoResidualError(str(error)) from error
 
     found = staged(ranking, recalibrated, beside, offered, settings)
-    found = replace(found, refused=(*found.refused, *_split_already(recalibrated.model, effects, data)))
+    found = replace(found, refused=(*found.refused, *_split_already(recalibrated.model, effects)))
     try:
         if found.interrupted == ranking.interrupted:
             known = _rivals(ranking, found.final, found.accepted, data)
@@ -358,7 +358,7 @@ def _unpromising(ranking: Ranking, model: Model, offered: Sequence[Candidate]) -
     return {candidate.key: _why_unbuilt(model, candidate) or reason for candidate in left}
 
 
-def _split_already(model: Model, effects: Sequence[str] | None, data: Data) -> tuple[RefusedEffect, ...]:
+def _split_already(model: Model, effects: Sequence[str] | None) -> tuple[RefusedEffect, ...]:
     """Effects that a ranking cannot offer, for the model file has another one that gives way at their joint."""
     splitting = [EFFECTS[name] for name in asked_for(effects) if EFFECTS[name].splits]
     there = {(one.name, one.at) for one in model.effects}
@@ -367,7 +367,7 @@ def _split_already(model: Model, effects: Sequence[str] | None, data: Data) -> t
         RefusedEffect(
             effect.name,
             joint,
-            f"{beyond(effect, joint, model, data.training.joints)}; take that out of the model file to try this one",
+            f"{beyond(effect, joint, model)}; take that out of the model file to try this one",
         )
         for effect in splitting
         for joint in joints
