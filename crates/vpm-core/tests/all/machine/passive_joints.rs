@@ -75,6 +75,21 @@ fn turning(rows: u32, step: f64) -> [Vec<f64>; 3] {
     [of(&|t| 0.4 + (5.0 * t).sin()), of(&|t| 5.0 * (5.0 * t).cos()), of(&|t| -25.0 * (5.0 * t).sin())]
 }
 
+/// A free run from `start` with a push of the first joint; following that joint gives all others back, and needs no effort.
+fn thrown(d: &Description, stepping: Stepping, mut start: Vec<f64>) -> Result<Run> {
+    let setting = Setting { description: d, theta: &d.parameters, stepping, sensitivities: &[], interrupt: &|| false };
+    start[d.n_coordinates()] = 4.0;
+    let run = free_run(setting, &start, Table::new("inputs", &[], 601, 0)?)?;
+    let column = |offset: usize| -> Vec<f64> {
+        run.outputs.chunks(d.n_outputs()).flat_map(|row| [row[offset], 7.0, -3.0]).collect()
+    };
+    let followed = guided(d, stepping, &[column(0), column(1), column(2)], &[2, PLAY], &[])?;
+    let state = followed.states.iter().zip(&run.states).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+    let effort = followed.outputs.chunks(d.n_outputs()).fold(0.0_f64, |most, row| most.max(row[3].abs()));
+    assert!(state < 2e-3 && effort < 2e-2, "state {state}, effort {effort} N m");
+    Ok(run)
+}
+
 #[test]
 fn passive_joints_move_as_in_the_free_machine() -> Result<()> {
     // Rest, from a motion that stands still; then the machine falls freely, and following one joint gives back the others.
@@ -85,17 +100,7 @@ fn passive_joints_move_as_in_the_free_machine() -> Result<()> {
     let efforts: Vec<f64> = rest.outputs[..12].chunks(4).map(|channels| channels[3]).collect();
     assert!(efforts[0].abs() > 0.1 && efforts[1].abs() < 1e-8 && efforts[2].abs() < 1e-8, "{efforts:?}");
     assert!(rest.states[PLAY].abs() > 0.005, "gravity lays the play to one side: {} rad", rest.states[PLAY]);
-    let setting = Setting { description: &d, theta: &d.parameters, stepping, sensitivities: &[], interrupt: &|| false };
-    let mut start = rest.states;
-    start[d.n_coordinates()] = 4.0;
-    let run = free_run(setting, &start, Table::new("inputs", &[], 601, 0)?)?;
-    let column = |offset: usize| -> Vec<f64> {
-        run.outputs.chunks(d.n_outputs()).flat_map(|row| [row[offset], 7.0, -3.0]).collect()
-    };
-    let followed = guided(&d, stepping, &[column(0), column(1), column(2)], &[2, PLAY], &[])?;
-    let state = followed.states.iter().zip(&run.states).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
-    let effort = followed.outputs.chunks(d.n_outputs()).fold(0.0_f64, |most, row| most.max(row[3].abs()));
-    assert!(state < 2e-3 && effort < 2e-2, "state {state}, effort {effort} N m");
+    let run = thrown(&d, stepping, rest.states)?;
     let play: Vec<f64> = run.states.chunks(d.n_states()).map(|state| state[PLAY]).collect();
     let span = play.iter().fold(0.0_f64, |most, q| most.max((q - play[0]).abs()));
     assert!(span > 0.01, "the play must be crossed: {span} rad");
@@ -107,18 +112,9 @@ fn memories_go_along_as_in_the_free_machine() -> Result<()> {
     // One joint that follows and one that does not remember their way; a third one does not.
     let d = remembering(0.02, &[(0, 0.6), (2, 0.3)]);
     let stepping = Stepping::new(0.002, 4, Method::Rosenbrock)?;
-    let setting = Setting { description: &d, theta: &d.parameters, stepping, sensitivities: &[], interrupt: &|| false };
-    let mut start = guided(&d, stepping, &[vec![0.3, 0.0, 0.0], vec![0.0; 3], vec![0.0; 3]], &[PLAY, 2], &[])?.states;
-    start[d.n_coordinates()] = 4.0;
-    let run = free_run(setting, &start, Table::new("inputs", &[], 401, 0)?)?;
-    let column = |offset: usize| -> Vec<f64> {
-        run.outputs.chunks(d.n_outputs()).flat_map(|row| [row[offset], 7.0, -3.0]).collect()
-    };
-    let followed = guided(&d, stepping, &[column(0), column(1), column(2)], &[2, PLAY], &[])?;
-    let state = followed.states.iter().zip(&run.states).fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
-    let effort = followed.outputs.chunks(d.n_outputs()).fold(0.0_f64, |most, row| most.max(row[3].abs()));
-    assert!(state < 2e-3 && effort < 2e-2, "state {state}, effort {effort} N m");
-    let memories: Vec<&[f64]> = followed.states.chunks(d.n_states()).map(|state| &state[d.n_states() - 2..]).collect();
+    let rest = guided(&d, stepping, &[vec![0.3, 0.0, 0.0], vec![0.0; 3], vec![0.0; 3]], &[PLAY, 2], &[])?;
+    let run = thrown(&d, stepping, rest.states)?;
+    let memories: Vec<&[f64]> = run.states.chunks(d.n_states()).map(|state| &state[d.n_states() - 2..]).collect();
     for k in 0..2 {
         let most = memories.iter().fold(0.0_f64, |most, values| most.max(values[k].abs()));
         assert!(most > 0.1, "memory {k} must matter: {most}");
