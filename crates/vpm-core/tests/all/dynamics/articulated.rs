@@ -78,6 +78,13 @@ fn solved(matrix: &[f64], load: &[f64]) -> Vec<f64> {
     x
 }
 
+/// Condition of a matrix (n, n) with rows and columns scaled.
+fn condition(matrix: &[f64], n: usize) -> f64 {
+    let scaled = |i: usize, j: usize| matrix[i * n + j] / (matrix[i * n + i] * matrix[j * n + j]).sqrt();
+    let values = DMatrix::from_fn(n, n, scaled).symmetric_eigenvalues();
+    values.max() / values.min()
+}
+
 /// Asserts that accelerations solve `matrix a = load`: row by row up to rounding, and as well as the matrix decides them.
 ///
 /// A row may miss by 1e-12 of the numbers in it; the accelerations by 1e-10, or by what a relative error of 1e-14 in the entries of a matrix
@@ -90,9 +97,7 @@ fn check(matrix: &[f64], found: &[f64], load: &[f64]) -> std::result::Result<(),
         let residual = (terms.iter().sum::<f64>() - load).abs();
         prop_assert!(residual <= 1e-12 * size, "row {i} of {n} misses by {residual} of {size}");
     }
-    let scaled = |i: usize, j: usize| matrix[i * n + j] / (matrix[i * n + i] * matrix[j * n + j]).sqrt();
-    let values = DMatrix::from_fn(n, n, scaled).symmetric_eigenvalues();
-    let (error, condition) = (error(matrix, found, &solved(matrix, load)), values.max() / values.min());
+    let (error, condition) = (error(matrix, found, &solved(matrix, load)), condition(matrix, n));
     prop_assert!(error < f64::max(1e-10, 1e-14 * condition), "error {error} of {n} coordinates, condition {condition}");
     Ok(())
 }
@@ -166,9 +171,10 @@ proptest! {
         let [a, b, c, d] = [-2.0 * h, -h, h, 2.0 * h].map(&mut at);
         let expected: Vec<f64> = (0..n).map(|k| (a[k] - d[k] + 8.0 * (c[k] - b[k])) / (12.0 * h)).collect();
         let (matrix, _) = dense(&plain, &[q, v, tau]);
-        // Where nothing depends on the state, slopes are the rounding of the accelerations.
-        let error = error(&matrix, &found, &expected).min(1e6 * distance(&matrix, &found, &expected) / size(&matrix, &b));
-        prop_assert!(error < 1e-4, "error {error}");
+        let (error, apart) = (error(&matrix, &found, &expected), distance(&matrix, &found, &expected) / size(&matrix, &b));
+        // Differences have the rounding of the accelerations, over the step: all of it where nothing depends on the state.
+        let rounding = f64::max(1e-10, f64::EPSILON * condition(&matrix, n) / h);
+        prop_assert!(error < 1e-4 || apart < rounding, "error {error}, {apart} of the accelerations beside {rounding}");
     }
 }
 
