@@ -3,7 +3,7 @@
 from dataclasses import replace
 from functools import lru_cache
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -502,6 +502,20 @@ def test_fits_begin_at_the_file_where_nothing_counts_from_afar(
     gone = abs(MASS - 3.3) / float(model.parameters["sledge.mass"].uncertainty or 0.0)
     vpm.rank(model, pushed(seed=1, duration=2.0), effects=["spring"], settings=Settings(reach=share * gone))
     assert begun == pytest.approx(begins, rel=0.02)
+
+
+def test_friction_on_the_other_side_has_to_make_the_file_more_probable() -> None:
+    """It stands for values that the file rules out; one that is zero and spares none of them is nothing."""
+    model = Model.from_toml(SLEDGE)
+    stated = structure_of(model)
+    off = stated.at(stated.standard + 3.0)
+    assert stated.doubt == 0.0
+    assert off.doubt == pytest.approx(4.5 * len(model.adjustable))
+    search = SimpleNamespace(settings=Settings())
+    for without, evidence, spared in ((off, 12.9, True), (off, 5.0, False), (stated, 12.9, False)):
+        look, fitted = (SimpleNamespace(structure=one) for one in (without, stated))
+        trial: Any = SimpleNamespace(evidence=evidence, look=SimpleNamespace(fitted=look), fitted=fitted)
+        assert Search._spares_file(cast("Search", search), trial) == spared
 
 
 @pytest.mark.parametrize(

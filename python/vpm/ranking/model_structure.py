@@ -122,8 +122,17 @@ class Structure:
 
     def is_far(self, most: float) -> bool:
         """Whether a structure without effects lies more than so many deviations from what its model file states."""
-        stated = [place for place, name in enumerate(self.priors) if name in self.model.adjustable]
-        return not self.effects and bool(np.any(np.abs(self.standard[stated]) > most))
+        return not self.effects and bool(np.any(np.abs(self._from_file) > most))
+
+    @property
+    def doubt(self) -> float:
+        """How improbable a structure's values are by what its model file states, nats."""
+        return 0.5 * float(self._from_file @ self._from_file)
+
+    @property
+    def _from_file(self) -> Array:
+        """Deviations (k,) of a structure's values from what its model file states."""
+        return self.standard[[place for place, name in enumerate(self.priors) if name in self.model.adjustable]]
 
     def moves(self, names: Sequence[str]) -> Array:
         """Step of each parameter of a structure for a difference quotient (len(names),)."""

@@ -315,7 +315,7 @@ class Search:
         """
         with contextlib.suppress(*ASTRAY):
             structure = on_both_sides(looks[0].fitted.structure, self.extensions, self.names, self.settings.effects)
-            return self._with_needed(structure, looks, self._is_probable, "on the other side of what gives way, too")
+            return self._with_needed(structure, looks, self._spares_file, "on the other side of what gives way, too")
         return looks, []
 
     def _with_needed(
@@ -347,11 +347,12 @@ class Search:
 
     def _stands(self, trial: Trial) -> bool:
         """Whether a weighed effect of the search counts and is more probable than chance."""
-        return trial.counts and self._is_probable(trial)
+        return trial.counts and trial.evidence > self.settings.odds
 
-    def _is_probable(self, trial: Trial) -> bool:
-        """Whether a weighed effect of the search is more probable than chance."""
-        return trial.evidence > self.settings.odds
+    def _spares_file(self, trial: Trial) -> bool:
+        """Whether a weighed effect of the search is more probable than chance, and what the file states is with it."""
+        without, with_it = (one.structure.doubt for one in (trial.look.fitted, trial.fitted))
+        return trial.evidence > self.settings.odds and without - with_it > self.settings.tolerance
 
     def _tried(self, look: Look, begun: Look) -> list[Trial]:
         """Most promising effects of a search round, fitted under one tracker from the structure that was ``begun``."""
