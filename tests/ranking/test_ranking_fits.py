@@ -15,7 +15,6 @@ from second_suite import arm
 from sledge import GAIN, MASS, OIL, SLEDGE, pushed
 from vpm.catalogue import EFFECTS
 from vpm.catalogue.kinds import in_words
-from vpm.catalogue.shared import PLACES
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import candidates
 from vpm.experiment import Experiment
@@ -28,7 +27,7 @@ from vpm.ranking.model_structure import Structure
 from vpm.ranking.parameter_priors import Sizes
 from vpm.ranking.proposals import Proposal, _seated, proposals
 from vpm.ranking.ranking_search import Search, _is_worse
-from vpm.ranking.settings import Settings
+from vpm.ranking.settings import PLACES, Settings
 from vpm.ranking.start_values import started
 from vpm.ranking.structure_extensions import Extensions
 from vpm.ranking.tracked_records import TrackedRecords, Tracker, tracker_gains
@@ -303,8 +302,7 @@ def test_a_place_that_may_lie_anywhere_begins_far_away_too() -> None:
     data = InverseDynamicsProblem(model, records()[:1])
     sizes = Sizes(model, data)
     found = {one.effect.name: started(one, model, sizes) for one in candidates(model, data, np.zeros(1), ("spring",))}
-    way = data.motions[0].position
-    low, high = float(way.min()), float(way.max())
+    low, high = sizes.ways["way"]
     rests = [start["rest"] for start in found["spring"].starts]
     assert rests[0] == pytest.approx(0.5 * (low + high))
     assert min(rests) < low - (high - low) < high + (high - low) < max(rests)

@@ -16,10 +16,6 @@ SLOW = (2e-4, 0.1)
 STRIBECK = (1e-2, 1e-1)
 #: Way over which a contact closes where none is given: prismatic (m), revolute (rad).
 CONTACT = (1e-5, 1e-4)
-#: Where a place of rest begins in a search, as multiples of half of the way that is seen, from its middle: within the
-#: way, just outside on either side, and so far away that it pulls nearly the same everywhere. Without a size an effect
-#: does not depend on its place, so that a first step leaves it.
-PLACES = (0.0, -2.0, 2.0, -8.0, 8.0)
 #: A stiffness that nothing deflects; a place that no joint reaches, and a command that is never given.
 RIGID, NEVER = 1e9, 1e9
 #: Largest share of a load that inverse dynamics has one solution for.

@@ -119,6 +119,8 @@ MOST_SAMPLES = 4000
 
 # ---- start values ----------------------------------------------------------------------------------------------------
 
+#: Two equal steps of a place change the column of its size alike, to rounding.
+EVEN = 1e-6
 #: Share of the largest influence on a residual below which that of a parameter is rounding.
 ROUNDED = 1e-12
 #: Deviations of its sensor's noise that the way of a coordinate at rest spans: four to either side.

@@ -53,6 +53,9 @@ TRIALS, TRIALS_BY_SECANTS = 4, 2
 FAINT = 1e-6
 #: Share of its force by which a stop is stronger against the fastest impact, to begin with.
 LOSS = 0.1
+#: Where a place that may lie anywhere begins, as multiples of half of the way that is seen, from its middle: within the
+#: way, just outside on either side, and so far away that it pulls nearly the same everywhere.
+PLACES = (0.0, -2.0, 2.0, -8.0, 8.0)
 #: Delay that is nothing unusual, s: a few intervals of a field bus.
 DELAY = 5e-3
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from vpm.catalogue.kinds import ANY
 from vpm.discrepancy.screening.candidates import Candidate
 from vpm.discrepancy.screening.compliance_and_stop_start import moved
 from vpm.model import Model
 from vpm.ranking.parameter_priors import Sizes
-from vpm.ranking.settings import LOSS
+from vpm.ranking.settings import LOSS, PLACES
 
 
 def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
@@ -19,7 +20,7 @@ def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
         # One wave on all of the way that is seen: a longer one is a slope.
         (low, high), (first, last) = ends["period"], sizes.ways[candidate.site]
         ends["period"] = low, max(high, last - first)
-    candidate = replace(candidate, bounds=ends)
+    candidate = _placed(replace(candidate, bounds=ends), sizes)
     if candidate.effect.has_play:
         return replace(candidate, starts=tuple(_backlash(start) for start in candidate.starts), fixed=())
     if candidate.effect.stops:
@@ -28,6 +29,21 @@ def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
         starts = tuple(_stop(start, candidate.site, model, sizes) for start in candidate.starts if seen)
         return replace(candidate, starts=starts, neutral=False)
     return candidate
+
+
+def _placed(candidate: Candidate, sizes: Sizes) -> Candidate:
+    """Candidate with several start values of a location parameter, such as where a spring rests.
+
+    Without size an effect does not depend on its place, so a first step gives it a size and leaves the place. A spring
+    that rests far away pulls nearly the same everywhere.
+    """
+    anywhere = [one.name for one in candidate.effect.parameters if one.shape and tuple(one.physical) == ANY]
+    if not candidate.neutral or len(anywhere) != 1 or len(candidate.starts) != 1 or candidate.site not in sizes.ways:
+        return candidate
+    (start,), (place,) = candidate.starts, anywhere
+    low, high = sizes.ways[candidate.site]
+    starts = tuple({**start, place: 0.5 * (low + high + share * (high - low))} for share in PLACES)
+    return replace(candidate, starts=starts)
 
 
 def _backlash(start: Mapping[str, float]) -> Mapping[str, float]:

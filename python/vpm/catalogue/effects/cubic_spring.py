@@ -4,7 +4,6 @@ Source: Nayfeh and Mook 1979, section 4.1.
 """
 
 from vpm.catalogue.kinds import ANY, EffectType, shape, size
-from vpm.catalogue.shared import PLACES
 from vpm.catalogue.signature import Signature
 from vpm.catalogue.traits import Tried
 
@@ -35,7 +34,7 @@ EFFECT = EffectType(
     impossible="either sign is possible: beside a spring a negative one makes it softer on its way",
     confused_with={},
     screened=False,
-    tried=(Tried("rest", "way", PLACES, (-10.0, 10.0)),),
+    tried=(Tried("rest", "way", (0.0,), (-10.0, 10.0)),),
     link_side_alone=True,
     usual="force",
     signature=Signature(

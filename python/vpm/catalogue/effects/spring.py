@@ -4,7 +4,6 @@ Source: Hooke's law.
 """
 
 from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectType, shape, size
-from vpm.catalogue.shared import PLACES
 from vpm.catalogue.signature import Signature
 from vpm.catalogue.traits import Tried
 
@@ -42,7 +41,7 @@ EFFECT = EffectType(
         "torque_ripple": "they agree over less than a quarter of a period; a longer way discriminates",
         "hysteresis": "they agree over ways that are too short to slide; a longer way discriminates",
     },
-    tried=(Tried("rest", "way", PLACES, (-10.0, 10.0)),),
+    tried=(Tried("rest", "way", (0.0,), (-10.0, 10.0)),),
     link_side_alone=True,
     usual="force",
     plain="stiffness",

@@ -15,9 +15,10 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtri
 
+from vpm.catalogue.kinds import ANY
 from vpm.discrepancy.screening.candidates import Candidate, acts_on, joint_at
 from vpm.discrepancy.screening.compliance_and_stop_start import fine_starts
-from vpm.discrepancy.settings import OF_JOINT, RICHEST, ROUNDED, SHORT_LIST, SIZE_LEVEL
+from vpm.discrepancy.settings import EVEN, OF_JOINT, RICHEST, ROUNDED, SHORT_LIST, SIZE_LEVEL
 from vpm.errors import DivergedError
 from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
 from vpm.identify.identifiability import Span, closest_column, column_lengths, is_alias
@@ -137,6 +138,46 @@ def _short(model: Model, candidate: Candidate, name: str) -> str:
     return next(short for short, dotted in effect.parameter_names.items() if dotted == name)
 
 
+@dataclass(frozen=True)
+class Place:
+    """Indices of size and location parameter of an effect, and the column of their product."""
+
+    size: int
+    where: int
+    column: Array
+
+
+def free_location(
+    data: InverseDynamicsProblem, model: Model, candidate: Candidate, added: Sequence[str], fresh: Array
+) -> Place | None:
+    """Location parameter of a candidate that has a size and a location, or None.
+
+    - ``model``: with the candidate at its start, which has no size
+    - ``added``: its parameters, by dotted name
+    - ``fresh`` (n, len(added)): their columns there
+
+    None too where the column of the size does not change by equal steps with the place.
+    """
+    if not candidate.neutral or len(candidate.starts) > 1 or len(added) != 2:
+        return None
+    effect = model.effect(*candidate.key)
+    short = {dotted: name for name, dotted in effect.parameter_names.items()}
+    own = [candidate.effect.parameter(short[name]) for name in added]
+    anywhere = [i for i, p in enumerate(own) if p.shape and tuple(p.physical) == ANY]
+    if len(anywhere) != 1 or own[1 - anywhere[0]].shape:
+        return None
+    where, size = anywhere[0], 1 - anywhere[0]
+    start, step = model.parameters[added[where]].value, own[where].typical
+    columns = [fresh[:, size]]
+    for steps in (1.0, 2.0):
+        moved = model.with_parameters({added[where]: start + steps * step})
+        columns.append(data.evaluate(moved, moved.theta, [moved.index(added[size])])[1][:, 0])
+    first, second = columns[1] - columns[0], columns[2] - columns[1]
+    if not np.any(first) or np.linalg.norm(second - first) > EVEN * np.linalg.norm(first):
+        return None
+    return Place(size, where, first / step)
+
+
 def probe(base: Baseline, data: InverseDynamicsProblem, candidate: Candidate) -> Probe:
     """Probe a candidate from all its start values; the best step counts, possible estimates before impossible ones."""
     if (found := _searched(base, data, candidate)) is not None:
@@ -220,9 +261,15 @@ def _probe_start(
     columns = [model.index(name) for name in added]
     # Known columns are taken as before it: few effects change them, and where links bend each costs a simulation.
     residual, fresh = data.evaluate(model, model.theta, columns)
+    place = free_location(data, model, candidate, added, fresh)
+    if place is not None:
+        fresh[:, place.where] = place.column
     keep, held, invisible = sort_columns(
         added, fresh, base.span, (base.free, base.jacobian), residual, _sizes(model, candidate, base.free, added)
     )
+    if place is not None and place.where in keep and place.size not in keep:
+        keep.remove(place.where)
+        invisible = (*invisible, added[place.where])
     free = tuple(added[i] for i in keep)
     start_values = model.theta[[columns[i] for i in keep]]
     values, std, left = linear_step(data, base.span.rest(fresh[:, keep]), base.span.rest(residual))
@@ -235,6 +282,14 @@ def _probe_start(
     estimates = dict(zip(free, (values + start_values).tolist(), strict=True))
     deviations = dict(zip(free, std.tolist(), strict=True))
     drop, here = _lowered(base, data, candidate, left) if free else (0.0, 0.0)
+    if place is not None and place.where in keep:
+        size, where = added[place.size], added[place.where]
+        if estimates[size] <= model.parameters[size].minimum:
+            free, invisible = tuple(name for name in free if name != where), (*invisible, where)
+        else:
+            first = model.parameters[where].value
+            estimates[where] = first + (estimates[where] - first) / estimates[size]
+            deviations[where] /= abs(estimates[size])
     return Probe(candidate, model, free, held, invisible, estimates, deviations, drop, here)
 
 
