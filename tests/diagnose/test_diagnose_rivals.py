@@ -23,16 +23,6 @@ def test_a_spring_is_named_and_not_the_constant_force_that_is_the_plainer_name(s
 
 
 @pytest.mark.nightly
-def test_a_search_tries_where_a_spring_may_rest() -> None:
-    """A spring that rests beyond its way looks like a constant force, or a shifted centre of mass."""
-    case = shared_case("axis_rotary", "spring", 106)
-    tried = ["bias_force", "spring"]
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=tried, names="search", workers=1)
-    assert [(effect.name, effect.site) for effect in why.effects] == [("spring", "axis")]
-    assert why.classes == (("spring at axis", "bias_force at axis"),)
-
-
-@pytest.mark.nightly
 def test_a_constant_force_keeps_its_name_where_finer_laws_know_nothing_more() -> None:
     case = shared_case("axis_rotary", "bias_force", 2)
     tried = ["bias_force", "spring", "asymmetric_friction"]

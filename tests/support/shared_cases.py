@@ -38,7 +38,7 @@ NIGHTLY: dict[str, tuple[Request, ...]] = {
         (("spring", "viscous_friction"), 3),
     ),
     "axis_rotary": (
-        ("asymmetric_friction", 2),
+        ("asymmetric_friction", 5),
         ("bias_force", 2),
         ("cubic_spring", 43),
         ("end_stop", 4),
@@ -48,6 +48,7 @@ NIGHTLY: dict[str, tuple[Request, ...]] = {
         ("parameters", 100),
         ("spring", 2),
         ("spring", 7),
+        ("spring", 9),
         ("spring", 100),
         ("spring", 106),
         ("stribeck_friction", 3001),
