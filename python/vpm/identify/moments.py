@@ -73,7 +73,7 @@ def real_bodies(model: Model, free: Sequence[str], low: Array, high: Array) -> t
             matrix[np.ix_(mine, mine)] = 1.0 - np.eye(3)
             low[mine], high[mine] = 0.0, np.inf
         elif len(mine) == 2:
-            third = next(model.parameters[name].value for name in moments_of(names[0]) if name not in free)
+            (third,) = _known(model, names)
             matrix[np.ix_(mine, mine)] = [[0.5, 0.5], [0.5, -0.5]]
             low[mine], high[mine] = [third, -third], [np.inf, third]
     return Coordinates(None if np.array_equal(matrix, np.eye(len(free))) else matrix), low, high
@@ -92,10 +92,15 @@ def free_moments(model: Model, free: Collection[str]) -> list[list[str]]:
 
 def beside_known(model: Model, names: Sequence[str]) -> tuple[float, float] | None:
     """Ends of the one free moment of inertia of a body beside two that are known; none where they leave no room."""
-    known = [model.parameters[name].value for name in moments_of(names[0]) if name not in names]
+    known = _known(model, names)
     if len(known) != 2 or min(known) <= 0.0:
         return None
     return abs(known[0] - known[1]), known[0] + known[1]
+
+
+def _known(model: Model, names: Sequence[str]) -> list[float]:
+    """Moments of inertia of a body beside its free ones."""
+    return [model.parameters[name].value for name in moments_of(names[0]) if name not in names]
 
 
 def moments_of(moment: str) -> list[str]:
@@ -113,12 +118,8 @@ def to_the_border(before: Array, after: Array) -> Array:
 
 def rods(model: Model, free: Collection[str]) -> list[tuple[str, str]]:
     """Pairs of free moments of slender rods: the third one is known and zero, so that both are equal."""
-
-    def third(pair: Sequence[str]) -> float:
-        return next(model.parameters[name].value for name in moments_of(pair[0]) if name not in pair)
-
     pairs = [mine for mine in free_moments(model, free) if len(mine) == 2]
-    return [(one, other) for one, other in pairs if third((one, other)) == 0.0]
+    return [(one, other) for one, other in pairs if _known(model, (one, other)) == [0.0]]
 
 
 def on_the_border(model: Model, free: Sequence[str]) -> list[tuple[list[str], str]]:

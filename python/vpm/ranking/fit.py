@@ -246,6 +246,8 @@ class Fitter:
             after = self.cost(tried, residual, noise)
             if after < before:
                 return tried, residual, after
+            if trial == trials - 1:
+                break
             bent = (noise.whitened(residual, self.tracked.parts) - errors - share * along) / share**2
             costs = [(noise.cost(errors + part * along + part**2 * bent), part) for part in share * NEARER]
             least, share = min(costs)

@@ -172,7 +172,8 @@ class Look:
         score = _repeated([(self.left[1], left[1])], self.settings.pieces)
         heavier = key is not None and EFFECTS[key[0]].adds_inertia
         alone = float(_shares(self._drawn, left)[place]) if heavier else 0.0
-        overtone = key is not None and fitted.structure.is_overtone(key, self._fitter.tracked.way(key[1]))
+        ways = self._fitter.tracked.ways
+        overtone = key is not None and fitted.structure.is_overtone(key, ways.get(key[1], np.inf))
         judgement = Judgement(removed, min(shares), score, size, beside, shape, alone, overtone)
         if key is None or not ended or not judgement.is_faint(self.settings, PARTS):
             return judgement

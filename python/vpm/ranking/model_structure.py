@@ -126,12 +126,12 @@ class Structure:
 
     @property
     def doubt(self) -> float:
-        """How improbable a structure's values are by what its model file states, nats."""
+        """How improbable a structure's values are by its model file, and those of its effects by their priors, nats."""
         return 0.5 * float(self._from_file @ self._from_file)
 
     @property
     def _from_file(self) -> Array:
-        """Deviations (k,) of a structure's values from what its model file states."""
+        """Deviations (k,) of a structure's values from what its model file states; of its effects' by their priors."""
         return self.standard[[place for place, name in enumerate(self.priors) if name in self.model.adjustable]]
 
     def moves(self, names: Sequence[str]) -> Array:

@@ -98,12 +98,16 @@ class TrackedRecords:
         #: Samples that are fitted, and those that are held back.
         self.parts, self.held_back = _divided(self._stretches, PARTS - 1)
 
-    def way(self, site: str) -> float:
-        """Way along which a joint moves in all tracked records; infinite where no channel shows it."""
-        channels, name = self.records[0].channels, f"{site}.position"
-        if name not in channels:
-            return np.inf
-        return float(np.ptp(np.concatenate([record.readings[:, channels.index(name)] for record in self.records])))
+    @cached_property
+    def ways(self) -> dict[str, float]:
+        """Way along which each joint or transmission that a channel shows moves in all tracked records."""
+        places = {name: place for place, name in enumerate(self.records[0].channels) if name.endswith(".position")}
+        return {
+            name.removesuffix(".position"): float(
+                np.ptp(np.concatenate([one.readings[:, place] for one in self.records]))
+            )
+            for name, place in places.items()
+        }
 
     def with_hold(self, hold: str) -> TrackedRecords:
         """Tracked records with another hold of commands between samples."""
