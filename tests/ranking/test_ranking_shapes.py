@@ -12,7 +12,7 @@ from second_suite.cases import inputs_of
 from second_suite.logs import logged
 from second_suite.loop import simulated
 from second_suite.machine import columns_of
-from sledge import DRY, pushed
+from sledge import DRY, SLEDGE, pushed
 from vpm.catalogue.shared import SLOW
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -62,7 +62,7 @@ def test_seals_that_stick_are_no_other_friction_of_the_joint() -> None:
     assert ranking.recalibrated.parameters["lifter.friction.transition_velocity"].value < 2e-4
 
 
-@pytest.mark.parametrize("seeds", [(1, 2), (3, 4)])
+@pytest.mark.parametrize("seeds", [(3, 4), (11, 12)])
 def test_what_a_law_is_wrong_by_in_its_shape_is_no_other_effect(seeds: tuple[int, int]) -> None:
     """An excess that falls off by the square of the speed is no bell; the rest looks like a drag, all the way.
 
@@ -80,3 +80,12 @@ def test_a_drag_that_is_there_is_found_beside_an_excess_of_either_shape(hidden: 
     records = [pushed(seed=seed, dry=3.0, duration=5.0, **hidden) for seed in (1, 2)]
     ranking = vpm.rank(Model.from_toml(DRY), records, effects=["stribeck_friction", "quadratic_drag"])
     assert {one.effect for one in ranking.effects} == {"stribeck_friction", "quadratic_drag"}
+
+
+def test_friction_that_vanishes_at_some_places_counts_with_its_mean() -> None:
+    """Its mean alone takes nothing from some pieces of the records, and its waves rest on that."""
+    ranking = vpm.rank(Model.from_toml(SLEDGE), [pushed(seed=seed, dry=3.0, wavy=3.0) for seed in (1, 2)])
+    named = {(one.effect, one.site) for one in ranking.effects}
+    assert named == {("coulomb_friction", "way"), ("position_dependent_friction", "way")}
+    level, wave = (ranking.model.parameters[f"way.friction.{name}"].value for name in ("coulomb", "position_cosine"))
+    assert (level, wave) == pytest.approx((3.0, 3.0), rel=0.01)

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from vpm.catalogue import EFFECTS
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import Key
 from vpm.errors import VpmError
@@ -274,6 +275,8 @@ class Search:
     ) -> tuple[list[Look], list[tuple[Ranked, ...]]]:
         """Search round with several effects at once, where no effect alone does as well."""
         looks, together = self._at_several_places(looks, best, tried)
+        if not (best or together):
+            looks, together = self._resting_on_another(looks, tried)
         return (looks, together) if best or together else self._rubbing_on_both_sides(looks)
 
     def _at_several_places(
@@ -305,6 +308,28 @@ class Search:
             structure = with_usual_friction(looks[0], self.data, self.extensions, self.sizes, self.names, most)
             if structure is not None:
                 return self._with_needed(structure, looks, self._stands, "bring the model back to its records")
+        return looks, []
+
+    def _resting_on_another(
+        self, looks: list[Look], tried: Sequence[Trial]
+    ) -> tuple[list[Look], list[tuple[Ranked, ...]]]:
+        """Search with an effect and one that rests on it, where none counts alone.
+
+        Friction that differs along the way by as much as there is of it has no mean that piece after piece shows.
+        """
+        resting = {name: needed for name in self.names if (needed := EFFECTS[name].requires)}
+        worth = [t for t in tried if t.key[0] in resting.values() and t.judgement.least > self.settings.worth]
+        if not worth:
+            return looks, []
+        first = min(worth, key=lambda trial: trial.left)
+        with contextlib.suppress(*ASTRAY):
+            names = [name for name, needed in resting.items() if needed == first.key[0]]
+            look = self._look(first.fitted)
+            pairs = [two for two in self._finished(self._tried(look, look, names)) if two.key[1] == first.key[1]]
+            if pairs:
+                structure = min(pairs, key=lambda trial: trial.left).fitted.structure
+                found, together = self._with_needed(structure, [first.look], self._stands, "count together")
+                return (found, together) if together else (looks, [])
         return looks, []
 
     def _rubbing_on_both_sides(self, looks: list[Look]) -> tuple[list[Look], list[tuple[Ranked, ...]]]:
@@ -354,9 +379,10 @@ class Search:
         without, with_it = (one.structure.doubt for one in (trial.look.fitted, trial.fitted))
         return trial.evidence > self.settings.odds and without - with_it > self.settings.tolerance
 
-    def _tried(self, look: Look, begun: Look) -> list[Trial]:
+    def _tried(self, look: Look, begun: Look, names: Sequence[str] | None = None) -> list[Trial]:
         """Most promising effects of a search round, fitted under one tracker from the structure that was ``begun``."""
-        chosen = proposals(begun, self.fitter, self.data, self.extensions, self.each, self.names, self.bands)
+        asked = self.names if names is None else names
+        chosen = proposals(begun, self.fitter, self.data, self.extensions, self.each, asked, self.bands)
         return [Trial.of(fitted, look, ended=False) for fitted in raced(chosen, begun, self.fitter, self.each)]
 
     def _finished(self, tried: Sequence[Trial]) -> list[Trial]:
