@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from scipy.signal import lfilter
 
 import vpm
 from second_suite import arm
@@ -20,7 +21,7 @@ from vpm.discrepancy.screening.candidates import candidates
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
-from vpm.ranking.fit import Fitter, View, by_secant
+from vpm.ranking.fit import Fitter, View, by_secant, counted_too_often
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
 from vpm.ranking.model_structure import Structure
@@ -636,3 +637,13 @@ def test_values_that_only_scale_return_to_what_is_known_beside_a_false_derivativ
     noise = fitter.noise_of(start.structure, tracker)
     fitted, _ = fitter.moved(replace(start, jacobian=false), View(noise))
     assert np.abs(fitted.structure.standard).max() < 1.0
+
+
+@given(st.sampled_from([0.0, 0.5, 0.9, 0.98]), st.integers(1, 2), st.integers(0, 2**32 - 1))
+def test_samples_count_too_often_by_how_long_their_errors_last(memory: float, channels: int, seed: int) -> None:
+    """Of an autoregression of first order a constant is known (1 + a) / (1 - a) times less well than of white noise."""
+    random, samples = np.random.default_rng(seed), 40000
+    errors = lfilter([1.0], [1.0, -memory], random.standard_normal((channels, samples)), axis=1).ravel()
+    slopes = 1e3 * np.column_stack([np.ones(samples), np.linspace(-1.0, 1.0, samples)])
+    often = counted_too_often(errors, np.tile(slopes, (channels, 1)), channels, 200)
+    assert often == pytest.approx((1.0 + memory) / (1.0 - memory), rel=0.5)

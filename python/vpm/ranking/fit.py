@@ -119,16 +119,17 @@ class Fitter:
         """Gauss-Newton descent of a fit from known derivatives, updated by secants or computed ``anew``."""
         before = self.cost(now.structure, now.residual, view.noise)
         errors, slopes = view.errors(now, self.tracked.parts)
+        tolerance = self._tolerance(view, errors, slopes) if now.structure.priors else math.inf
         ended = False
         for _ in range(self.settings.iterations if now.structure.priors else 0):
             move, gain = self._step(now.structure, view, errors, slopes)
             hopeful = before - self.settings.patience * gain <= goal
-            worth = hopeful and gain >= self.settings.tolerance
+            worth = hopeful and gain >= tolerance
             step, trials = (move, errors, slopes @ move), TRIALS if fresh else TRIALS_BY_SECANTS
             better = self._better(now, view.noise, step, before, trials) if worth else None
             if better is None:
                 better = self._pulled(now, view, (errors, slopes), before)
-            slow = better is None or before - better[2] < self.settings.tolerance
+            slow = better is None or before - better[2] < tolerance
             if better is not None:
                 move = better[0].standard - now.structure.standard
                 now, last, before = replace(now, structure=better[0], residual=better[1]), errors, better[2]
@@ -141,6 +142,7 @@ class Fitter:
             if fresh:
                 now = self.followed(now.structure, now.tracker, now.names, now.residual)
                 errors, slopes = view.errors(now, self.tracked.parts)
+                tolerance = self._tolerance(view, errors, slopes)
         return Fitted(now.structure, now.tracker, now.residual, before, ended), slopes
 
     def finished(self, found: Fitted, view: View) -> Fitted:
@@ -225,6 +227,16 @@ class Fitter:
         gain, z = view.noise.cost(errors) - view.noise.cost(errors + slopes @ move), structure.standard
         return move, gain + 0.5 * (float(z @ z) - float((z + move) @ (z + move)))
 
+    def _tolerance(self, view: View, errors: Array, slopes: Array) -> float:
+        """Gain of a step, nats, below which a fit ends: what chance makes of it.
+
+        No more than what each step of a fit, in the mean, has to gain to make an effect worth it.
+        """
+        channels, settings = len(view.noise.tails), self.settings
+        often = counted_too_often(*view.weighted(errors, slopes), channels, settings.pieces)
+        most = settings.needed(len(errors) // channels) / (settings.turns * settings.iterations)
+        return max(settings.tolerance, min(settings.tolerance * often, most))
+
     def _better(
         self, now: Followed, noise: NoiseModel, step: tuple[Array, Array, Array], before: float, trials: int
     ) -> tuple[Structure, Array, float] | None:
@@ -308,6 +320,23 @@ class Fitter:
 def in_roots(errors: Array, slopes: Array, roots: Array) -> tuple[Array, Array]:
     """Errors (n,) and derivatives (n, k) of a fit, weighted by square roots."""
     return errors * roots, slopes * roots[:, None]
+
+
+def counted_too_often(errors: Array, slopes: Array, channels: int, pieces: int) -> float:
+    """How many times too often samples count in a fit whose errors (n,) last longer than a sample.
+
+    - ``slopes`` (n, k): by deviations of the priors, channel by channel as the errors
+
+    Law: how much the slope of the cost differs between pieces of the records, and how much it would if errors were
+    independent (K.-Y. Liang and S. Zeger, *Biometrika* 73, 1986).
+    """
+    scale, count = max(float(np.mean(errors**2)), 1e-300), slopes.shape[1]
+    by_sample = np.sum((slopes * errors[:, None]).reshape(channels, -1, count), axis=0) / scale
+    sums = np.stack([np.sum(piece, axis=0) for piece in np.array_split(by_sample, pieces)])
+    information, spread = slopes.T @ slopes / scale, pieces * np.cov(sums, rowvar=False).reshape(count, count)
+    known = information + np.eye(count)
+    expected, seen = (float(np.trace(np.linalg.solve(known, one))) for one in (information, spread))
+    return seen / max(expected, 1e-300)
 
 
 def by_secant(slopes: Array, change: Array, move: Array) -> Array:

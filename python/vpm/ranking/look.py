@@ -127,9 +127,8 @@ class Look:
     @property
     def needed(self) -> float:
         """Least gain for which an effect is worth it in a look, nats."""
-        samples = len(self.left[0])
         least = min((1.0 - quiet for quiet, room in zip(self._quiet, self._rooms(), strict=True) if room), default=1.0)
-        return float(-0.5 * samples * np.log1p(-self.settings.worth * least))
+        return self.settings.needed(len(self.left[0]), least)
 
     def has_room(self, beside: Fitted | None = None) -> bool:
         """Whether a look has room for any effect that counts, alone or beside another structure."""

@@ -103,7 +103,7 @@ class Settings:
     patience: float = 3.0  #: By how much more than a step predicts a fit may still gain before it is given up.
     #: Of the cost that the most promising fit of a look saves: another one that cannot save as much is given up.
     share: float = 0.5
-    tolerance: float = 0.5  #: Gain of a step, nats, below which a fit ends.
+    tolerance: float = 0.5  #: Gain of a step, nats, below which a fit ends if errors are independent.
     reach: float = 6.0  #: Deviations of its prior that a parameter may move in a step.
     #: Length of the autoregression that whitens the error of a channel where evidence is told, samples.
     order: int = 12
@@ -117,3 +117,7 @@ class Settings:
     same: float = 1.0  #: Effects between which the records decide by fewer nats than this, in the mean, are rivals.
     sure: float = 0.95  #: The most probable effects that are as probable together are rivals, too.
     effects: int = 4  #: Most effects of a structure.
+
+    def needed(self, samples: int, share: float = 1.0) -> float:
+        """Least gain, nats, for which an effect is worth it, if a share of the error power of samples is no noise."""
+        return float(-0.5 * samples * np.log1p(-self.worth * share))
