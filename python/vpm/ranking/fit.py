@@ -124,10 +124,9 @@ class Fitter:
         for _ in range(self.settings.iterations if now.structure.priors else 0):
             move, gain = self._step(now.structure, view, errors, slopes)
             hopeful = before - self.settings.patience * gain <= goal
-            worth = hopeful and gain >= tolerance
             step, trials = (move, errors, slopes @ move), TRIALS if fresh else TRIALS_BY_SECANTS
-            better = self._better(now, view.noise, step, before, trials) if worth else None
-            if better is None:
+            better = self._better(now, view.noise, step, before, trials) if hopeful and gain >= tolerance else None
+            if better is None and hopeful:
                 better = self._pulled(now, view, (errors, slopes), before)
             slow = better is None or before - better[2] < tolerance
             if better is not None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.ranking.fit import Fitted, Fitter
@@ -14,10 +14,11 @@ from vpm.ranking.tried_effect import is_part
 def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: ParallelCandidates) -> list[Fitted]:
     """Fits of the proposals that may win the race.
 
-    Each has to gain what makes it worth while. The most promising one is fitted first, and another one has to save a
-    share of the cost that this one saved (O. Maron and A. Moore, *Advances in Neural Information Processing Systems* 6,
-    1994: those that cannot win leave a race early). A part of another one is fitted all the same: a rotor may seem to
-    gain little where a spring takes it along. The outcome does not depend on how many are fitted at a time.
+    Each has to gain what makes it worth while. The most promising one is fitted first, then the next two, four, and so
+    on. Each has to save a share of the cost that the best one before saved (O. Maron and A. Moore, *Advances in Neural
+    Information Processing Systems* 6, 1994: those that cannot win leave a race early). A part of another one is fitted
+    all the same: a rotor may seem to gain little where a spring takes it along. The outcome does not depend on how many
+    are fitted at a time.
 
     Parameters
     ----------
@@ -28,13 +29,22 @@ def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: Parallel
     each : ParallelCandidates
     """
     ordered = sorted(chosen, key=lambda one: -one.gain)
-    first = _fitted(ordered[:1], look.needed, look, fitter, each)
-    saved = [look.fitted.cost - fitted.cost for fitted in first]
-    wanted = max([look.needed, *(fitter.settings.share * nats for nats in saved)])
     model, keys = look.fitted.structure.model, {one.key for one in chosen}
     parts = [one for one in ordered[1:] if any(is_part(model, one.key, key) for key in keys)]
-    others = [one for one in ordered[1:] if one not in parts]
-    return first + _fitted(others, wanted, look, fitter, each) + _fitted(parts, look.needed, look, fitter, each)
+    ends, wanted = list[Fitted](), look.needed
+    for several in _doubling([one for one in ordered if one not in parts]):
+        ended = _fitted(several, wanted, look, fitter, each)
+        wanted = max([wanted, *(fitter.settings.share * (look.fitted.cost - one.cost) for one in ended)])
+        ends += ended
+    return ends + _fitted(parts, look.needed, look, fitter, each)
+
+
+def _doubling(ordered: Sequence[Proposal]) -> Iterator[Sequence[Proposal]]:
+    """Proposals in their order: one, the next two, the next four, and so on."""
+    begin = 0
+    while begin < len(ordered):
+        yield ordered[begin : 2 * begin + 1]
+        begin = 2 * begin + 1
 
 
 def _fitted(
