@@ -353,6 +353,13 @@ def test_seats_go_to_starts_that_promise_a_gain() -> None:
     assert seated == [("spring", 90.0), ("spring", 70.0), ("backlash", 80.0)]
 
 
+def test_starts_that_gain_the_same_take_one_seat() -> None:
+    """They differ in what does nothing there; a spring that starts elsewhere is another one."""
+    structure = structure_of(Model.from_toml(SLEDGE)).carried(Model.from_toml(SLEDGE).with_effect("spring", "way"))
+    springs = [Proposal(replace(structure, effects=(("spring", "way"),)), gain, True) for gain in (90.0, 89.9, 70.0)]
+    assert _seated(springs, 10.0, Settings()) == [springs[0], springs[2]]
+
+
 @pytest.mark.parametrize(("more", "close"), [((), 1e-6), (("hysteresis",), 1e-3)])
 def test_effects_that_do_nothing_share_a_pass_and_promise_the_same(
     more: tuple[str, ...], close: float, monkeypatch: pytest.MonkeyPatch

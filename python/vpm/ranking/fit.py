@@ -303,7 +303,7 @@ class Fitter:
         columns, moves = by
         if moves is None or not columns:
             return False
-        motion = np.maximum(np.max(np.abs(self.tracked.motion), axis=0), 1e-300)
+        motion = self.tracked.farthest
         farthest = np.max(np.abs(jacobian), axis=0) * moves / MOVE / motion[:, None]  # by one deviation
         channel, number = map(int, np.unravel_index(np.argmax(farthest), farthest.shape))
         if farthest[channel, number] <= 1.0:

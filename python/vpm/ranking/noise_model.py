@@ -192,8 +192,10 @@ class NoiseModel:
         """Negative log-density under the noise model but for a constant, at the most likely scales."""
         channels = self.by_channel(errors)
         sizes = self._scales(channels)
-        likely = float(np.sum(log_student(channels / sizes, self.freedom)))
-        return float(channels.shape[1] * np.sum(np.log(sizes))) - likely
+        spread = float(channels.shape[1] * np.sum(np.log(sizes)))
+        if not np.any(np.isfinite(self.tails)):  # in their own scale normal errors are as probable, whatever they are
+            return spread + 0.5 * channels.size * float(1.0 + np.log(2.0 * np.pi))
+        return spread - float(np.sum(log_student(channels / sizes, self.freedom)))
 
     def roots(self, errors: Array) -> Array:
         """Square roots of the weights (n,) that the noise model gives to squared errors."""

@@ -206,12 +206,23 @@ def _gain(look: Look, followed: Followed, one: _Extended) -> float:
 
 
 def _seated(ordered: Sequence[Proposal], promising: float, settings: Settings) -> list[Proposal]:
-    """Best few starts of each proposal with a gain; neutral ones as many as the settings allow."""
+    """Best few starts of each proposal with a gain; neutral ones as many as the settings allow.
+
+    Starts that gain the same differ in what does nothing there, and lead to the same place.
+    """
     seated: dict[Key, list[Proposal]] = defaultdict(list)
     for proposal in ordered:
         several = seated[proposal.key]
-        if proposal.gain >= promising and len(several) < settings.starts:
+        new = not any(_is_same(proposal, other, settings) for other in several)
+        if proposal.gain >= promising and new and len(several) < settings.starts:
             several.append(proposal)
     neutral = [several for several in seated.values() if several and several[0].neutral][: settings.seats]
     others = [several for several in seated.values() if several and not several[0].neutral]
     return [proposal for several in neutral + others for proposal in several]
+
+
+def _is_same(one: Proposal, other: Proposal, settings: Settings) -> bool:
+    """Whether two starts of a proposal gain the same on the same side."""
+    if abs(one.gain - other.gain) > settings.tolerance:
+        return False
+    return one.structure.side(one.key) == other.structure.side(other.key)

@@ -157,6 +157,11 @@ class TrackedRecords:
         """Residual of tracked records under a model at rest (N, m): readings minus their means."""
         return np.concatenate([record.readings - np.mean(record.readings, axis=0) for record in self.records])
 
+    @cached_property
+    def farthest(self) -> Array:
+        """Farthest that each channel of tracked records is from its mean (m,)."""
+        return np.asarray(np.maximum(np.max(np.abs(self.motion), axis=0), 1e-300))
+
     def drawn(self, band: float) -> Array:
         """Residual of tracked records under free masses (N, m); zero for channels that are not drawn.
 
