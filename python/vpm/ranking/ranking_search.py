@@ -318,18 +318,24 @@ class Search:
         Friction that differs along the way by as much as there is of it has no mean that piece after piece shows.
         """
         resting = {name: needed for name in self.names if (needed := EFFECTS[name].requires)}
-        worth = [t for t in tried if t.key[0] in resting.values() and t.judgement.least > self.settings.worth]
-        if not worth:
-            return looks, []
-        first = min(worth, key=lambda trial: trial.left)
-        with contextlib.suppress(*ASTRAY):
-            names = [name for name, needed in resting.items() if needed == first.key[0]]
-            look = self._look(first.fitted)
-            pairs = [two for two in self._finished(self._tried(look, look, names)) if two.key[1] == first.key[1]]
-            if pairs:
-                structure = min(pairs, key=lambda trial: trial.left).fitted.structure
-                found, together = self._with_needed(structure, [first.look], self._stands, "count together")
-                return (found, together) if together else (looks, [])
+        bare = {one.key: one for one in sorted(tried, key=lambda one: -one.left) if one.key[0] in resting.values()}
+        for first in sorted(bare.values(), key=lambda one: one.left):
+            with contextlib.suppress(*ASTRAY):
+                look = self._look(self.fitter.finished(first.fitted, View(first.look.view.noise)))
+                names = [name for name, needed in resting.items() if needed == first.key[0]]
+                beside = self._finished(self._tried(look, look, names))
+                counting = [two for two in beside if two.counts and two.key[1] == first.key[1]]
+                best = min(counting, key=lambda two: two.left, default=None)
+                if best is None:
+                    continue
+                both = weighed([Trial.of(best.fitted, first.look, first.key)], self.fitter)[0]
+                if not self._stands(both):
+                    continue
+                self.say(f"{first.label} and {best.key[0]} together {_removing(both)}")
+                (second,) = self._listed(None, weighed([best], self.fitter))
+                (one,) = self._listed(both, [both])
+                own = {name: value for name, value in one.values.items() if name not in second.values}
+                return self._all_looks(self._look(best.fitted)), [(replace(one, values=own),), (second,)]
         return looks, []
 
     def _rubbing_on_both_sides(self, looks: list[Look]) -> tuple[list[Look], list[tuple[Ranked, ...]]]:
