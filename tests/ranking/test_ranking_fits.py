@@ -29,9 +29,11 @@ from vpm.ranking.parameter_priors import Sizes
 from vpm.ranking.proposals import Proposal, _seated, proposals
 from vpm.ranking.ranking_search import Search, _is_worse
 from vpm.ranking.settings import PLACES, Settings
+from vpm.ranking.several_at_once import _spares_file
 from vpm.ranking.start_values import started
 from vpm.ranking.structure_extensions import Extensions
 from vpm.ranking.tracked_records import TrackedRecords, Tracker, tracker_gains
+from vpm.ranking.trials import Trials
 from vpm.weighing import Prior
 
 #: An arm on a vertical hinge, without friction.
@@ -478,13 +480,13 @@ def test_a_tracker_that_lets_a_machine_fall_is_not_looked_at() -> None:
 
 
 def test_fits_under_the_next_tracker_begin_where_the_first_one_ended(monkeypatch: pytest.MonkeyPatch) -> None:
-    begun, fitted = [], Search._fitted
+    begun, fitted = [], Search.fitted
 
     def seen(search: Search, structure: Structure, tracker: Tracker) -> Any:
         begun.append((tracker.band, structure.values["sledge.mass"]))
         return fitted(search, structure, tracker)
 
-    monkeypatch.setattr(Search, "_fitted", seen)
+    monkeypatch.setattr(Search, "fitted", seen)
     vpm.rank(Model.from_toml(SLEDGE), pushed(seed=1, duration=2.0), effects=[])
     (first, at_first), (second, then) = begun[:2]
     assert (first, second) == Settings().bands
@@ -503,7 +505,7 @@ def test_fits_begin_at_the_file_where_nothing_counts_from_afar(
         begun.append(float(start.fitted.structure.theta[model.index("sledge.mass")]))
         return []
 
-    monkeypatch.setattr(Search, "_tried", nothing)
+    monkeypatch.setattr(Search, "tried", nothing)
     monkeypatch.setattr(Look, "has_room", lambda *_: True)
     gone = abs(MASS - 3.3) / float(model.parameters["sledge.mass"].uncertainty or 0.0)
     vpm.rank(model, pushed(seed=1, duration=2.0), effects=["spring"], settings=Settings(reach=share * gone))
@@ -517,11 +519,11 @@ def test_friction_on_the_other_side_has_to_make_the_file_more_probable() -> None
     off = stated.at(stated.standard + 3.0)
     assert stated.doubt == 0.0
     assert off.doubt == pytest.approx(4.5 * len(model.adjustable))
-    search = SimpleNamespace(settings=Settings())
+    trials = SimpleNamespace(settings=Settings())
     for without, evidence, spared in ((off, 12.9, True), (off, 5.0, False), (stated, 12.9, False)):
         look, fitted = (SimpleNamespace(structure=one) for one in (without, stated))
         trial: Any = SimpleNamespace(evidence=evidence, look=SimpleNamespace(fitted=look), fitted=fitted)
-        assert Search._spares_file(cast("Search", search), trial) == spared
+        assert _spares_file(cast("Trials", trials), trial) == spared
 
 
 @pytest.mark.parametrize(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.screening.candidates import Key
 from vpm.model import Model
+from vpm.numbers import rough_percent
 from vpm.ranking.fit import Fitted
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
@@ -49,6 +50,11 @@ class Trial:
     def label(self) -> str:
         """Label of a tried effect: ``effect at site``."""
         return " at ".join(self.key)
+
+    @property
+    def removing(self) -> str:
+        """Text on what a tried effect does: ``removes 3 % of the error power``."""
+        return f"removes {rough_percent(self.judgement.removed)} of the error power"
 
     @property
     def is_instrument(self) -> bool:

@@ -1,0 +1,216 @@
+"""Trials of effects in a ranking: fits of structures under trackers, looks at them, and what they are worth."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from vpm.discrepancy.parallel_candidates import ParallelCandidates
+from vpm.discrepancy.screening.candidates import Key
+from vpm.errors import VpmError
+from vpm.experiment import Experiment
+from vpm.model import Model
+from vpm.ranking.choice_by_evidence import as_good, evidence, weighed
+from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
+from vpm.ranking.look import Look
+from vpm.ranking.model_structure import Structure
+from vpm.ranking.noise_model import fitted_noise
+from vpm.ranking.own_vibration import below_own_vibration
+from vpm.ranking.parameter_priors import Sizes, known
+from vpm.ranking.posterior import robust_probabilities
+from vpm.ranking.proposal_fits import raced
+from vpm.ranking.proposals import proposals
+from vpm.ranking.result import Ranked
+from vpm.ranking.settings import Settings
+from vpm.ranking.short_waves import wider_bands
+from vpm.ranking.structure_extensions import Extensions
+from vpm.ranking.substitute_records import shown, why_unbalanced
+from vpm.ranking.tracked_records import TrackedRecords, Tracker
+from vpm.ranking.tried_effect import Trial
+from vpm.simulate import Setup
+
+
+class Trials:
+    """Trials of effects beside a structure: it is fitted, looked at, and weighed with each of them."""
+
+    def __init__(
+        self,
+        model: Model,
+        records: Sequence[Experiment],
+        names: Sequence[str],
+        settings: Settings,
+        setup: Setup | None,
+        each: ParallelCandidates,
+        say: Callable[[str], None],
+    ) -> None:
+        settings = below_own_vibration(settings, model, records)
+        self.names, self.settings, self.each, self.say = names, settings, each, say
+        self.fitter = Fitter(TrackedRecords(model, records, settings, setup), settings)
+        self.data = shown(model, self.fitter.tracked)
+        self.bands = () if why_unbalanced(model, records) else wider_bands(model, self.data)
+        self.sizes = Sizes(model, self.data)
+        self.extensions = Extensions(self.sizes)
+        firsts = self.fitter.tracked.firsts.priors
+        values = np.append(model.theta, np.zeros(len(firsts)))
+        self.start = Structure(
+            model, values, known(model, self.data, self.fitter.tracked) | firsts, firsts=tuple(firsts)
+        )
+        self.first: dict[float, Look] = {}  # looks at the model as it was, by bandwidth
+        self.others: dict[Key, list[Structure]] = {}  # what counted as well when an effect came in
+
+    def looks(self, structure: Structure, known: Look | None = None) -> list[Look]:
+        """Looks of the search at a structure under each tracker that can follow it.
+
+        A slow tracker may lose what hangs behind a contact, or let a leg fall over. What it leaves then says nothing.
+        Where one follows, fits under the next begin at its values: these hide more, and begun afar they may end early.
+        A fast one that predicts worse is left out, see `_predicts_worse`.
+
+        Raises
+        ------
+        VpmError
+            All of them run away.
+        """
+        looks = [] if known is None else [known]
+        reason: Exception = VpmError(f"{structure.model.name} runs away from the records")
+        for band in self.settings.bands:
+            if known is None or band != known.fitted.tracker.band:
+                begun = next((look.fitted.structure for look in looks if look.follows), structure)
+                try:
+                    looks.append(self.look(self.fitted(begun, Tracker(band))))
+                except ASTRAY as error:
+                    reason = error
+        if not looks:
+            raise reason
+        looks = [look for look in looks if look.follows] or looks[-1:]
+        return [look for look in looks if not any(self._predicts_worse(look, other) for other in looks)]
+
+    def _predicts_worse(self, look: Look, slower: Look) -> bool:
+        """Whether a fast look of the search makes the records clearly less probable than a slower one.
+
+        A tracker moves its model by the noise of sensors, too. Where that outweighs the errors that it corrects, a
+        structure leaves less by answering less to noise, and its values lead astray. Predictions of the same samples
+        are compared, each whitened by its own spectrum (A. Dawid, *J. Royal Statistical Society A* 147, 1984).
+        """
+        if look.fitted.tracker.band <= slower.fitted.tracker.band:
+            return False
+        told = (self._predictive_density(one.fitted) for one in (look, slower))
+        return next(told) + self.settings.odds < next(told)
+
+    def _predictive_density(self, fitted: Fitted) -> float:
+        """Log-density of the fitted samples as a tracker predicts them, whitened by their own spectrum."""
+        noise = fitted_noise(fitted.residual, self.fitter.tracked.parts, self.settings.order)
+        return float(np.sum(self.fitter.log_density(fitted, noise)))
+
+    def all_looks(self, look: Look) -> list[Look]:
+        """Looks at a tried structure under each tracker, one of which is known."""
+        return self.looks(look.fitted.structure, look)
+
+    def look(self, fitted: Fitted) -> Look:
+        """Look at a tried structure as it was fitted."""
+        return Look(fitted, self.fitter, self.first.get(fitted.tracker.band))
+
+    def fitted(self, structure: Structure, tracker: Tracker) -> Fitted:
+        """Fit of a structure to the end in the search, with channels scaled by their first residual."""
+        view = View(self.fitter.noise_of(structure, tracker))
+        return self.fitter.finished(self.fitter.fitted(structure, tracker, view), view)
+
+    def without(self, key: Key, look: Look) -> Look:
+        """Searched structure without one effect, fitted again under its tracker."""
+        return self.look(self.fitted(look.fitted.structure.without(key), look.fitted.tracker))
+
+    def tried(self, look: Look, begun: Look, names: Sequence[str] | None = None) -> list[Trial]:
+        """Most promising effects of a search round, fitted under one tracker from the structure that was ``begun``."""
+        asked = self.names if names is None else names
+        chosen = proposals(begun, self.fitter, self.data, self.extensions, self.each, asked, self.bands)
+        return [Trial.of(fitted, look, ended=False) for fitted in raced(chosen, begun, self.fitter, self.each)]
+
+    def finished(self, tried: Sequence[Trial]) -> list[Trial]:
+        """Fits of one tracker in a search round that are worth it, finished to the end."""
+        worth = [t for t in tried if t.judgement.removed > self.settings.worth and t.fitted.structure.shows(t.key)]
+        if not worth:
+            return []
+        best = min(worth, key=lambda trial: trial.left)
+        most = self.settings.finished * best.left
+        hopeful = [t for t in worth if t.left <= most or as_good(t, best, self.settings) or best.contains(t)]
+
+        def one_finished(trial: Trial) -> Trial:
+            view = View(trial.look.view.noise)
+            fitted = self.fitter.finished(trial.fitted, view)
+            ends = [fitted, *self._detours(fitted, view)] if trial.splits else [fitted]
+            return Trial.of(min(ends, key=lambda one: one.cost), trial.look)
+
+        ends = self.each("finishing", one_finished, hopeful, lambda trial: trial.label)
+        return [end for end in ends if isinstance(end, Trial)]
+
+    def _detours(self, fitted: Fitted, view: View) -> list[Fitted]:
+        """Fits of a splitting effect in the search, continued from where a faster tracker leads.
+
+        A slow tracker lets a load behind a backlash go its own way. Few of its impacts are in step with those of the
+        record, and fits end in many places. A fast one holds it in step (H. Abarbanel, *Predicting the Future*,
+        Springer 2013).
+        """
+        detour = Tracker(max(self.settings.bands))
+        if detour == fitted.tracker:
+            return []
+        try:
+            quick = self.fitted(fitted.structure, detour).structure
+            return [self.fitter.finished(self.fitter.fitted(quick, fitted.tracker, view), view)]
+        except ASTRAY:
+            return []
+
+    def in_its_place(self, look: Look, others: Sequence[Structure]) -> list[Trial]:
+        """Last effects of other structures in the place of a searched one, fitted."""
+
+        def one_fitted(other: Structure) -> Trial:
+            structure, view = look.fitted.structure.with_last_of(other), View(look.view.noise)
+            fitted = self.fitter.fitted(structure, look.fitted.tracker, view)
+            return Trial.of(fitted, look, ended=False)
+
+        ends = self.each("exchanging", one_fitted, others, lambda other: " at ".join(other.effects[-1]))
+        return self.finished([end for end in ends if isinstance(end, Trial)])
+
+    def weighed_beside_others(self, key: Key, look: Look) -> Trial:
+        """Effect of a searched structure with its evidence, judged against the structure without it."""
+        return weighed([Trial.of(look.fitted, self.without(key, look), key)], self.fitter)[0]
+
+    def is_likelier(self, trial: Trial, other: Trial) -> bool:
+        """Whether a fit of the search is clearly more probable than another one under the same tracker."""
+        noise = fitted_noise(trial.fitted.residual, self.fitter.tracked.parts, self.settings.order)
+        told = [evidence(one.fitted, self.fitter, noise) for one in (trial, other)]
+        return told[0] - told[1] > self.settings.odds
+
+    def stands(self, trial: Trial) -> bool:
+        """Whether a weighed effect of the search counts and is more probable than chance."""
+        return trial.counts and trial.evidence > self.settings.odds
+
+    def listed(self, best: Trial | None, tried: Sequence[Trial]) -> tuple[Ranked, ...]:
+        """All effects that the search tried: accepted ones, then by the error that they leave."""
+        several: dict[Key, Ranked] = {}
+        told = [trial for trial in tried if np.isfinite(trial.evidence)]
+        gains = [trial.evidence - self.settings.odds for trial in told]
+        *shares, _, _ = robust_probabilities(gains, self.settings.tempering, self.settings.astray)
+        probability = {id(trial): float(share) for trial, share in zip(told, shares, strict=True)}
+        labels = {trial.label: probability[id(trial)] for trial in told}
+        for trial in sorted(tried, key=lambda trial: (trial is not best, trial.left)):
+            own = probability.get(id(trial), np.nan)
+            alike = sum(labels.get(label, 0.0) for label in trial.rivals)
+            ranked = self._ranked(trial, own, own + alike)
+            several.setdefault(ranked.key, ranked)
+        return tuple(several.values())
+
+    def _ranked(self, trial: Trial, probability: float, class_probability: float) -> Ranked:
+        structure, without = trial.fitted.structure, trial.look.fitted.structure
+        values = {name: value for name, value in structure.values.items() if name not in without.priors}
+        side, band = structure.side(trial.key), trial.fitted.tracker.band
+        return Ranked(
+            *trial.key,
+            values,
+            trial.judgement,
+            band,
+            side,
+            trial.evidence,
+            probability,
+            trial.rivals,
+            class_probability,
+        )
