@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from vpm.catalogue import EFFECTS
 from vpm.discrepancy.diagnosis import ChannelGap
 from vpm.discrepancy.verdict import _nothing_missing, verdict
 
@@ -71,6 +72,40 @@ def test_an_effect_that_leaves_the_deflection_behind_its_joint_explains_nothing(
     }
     left: Any = SimpleNamespace(present=True)
     assert verdict(data, judged, judged, found, gap, left, None)[0] == word
+
+
+@pytest.mark.parametrize(
+    ("effect", "left", "word"),
+    [
+        ("backlash", 0.38, "effect_found"),
+        ("backlash", 0.62, "unexplained"),
+        ("cubic_spring", 0.38, "unexplained"),
+    ],
+)
+def test_a_play_that_does_most_of_the_work_is_the_explanation(effect: str, left: float, word: str) -> None:
+    """Its impacts are no more where they were in the log, and the residual with it is as large as without."""
+    entry: Any = SimpleNamespace(key=(effect, "shoulder"), trial=SimpleNamespace())
+    entry.trial.probe = SimpleNamespace(candidate=SimpleNamespace(label=f"{effect} at shoulder"))
+    added: Any = SimpleNamespace(type=EFFECTS[effect], at="shoulder")
+    model: Any = SimpleNamespace(
+        effects=(added,),
+        bodies=(),
+        joints=("shoulder",),
+        parameters={},
+        joint_behind=lambda joint: f"{joint}_deflection",
+    )
+    final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=()))
+    found: Any = SimpleNamespace(
+        accepted=(entry,), left={"shoulder": left}, within_laws=False, interrupted=False, final=final, ranked=None
+    )
+    judged: Any = SimpleNamespace(model=model)
+    data: Any = SimpleNamespace(training=SimpleNamespace(joints=("shoulder",)))
+    gap = {
+        "shoulder.effort": ChannelGap(0.0364, 0.0351, 0.0365, 0.0132, "N m", 1.0, "inverse_dynamics"),
+        "shoulder.position (observed)": ChannelGap(7.4e-5, 6.6e-5, 6.6e-5 * left**0.5, 9e-6, "rad", 0.68, "observed"),
+    }
+    rest: Any = SimpleNamespace(present=True)
+    assert verdict(data, judged, judged, found, gap, rest, None)[0] == word
 
 
 def test_an_error_that_grew_is_not_told_as_a_gap_that_closed() -> None:

@@ -70,12 +70,13 @@ def free_joints(model: Model) -> tuple[str, ...]:
 
 
 def tracker_gaps(ranking: Ranking, balanced: Sequence[str] | None) -> dict[str, ChannelGap]:
-    """Errors of the ranking's tracker on validation records at joints without an inverse-dynamics residual.
+    """Errors of the ranking's tracker on validation records at joints with play, or without inverse-dynamics residual.
 
     So of shafts that turn with such a joint. Of all channels where there is no such residual, and so no joint of which
     the efforts are ``balanced``.
     """
     model, joints = ranking.recalibrated, set(ranking.recalibrated.joints) - set(balanced or ())
+    joints |= {effect.at for effect in ranking.model.effects if effect.type.has_play}
     joints |= {shaft for shaft in model.transmissions if joints & set(model.ratios(shaft))}
     return {
         f"{channel} ({OBSERVED})": ChannelGap(

@@ -113,7 +113,7 @@ class _Errors:
         still = [g for g in beside if _is_clear(g.after, g)]
         structured = left is not None and left.present and any(_is_clear(g.after, g) for g in main)
         remaining = structured or (rest is not None and rest.repeats and not is_negligible(gap)) or bool(still)
-        judged = beside if beside and _is_unmeasured(found, data) else main + beside
+        judged = beside if beside and _rests_on_tracker(found, data) else main + beside
         # A channel of noise alone, such as a deflection of what does not bend, says nothing.
         shown = [g for g in judged if not g.signal <= FLOOR_FACTOR * g.noise_floor]
         worst = max(shown or judged, key=_clear_of_noise)
@@ -171,7 +171,7 @@ def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], tracked: float) ->
     to balance: where little is left of what a tracker sees, that says more. A deflection behind their joint is told by
     a tracker alone, and what it leaves of that as it was is no law on either side.
     """
-    if tracked <= MOSTLY_OPEN and any(effect.type.has_play for effect in found.final.model.effects):
+    if tracked <= _most_left(found) and _has_play(found):
         return False
     efforts = [gap[channel] for joint in _joints(found) if (channel := f"{joint}.effort") in gap]
     most = any(g.after**2 > CLEAR_GAIN * g.signal**2 for g in efforts)
@@ -182,10 +182,14 @@ def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], tracked: float) ->
     return most or any(g.recalibrated < g.signal < g.after for g in main_gaps(gap))
 
 
-def _is_unmeasured(found: Search, data: Data | None) -> bool:
-    """Whether all named effects act at joints without a residual, so that the verdict rests on a tracker."""
+def _rests_on_tracker(found: Search, data: Data | None) -> bool:
+    """Whether the verdict rests on a tracker: all named effects act at joints with play, or without a residual."""
     at = _joints(found)
-    return data is not None and bool(at) and not at & {*data.training.joints, ""}
+    if data is None or not at:
+        return False
+    model = found.final.model
+    played = {effect.at for effect in model.effects if effect.type.has_play}
+    return at <= played or not at & {*data.training.joints, ""}
 
 
 def _joints(found: Search) -> set[str]:
@@ -210,7 +214,20 @@ def _is_explanation(found: Search, tracked: float, mostly_open: bool) -> bool:
         return True
     if np.isnan(tracked):
         return not mostly_open
-    return tracked <= MOSTLY_OPEN or (tracked < 1.0 and not mostly_open)
+    return tracked <= _most_left(found) or (tracked < 1.0 and not mostly_open)
+
+
+def _most_left(found: Search) -> float:
+    """Largest share of the error power that effects of a clear verdict may have left under the tracker.
+
+    From impact to impact a play multiplies what is a little off, so that there most of the work is enough.
+    """
+    return 1.0 - CLEAR_GAIN if _has_play(found) else MOSTLY_OPEN
+
+
+def _has_play(found: Search) -> bool:
+    """Whether a joint of the verdict's model has play."""
+    return any(effect.type.has_play for effect in found.final.model.effects)
 
 
 def _nothing_missing(
