@@ -80,6 +80,21 @@ EQUIVALENT = (
 )  # fmt: skip
 
 
+#: What is hidden with an effect where the model file has none of it: friction of each place is no less than zero, so
+#: that what differs along the way has a mean.
+WITH = {"position_dependent_friction": "coulomb_friction"}
+
+
+def named_beside(answer: Answer) -> tuple[Named, ...]:
+    """Named effects, without what is hidden with the hidden one, if both are named."""
+    brought = {(WITH[h.name], h.site) for h in answer.hidden if h.name in WITH and _is_named(answer, h)}
+    return tuple(one for one in answer.named if (one.name, one.site) not in brought)
+
+
+def _is_named(answer: Answer, hidden: Named) -> bool:
+    return any((one.name, one.site) == (hidden.name, hidden.site) for one in answer.named)
+
+
 def names_right(machine: str, hidden: Named, named: Named) -> bool:
     """Whether a name is that of the hidden effect, or one of the same physics."""
     return named.name == hidden.name or any(_same(machine, hidden, named, same) for same in EQUIVALENT)
@@ -134,7 +149,8 @@ def rate(answers: Iterable[Answer], hit: Callable[[Answer], bool]) -> Rate:
 def top(answer: Answer, count: int) -> bool:
     """Whether the hidden effect is among the first so many; the first is that of the answer, not of the ranking."""
     if count == 1:
-        return bool(answer.named) and names_right(answer.machine, answer.hidden[0], answer.named[0])
+        told = named_beside(answer)
+        return bool(told) and names_right(answer.machine, answer.hidden[0], told[0])
     names: list[str] = []
     for named in answer.ranking:
         if named.name not in names:
@@ -148,12 +164,13 @@ def top(answer: Answer, count: int) -> bool:
 
 def in_place(answer: Answer) -> bool:
     """Whether the first accepted effect is the hidden one at its site."""
-    return bool(answer.named) and site_right(answer.machine, answer.hidden[0], answer.named[0])
+    told = named_beside(answer)
+    return bool(told) and site_right(answer.machine, answer.hidden[0], told[0])
 
 
 def alone(answer: Answer) -> bool:
     """Whether the answer names the hidden effect and nothing else."""
-    return top(answer, 1) and len(answer.named) == 1
+    return top(answer, 1) and len(named_beside(answer)) == 1
 
 
 def all_named(answer: Answer) -> bool:

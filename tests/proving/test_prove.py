@@ -68,6 +68,16 @@ def test_a_right_name_at_a_wrong_site_is_half_right() -> None:
     assert not score.in_place(astray)
 
 
+def test_the_mean_of_friction_that_differs_along_the_way_counts_with_it() -> None:
+    hidden, mean = "position_dependent_friction@axis", "coulomb_friction@axis"
+    both = answer(hidden, mean, hidden)
+    assert score.top(both, 1)
+    assert score.in_place(both)
+    assert score.alone(both)
+    assert not score.alone(answer(hidden, mean, hidden, "bias_force@axis"))
+    assert not score.top(answer(hidden, mean), 1)
+
+
 def test_equivalent_names_count_on_their_machines_only() -> None:
     late = answer("sensor_delay@encoder", "input_delay@drive")
     assert score.top(late, 1)
