@@ -3,23 +3,27 @@
 from __future__ import annotations
 
 import contextlib
+from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import TypeAlias
 
+import numpy as np
+
 from vpm.catalogue import EFFECTS
-from vpm.ranking.both_sides import on_both_sides
+from vpm.discrepancy.screening.candidates import Candidate, candidates
 from vpm.ranking.choice_by_evidence import weighed
 from vpm.ranking.fit import ASTRAY, View
 from vpm.ranking.look import Look
 from vpm.ranking.model_structure import Structure
+from vpm.ranking.regression import regressed
 from vpm.ranking.result import Ranked
-from vpm.ranking.several_places import alike
+from vpm.ranking.start_values import started
+from vpm.ranking.structure_extensions import SIDES
 from vpm.ranking.substitute_records import why_unbalanced
 from vpm.ranking.trials import Trials
 from vpm.ranking.tried_effect import Trial
-from vpm.ranking.usual_friction import with_usual_friction
 
 #: Looks at what was found, and a round for each new effect; looks as they were and none if nothing was.
 Found: TypeAlias = tuple[list[Look], list[tuple[Ranked, ...]]]
@@ -39,7 +43,7 @@ def _at_several_places(trials: Trials, looks: list[Look], best: Trial | None, tr
     if best is not None and not best.look.has_room(best.fitted):
         return looks, []
     comparable = [one for one in tried if best is None or one.look is best.look]
-    for trial in alike(comparable, room, trials.fitter, trials.each):
+    for trial in _alike(trials, comparable, room):
         with contextlib.suppress(*ASTRAY):
             if not trial.counts or (best is not None and not trials.is_likelier(trial, best)):
                 continue
@@ -52,16 +56,76 @@ def _at_several_places(trials: Trials, looks: list[Look], best: Trial | None, tr
     return looks, []
 
 
+def _alike(trials: Trials, tried: Sequence[Trial], most: int) -> list[Trial]:
+    """Fits of one effect at several places together, ``most`` effects at a time, by the error that they leave.
+
+    Joints that move each other hide such an effect from each other. A command that is delayed at one drive alone would
+    need a force at the next drive that no log holds.
+    """
+    several: dict[tuple[Look, str], dict[str, Trial]] = defaultdict(dict)
+    for trial in sorted(tried, key=lambda one: one.left):
+        name, site = trial.key
+        several[trial.look, name].setdefault(site, trial)
+    groups = [list(places.values()) for places in several.values() if 1 < len(places) <= most]
+
+    def one_fitted(group: Sequence[Trial]) -> Trial:
+        structure, look = _joined(group), group[0].look
+        least = min(one.fitted.cost for one in tried if one.look is look)
+        view, goal = View(look.view.noise), min(look.fitted.cost - look.needed, least)
+        begun = trials.fitter.fitted(structure, look.fitted.tracker, view, goal)
+        return Trial.of(
+            trials.fitter.finished(begun, view) if begun.cost < goal else begun, look, ended=begun.cost < goal
+        )
+
+    ends = trials.each("fitting at several places", one_fitted, groups, lambda group: group[0].key[0])
+    return sorted((end for end in ends if isinstance(end, Trial)), key=lambda end: end.left)
+
+
+def _joined(group: Sequence[Trial]) -> Structure:
+    """Structure with one effect at several places, each with the values of its own fit.
+
+    Where that led nowhere they begin at a size that is nothing unusual, one deviation of what is known of them.
+    """
+    first, *others = (_begun(trial) for trial in group)
+    for other in others:
+        first = first.with_last_of(other)
+    return first
+
+
+def _begun(trial: Trial) -> Structure:
+    structure, known = trial.fitted.structure, trial.look.fitted.structure.priors
+    if trial.fitted.cost < trial.look.fitted.cost:
+        return structure
+    fresh = np.array([name not in known for name in structure.priors])
+    return structure.at(np.where(fresh, 1.0, structure.standard))
+
+
 def brought_back(trials: Trials, looks: list[Look]) -> Found:
     """Looks begun with the usual friction that counts, of a model that is lost at several joints without it."""
     if why_unbalanced(trials.start.model, trials.fitter.tracked.experiments) or not all(look.is_lost for look in looks):
         return looks, []
     with contextlib.suppress(*ASTRAY):
-        most = trials.settings.effects
-        structure = with_usual_friction(looks[0], trials.data, trials.extensions, trials.sizes, trials.names, most)
+        structure = _with_usual_friction(trials, looks[0])
         if structure is not None:
             return _with_needed(trials, structure, looks, trials.stands, "bring the model back to its records")
     return looks, []
+
+
+def _with_usual_friction(trials: Trials, look: Look) -> Structure | None:
+    """Structure with the usual friction that its joints lack, by regression; None where that is more than it takes.
+
+    Friction of gears may take many times the torque of the inertia. Where several joints lack it, each of them hides
+    what friction at another one would explain.
+    """
+    structure, usual = look.fitted.structure, [name for name in trials.names if EFFECTS[name].usual == "friction"]
+    model, data = structure.repaired, trials.data
+    residual, _ = data.evaluate(model, model.theta)
+    listed = [started(one, model, trials.sizes) for one in candidates(model, data, residual, usual, either_side=True)]
+    if not 1 < len(listed) <= trials.settings.effects:
+        return None
+    for candidate in listed:
+        structure = trials.extensions.extended(structure, candidate, candidate.starts[0], "motor")
+    return regressed(structure, data)
 
 
 def _resting_on_another(trials: Trials, looks: list[Look], tried: Sequence[Trial]) -> Found:
@@ -69,6 +133,8 @@ def _resting_on_another(trials: Trials, looks: list[Look], tried: Sequence[Trial
 
     Friction that differs along the way by as much as there is of it has no mean that piece after piece shows.
     """
+    if len(looks[0].fitted.structure.effects) + 2 > trials.settings.effects:
+        return looks, []
     resting = {name: needed for name in trials.names if (needed := EFFECTS[name].requires)}
     bare = {one.key: one for one in sorted(tried, key=lambda one: -one.left) if one.key[0] in resting.values()}
     for first in sorted(bare.values(), key=lambda one: one.left):
@@ -98,11 +164,36 @@ def _rubbing_on_both_sides(trials: Trials, looks: list[Look]) -> Found:
     error, and only the evidence knows of the file.
     """
     with contextlib.suppress(*ASTRAY):
-        structure = on_both_sides(looks[0].fitted.structure, trials.extensions, trials.names, trials.settings.effects)
+        structure = _on_both_sides(trials, looks[0].fitted.structure)
         return _with_needed(
             trials, structure, looks, partial(_spares_file, trials), "on the other side of what gives way, too"
         )
     return looks, []
+
+
+def _on_both_sides(trials: Trials, structure: Structure) -> Structure:
+    """Structure with the usual friction of joints that were split on their other side too, as far as it has room.
+
+    A model of a whole joint says how much rubs there, and not before or behind what gives way. All of it came to one
+    side with what split the joint.
+    """
+    model, split = structure.model, {site for name, site in structure.effects if EFFECTS[name].splits}
+    taken = {(one.name, one.at, one.side) for one in model.effects}
+    for effect in model.effects:
+        usual = effect.type.usual == "friction" and effect.name in trials.names
+        if not usual or effect.at not in split or len(structure.effects) == trials.settings.effects:
+            continue
+        (other,) = (side for side in SIDES if side != effect.side)
+        if (effect.name, effect.at, other) in taken or (effect.name, effect.at) in structure.effects:
+            continue
+        # It turns round at the same speed there.
+        shapes = tuple(one.name for one in effect.type.parameters if one.shape)
+        values = {short: float(structure.theta[structure.place(effect.parameter_names[short])]) for short in shapes}
+        start = {**{one.name: 0.0 for one in effect.type.parameters}, **values}
+        structure = trials.extensions.extended(
+            structure, Candidate(effect.type, effect.at, (start,), fixed=shapes), start, other
+        )
+    return structure
 
 
 def _with_needed(
