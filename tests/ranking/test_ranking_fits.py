@@ -656,3 +656,12 @@ def test_samples_count_too_often_by_how_long_their_errors_last(memory: float, ch
     slopes = 1e3 * np.column_stack([np.ones(samples), np.linspace(-1.0, 1.0, samples)])
     often = counted_too_often(errors, np.tile(slopes, (channels, 1)), channels, 200)
     assert often == pytest.approx((1.0 + memory) / (1.0 - memory), rel=0.5)
+
+
+@given(st.integers(0, 2**32 - 1))
+def test_parameters_that_only_show_together_count_as_one(seed: int) -> None:
+    """Two columns that are one, far larger than what is known of them: their normal equations are singular."""
+    random = np.random.default_rng(seed)
+    errors, column = random.standard_normal(400), 1e12 * random.standard_normal((400, 1))
+    alone = counted_too_often(errors, column, 1, 20)
+    assert counted_too_often(errors, np.hstack([column, column]), 1, 20) == pytest.approx(alone, rel=1e-6)

@@ -20,6 +20,8 @@ from vpm.ranking.tracked_records import NOTHING, By, TrackedRecords, Tracker
 
 #: Residuals and derivatives that no record has; their squares are still numbers.
 RUNAWAY = 1e100
+#: What rounding leaves of the diagonal of scaled normal equations.
+ROUNDED = 1e-12
 #: What is raised of structures that the records contradict, that cannot be computed, or whose bodies are not real.
 ASTRAY = (ValueError, ArithmeticError)
 
@@ -333,8 +335,10 @@ def counted_too_often(errors: Array, slopes: Array, channels: int, pieces: int) 
     by_sample = np.sum((slopes * errors[:, None]).reshape(channels, -1, count), axis=0) / scale
     sums = np.stack([np.sum(piece, axis=0) for piece in np.array_split(by_sample, pieces)])
     information, spread = slopes.T @ slopes / scale, pieces * np.cov(sums, rowvar=False).reshape(count, count)
-    known = information + np.eye(count)
-    expected, seen = (float(np.trace(np.linalg.solve(known, one))) for one in (information, spread))
+    sizes = 1.0 / np.sqrt(np.diag(information) + 1.0)
+    even = np.outer(sizes, sizes)
+    known = information * even + np.diag(sizes**2 + ROUNDED)
+    expected, seen = (float(np.trace(np.linalg.solve(known, one * even))) for one in (information, spread))
     return seen / max(expected, 1e-300)
 
 
@@ -362,7 +366,7 @@ def bounded_step(
     if not np.all(np.isfinite(normal)):  # as of a joint that stands, of which nothing is left to explain
         raise VpmError(f"{structure.model.name}: the records leave no error that a step could be measured by")
     sizes = 1.0 / np.sqrt(np.diag(normal))
-    root = np.linalg.cholesky(normal * np.outer(sizes, sizes) + 1e-12 * np.eye(len(z))).T
+    root = np.linalg.cholesky(normal * np.outer(sizes, sizes) + ROUNDED * np.eye(len(z))).T
     pull = -(slopes.T @ errors / scale + known * z) * sizes
     target = np.linalg.solve(root.T, pull)
     low = np.where(far, -np.inf, np.minimum(np.maximum(structure.ends[:, 0] - z, -reach), -1e-12)) / sizes
