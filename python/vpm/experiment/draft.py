@@ -9,9 +9,10 @@ from pathlib import Path
 import numpy as np
 
 from vpm.errors import ExperimentError, UnitError, VpmError
-from vpm.experiment.grid import Source, check_finite
+from vpm.experiment.grid import Source, check_finite, is_smooth
 from vpm.experiment.readers import open_log
 from vpm.experiment.readers.base import Log, bracketed
+from vpm.experiment.signal import interpolate
 from vpm.experiment.table import Table
 from vpm.expression import PURE, Quantity, read_expression
 from vpm.model import ChannelEntry, Model
@@ -34,6 +35,8 @@ class Draft:
     clocks: dict[str, Array] = field(default_factory=dict)
     history: list[str] = field(default_factory=list)
     unused: tuple[str, ...] = ()
+    #: Delays of columns that were moved back already, s: at the ends of the record they have no value.
+    moved: list[float] = field(default_factory=list)
 
 
 def mapped_draft(log: Log, table: Mapping[str, ChannelEntry], model: Model | None) -> Draft:
@@ -60,7 +63,8 @@ def mapped_draft(log: Log, table: Mapping[str, ChannelEntry], model: Model | Non
             path=str(path),
             channel="time",
         )
-    read = _built(source, content, "time", entry, present["time"]) if entry.value else content.columns[clock]
+    stamps = {name: content.columns[column] for name, column in present["time"].items()}
+    read = _built(source, stamps, "time", entry) if entry.value else content.columns[clock]
     draft = Draft(source, unit.to_si(read * entry.scale + entry.offset))
     own_clocks = {column: unit.to_si(own * entry.scale + entry.offset) for column, own in content.clocks.items()}
     content = replace(content, clocks=own_clocks)
@@ -126,7 +130,13 @@ def _map_channel(
     for name, part in entry.parts.items():
         what = f'column "{part.column}" ({channel})'
         check_finite(content.columns[columns[name]], clock, what, source, channel=channel)
-    raw = _built(draft.source, content, channel, entry, columns) if entry.value else content.columns[columns[""]]
+    read = {name: content.columns[column] for name, column in columns.items()}
+    for name, part in entry.columns.items():
+        if part.delay:
+            read[name] = _moved_back(clock, read[name], part.delay, smooth=is_smooth(channel))
+            draft.moved.append(part.delay)
+            draft.history.append(f'For {channel} column "{part.column}" was moved back by {part.delay:.6g} s.')
+    raw = _built(draft.source, read, channel, entry) if entry.value else read[""]
     draft.columns[channel] = given.to_si(raw * entry.scale + entry.offset)
     words = [f"{channel} is {entry.told}"]
     if entry.value:
@@ -139,6 +149,11 @@ def _map_channel(
     draft.history.append(", ".join(words) + ".")
     if entry.delay != 0.0:
         draft.delays[channel] = entry.delay
+
+
+def _moved_back(clock: Array, values: Array, delay: float, *, smooth: bool) -> Array:
+    """Column of a draft moved back by its delay; where it ends it keeps its last value."""
+    return interpolate(clock, values, np.clip(clock + delay, clock[0], clock[-1]), smooth=smooth)
 
 
 def _clock(draft: Draft, content: Table, channel: str, columns: Mapping[str, str]) -> Array | None:
@@ -155,13 +170,10 @@ def _clock(draft: Draft, content: Table, channel: str, columns: Mapping[str, str
     return first
 
 
-def _built(source: Source, content: Table, channel: str, entry: ChannelEntry, columns: Mapping[str, str]) -> Array:
-    """Value of a drafted channel, or of the clock, over several columns, in the unit of the entry."""
+def _built(source: Source, read: Mapping[str, Array], channel: str, entry: ChannelEntry) -> Array:
+    """Value of a drafted channel, or of the clock, over several columns as they were read, in the unit of the entry."""
     units = {name: parse_unit(part.unit) for name, part in entry.columns.items()}
-    parts = {
-        name: Quantity(units[name].to_si(content.columns[column]), units[name].dimension)
-        for name, column in columns.items()
-    }
+    parts = {name: Quantity(units[name].to_si(values), units[name].dimension) for name, values in read.items()}
     given = parse_unit(entry.unit)
     try:
         value = read_expression(entry.value)(parts)

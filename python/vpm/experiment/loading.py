@@ -133,6 +133,9 @@ def _finish(make: type[R], draft: Draft, name: str, irregular: str, resample: fl
     record = make(name, time, data, channels, units, (*draft.history, sentence), draft.unused, slower)
     if draft.delays:
         record = record.align(draft.delays)
+    if draft.moved:
+        first, last = time[0] - min(0.0, *draft.moved), time[-1] - max(0.0, *draft.moved)
+        record = record.trim(max(first, record.time[0]), min(last, record.time[-1]))
     return record if resample is None else record.resample(resample)
 
 

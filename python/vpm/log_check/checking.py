@@ -169,7 +169,7 @@ class _Check:
         found, affected, whole = list[Finding](), set[str](), record
         for _ in range(self.settings.rounds if len(part) >= self.settings.judged else 0):
             units = _units(model, record, table)
-            explanations = Explainer(self.judge, units, self.each).explained(part, (*outputs, *inputs), left)
+            explanations = Explainer(self.judge, units, table, self.each).explained(part, (*outputs, *inputs), left)
             for one in explanations:
                 changed = one.correction.entries(table)
                 table = {**table, **changed}

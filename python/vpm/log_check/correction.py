@@ -26,6 +26,10 @@ class Correction:
     delay: float = 0.0  #: By how much later than the others they were stamped, s.
     swap: bool = False
     unit: str = ""  #: Unit that the column is in, where it is another one than the table says; else "".
+    #: Name of the column that is late, where the channel is a value over several; else "".
+    column: str = ""
+    #: Its other columns, which are not: the channel that each one is by itself, and its weight in the value.
+    beside: tuple[tuple[str, float], ...] = ()
 
     def applied(self, record: Experiment) -> Experiment:
         """The record with this correction done.
@@ -35,12 +39,23 @@ class Correction:
         if self.is_clock:
             return replace(record, time=record.time * self.factor)
         if self.delay:
-            return record.align(dict.fromkeys(self.channels, self.delay))
+            late = self._less_others(record, 1.0).align(dict.fromkeys(self.channels, self.delay))
+            return self._less_others(late, -1.0)
         data, places = np.array(record.data), [record.channels.index(name) for name in self.channels]
         if self.swap:
             data[:, places] = data[:, places[::-1]]
         else:
             data[:, places] *= self.factor
+        return replace(record, data=data)
+
+    def _less_others(self, record: Experiment, share: float) -> Experiment:
+        """The record to correct, with the columns that are not late taken out of the value, or put back."""
+        if not self.beside:
+            return record
+        data = np.array(record.data)
+        data[:, record.channels.index(self.channels[0])] -= share * sum(
+            weight * record[of] for of, weight in self.beside
+        )
         return replace(record, data=data)
 
     def entries(self, table: Mapping[str, ChannelEntry]) -> dict[str, ChannelEntry]:
@@ -52,6 +67,10 @@ class Correction:
         return {name: self._entry(table[name]) for name in known}
 
     def _entry(self, entry: ChannelEntry) -> ChannelEntry:
+        if self.column:
+            part = entry.columns[self.column]
+            late = part.model_copy(update={"delay": part.delay + self.delay})
+            return entry.model_copy(update={"columns": {**entry.columns, self.column: late}})
         if self.delay:
             return entry.model_copy(update={"delay": entry.delay + self.delay})
         if self.unit:
@@ -70,7 +89,8 @@ class Correction:
             return f"{names} are in each other's place"
         if self.delay:
             several, way = len(self.channels) > 1, "late" if self.delay > 0.0 else "early"
-            return f"{names} {'come' if several else 'comes'} {1e3 * abs(self.delay):.3g} ms {way}"
+            what = f"the column {self.column} of {names}" if self.column else names
+            return f"{what} {'come' if several else 'comes'} {1e3 * abs(self.delay):.3g} ms {way}"
         turned = f" and {have} the opposite sign" if self.factor < 0.0 else ""
         if self.unit:
             return f"{names} {are} in {self.unit}, not in {units[self.channels[0]]}{turned}"
@@ -114,7 +134,7 @@ class Correction:
         if self.swap:
             return "exchange their columns in the channel table"
         if self.delay:
-            entry = f"delay = {self.delay:.4g}"
+            entry = f"delay = {self.delay:.4g}" + (f" of its column {self.column}" if self.column else "")
         elif self.unit:
             entry = f'unit = "{self.unit}"' + (" and scale = -1" if self.factor < 0.0 else "")
         else:
@@ -123,9 +143,14 @@ class Correction:
 
     @property
     def is_possible(self) -> bool:
-        """Whether a machine may be late as this correction says: by its answer, or by its sensors."""
-        return self.delay != 0.0 and all(
-            (self.delay < 0.0) == name.endswith((".command", ".disturbance")) for name in self.channels
+        """Whether a machine may be late as this correction says: by its answer, or by its sensors.
+
+        No effect of a machine delays one column of a value.
+        """
+        return (
+            self.delay != 0.0
+            and not self.column
+            and all((self.delay < 0.0) == name.endswith((".command", ".disturbance")) for name in self.channels)
         )
 
 

@@ -15,7 +15,8 @@ from vpm.experiment import Experiment
 from vpm.identify.response_along_motion import bends
 from vpm.log_check.correction import Correction, Pair
 from vpm.log_check.shares import FORCES, Judge, Shares, Tangent, mean_logarithm
-from vpm.log_check.tried_corrections import delays, of_two, scales
+from vpm.log_check.tried_corrections import delays, delays_of_columns, of_two, scales
+from vpm.model import ChannelEntry
 
 Change = TypeVar("Change", Correction, Pair)
 
@@ -52,10 +53,13 @@ class Explainer:
     """Finds the corrections of channel tables that explain what a model leaves of records.
 
     - ``units``: units in which the channels were read
+    - ``table``: channel table by which they were read
     """
 
-    def __init__(self, judge: Judge, units: Mapping[str, str], each: ParallelCandidates) -> None:
-        self.judge, self.units, self.each = judge, units, each
+    def __init__(
+        self, judge: Judge, units: Mapping[str, str], table: Mapping[str, ChannelEntry], each: ParallelCandidates
+    ) -> None:
+        self.judge, self.units, self.table, self.each = judge, units, table, each
         self.model, self.settings = judge.model, judge.settings
 
     def explained(self, part: Experiment, used: Sequence[str], left: Shares) -> list[Explanation]:
@@ -157,7 +161,8 @@ class Explainer:
         """The explanation with the other side of a delay: some channels late is the same as all others early."""
         correction = found.correction
         others = tuple(name for name in used if name not in correction.channels)
-        if others not in {one.channels for one in delays(self.model, used, self.settings)} or not correction.delay:
+        possible = {one.channels for one in delays(self.model, used, self.settings)}
+        if others not in possible or not correction.delay or correction.column:
             return found
         mirror = replace(correction, channels=others, delay=-correction.delay)
         rivals = (one for one in found.rivals if set(one.channels) != set(others))
@@ -241,7 +246,8 @@ class Explainer:
         predicted to leave about as little as the best correction that is ``known``.
         """
         some = left.above(self.settings.negligible)
-        corrections = self._about(delays(self.model, used, self.settings), some, left)
+        tried = (*delays(self.model, used, self.settings), *delays_of_columns(self.table, used, self.settings))
+        corrections = self._about(tried, some, left)
         least, found = self.settings.held * part.dt, list[_Trial]()
         for at in (tangent, None):
             if (near := at or self.judge.tangent(part, self.judge.measured(part), FORCES)) is None:
@@ -319,10 +325,15 @@ class Explainer:
     def _is_of_values(self, correction: Correction, before: Shares, after: Shares) -> bool:
         """Whether the model explains the record anyway, but with values that its file rules out, now needless.
 
-        Of delays that says nothing: what a model lacks moves its parameters as well, and looks late.
+        Of delays that says nothing: what a model lacks moves its parameters as well, and looks late. But nothing that
+        it lacks delays one column of a value against the others.
         """
         settings = self.settings
-        if correction.delay or before.far <= settings.far or after.chance < settings.believable:
+        if (
+            (correction.delay and not correction.column)
+            or before.far <= settings.far
+            or after.chance < settings.believable
+        ):
             return False
         doubtful = before.above(settings.doubtful) | after.above(settings.doubtful)
         return before.unlikely - after.unlikely > settings.likelier and not doubtful
@@ -353,7 +364,7 @@ class Explainer:
 
 def _is_same(one: Correction, other: Correction) -> bool:
     """Whether two explanations move the same channels in time."""
-    return bool(one.delay) and bool(other.delay) and one.channels == other.channels
+    return bool(one.delay) and bool(other.delay) and (one.channels, one.column) == (other.channels, other.column)
 
 
 def _is_no_scale(one: Correction, other: Correction) -> bool:

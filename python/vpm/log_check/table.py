@@ -51,7 +51,8 @@ def _source(entry: ChannelEntry) -> list[str]:
     if not entry.value:
         return [f"column = {_quoted(entry.column)}"]
     each = (
-        f"{name} = {{ column = {_quoted(part.column)}, unit = {_quoted(part.unit)} }}"
+        f"{name} = {{ column = {_quoted(part.column)}, unit = {_quoted(part.unit)}"
+        f"{f', delay = {part.delay!r}' if part.delay else ''} }}"
         for name, part in entry.columns.items()
     )
     return [f"value = {_quoted(entry.value)}", f"columns = {{ {', '.join(each)} }}"]

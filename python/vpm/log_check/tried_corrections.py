@@ -5,11 +5,18 @@ from __future__ import annotations
 import math
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import combinations, product
 
+import numpy as np
+
+from vpm.errors import VpmError
+from vpm.expression import Quantity, read_expression
 from vpm.log_check.correction import TIME, Correction, Pair, factor_between
 from vpm.log_check.settings import Settings
-from vpm.model import Model
+from vpm.model import ChannelEntry, Model
+from vpm.numbers import Array
+from vpm.units import parse_unit
 
 #: Units in which logs are often written, by the SI unit of a channel.
 CUSTOMARY: Mapping[str, tuple[str, ...]] = {
@@ -62,6 +69,60 @@ def delays(model: Model, used: Sequence[str], settings: Settings) -> Iterator[Co
     for group in _groups(model, used, si):
         if len({name.rpartition(".")[2] for name in group}) == 1:
             yield from (Correction(group, delay=delay) for delay in settings.delays)
+
+
+def delays_of_columns(
+    table: Mapping[str, ChannelEntry], used: Sequence[str], settings: Settings
+) -> Iterator[Correction]:
+    """Corrections to try: one column of a value over several that is stamped late; see `delays`.
+
+    Its others have to be channels by themselves: then the record tells how the value would be.
+
+    - ``table``: channel table by which the record was read
+    """
+    for channel in used:
+        entry = table.get(channel)
+        for late in () if entry is None else entry.columns:
+            beside = _told_apart(table, channel, late, used)
+            if beside:
+                found = Correction((channel,), column=late, beside=beside)
+                yield from (replace(found, delay=delay) for delay in settings.delays)
+
+
+def _told_apart(
+    table: Mapping[str, ChannelEntry], channel: str, late: str, used: Sequence[str]
+) -> tuple[tuple[str, float], ...]:
+    """Channels that the other columns of a value to correct are, with the weight of each; none where it is no sum."""
+    entry = table[channel]
+    own = {one.column: name for name, one in table.items() if name in used and one.column and not one.delay}
+    others = {name: own.get(part.column, "") for name, part in entry.columns.items() if name != late}
+    weights = _weights(entry)
+    if not weights or not all(others.values()):
+        return ()
+    steps = {name: parse_unit(table[of].unit).factor * table[of].scale for name, of in others.items()}
+    return tuple((of, weights[name] / steps[name]) for name, of in others.items())
+
+
+def _weights(entry: ChannelEntry) -> dict[str, float]:
+    """Weights of the numbers in the columns of a value to correct, in SI; none where it is no weighted sum of them."""
+    value, names = read_expression(entry.value), tuple(entry.columns)
+    units = {name: parse_unit(part.unit) for name, part in entry.columns.items()}
+
+    def at(numbers: Array) -> Array:
+        parts = {
+            name: Quantity(units[name].to_si(each), units[name].dimension)
+            for name, each in zip(names, numbers, strict=True)
+        }
+        return entry.scale * value(parts).values
+
+    try:
+        # All columns at zero, each at one, then all at different numbers: of a sum the first ones tell the last.
+        tried = at(np.column_stack([np.zeros(len(names)), np.eye(len(names)), 1.0 + np.arange(len(names)) / 3.0]))
+    except VpmError:
+        return {}
+    weights = tried[1:-1] - tried[0]
+    is_sum = np.isclose(tried[-1], tried[0] + weights @ (1.0 + np.arange(len(names)) / 3.0), rtol=1e-9)
+    return dict(zip(names, weights.tolist(), strict=True)) if is_sum else {}
 
 
 def of_two(model: Model, used: Sequence[str], units: Mapping[str, str], settings: Settings) -> Iterator[Pair]:

@@ -5,6 +5,7 @@ The value of a channel is ``scale column + offset``, in ``unit``; the samples ar
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Self
 
@@ -19,6 +20,10 @@ from vpm.units import parse_unit, require_dimension
 if TYPE_CHECKING:
     from vpm.model.schema import Document
     from vpm.model.structure import Structure
+
+
+#: Arguments of functions that take jumps out of a column, between which nothing can be interpolated.
+_OF_JUMPS = r"\b(?:unwrap|zeroed)\(([^()]*)\)"
 
 
 def _not_zero(value: float) -> float:
@@ -39,6 +44,7 @@ class ColumnPart(BaseModel):
 
     column: Text
     unit: Annotated[Text, AfterValidator(_readable)] = "1"
+    delay: Number = 0.0  #: How late its samples are stamped against those of the other columns (s).
 
 
 def _part(given: object) -> object:
@@ -78,6 +84,9 @@ class ChannelEntry(BaseModel):
             if name in self.columns:
                 raise ValueError(f'has columns.{name}, which its value "{self.value}" does not name; leave it out')
             raise ValueError(f'has the value "{self.value}", but columns has no {name}; name its column')
+        jumping = {name for inner in re.findall(_OF_JUMPS, self.value) for name in re.findall(r"\w+", inner)}
+        for name in sorted(jumping & {name for name, part in self.columns.items() if part.delay}):
+            raise ValueError(f'has a delay of columns.{name}, which jumps in "{self.value}"; delay the whole channel')
         return self
 
     @property
