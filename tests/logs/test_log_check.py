@@ -426,6 +426,27 @@ def test_a_rest_before_the_motion_is_no_sensor_that_stood_still() -> None:
     assert odd(np.round(values / 1e-4) * 1e-4) == []
 
 
+def test_a_reading_that_repeats_while_the_other_sensors_rest_did_not_stand_still() -> None:
+    """Dry friction holds both joints: noise of 0.3 steps leaves the one's encoder on one value, and the other rests."""
+    drawn = np.random.default_rng(8)
+    moved = [swing(0.0), swing(0.0)[::-1]]
+    held = [np.concatenate([one[:2000], np.full(60, one[2000]), one[2000:]]) for one in moved]
+    # The first one is a difference of two encoders, so that its own steps are finer than its noise.
+    noise = 1e-4 * drawn.standard_normal(len(held[0]))
+    noise[2000:2060] = 0.0
+    first = held[0] + noise
+    first[2000:2060] = first[2000]
+
+    def kinds(second: Array) -> list[str]:
+        columns = {"one.position": first, "two.position": second}
+        log = vpm.Experiment.from_arrays(np.arange(len(first)) / 500.0, columns, {}, name="log", model=MODEL)
+        return [one.kind for one in odd_stretches(log, list(columns), [], Settings())]
+
+    resting = held[1] + 1e-4 * drawn.standard_normal(len(first))
+    assert kinds(resting) == []
+    assert kinds(resting + 0.3 * np.sin(40.0 * np.arange(len(first)) / 500.0)) == ["frozen"]
+
+
 def test_finds_spikes() -> None:
     values = swing()
     values[[700, 1900]] += 0.5
@@ -437,6 +458,21 @@ def test_finds_what_was_cut_off() -> None:
     found = odd(np.clip(swing(), -2.0, 0.9))
     assert [one.kind for one in found] == ["clipped"]
     assert "largest value, 0.9," in found[0].sentence
+
+
+def test_a_speed_reference_of_ramps_and_plateaus_is_not_cut_off() -> None:
+    """A crane is told to travel at several speeds, each of which is held; its fastest one is no limit."""
+    time = np.arange(3000) / 50.0
+    goals = np.repeat([0.0, 0.5, 0.0, -0.35, 0.6, 0.15, -0.6, 0.0, 0.3, 0.0], 300)
+    command, now = np.empty(len(time)), 0.0
+    for k, goal in enumerate(goals):  # the inverter's ramp, 0.3 m/s2
+        now += float(np.clip(goal - now, -0.3 / 50.0, 0.3 / 50.0))
+        command[k] = now
+    log = vpm.Experiment.from_arrays(time, {"m1.command": np.round(command, 3)}, {}, name="log", model=MODEL)
+    assert list(odd_stretches(log, [], ["m1.command"], Settings())) == []
+    limited = np.clip(4.0 * np.sin(1.3 * time) + 3.0 * np.sin(2.1 * time), -5.0, 5.0)
+    log = vpm.Experiment.from_arrays(time, {"m1.command": limited}, {}, name="log", model=MODEL)
+    assert [one.kind for one in odd_stretches(log, [], ["m1.command"], Settings())] == ["clipped", "clipped"]
 
 
 def test_finds_coarse_steps() -> None:

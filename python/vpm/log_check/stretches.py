@@ -25,12 +25,12 @@ def odd_stretches(
     - ``outputs``, ``inputs``: channels that sensors show, and commands
     """
     for name in outputs:
-        yield from _of_sensor(record, name, settings)
+        yield from _of_sensor(record, name, [other for other in outputs if other != name], settings)
     for name in (*outputs, *inputs):
         yield from _clipped(record, name, settings)
 
 
-def _of_sensor(record: Experiment, name: str, settings: Settings) -> Iterator[Finding]:
+def _of_sensor(record: Experiment, name: str, others: Sequence[str], settings: Settings) -> Iterator[Finding]:
     values = record[name]
 
     def finding(kind: str, sentence: str, repair: str) -> Finding:
@@ -41,7 +41,7 @@ def _of_sensor(record: Experiment, name: str, settings: Settings) -> Iterator[Fi
         return
     if np.unique(values).size < settings.levels:
         return
-    if frozen := _frozen(values, settings):
+    if frozen := _frozen(record, name, others, settings):
         first, last = record.time[frozen.start], record.time[frozen.stop - 1]
         yield finding(
             "frozen",
@@ -105,8 +105,12 @@ def _is_flat(levels: Array, settings: Settings) -> bool:
     return float(levels.max()) < settings.level * float(levels.min())
 
 
-def _frozen(values: Array, settings: Settings) -> slice | None:
-    """The longest stretch of one value, if it ends by a jump, or if the channel has noise elsewhere."""
+def _frozen(record: Experiment, name: str, others: Sequence[str], settings: Settings) -> slice | None:
+    """The longest stretch of one value, if it ends by a jump, or if the channel has noise elsewhere.
+
+    A reading that does not jump may repeat one value while the machine rests: then all other sensors rest, too.
+    """
+    values = record[name]
     steps = np.diff(values)
     run = _longest(steps == 0.0)
     if (
@@ -115,9 +119,22 @@ def _frozen(values: Array, settings: Settings) -> slice | None:
         or values[run.start] in (values.max(), values.min())
     ):
         return None  # what stays at an end was cut off there
-    others = np.abs(np.delete(steps, run.stop))
-    jumps = abs(steps[run.stop]) > settings.jump * float(others.max())
-    return slice(run.start, run.stop + 1) if jumps or _is_noisy(np.delete(values, run), settings) else None
+    stretch = slice(run.start, run.stop + 1)
+    if abs(steps[run.stop]) > settings.jump * float(np.abs(np.delete(steps, run.stop)).max()):
+        return stretch
+    at_rest = bool(others) and all(_rests(record[other], stretch) for other in others)
+    return stretch if not at_rest and _is_noisy(np.delete(values, run), settings) else None
+
+
+def _rests(values: Array, stretch: slice) -> bool:
+    """Whether noise and a step of its sensor are all that moves a channel in a stretch.
+
+    Of n normal values the largest lies about sqrt(2 ln n) deviations above the mean (H. Cramér, *Mathematical Methods
+    of Statistics*, 1946, section 28.6).
+    """
+    part, noise = values[stretch], noise_std(values)
+    most = 2.0 * noise * float(np.sqrt(2.0 * np.log(part.size))) + (quantisation_step(values) or 0.0)
+    return float(np.ptp(part)) <= most
 
 
 def _is_noisy(values: Array, settings: Settings) -> bool:
@@ -153,20 +170,31 @@ def _clipped(record: Experiment, name: str, settings: Settings) -> Iterator[Find
     values = record[name]
     if np.unique(values).size < settings.levels:
         return
+    levels, counts = np.unique(values, return_counts=True)
+    often = [float(level) for level in levels[counts > settings.clipped * values.size] if level != 0.0]
+    held = [level for level in often if _is_held(values, level, settings)]
+    if any(levels[0] < level < levels[-1] for level in held):
+        return  # ramps and steps of whoever sent it: it is held at values within its range, too
+    for level in held:
+        word, share = "largest" if level == levels[-1] else "smallest", float(np.mean(values == level))
+        yield Finding(
+            "clipped",
+            (name,),
+            (record.name,),
+            f"{name} stands at its {word} value, {level:.4g}, in {100.0 * share:.2g} % of the samples",
+            "check the range of its sensor or the limit of its drive",
+        )
+
+
+def _is_held(values: Array, level: float, settings: Settings) -> bool:
+    """Whether a stretch comes to a value at full speed and stays there.
+
+    A swing that turns round is slow there, but no slower than beside it; a machine that rests comes slowly.
+    """
     near = max(quantisation_step(values) or 0.0, settings.coarse * float(np.ptp(values)))
-    for end, word in ((float(values.max()), "largest"), (float(values.min()), "smallest")):
-        there, next_to_it = values == end, np.abs(values - end) < 1.5 * near
-        share = float(np.mean(there))
-        # A swing that turns round is slow there, but no slower than beside it; a machine that rests comes slowly.
-        stays = np.count_nonzero(there) > settings.jump * (np.count_nonzero(next_to_it) - np.count_nonzero(there))
-        if stays and share > settings.clipped and end != 0.0 and _is_abrupt(values, there, settings):
-            yield Finding(
-                "clipped",
-                (name,),
-                (record.name,),
-                f"{name} stands at its {word} value, {end:.4g}, in {100.0 * share:.2g} % of the samples",
-                "check the range of its sensor or the limit of its drive",
-            )
+    there = values == level
+    beside = np.count_nonzero(np.abs(values - level) < 1.5 * near) - np.count_nonzero(there)
+    return bool(np.count_nonzero(there) > settings.jump * beside) and _is_abrupt(values, there, settings)
 
 
 def _is_abrupt(values: Array, there: NDArray[np.bool_], settings: Settings) -> bool:
