@@ -8,6 +8,7 @@ from functools import partial
 from itertools import chain
 from typing import Any, TypedDict, get_args
 
+from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis
 from vpm.discrepancy.diagnosis_fields import (
@@ -65,6 +66,10 @@ STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, w
 UNFILTERED = "the cut-off frequency is not used, for an observer filters nothing"
 #: Said where something stays unexplained, of readings whose errors no candidate describes.
 NO_SENSOR = "no offset, gain or delay of {channels} was tried: describe a sensor of them in the model file to try these"
+#: Said where a drive is named late whose joint is read by no described sensor.
+LATE_READINGS = (
+    " A late reading of {channels} would look alike, and was not tried: the model file describes no sensor of it."
+)
 #: What is odd in a channel and may pass for an effect.
 NOTED = ("delay", "frozen", "clipped", "spikes")
 
@@ -232,14 +237,28 @@ def diagnosed(
     names = asked.get("names", RANKING)
     request = Request(effects, most, tell or (lambda _: None), each, names)
     diagnosis = _diagnosis(model, records, request, cutoff, setup)
-    blind = [] if diagnosis.verdict != "unexplained" else _without_sensor(model, records[0])
-    return replace(diagnosis, notes=(*odd, *diagnosis.notes, *blind))
+    bare = _without_sensor(model, records[0])
+    blind = [NO_SENSOR.format(channels=", ".join(bare))] if bare and diagnosis.verdict == "unexplained" else []
+    summary = diagnosis.summary + _or_late_readings(model, diagnosis, bare)
+    return replace(diagnosis, summary=summary, notes=(*odd, *diagnosis.notes, *blind))
 
 
 def _without_sensor(model: Model, records: Sequence[Experiment]) -> list[str]:
-    """Note on logged outputs without a described sensor, whose errors a diagnosis does not try."""
-    bare = {name for record in records for name in measured_outputs(model, record) if model.sensor_of(name) is None}
-    return [NO_SENSOR.format(channels=", ".join(sorted(bare)))] if bare else []
+    """Logged outputs without a described sensor, whose errors a diagnosis does not try."""
+    return sorted(
+        {name for record in records for name in measured_outputs(model, record) if model.sensor_of(name) is None}
+    )
+
+
+def _or_late_readings(model: Model, diagnosis: Diagnosis, bare: Sequence[str]) -> str:
+    """Sentence of a diagnosis on readings whose delay would look like that of a drive that it names, or "".
+
+    From commands to readings only the sum of all delays shows. ``bare``: readings without a described sensor.
+    """
+    late = [one.site for one in diagnosis.effects if EFFECTS[one.name].late in {"delay", "lag"}]
+    moved = {joint for drive in late if drive in model.actuators for joint in model.joints_of_actuator(drive)}
+    alike = [name for name in bare if name.rpartition(".")[0] in moved]
+    return LATE_READINGS.format(channels=" or ".join(alike)) if alike else ""
 
 
 def _diagnosis(model: Model, records: Records, request: Request, cutoff: float | None, setup: Setup) -> Diagnosis:
