@@ -222,6 +222,26 @@ class TrackedRecords:
         other.records = tuple(noisy)
         return other
 
+    def falls(self, model: Model, theta: Array, tracker: Tracker) -> bool:
+        """Whether noise of the readings moves the tracked model by more than it moves them.
+
+        A tracker that is stable passes on what is slow, and damps all else. A machine that falls over, or meets the
+        ground, faster than it is drawn back amplifies any difference, so that no parameter explains what is left.
+        """
+        random, noisy, noise = np.random.default_rng(SEED), copy.copy(self), list[Array]()
+        for record, log in zip(self.records, self.experiments, strict=True):
+            drawn = [drawn_noise(log, name, random) * (name in self.drawn_to) for name in record.channels]
+            noise.append(np.column_stack(drawn))
+        noisy.records = tuple(
+            replace(record, readings=record.readings + more) for record, more in zip(self.records, noise, strict=True)
+        )
+        places = [self.records[0].channels.index(name) for name in self.drawn_to]
+        added = np.concatenate(noise)[:, places]
+        left, other = (one.follow(model, theta, tracker)[0][:, places] for one in (self, noisy))
+        moved = [np.sum(values[rows] ** 2, axis=0) for rows in self.rows for values in (added + left - other, added)]
+        ratio = np.sum(moved[::2], axis=0) / np.maximum(np.sum(moved[1::2], axis=0), 1e-300)
+        return float(np.mean(np.log(np.maximum(ratio, 1e-300)))) > 0.0
+
     def _passed(self, band: float, parts: Parts, channel: str) -> list[Array]:
         """Share of white sensor noise that a tracker passes to the residual, by frequency.
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Callable, Sequence
 
 import numpy as np
@@ -82,8 +83,21 @@ class Trials:
                     reason = error
         if not looks:
             raise reason
-        looks = [look for look in looks if look.follows] or looks[-1:]
+        looks = [look for look in looks if look.follows and not self._falls(look, looks)] or looks[-1:]
         return [look for look in looks if not any(self._predicts_worse(look, other) for other in looks)]
+
+    def _falls(self, look: Look, others: Sequence[Look]) -> bool:
+        """Whether a machine of the search falls over under a look's tracker, with values by which a faster one follows.
+
+        What is left then says where noise led the model, and an effect that holds it up passes for missing.
+        """
+        faster = [one for one in others if one.follows and one.fitted.tracker.band > look.fitted.tracker.band]
+        with contextlib.suppress(*ASTRAY):
+            if not faster:
+                return False
+            known = faster[-1].fitted.structure
+            return self.fitter.tracked.falls(known.model, known.theta, look.fitted.tracker)
+        return True
 
     def _predicts_worse(self, look: Look, slower: Look) -> bool:
         """Whether a fast look of the search makes the records clearly less probable than a slower one.
