@@ -1,6 +1,7 @@
 """The page for people: complete, self-contained, and true to the diagnosis."""
 
 import hashlib
+import io
 import re
 import xml.etree.ElementTree as ET
 from dataclasses import replace
@@ -14,6 +15,7 @@ from vpm.demo import MODEL, TRAIN, VALIDATION
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.numbers import percent, short
 from vpm.report.messages import estimate, took
+from vpm.report.story import print_story
 
 HTML, SVG = "{http://www.w3.org/1999/xhtml}", "{http://www.w3.org/2000/svg}"
 #: Most bytes of a page.
@@ -55,6 +57,20 @@ def test_one_core_and_four_find_the_same(diagnosis: vpm.Diagnosis) -> None:
     count = screened[0][3]
     assert [each[2] for each in screened[:count]] == list(range(1, count + 1))
     assert len({each[1] for each in screened[:count]}) > 1
+
+
+def test_a_terminal_says_each_reason_once(diagnosis: vpm.Diagnosis) -> None:
+    from rich.console import Console
+
+    refused = [RefusedEffect(name, site, "too slight") for name in ("spring", "backlash") for site in ("hip", "knee")]
+    console = Console(file=io.StringIO(), record=True, width=200)
+    print_story(replace(diagnosis, refused=(*refused, RefusedEffect("payload", "hand", "too late"))), console)
+    lines = console.export_text().splitlines()
+    start = lines.index("refused:")
+    assert lines[start + 1 : start + 3] == [
+        "  spring at hip, knee; backlash at hip, knee: too slight",
+        "  payload at hand: too late",
+    ]
 
 
 def test_each_finding_has_its_evidence_on_validation_data(diagnosis: vpm.Diagnosis) -> None:

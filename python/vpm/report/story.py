@@ -55,7 +55,13 @@ def _gaps(d: Diagnosis) -> list[str]:
 
 
 def _refused(d: Diagnosis) -> list[str]:
-    lines = [f"  {refused.name} at {refused.site}: {refused.reason}" for refused in d.refused]
+    sites: dict[str, dict[str, list[str]]] = {}
+    for refused in d.refused:
+        sites.setdefault(refused.reason, {}).setdefault(refused.name, []).append(refused.site)
+    lines = []
+    for reason, alike in sites.items():
+        named = "; ".join(f"{name} at {', '.join(places)}" for name, places in alike.items())
+        lines.append(f"  {named}: {reason}")
     return ["refused:", *lines] if lines else []
 
 
