@@ -243,7 +243,8 @@ u the command, x a true value, y its reading. Units: C is m or rad, E is N or N 
 the sensor. Of two defaults the second is for joints that turn.
 
 Effects marked *side* may sit behind the spring of a [joint_compliance](#joint_compliance) or [backlash](#backlash) of
-their joint, by `side = "link"`. There q and v include the deflection. *Ranking*: only a [ranking](ranking.md) tries it.
+their joint, by `side = "link"`. There q and v include the deflection. Those marked *spring* may sit in that spring
+itself, by `at = "axis_deflection"`; q and v are the deflection alone. *Ranking*: only a [ranking](ranking.md) tries it.
 """
 
 
@@ -288,6 +289,8 @@ def _remarks(effect: EffectType) -> str:
     remarks = []
     if effect.has_sides:
         remarks.append("*side*")
+    if effect.in_springs:
+        remarks.append("*spring*")
     if effect.requires:
         remarks.append(f"corrects [{effect.requires}](#{effect.requires}), which has to be there")
     if not effect.screened:

@@ -17,6 +17,7 @@ MOTOR, TABLE, STIFFNESS, DAMPING = 60.0, 30.0, 2e6, 400.0  # kg, kg, N/m, N s/m
 DRY, OIL = (60.0, 30.0), (150.0, 60.0)  # N, N s/m: of the motor, of the table
 TURNING, STRIBECK = 1e-3, 4e-3  # m/s
 NOISE = 1e-7  # m
+OVER = 1.2e-5  # m: way over which the spring turns its resistance round
 FINE, RATE = 1e-4, 500  # s, Hz
 
 NOMINAL = """
@@ -65,7 +66,9 @@ SPLIT = Model.from_toml(NOMINAL + GIVES_WAY + rubs("motor", 50.0, 130.0) + rubs(
 
 
 @cache
-def moved(seed: int, excess: float = 0.0, every: int = 1, noise: float = NOISE) -> tuple[Array, Array]:
+def moved(
+    seed: int, excess: float = 0.0, every: int = 1, noise: float = NOISE, lost: float = 0.0
+) -> tuple[Array, Array]:
     """Readings (N, 2) of both sides and forces (N,) of a drive under position control, ``every`` times as often."""
     random = np.random.default_rng(seed)
     step, count = round(1.0 / (RATE * every * FINE)), 5 * RATE * every
@@ -74,7 +77,7 @@ def moved(seed: int, excess: float = 0.0, every: int = 1, noise: float = NOISE) 
     time = np.arange(count) / (RATE * every)
     share = np.clip((time[:, None] - starts) / 0.35, 0.0, 1.0)
     goals = (share**3 * (10.0 - 15.0 * share + 6.0 * share**2)) @ random.permutation(ways)
-    x = v = y = w = total = 0.0
+    x = v = y = w = total = bristle = 0.0
     read, forces = np.empty((count, 2)), np.empty(count)
     for k, goal in enumerate(goals):
         read[k] = x, y
@@ -82,7 +85,8 @@ def moved(seed: int, excess: float = 0.0, every: int = 1, noise: float = NOISE) 
         total += error * step * FINE
         forces[k] = force = 12000.0 * (error + 40.0 * total)
         for _ in range(step):
-            between = STIFFNESS * (x - y) + DAMPING * (v - w)
+            between = STIFFNESS * (x - y) + DAMPING * (v - w) + lost * bristle
+            bristle += FINE * (v - w - abs(v - w) * bristle) / OVER  # P. Dahl 1968
             dry = DRY[1] + excess * exp(-((w / STRIBECK) ** 2))
             v += FINE * (force - between - DRY[0] * tanh(v / TURNING) - OIL[0] * v) / MOTOR
             w += FINE * (between - dry * tanh(w / TURNING) - OIL[1] * w) / TABLE
@@ -157,6 +161,21 @@ def test_a_named_effect_is_measured_by_a_tracker_that_follows_it() -> None:
     assert [(one.effect, one.side) for one in ranking.effects] == [("stribeck_friction", "link")]
     for gap in ranking.gaps.values():
         assert gap.after < 0.2 * gap.recalibrated
+
+
+def test_a_spring_that_loses_force_in_itself_has_the_hysteresis_at_its_own_joint() -> None:
+    """Dahl's law of the wind-up, not of the way of the table, which is ten thousand times as long."""
+    ranking = vpm.rank(
+        SPLIT,
+        [logged(SPLIT, *moved(7, lost=20.0))],
+        [logged(SPLIT, *moved(8, lost=20.0))],
+        effects=["hysteresis", "cubic_spring"],
+        workers=1,
+    )
+    assert [(one.effect, one.site) for one in ranking.effects] == [("hysteresis", "axis_deflection")]
+    values = {name: parameter.value for name, parameter in ranking.model.parameters.items()}
+    assert abs(values["axis_deflection.hysteresis.force"] - 20.0) < 2.0
+    assert abs(values["axis_deflection.hysteresis.displacement"] - OVER) < 0.2 * OVER
 
 
 def test_a_backlash_where_the_file_has_a_spring_is_refused_with_the_way_to_try_it() -> None:

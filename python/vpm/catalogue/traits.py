@@ -58,6 +58,8 @@ class Traits:
     """Whether, at a joint with a compliance or backlash, it belongs to the motor side or to the spring itself."""
     link_side_alone: bool = False
     """Whether the link alone has it, and never the shaft of a transmission: links run into ends and hang on springs."""
+    in_springs: bool = False
+    """Whether a spring that gives way between a motor and its link, or at the root of a link, may have it in itself."""
     takes_effort: bool = False
     """Whether it does nothing at a joint on which no actuator acts itself."""
     beside_others: bool = False

@@ -86,7 +86,7 @@ def drives_of(model: Model, joints: tuple[str, ...]) -> Drives | None:
     machine without such effects. None where that has other joints.
     """
     bare = model
-    for effect in model.effects if tuple(model.joints) != joints else ():
+    for effect in (one for one in model.effects if one.type.motion and tuple(model.joints) != joints):
         candidate = bare.without_effect(*effect.key)
         bare = candidate if len(candidate.joints) < len(bare.joints) else bare
     if tuple(bare.joints) != joints:
@@ -110,8 +110,8 @@ def bending(model: Model, joints: tuple[str, ...], *, wound: bool = False) -> Be
     splitting = [e for e in model.effects if e.type.has_play or (wound and e.type.splits)]
     plays = [e for e in splitting if model.joint_behind(e.at)]
     flying = {model.joint_behind(e.at) for e in plays}
-    if any(e.side == "link" and model.joint_behind(e.at) for e in model.effects):
-        return None  # what acts behind a spring moves it
+    if any((e.side == "link" and model.joint_behind(e.at)) or e.at in model.added_joints for e in model.effects):
+        return None  # what acts behind a spring or in it moves it
     if tuple(joint for joint in model.joints if joint not in flying) != joints:
         return None
     if not model.core.n_elastic and (not plays or any(e.type.rotor for e in model.effects)):

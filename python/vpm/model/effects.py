@@ -111,6 +111,8 @@ def effect_problems(document: Document, structure: Structure) -> Iterator[Proble
         sites = structure.sites(effect.site)
         if effect.has_sides:
             sites = (*sites, *document.transmissions)
+        if effect.in_springs:
+            sites = (*sites, *structure.added)
         if entry.at in document.transmissions and entry.at not in sites:
             rest = f'is "{entry.at}", a transmission, but {effect.name} sits at {_a(effect.site)} alone'
             repair = _shaft_repair(effect)

@@ -23,6 +23,7 @@ from vpm.model.effects import Effect, effects_of
 from vpm.model.evaluation import Evaluations
 from vpm.model.parameters import Parameter
 from vpm.model.reading import parse_toml, read_toml
+from vpm.model.splitting import name_behind
 from vpm.model.writer import content_of, toml_of
 from vpm.numbers import number_of
 from vpm.results import Storable, html_table
@@ -268,7 +269,7 @@ class Model(Evaluations, Storable):
         return model
 
     def without_effect(self, name: str, at: str, side: Side = "motor") -> Self:
-        """Model with one effect less.
+        """Model with one effect less, and without what sits in the spring that goes with it.
 
         Raises
         ------
@@ -276,8 +277,10 @@ class Model(Evaluations, Storable):
             The model has no such effect at this site.
         """
         gone, content = self.effect(name, at, side), self.to_dict()
+        springs = {f"{at}_bending", name_behind(at)} if gone.type.motion else set()
+        inside = springs & set(self.added_joints)
         kept = zip(self.effects, content["effects"], strict=True)
-        content["effects"] = [entry for effect, entry in kept if effect != gone]
+        content["effects"] = [entry for effect, entry in kept if effect != gone and effect.at not in inside]
         return type(self)(content)
 
     def sites(self, kind: str) -> tuple[str, ...]:

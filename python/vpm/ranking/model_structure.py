@@ -237,7 +237,8 @@ class Structure:
             Another effect rests on it.
         """
         rest = self.carried(self.model.without_effect(*key, self.side(key)))
-        return replace(rest, effects=tuple(effect for effect in self.effects if effect != key))
+        left = {(effect.name, effect.at) for effect in rest.model.effects}
+        return replace(rest, effects=tuple(one for one in self.effects if one != key and one in left))
 
     def with_last_of(self, other: Structure) -> Structure:
         """Structure with the last effect of another structure added.

@@ -36,6 +36,7 @@ EFFECT = EffectType(
     screened=False,
     tried=(Tried("rest", "way", (0.0,), (-10.0, 10.0)),),
     link_side_alone=True,
+    in_springs=True,
     usual="force",
     signature=Signature(
         ("position",), "A cubic parabola that crosses zero at the place of rest", "Slow motion over the whole way"

@@ -58,6 +58,7 @@ EFFECT = EffectType(
         "spring": "they agree over ways that are too short to slide; a longer way discriminates",
     },
     sticks=True,
+    in_springs=True,
     tried=(
         Tried("displacement", "travel", (0.004, 0.02, 0.1), (0.0, 2.0), sampled=True),
         Tried("shape", "one", (), (0.0, 20.0)),

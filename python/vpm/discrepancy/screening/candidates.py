@@ -27,6 +27,7 @@ from vpm.discrepancy.screening.ripple_periods import ripple_periods
 from vpm.discrepancy.settings import LEAST, LIMITED_MOST, WITHIN_NOISE
 from vpm.errors import DiagnosisError, near_match
 from vpm.experiment import instrument_noise
+from vpm.experiment.signal import differentiate
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.numbers import Array
@@ -124,10 +125,12 @@ def candidates(
     - ``effects``: restrict the search to these; to those that a diagnosis tries if not given
     - ``either_side``: whether both sides of a joint that is split may have the same effect, each its own
     """
+    logged = set.intersection(*(set(log.channels) for log in data.experiments))
+    hidden = {joint for joint in model.added_joints if f"{joint}.position" not in logged}
     return tuple(
         _candidate(effect, site, model, data, residual)
         for effect, site in _absent(model, effects, either_side=either_side)
-        if not beyond(effect, site, model)
+        if site not in hidden and not beyond(effect, site, model)
     )
 
 
@@ -290,9 +293,12 @@ def shares_at(model: Model, site: str, joints: Sequence[str]) -> Array:
 
 def _excitation(data: InverseDynamicsProblem, model: Model, site: str, actuator: str | None) -> Excitation:
     """Excitation of one joint: its largest speed (99.9 % quantile), middle and half range, sampling time, command."""
-    shares = shares_at(model, site, data.motions[0].joints)
-    position = np.concatenate([m.position @ shares for m in data.motions])
-    velocity = np.concatenate([m.velocity @ shares for m in data.motions])
+    if site in model.added_joints:
+        position, velocity = way_of_spring(data, site)
+    else:
+        shares = shares_at(model, site, data.motions[0].joints)
+        position = np.concatenate([m.position @ shares for m in data.motions])
+        velocity = np.concatenate([m.velocity @ shares for m in data.motions])
     column = model.actuators.index(actuator) if actuator is not None else 0
     command = max((float(np.abs(m.inputs[:, column]).max()) for m in data.motions if m.inputs.size), default=1.0)
     low, high = float(position.min()), float(position.max())
@@ -306,6 +312,13 @@ def _excitation(data: InverseDynamicsProblem, model: Model, site: str, actuator:
         column,
         max(m.dt * len(m.time) for m in data.motions),
     )
+
+
+def way_of_spring(data: InverseDynamicsProblem, joint: str) -> tuple[Array, Array]:
+    """Way of a spring that a candidate sits in, and its rate (n,), as logs hold them: no motion of it is prescribed."""
+    ways = [log[f"{joint}.position"] for log in data.experiments]
+    rates = [differentiate(way, m.dt) for way, m in zip(ways, data.motions, strict=True)]
+    return np.concatenate(ways), np.concatenate(rates)
 
 
 def _over_way(data: InverseDynamicsProblem, model: Model, site: str, residual: Array) -> tuple[Array, Array, Array]:

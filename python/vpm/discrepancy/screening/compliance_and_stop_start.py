@@ -50,6 +50,8 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
     if effect.has_sides and not effect.link_side_alone:
         # What sits on a shaft that one joint alone turns is the same at the joint.
         sites = (*sites, *(name for name in model.transmissions if len(model.ratios(name)) > 1))
+    if effect.in_springs:
+        sites = (*sites, *model.added_joints)
     if effect.beside_others:
         moved = {name: set(model.joints_of_actuator(name)) for name in model.actuators}
         shared = {site for site in sites if any(moved[site] & moved[name] for name in moved if name != site)}
