@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vpm import Model
-from vpm.identify.moments import beside_known, free_moments, real_bodies, to_the_border
+from vpm.identify.moments import beside_known, free_moments, on_the_border, real_bodies, to_the_border
 
 BODY = """
 name = "arm"
@@ -45,3 +45,12 @@ def test_one_free_moment_lies_between_difference_and_sum_of_the_others() -> None
     assert (low[0], high[0]) == pytest.approx((0.1, 0.3))
     several = Model.from_toml(BODY % (free, free, 0.2))
     assert beside_known(several, *free_moments(several, several.adjustable)) is None
+
+
+def test_a_moment_is_named_that_no_measurement_tells_from_the_sum_of_the_others() -> None:
+    told = []
+    for moment in (0.3, 0.3 * (1.0 - 1e-4), 0.28):
+        model = Model.from_toml(BODY % (0.1, f"{{ value = {moment}, uncertainty = 0.1 }}", 0.2))
+        told.append([names for names, _ in on_the_border(model, list(model.adjustable))])
+    (name,) = model.adjustable
+    assert told == [[[name]], [[name]], []]
