@@ -141,6 +141,7 @@ class _Check:
 
     def __init__(self, judge: Judge, each: ParallelCandidates) -> None:
         self.judge, self.each, self.settings = judge, each, judge.settings
+        self._in_vain: list[Shares] = []  # what is left of records that no correction explains
 
     def begun(self, record: Experiment) -> _Begun:
         """Beginning of a check: what is left of a record as it is."""
@@ -167,7 +168,8 @@ class _Check:
         inputs = tuple(name for name in model.input_channels if name in record)
         stretches = list(odd_stretches(record, outputs, inputs, self.settings))
         found, affected, whole = list[Finding](), set[str](), record
-        for _ in range(self.settings.rounds if len(part) >= self.settings.judged else 0):
+        says = len(part) >= self.settings.judged and not self._is_as_before(left)
+        for _ in range(self.settings.rounds if says else 0):
             units = _units(model, record, table)
             explanations = Explainer(self.judge, units, table, self.each).explained(part, (*outputs, *inputs), left)
             for one in explanations:
@@ -178,6 +180,8 @@ class _Check:
                 part, whole, left = one.correction.applied(part), one.correction.applied(whole), one.after
             if not explanations:
                 break
+        if says and not found:
+            self._in_vain.append(left)
         if others := left.above(self.settings.doubtful) - affected:
             found = [doubted(one, others) for one in found]
         units = _units(model, record, table)
@@ -187,6 +191,18 @@ class _Check:
         if tangent is not None and (undetermined := self.judge.undetermined(tangent)):
             stretches.append(_of_parameters(undetermined, record.name))
         return [*begun.sides, *found, *stretches], left
+
+    def _is_as_before(self, left: Shares) -> bool:
+        """Whether a checked record leaves what another one left that no correction explains.
+
+        All records have one channel table: what the model lacks shows in each of them. A mistake of this record alone
+        would leave more of its channels.
+        """
+        some = left.above(self.settings.doubtful)
+        return bool(some) and any(
+            all(left.by_channel[name] * self.settings.alike <= other.by_channel.get(name, 0.0) for name in some)
+            for other in self._in_vain
+        )
 
 
 def doubted(found: Finding, others: Collection[str]) -> Finding:

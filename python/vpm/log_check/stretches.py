@@ -141,8 +141,9 @@ def _is_noisy(values: Array, settings: Settings) -> bool:
     """Whether noise moves a stretch from sample to sample, so that no rest repeats a value."""
     if values.size <= settings.fewest:
         return False
-    usual = float(np.median(np.abs(np.diff(values))))
-    return noise_std(values) > max(quantisation_step(values) or 0.0, settings.quiet * usual)
+    steps = np.abs(np.diff(values))
+    least = float(np.min(steps, where=steps > 0.0, initial=np.inf))  # of an encoder, however many digits are written
+    return noise_std(values) > max(least, settings.quiet * float(np.median(steps)))
 
 
 def _longest(same: NDArray[np.bool_]) -> slice:
