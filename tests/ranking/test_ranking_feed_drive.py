@@ -6,6 +6,7 @@ from functools import cache
 from math import exp, tanh
 
 import numpy as np
+import pytest
 from scipy.signal import butter, freqz, sosfilt
 
 import vpm
@@ -67,7 +68,7 @@ SPLIT = Model.from_toml(NOMINAL + GIVES_WAY + rubs("motor", 50.0, 130.0) + rubs(
 
 @cache
 def moved(
-    seed: int, excess: float = 0.0, every: int = 1, noise: float = NOISE, lost: float = 0.0
+    seed: int, excess: float = 0.0, every: int = 1, noise: float = NOISE, lost: float = 0.0, hiss: float = 0.0
 ) -> tuple[Array, Array]:
     """Readings (N, 2) of both sides and forces (N,) of a drive under position control, ``every`` times as often."""
     random = np.random.default_rng(seed)
@@ -83,7 +84,7 @@ def moved(
         read[k] = x, y
         error = 40.0 * (goal - x) - v
         total += error * step * FINE
-        forces[k] = force = 12000.0 * (error + 40.0 * total)
+        forces[k] = force = 12000.0 * (error + 40.0 * total) + hiss * random.standard_normal()
         for _ in range(step):
             between = STIFFNESS * (x - y) + DAMPING * (v - w) + lost * bristle
             bristle += FINE * (v - w - abs(v - w) * bristle) / OVER  # P. Dahl 1968
@@ -147,6 +148,20 @@ def test_nothing_is_left_where_a_logger_filtered_all_channels_alike() -> None:
     assert not ranking.effects
     assert gap.after < 1.3 * gap.noise
     assert gap.noise < 1.1 * np.sqrt(2.0 * 0.4) * 1e-6  # two readings, 200 of 500 Hz
+
+
+@pytest.mark.parametrize("acts", [True, False])
+def test_noise_of_a_held_command_is_missing_nowhere_unless_it_acts(acts: bool) -> None:
+    """A read current rings a shaft in the model alone; one that hisses itself rings the machine, and is exact."""
+    logs = []
+    for seed in (9, 10):
+        read, forces = moved(seed, hiss=4.0 if acts else 0.0)
+        heard = forces if acts else forces + 4.0 * np.random.default_rng(seed).standard_normal(len(forces))
+        logs.append(logged(SPLIT, read, heard))
+    ranking = vpm.rank(SPLIT, logs[:1], logs[1:], effects=["coulomb_friction"], workers=1)
+    gap = ranking.gaps["axis_deflection.position"]
+    assert gap.after < 1.3 * gap.noise
+    assert (gap.noise < 1.5 * np.sqrt(2.0) * NOISE) == acts
 
 
 def test_a_named_effect_is_measured_by_a_tracker_that_follows_it() -> None:

@@ -99,7 +99,7 @@ class Structured:
         passed : sequence of ndarray, optional
             Share of the power of white noise that is in each line of each piece, where not all of it is.
         drawn : sequence of sequence of ndarray
-            Draws of other noise, in pieces each, which is not white.
+            Draws of other noise, in pieces each, which is not white. Of a band it is no more than the signal has there.
         """
         places = np.concatenate([frequencies(len(piece)) for piece in pieces])
         powers = np.concatenate([dct(piece, norm="ortho") ** 2 for piece in pieces])
@@ -112,10 +112,10 @@ class Structured:
         other = np.zeros(len(powers))
         for several in drawn:
             other += np.concatenate([dct(piece, norm="ortho") ** 2 for piece in several]) / len(drawn)
-        noise = level * white + np.array([np.mean(band) for band in _banded(places, other)[1]])
-        return cls(
-            edges, 1.0 - noise / np.maximum(most, noise), float(np.sqrt(level * np.mean(shares) + np.mean(other)))
-        )
+        room = np.maximum(most - level * white, 0.0)
+        shown = np.minimum([np.mean(band) for band in _banded(places, other)[1]], room)
+        noise, mean = level * white + shown, np.average(shown, weights=[len(band) for band in bands])
+        return cls(edges, 1.0 - noise / np.maximum(most, noise), float(np.sqrt(level * np.mean(shares) + mean)))
 
     def part_of(self, piece: Array) -> Array:
         """Part of a signal's piece (n,) above white noise."""

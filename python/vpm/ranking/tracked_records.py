@@ -179,13 +179,22 @@ class TrackedRecords:
         return left
 
     def structured(
-        self, residual: Array, band: float, parts: Parts, model: Model, theta: Array | None = None
+        self,
+        residual: Array,
+        band: float,
+        parts: Parts,
+        model: Model,
+        theta: Array | None = None,
+        *,
+        held: bool = False,
     ) -> list[Structured]:
         """Part of a tracked residual (N, m) above the noise of each channel.
 
-        A ``model`` near the machine says what noise of commands does to it, with its own parameters or ``theta``.
+        A ``model`` near the machine says what noise of commands does to it, with its own parameters or ``theta``; of
+        commands that are ``held``, too, if asked for.
         """
-        moved = self._moved_by_commands(model, model.theta if theta is None else theta, band)
+        smooth = self.setup.course != HOLDS[0]
+        moved = self._moved_by_commands(model, model.theta if theta is None else theta, band) if smooth or held else []
         return [
             Structured.of(
                 [values[part] for part in parts],
@@ -198,11 +207,10 @@ class TrackedRecords:
     def _moved_by_commands(self, model: Model, theta: Array, band: float) -> list[Array]:
         """Changes of a tracked residual (N, m) by noise of commands, drawn several times.
 
-        A command that is held from sample to sample is what a controller sent, and exact. One that runs on in between
-        was read like any output: what its noise does to the machine, such as the ringing of a shaft, is not missing.
+        A command that is held from sample to sample is mostly what a controller sent, and exact. One that runs on in
+        between was read like any output: what its noise does to the machine, such as the ringing of a shaft, is not
+        missing.
         """
-        if self.setup.course == HOLDS[0]:
-            return []
         random, tracker = np.random.default_rng(SEED), Tracker(band).coarse
         with contextlib.suppress(VpmError, ArithmeticError):
             quiet, _ = self.follow(model, theta, tracker)

@@ -36,7 +36,8 @@ def gaps(held_out: TrackedRecords, stages: tuple[Model, Model, Model], band: flo
     unknown = np.full(after.shape[1], np.nan)
     shares, noise = unknown, unknown
     if np.all(np.isfinite(recalibrated)):
-        filters = held_out.structured(recalibrated, band, parts, stages[1])
+        # Drives that are faster than their log read currents that are held: the errors show whether one was exact.
+        filters = held_out.structured(recalibrated, band, parts, stages[1], held=True)
         shares, noise = _shares((recalibrated, held_out.drawn(band)), after, parts, filters)
     names = held_out.records[0].channels
     units = map(stages[0].channel_unit, names)
