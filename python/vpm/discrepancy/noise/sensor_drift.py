@@ -57,7 +57,8 @@ def sensor_drifts(
 
     Of channels that are compared beside the efforts, such as strains, whose sensors no one described. The zero of a
     bridge is as slow as its temperature (E. Doebelin, *Measurement Systems*, 2004, section 3.2), and no force of a
-    machine that moves goes along a straight line for a whole record.
+    machine that moves goes along a straight line for a whole record. A pressure does: it is the integral of what flows,
+    so that a leak which the model lacks moves it like that. Channels of drives and supplies are left as they are.
 
     - ``model``: the best model found
     - ``problems``: training and validation records, each with the residual of the model
@@ -65,9 +66,11 @@ def sensor_drifts(
     - ``factor``: of the noise floor up to which an error is noise
     """
     found: list[Drift] = []
+    integrating = {*model.actuators, *model.supplies}
     for channel in problems[-1][0].shown:
         one = gap[channel]
-        if model.sensor_of(channel) is not None or not one.after > factor * one.noise_floor:
+        described = model.sensor_of(channel) is not None or channel.rpartition(".")[0] in integrating
+        if described or not one.after > factor * one.noise_floor:
             continue
         lines, left = [], 0.0
         for problem, residual in problems:
