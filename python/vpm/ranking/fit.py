@@ -332,14 +332,16 @@ def counted_too_often(errors: Array, slopes: Array, channels: int, pieces: int) 
     independent (K.-Y. Liang and S. Zeger, *Biometrika* 73, 1986).
     """
     scale, count = max(float(np.mean(errors**2)), 1e-300), slopes.shape[1]
-    by_sample = np.sum((slopes * errors[:, None]).reshape(channels, -1, count), axis=0) / scale
-    sums = np.stack([np.sum(piece, axis=0) for piece in np.array_split(by_sample, pieces)])
-    information, spread = slopes.T @ slopes / scale, pieces * np.cov(sums, rowvar=False).reshape(count, count)
-    sizes = 1.0 / np.sqrt(np.diag(information) + 1.0)
-    even = np.outer(sizes, sizes)
-    known = information * even + np.diag(sizes**2 + ROUNDED)
-    expected, seen = (float(np.trace(np.linalg.solve(known, one * even))) for one in (information, spread))
-    return seen / max(expected, 1e-300)
+    with np.errstate(over="ignore", invalid="ignore"):  # of records that leave next to no error
+        by_sample = np.sum((slopes * errors[:, None]).reshape(channels, -1, count), axis=0) / scale
+        sums = np.stack([np.sum(piece, axis=0) for piece in np.array_split(by_sample, pieces)])
+        information, spread = slopes.T @ slopes / scale, pieces * np.cov(sums, rowvar=False).reshape(count, count)
+        sizes = 1.0 / np.sqrt(np.diag(information) + 1.0)
+        even = np.outer(sizes, sizes)
+        known = information * even + np.diag(sizes**2 + ROUNDED)
+        expected, seen = (float(np.trace(np.linalg.solve(known, one * even))) for one in (information, spread))
+        often = seen / max(expected, 1e-300)
+    return often if np.isfinite(often) else 1.0
 
 
 def by_secant(slopes: Array, change: Array, move: Array) -> Array:
