@@ -139,22 +139,28 @@ def _resting_on_another(trials: Trials, looks: list[Look], tried: Sequence[Trial
     bare = {one.key: one for one in sorted(tried, key=lambda one: -one.left) if one.key[0] in resting.values()}
     for first in sorted(bare.values(), key=lambda one: one.left):
         with contextlib.suppress(*ASTRAY):
-            look = trials.look(trials.fitter.finished(first.fitted, View(first.look.view.noise)))
-            names = [name for name, needed in resting.items() if needed == first.key[0]]
-            beside = trials.finished(trials.tried(look, look, names))
-            counting = [two for two in beside if two.counts and two.key[1] == first.key[1]]
-            best = min(counting, key=lambda two: two.left, default=None)
-            if best is None:
-                continue
-            both = weighed([Trial.of(best.fitted, first.look, first.key)], trials.fitter)[0]
-            if not trials.stands(both):
-                continue
-            trials.say(f"{first.label} and {best.key[0]} together {both.removing}")
-            (second,) = trials.listed(None, weighed([best], trials.fitter))
-            (one,) = trials.listed(both, [both])
-            own = {name: value for name, value in one.values.items() if name not in second.values}
-            return trials.all_looks(trials.look(best.fitted)), [(replace(one, values=own),), (second,)]
+            found, pair = _paired(trials, first, [name for name, needed in resting.items() if needed == first.key[0]])
+            if pair:
+                return found, pair
     return looks, []
+
+
+def _paired(trials: Trials, first: Trial, names: Sequence[str]) -> Found:
+    """A tried effect with the best of those ``names`` that rest on it, if both count together."""
+    look = trials.look(trials.fitter.finished(first.fitted, View(first.look.view.noise)))
+    beside = trials.finished(trials.tried(look, look, names))
+    counting = [two for two in beside if two.counts and two.key[1] == first.key[1]]
+    if not counting:
+        return [look], []
+    best = min(counting, key=lambda two: two.left)
+    both = weighed([Trial.of(best.fitted, first.look, first.key)], trials.fitter)[0]
+    if not trials.stands(both):
+        return [look], []
+    trials.say(f"{first.label} and {best.key[0]} together {both.removing}")
+    (second,) = trials.listed(None, weighed([best], trials.fitter))
+    (one,) = trials.listed(both, [both])
+    own = {name: value for name, value in one.values.items() if name not in second.values}
+    return trials.all_looks(trials.look(best.fitted)), [(replace(one, values=own),), (second,)]
 
 
 def _rubbing_on_both_sides(trials: Trials, looks: list[Look]) -> Found:
