@@ -255,7 +255,7 @@ def _or_late_readings(model: Model, diagnosis: Diagnosis, bare: Sequence[str]) -
 
     From commands to readings only the sum of all delays shows. ``bare``: readings without a described sensor.
     """
-    late = [one.site for one in diagnosis.effects if EFFECTS[one.name].late in {"delay", "lag"}]
+    late = [one.site for one in diagnosis.effects if EFFECTS[one.name].shifts]
     moved = {joint for drive in late if drive in model.actuators for joint in model.joints_of_actuator(drive)}
     alike = [name for name in bare if name.rpartition(".")[0] in moved]
     return LATE_READINGS.format(channels=" or ".join(alike)) if alike else ""

@@ -119,6 +119,11 @@ class EffectParameter:
     typical: float = 1.0
     optional: bool = False
 
+    @property
+    def is_place(self) -> bool:
+        """Whether the parameter says where along its way an effect lies, which may be anywhere."""
+        return self.shape and tuple(self.physical) == ANY
+
     def default(self, kind: JointKind | None = None) -> float | None:
         """Value when none is given (SI), at a site on a joint of this kind; None if it has to be given.
 

@@ -28,8 +28,9 @@ from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import gain, segments
 from vpm.identify.identifiability import Span
-from vpm.identify.response_along_motion import bends
+from vpm.identify.response_along_motion import bends, joints_with_play
 from vpm.model import Effect, Model
+from vpm.model.splitting import name_of_bending
 from vpm.numbers import Array, power
 
 if TYPE_CHECKING:
@@ -55,7 +56,7 @@ def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
     own = set(model.joints) - set(model.added_joints)
     if len(own) > RANKED_JOINTS:
         return f"there are {len(own)} joints, more than {RANKED_JOINTS}"
-    bent = [f"{body}_bending.position" for body in model.bodies]
+    bent = [f"{name_of_bending(body)}.position" for body in model.bodies]
     held = [channel for channel in bent if any(channel in record for record in experiments)]
     return f"records hold {held[0]}" if held else ""
 
@@ -76,7 +77,7 @@ def tracker_gaps(ranking: Ranking, balanced: Sequence[str] | None) -> dict[str, 
     the efforts are ``balanced``.
     """
     model, joints = ranking.recalibrated, set(ranking.recalibrated.joints) - set(balanced or ())
-    joints |= {effect.at for effect in ranking.model.effects if effect.type.has_play}
+    joints |= joints_with_play(ranking.model)
     joints |= {shaft for shaft in model.transmissions if joints & set(model.ratios(shaft))}
     return {
         f"{channel} ({OBSERVED})": ChannelGap(

@@ -26,6 +26,7 @@ from vpm.discrepancy.settings import (
 )
 from vpm.errors import VpmError
 from vpm.identify import gain, segments
+from vpm.identify.response_along_motion import joints_with_play
 from vpm.identify.settings import MOSTLY_OPEN
 from vpm.model import Model
 from vpm.numbers import NORMAL_95, percent, short
@@ -171,7 +172,7 @@ def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], tracked: float) ->
     to balance: where little is left of what a tracker sees, that says more. A deflection behind their joint is told by
     a tracker alone, and what it leaves of that as it was is no law on either side.
     """
-    if tracked <= _most_left(found) and _has_play(found):
+    if tracked <= _most_left(found) and joints_with_play(found.final.model):
         return False
     efforts = [gap[channel] for joint in _joints(found) if (channel := f"{joint}.effort") in gap]
     most = any(g.after**2 > CLEAR_GAIN * g.signal**2 for g in efforts)
@@ -187,9 +188,7 @@ def _rests_on_tracker(found: Search, data: Data | None) -> bool:
     at = _joints(found)
     if data is None or not at:
         return False
-    model = found.final.model
-    played = {effect.at for effect in model.effects if effect.type.has_play}
-    return at <= played or not at & {*data.training.joints, ""}
+    return at <= joints_with_play(found.final.model) or not at & {*data.training.joints, ""}
 
 
 def _joints(found: Search) -> set[str]:
@@ -222,12 +221,7 @@ def _most_left(found: Search) -> float:
 
     From impact to impact a play multiplies what is a little off, so that there most of the work is enough.
     """
-    return 1.0 - CLEAR_GAIN if _has_play(found) else MOSTLY_OPEN
-
-
-def _has_play(found: Search) -> bool:
-    """Whether a joint of the verdict's model has play."""
-    return any(effect.type.has_play for effect in found.final.model.effects)
+    return 1.0 - CLEAR_GAIN if joints_with_play(found.final.model) else MOSTLY_OPEN
 
 
 def _nothing_missing(

@@ -54,6 +54,11 @@ def bends(model: Model) -> bool:
     return bool(model.core.n_elastic)
 
 
+def joints_with_play(model: Model) -> set[str]:
+    """Joints of a model whose two sides move without each other within a gap."""
+    return {effect.at for effect in model.effects if effect.type.has_play}
+
+
 def answers_at_once(model: Model) -> bool:
     """Whether efforts follow from each sample of a motion: links are rigid, and drives have no states of their own."""
     return not bends(model) and not has_own_drives(model)
@@ -355,7 +360,7 @@ def guided(
     for order, values in enumerate((m.position, m.velocity, m.acceleration)):
         motion[order][:, measured] = values
     method = "linearly_implicit" if has_own_drives(model) else setup.method(model, guided=True)
-    plays = any(effect.type.has_play for effect in model.effects)
+    plays = bool(joints_with_play(model))
     substeps = max(setup.substeps, math.ceil(m.dt / IN_PLAY - 1e-6)) if plays else setup.substeps
     strains = hold.arguments(model) if hold else (None, None)
     stepping = (m.dt, substeps, method, list(columns), passive, *strains, 0, known.departure)

@@ -8,7 +8,7 @@ import numpy as np
 from vpm.errors import DivergedError
 from vpm.identify.estimation import Estimate, Worth, estimate
 from vpm.identify.inverse_dynamics import InverseDynamicsProblem
-from vpm.identify.response_along_motion import bends, has_hidden, has_own_drives, shows_drives_alone
+from vpm.identify.response_along_motion import bends, has_hidden, has_own_drives, joints_with_play, shows_drives_alone
 from vpm.model import Model
 from vpm.numbers import Array
 
@@ -65,7 +65,7 @@ def estimate_on_tangent(
     residual, _ = data.evaluate(model, model.theta)
     cost, at, columns = float(residual @ residual), model, [model.index(name) for name in free]
     early = False
-    flying = any(effect.type.has_play for effect in model.effects) and not bends(model)
+    flying = bool(joints_with_play(model)) and not bends(model)
     flying = flying and has_hidden(model, data.motions[0].joints)
     for _ in range(FLYING if flying else TANGENTS):
         rough = estimate(at, Tangent(data, origin), free, bounds=bounds, tolerance=tolerance)

@@ -23,7 +23,7 @@ from vpm.model.effects import Effect, effects_of
 from vpm.model.evaluation import Evaluations
 from vpm.model.parameters import Parameter
 from vpm.model.reading import parse_toml, read_toml
-from vpm.model.splitting import name_behind
+from vpm.model.splitting import name_behind, name_of_bending
 from vpm.model.writer import content_of, toml_of
 from vpm.numbers import number_of
 from vpm.results import Storable, html_table
@@ -277,7 +277,7 @@ class Model(Evaluations, Storable):
             The model has no such effect at this site.
         """
         gone, content = self.effect(name, at, side), self.to_dict()
-        springs = {f"{at}_bending", name_behind(at)} if gone.type.motion else set()
+        springs = {name_of_bending(at), name_behind(at)} if gone.type.motion else set()
         inside = springs & set(self.added_joints)
         kept = zip(self.effects, content["effects"], strict=True)
         content["effects"] = [entry for effect, entry in kept if effect != gone and effect.at not in inside]

@@ -29,6 +29,11 @@ def name_behind(joint: str) -> str:
     return f"{joint}_deflection"
 
 
+def name_of_bending(body: str) -> str:
+    """Name of the joint at the root of a link that an effect splits to bend."""
+    return f"{body}_bending"
+
+
 def splits_joint(entry: EffectEntry, document: Document) -> bool:
     """Whether an effect splits a joint into motor and link: wind-up always, play where an actuator drives directly.
 
@@ -52,7 +57,7 @@ def deflections(document: Document) -> Mapping[str, str]:
 def bendings(document: Document) -> Mapping[str, str]:
     """Bodies that an effect splits into bending links, each with the name of the joint at its root."""
     bent = (entry.at for entry in document.effects if entry.traits.motion == "bending" and entry.at in document.bodies)
-    return {at: f"{at}_bending" for at in bent}
+    return {at: name_of_bending(at) for at in bent}
 
 
 def flexed(document: Document) -> Document:
@@ -82,7 +87,7 @@ def splitting_problems(document: Document, names: Mapping[str, str]) -> Iterator
             other = document.effects[earlier].type
             rest = f'splits joint "{joint}" again, after {other} in effects[{earlier}], and no inertia is between'
             yield Problem(where, f"{rest}; keep one of them")
-        added = f"{entry.at}_bending" if bends else name_behind(entry.at)
+        added = name_of_bending(entry.at) if bends else name_behind(entry.at)
         if added in {*document.joints, *document.bodies, *document.beams, *document.actuators, *document.sensors}:
             yield Problem(where, f'adds a joint "{added}", but the model has a component of this name; rename that one')
         if not _has_rotor(document, joint):

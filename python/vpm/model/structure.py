@@ -11,7 +11,7 @@ from vpm.model.joint import ANGULAR, EFFORT_UNIT, TURNING, Coordinate, Direction
 from vpm.model.outputs import channels_of, outputs_of, unit_of
 from vpm.model.pose import Frame, Mount, Pose, pose
 from vpm.model.schema import Document
-from vpm.model.splitting import bendings, deflections, flexed, name_behind
+from vpm.model.splitting import bendings, deflections, flexed, name_behind, name_of_bending
 from vpm.model.tree import WORLD
 
 
@@ -74,7 +74,7 @@ class Structure:
 
         A log may hold one, from a strain gauge or a second encoder; the machine as it is takes it for zero.
         """
-        bent = {f"{body}_bending": joint for body, joint in self.turned.items()}
+        bent = {name_of_bending(body): joint for body, joint in self.turned.items()}
         wound = {name_behind(joint): joint for joint in self.sites("joint")}
         return {f"{name}.position": joint for name, joint in (bent | wound).items() if name not in self.joints}
 

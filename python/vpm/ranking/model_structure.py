@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 import numpy as np
 
-from vpm.catalogue.kinds import ANY, Side
+from vpm.catalogue.kinds import Side
 from vpm.discrepancy.screening.candidates import Key
 from vpm.identify.moments import free_moments, moments_of, rods, to_the_border
 from vpm.model import Effect, Model
@@ -185,7 +185,7 @@ class Structure:
         names, found = list(self.priors), []
         for effect in self.model.effects if self.free_places else ():
             own = [(effect.type.parameter(short), name) for short, name in effect.parameter_names.items()]
-            places = [name for one, name in own if one.shape and tuple(one.physical) == ANY and name in names]
+            places = [name for one, name in own if one.is_place and name in names]
             sizes = [name for one, name in own if not one.shape and name in names]
             if len(places) == len(sizes) == 1 and self.theta[self.place(sizes[0])] != 0.0:
                 found.append((names.index(sizes[0]), names.index(places[0])))

@@ -8,7 +8,14 @@ import numpy as np
 
 from vpm.catalogue import EffectParameter
 from vpm.catalogue.shared import SLOW
-from vpm.discrepancy.screening.candidates import Candidate, joint_at, shares_at, slow_speeds, way_of_spring
+from vpm.discrepancy.screening.candidates import (
+    Candidate,
+    joint_at,
+    shares_at,
+    slow_speeds,
+    springs_shown,
+    way_of_spring,
+)
 from vpm.discrepancy.settings import LEAST
 from vpm.discrepancy.stuck_channels import is_moving
 from vpm.identify import InverseDynamicsProblem
@@ -50,10 +57,10 @@ class Sizes:
             inertia = float(inertias @ along**2)
             size = _strength(efforts @ along) or inertia * _strength(accelerations @ shares)
             self.joints[site] = size, _strength(velocities @ shares), 0.5 * float(np.ptp(way))
-        logged = set.intersection(*(set(log.channels) for log in data.experiments))
+        springs = springs_shown(model, data)
         for joint in data.joints:
             behind = model.joint_behind(joint)
-            if behind is not None and f"{behind}.position" in logged:
+            if behind is not None and behind in springs:
                 way, rate = way_of_spring(data, behind)
                 self.ways[behind] = float(way.min()), float(way.max())
                 # A spring passes on what its motor does.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from vpm.catalogue.kinds import ANY
 from vpm.discrepancy.screening.candidates import Candidate
 from vpm.discrepancy.screening.compliance_and_stop_start import moved
 from vpm.model import Model
@@ -37,7 +36,7 @@ def _placed(candidate: Candidate, sizes: Sizes) -> Candidate:
     Without size an effect does not depend on its place, so a first step gives it a size and leaves the place. A spring
     that rests far away pulls nearly the same everywhere.
     """
-    anywhere = [one.name for one in candidate.effect.parameters if one.shape and tuple(one.physical) == ANY]
+    anywhere = [one.name for one in candidate.effect.parameters if one.is_place]
     if not candidate.neutral or len(anywhere) != 1 or len(candidate.starts) != 1 or candidate.site not in sizes.ways:
         return candidate
     (start,), (place,) = candidate.starts, anywhere

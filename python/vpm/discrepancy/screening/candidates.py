@@ -125,8 +125,7 @@ def candidates(
     - ``effects``: restrict the search to these; to those that a diagnosis tries if not given
     - ``either_side``: whether both sides of a joint that is split may have the same effect, each its own
     """
-    logged = set.intersection(*(set(log.channels) for log in data.experiments))
-    hidden = {joint for joint in model.added_joints if f"{joint}.position" not in logged}
+    hidden = set(model.added_joints) - springs_shown(model, data)
     return tuple(
         _candidate(effect, site, model, data, residual)
         for effect, site in _absent(model, effects, either_side=either_side)
@@ -312,6 +311,11 @@ def _excitation(data: InverseDynamicsProblem, model: Model, site: str, actuator:
         column,
         max(m.dt * len(m.time) for m in data.motions),
     )
+
+
+def springs_shown(model: Model, data: InverseDynamicsProblem) -> set[str]:
+    """Springs of joints that were split, to sit in which a candidate needs their way: those that all logs hold."""
+    return {name for name in model.added_joints if all(f"{name}.position" in log for log in data.experiments)}
 
 
 def way_of_spring(data: InverseDynamicsProblem, joint: str) -> tuple[Array, Array]:

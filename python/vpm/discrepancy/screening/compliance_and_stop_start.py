@@ -33,7 +33,7 @@ from vpm.discrepancy.settings import (
 from vpm.experiment.signal import differentiate
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
-from vpm.model.splitting import name_behind
+from vpm.model.splitting import name_behind, name_of_bending
 from vpm.numbers import Array
 
 Starts = tuple[Mapping[str, float], ...]
@@ -101,7 +101,8 @@ def logged_swing(data: InverseDynamicsProblem, model: Model, site: str) -> tuple
     What hangs on the spring obeys ``a + d'' = -(k/J) d - (c/J) d'``, ``a`` the acceleration of the joint before it.
     Two numbers by linear least squares, without gravity and the motion of other joints, so good for a start only.
     """
-    logged = [c for c in data.shown if c in {f"{site}_bending.position", f"{name_behind(site)}.position"}]
+    behind = {f"{name}.position" for name in (name_of_bending(site), name_behind(site))}
+    logged = [channel for channel in data.shown if channel in behind]
     if not logged:
         return None
     column = data.motions[0].joints.index(_joint(model, site))

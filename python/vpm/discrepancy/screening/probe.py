@@ -15,7 +15,6 @@ from functools import cached_property
 import numpy as np
 from scipy.special import chdtri
 
-from vpm.catalogue.kinds import ANY
 from vpm.discrepancy.screening.candidates import Candidate, acts_on, joint_at
 from vpm.discrepancy.screening.compliance_and_stop_start import fine_starts
 from vpm.discrepancy.settings import EVEN, OF_JOINT, RICHEST, ROUNDED, SHORT_LIST, SIZE_LEVEL
@@ -163,7 +162,7 @@ def free_location(
     effect = model.effect(*candidate.key)
     short = {dotted: name for name, dotted in effect.parameter_names.items()}
     own = [candidate.effect.parameter(short[name]) for name in added]
-    anywhere = [i for i, p in enumerate(own) if p.shape and tuple(p.physical) == ANY]
+    anywhere = [i for i, p in enumerate(own) if p.is_place]
     if len(anywhere) != 1 or own[1 - anywhere[0]].shape:
         return None
     where, size = anywhere[0], 1 - anywhere[0]
