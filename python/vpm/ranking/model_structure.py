@@ -17,6 +17,9 @@ from vpm.numbers import Array
 from vpm.ranking.settings import MOVE
 from vpm.weighing.priors import Prior
 
+#: Deviations of a prior within which a value is that of its end.
+ROUNDED = 1e-6
+
 
 def sides_taken(model: Model, joint: str) -> set[Side]:
     """Sides of a joint in a structure that hold effects with a choice of side."""
@@ -119,6 +122,16 @@ class Structure:
         """Change of each unknown parameter of a structure by one prior deviation (k,)."""
         pairs = zip(self.priors.values(), self.columns, strict=True)
         return np.array([prior.slope(float(self.theta[column])) for prior, column in pairs])
+
+    @property
+    def off_its_ends(self) -> Structure:
+        """Structure with shapes that lie at an end of their range back in the middle of their priors.
+
+        At its end a law answers to nothing: a fit that got there to make up for what was missing does not come back.
+        """
+        shapes = np.array([prior.logarithmic for prior in self.priors.values()], dtype=bool)
+        stuck = shapes & np.any(np.abs(self.standard[:, None] - self.ends) < ROUNDED, axis=1)
+        return self.at(np.where(stuck, 0.0, self.standard)) if np.any(stuck) else self
 
     def is_far(self, most: float) -> bool:
         """Whether a structure without effects lies more than so many deviations from what its model file states."""

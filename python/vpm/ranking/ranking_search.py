@@ -139,7 +139,7 @@ class Search(Trials):
         Where much is missing, known parameters go far astray to make up for it, and fits from there need not lead back.
         Where nothing counts then, fits begin at what the model file states.
         """
-        best, tried = self._best(looks, looks)
+        best, tried = self._best(looks, [self._off_its_ends(look) for look in looks])
         if best is not None or not looks[0].fitted.structure.is_far(self.settings.reach):
             return best, tried
         with contextlib.suppress(*ASTRAY):
@@ -147,6 +147,14 @@ class Search(Trials):
             best, more = self._best(looks, stated)
             tried = [*more, *tried]
         return best, tried
+
+    def _off_its_ends(self, look: Look) -> Look:
+        """Look of the search from which fits with another effect can come back, see `Structure.off_its_ends`."""
+        fitted = look.fitted
+        if (other := fitted.structure.off_its_ends) is not fitted.structure:
+            with contextlib.suppress(*ASTRAY):
+                return self.look(self.fitter.unfitted(other, fitted.tracker))
+        return look
 
     def _best(self, looks: Sequence[Look], begun: Sequence[Look]) -> tuple[Trial | None, list[Trial]]:
         """Best additional effect of a search by fits from what was ``begun`` under each tracker, and all tried ones."""

@@ -13,7 +13,7 @@ import numpy as np
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.screening.candidates import Candidate, candidates
-from vpm.ranking.choice_by_evidence import weighed
+from vpm.ranking.choice_by_evidence import as_good, weighed
 from vpm.ranking.fit import ASTRAY, View
 from vpm.ranking.look import Look
 from vpm.ranking.model_structure import Structure
@@ -45,7 +45,7 @@ def _at_several_places(trials: Trials, looks: list[Look], best: Trial | None, tr
     comparable = [one for one in tried if best is None or one.look is best.look]
     for trial in _alike(trials, comparable, room):
         with contextlib.suppress(*ASTRAY):
-            if not trial.counts or (best is not None and not trials.is_likelier(trial, best)):
+            if not trial.counts or (best is not None and not _does_better(trials, trial, best)):
                 continue
             look = trials.look(trial.fitted)
             new = [key for key in trial.fitted.structure.effects if key not in trial.look.fitted.structure.effects]
@@ -54,6 +54,14 @@ def _at_several_places(trials: Trials, looks: list[Look], best: Trial | None, tr
                 trials.say(f"{trial.key[0]} at {' and '.join(site for _, site in new)} together {trial.removing}")
                 return trials.all_looks(look), [trials.listed(one, [one]) for one in found]
     return looks, []
+
+
+def _does_better(trials: Trials, trial: Trial, best: Trial) -> bool:
+    """Whether one effect at several places does more than another alone, by more than that one's law is wrong by.
+
+    Where all sensors are late, so is the drive: with more numbers they always leave a little less.
+    """
+    return not as_good(best, trial, trials.settings) and trials.is_likelier(trial, best)
 
 
 def _alike(trials: Trials, tried: Sequence[Trial], most: int) -> list[Trial]:
