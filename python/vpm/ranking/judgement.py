@@ -62,8 +62,12 @@ class Judgement(Storable):
         return not self.lacks(settings)
 
     def is_repeated(self, settings: Settings) -> bool:
-        """Whether a judgement is more than chance: enough goes, from piece after piece."""
-        return self.least > settings.worth and self.score > settings.score
+        """Whether a judgement is more than chance: enough goes, from piece after piece, or nearly all of it.
+
+        An end of a way may be met once or twice. Values that were fitted to one impact and foretell another one are not
+        right by chance.
+        """
+        return self.least > settings.worth and (self.score > settings.score or self.least > settings.clear)
 
     def is_faint(self, settings: Settings, parts: int) -> bool:
         """Whether a judgement fails only by its score, and would count with more parts of the record."""
@@ -74,7 +78,7 @@ class Judgement(Storable):
         """Text on what a judgement lacks to count; "" where it counts."""
         if self.least <= settings.worth:
             return f"it {self.words}; {rough_percent(settings.worth)} have to go"
-        if self.score <= settings.score:
+        if not self.is_repeated(settings):
             return (
                 f"it {self.words}, but not from piece after piece: "
                 f"{self.score:.2g} standard deviations, {settings.score:g} are needed"

@@ -121,7 +121,7 @@ class Look:
         """Whether a look leaves more error at each of several joints than masses on which nothing acts."""
         tracked = self._fitter.tracked
         shares = zip(tracked.records[0].channels, _shares(self._drawn, self.left).tolist(), strict=True)
-        joints = [share for channel, share in shares if channel in tracked.drawn_to]
+        joints = [share for channel, share in shares if channel in tracked.drawn_joints]
         return len(joints) > 1 and min(joints) > 1.0
 
     @property

@@ -87,8 +87,8 @@ class Settings:
     #: exact do not count here, see `EffectType.exact`.
     slight: float = SLIGHT
     second: float = 0.05  #: The same of the amplitude of effects that were added, of whose laws less is known.
-    #: Share of the error power above which an effect counts beside those all the same. Errors of laws do not have the
-    #: shape of another law by chance.
+    #: Share of the error power above which an effect counts beside those all the same, and if few pieces show it.
+    #: Errors of laws do not have the shape of another law by chance.
     clear: float = 0.85
     #: Share of the error power that another effect has to remove, of fitted and of held-back stretches.
     worth: float = 0.06

@@ -88,6 +88,8 @@ class TrackedRecords:
         self.records = tuple(_records(model, self.experiments))
         #: Channels to which the model is drawn.
         self.drawn_to = _drawn(model, self.records[0].channels) if self.records else ()
+        #: Those of them that show a joint, and no pressure.
+        self.drawn_joints = tuple(name for name in self.drawn_to if not _chamber(model, name))
         self._starts: WeakKeyDictionary[Model, list[Array]] = WeakKeyDictionary()
         ends = np.cumsum([len(record.time) for record in self.records])
         cuts = [
@@ -413,14 +415,18 @@ def _records(model: Model, experiments: Sequence[Experiment]) -> Iterator[Record
 
 
 def _drawn(model: Model, channels: Sequence[str]) -> tuple[str, ...]:
-    """Channels that a tracker draws independently: positions, those of driven joints first, or else velocities."""
+    """Channels that a tracker draws independently: positions, those of driven joints first, or else velocities.
+
+    So are pressures of chambers, which add up what flows in: without a reading nobody knows them after a while.
+    """
     positions = [name for name in channels if is_position(model, name)]
+    pressures = [name for name in channels if _chamber(model, name)]
     if not model.loops:
-        return (*positions, *(f"{joint}.velocity" for joint in joints_by_velocity(model, channels)))
+        return (*positions, *(f"{joint}.velocity" for joint in joints_by_velocity(model, channels)), *pressures)
     joints = {name.rpartition(".")[0]: name for name in positions}
     start, driven = model.loops.assembled(), [joint for joint in joints if joint in model.driven_joints]
     ways = [set(joints) & set(model.loops.independent(start, preferred)) for preferred in (driven, list(joints))]
-    return tuple(joints[joint] for joint in joints if joint in max(ways, key=len))
+    return (*(joints[joint] for joint in joints if joint in max(ways, key=len)), *pressures)
 
 
 def _among(columns: Sequence[int], count: int, values: Array) -> Array:
@@ -457,19 +463,30 @@ def tracker_gains(
     gains = np.zeros((samples, len(model.state_names), len(channels)))
     for column, channel in enumerate(channels):
         joint, _, quantity = channel.rpartition(".")
-        if joint not in coordinates or quantity not in {"position", "velocity"}:
+        if chamber := _chamber(model, channel):
+            places = [model.state_names.index(chamber)]
+        elif joint in coordinates and quantity in {"position", "velocity"}:
+            places = [coordinates.index(joint), len(coordinates) + coordinates.index(joint)]
+        else:
             continue
-        place = coordinates.index(joint)
-        slow, quick = (np.array(_gains(channel, band, dt)) for band in bands)
-        places, factor = [place, len(coordinates) + place], _factor(model, channel, theta)
+        own = slice(-len(places), None)  # of a pressure the rate alone is drawn
+        slow, quick = (np.array(_gains(channel, band, dt))[own] for band in bands)
+        factor = _factor(model, channel, theta)
         gains[:, places, column] = slow / factor
-        gains[: len(count), places, column] = np.clip(_gains_of_line(channel, count, dt), slow, quick) / factor
+        gains[: len(count), places, column] = np.clip(_gains_of_line(channel, count, dt)[:, own], slow, quick) / factor
     return gains
+
+
+def _chamber(model: Model, channel: str) -> str:
+    """State of a tracked model that a channel shows, if it is the pressure of a chamber, or ""."""
+    drive, _, quantity = channel.rpartition(".")
+    name = f"{drive}.{quantity.replace('pressure_', 'chamber_')}"
+    return name if name != channel and name in model.state_names else ""
 
 
 def _gains_of_line(channel: str, count: Array, dt: float) -> Array:
     """Gains (N, 2) as `_gains` gives them, for a tracker by a line through so many readings."""
-    if channel.endswith(".velocity"):
+    if not channel.endswith(".position"):
         return np.column_stack([np.zeros_like(count), 1.0 / count])
     rate = 6.0 / (count * (count + 1.0))
     return np.column_stack([rate * (2.0 * count - 1.0) / 3.0, rate / dt])
@@ -487,7 +504,7 @@ def is_position(model: Model, channel: str) -> bool:
 def _gains(channel: str, band: float, dt: float) -> tuple[float, float]:
     """Gains of a tracker from an error of a position, or of a velocity, to the position and its rate."""
     turn = 2.0 * np.pi * band * dt
-    if channel.endswith(".velocity"):
+    if not channel.endswith(".position"):
         return 0.0, float(-np.expm1(-turn))
     return float(-np.expm1(-2.0 * DAMPING * turn)), turn**2 / dt
 
@@ -495,7 +512,7 @@ def _gains(channel: str, band: float, dt: float) -> tuple[float, float]:
 def _free_mass(channel: str, band: float, dt: float) -> tuple[list[float], list[float]]:
     """Error of a tracked free mass: numerator and denominator polynomials of the transfer function."""
     place, rate = _gains(channel, band, dt)
-    if channel.endswith(".velocity"):
+    if not channel.endswith(".position"):
         return [1.0, -1.0], [1.0, rate - 1.0]
     return [1.0, -2.0, 1.0], [1.0, place + dt * rate - 2.0, 1.0 - place]
 
