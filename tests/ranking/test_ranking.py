@@ -326,10 +326,11 @@ def test_what_one_part_of_a_record_leaves_open_all_of_it_decides(monkeypatch: py
     """Three parts are surer than one by the root of three; here as much is asked for as one alone does not have."""
     model, record, effects = Model.from_toml(SLEDGE), pushed(seed=2, dry=0.6, duration=4.0), ["coulomb_friction"]
     (alone,) = vpm.rank(model, record, effects=effects).effects
-    strict = Settings(score=1.25 * alone.judgement.score)
+    strict = Settings(score=1.25 * alone.judgement.score, clear=1.0)
     (all_of_it,) = vpm.rank(model, record, effects=effects, settings=strict).effects
     assert all_of_it.judgement.score == pytest.approx(np.sqrt(PARTS) * alone.judgement.score, rel=0.2)
-    assert vpm.rank(model, record, effects=effects, settings=Settings(score=4.0 * alone.judgement.score)).effects == ()
+    stricter = replace(strict, score=4.0 * alone.judgement.score)
+    assert vpm.rank(model, record, effects=effects, settings=stricter).effects == ()
     monkeypatch.setattr(Judgement, "is_faint", lambda *_: False)
     assert vpm.rank(model, record, effects=effects, settings=strict).effects == ()
 

@@ -201,7 +201,7 @@ def test_the_size_of_an_effect_is_its_amplitude_beside_all_effects() -> None:
     # What removes nearly all that is left is more than a law is wrong by, however small it is beside another one.
     assert replace(told, beside=0.04, least=0.9).counts(Settings())
     assert not replace(told, shape=0.01).counts(Settings())
-    assert not replace(told, score=2.0).counts(Settings())
+    assert not replace(told, score=2.0, least=0.8).counts(Settings())
     assert not replace(told, least=0.01).counts(Settings())
 
 

@@ -51,7 +51,7 @@ def _after_a_step(look: Look, errors: Array, slopes: Array) -> float:
 
 def _at_other_shapes(look: Look, key: Key, fitter: Fitter) -> Iterator[Array]:
     """Change of the errors by deviations of the sizes of an effect (n, k), at shapes an octave up and down."""
-    structure, tracker = look.coarse.structure, look.fitted.tracker.coarse
+    structure, tracker = look.coarse.structure, look.coarse.tracker
     effect = structure.model.effect(*key, structure.side(key))
     own = {name: effect.type.parameter(short) for short, name in effect.parameter_names.items()}
     sizes = [name for name in structure.priors if name in own and not own[name].shape]

@@ -234,7 +234,7 @@ class Look:
                 bare = whole.bare(effects)
                 weaker = replace(bare, theta=whole.theta + part * (bare.theta - whole.theta))
                 same = replace(bare, theta=whole.theta)
-                tracker = self.fitted.tracker.coarse
+                tracker = self.coarse.tracker
                 now, left = (self._fitter.followed(one, tracker, ()).residual for one in (same, weaker))
                 return self._beside(now + (left - now) / part)
         return np.zeros(len(self.view.noise.tails))
@@ -265,7 +265,7 @@ class Look:
         if effects:
             with contextlib.suppress(*ASTRAY):
                 bare = self.coarse.structure.bare(effects)
-                left = self._fitter.followed(bare, self.fitted.tracker.coarse, ()).residual
+                left = self._fitter.followed(bare, self.coarse.tracker, ()).residual
                 return np.minimum(self._beside(left), self._beside(self._fitter.tracked.motion))
         return np.zeros(len(self.view.noise.tails))
 

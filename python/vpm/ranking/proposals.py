@@ -126,7 +126,7 @@ def _hopeful(
     """
 
     def promised(one: _Extended) -> list[tuple[float, _Extended]]:
-        gain, share = look.gain_along(fitter.followed(one.structure, look.fitted.tracker.coarse, ()).residual)
+        gain, share = look.gain_along(fitter.followed(one.structure, look.coarse.tracker, ()).residual)
         found = [(gain, one)]
         effect = one.candidate.effect  # within a gap the load tells no way
         if effect.splits and not effect.has_play and "stiffness" in one.start and 0.0 < share < 1.0:
@@ -134,7 +134,7 @@ def _hopeful(
             with contextlib.suppress(*ASTRAY):
                 other = extensions.extended(look.fitted.structure, one.candidate, start, one.side)
                 stiffer = replace(one, structure=other, start=start)
-                left = fitter.followed(other, look.fitted.tracker.coarse, ()).residual
+                left = fitter.followed(other, look.coarse.tracker, ()).residual
                 found.append((look.gain_along(left)[0], stiffer))
         return found
 
@@ -189,7 +189,7 @@ def _screened(look: Look, one_pass: _Pass, fitter: Fitter, extensions: Extension
         for one in others:
             together = extensions.extended(together, one.candidate, one.start, one.side)
         names = [name for one in asked for name in one.felt(look)]
-        followed = fitter.followed(together, look.fitted.tracker.coarse, names)
+        followed = fitter.followed(together, look.coarse.tracker, names)
         return [Proposal(one.structure, _gain(look, followed, one), one.candidate.neutral) for one in asked]
     if not others:
         return []  # it runs away from the records

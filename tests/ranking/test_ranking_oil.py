@@ -1,0 +1,102 @@
+"""Rankings of machines with oil: chambers add up what flows in, and friction holds their pistons."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import vpm
+from places import EXAMPLES
+from vpm.experiment import Experiment
+from vpm.model import Model
+from vpm.numbers import Array
+from vpm.ranking.fit import Fitter
+from vpm.ranking.judgement import Judgement
+from vpm.ranking.model_structure import Structure
+from vpm.ranking.settings import Settings
+from vpm.ranking.tracked_records import TrackedRecords, Tracker, tracker_gains
+from vpm.weighing import Prior
+
+RATE = 500.0
+PRESSURES = ("servo.pressure_a", "servo.pressure_b")
+SENSORS = {"encoder": "axis.position", "gauge_a": PRESSURES[0], "gauge_b": PRESSURES[1]}
+
+
+def rig(**friction: Any) -> Model:
+    """The rig with Coulomb friction, an encoder, and a gauge in each chamber."""
+    content = Model.load(EXAMPLES / "servo_cylinder" / "rig.toml").to_dict()
+    content["sensors"] = {name: {"measures": channel} for name, channel in SENSORS.items()}
+    content["effects"].append({"type": "coulomb_friction", "at": "axis", "coulomb": 20.0, **friction})
+    return Model.from_dict(content)
+
+
+def currents(seconds: float = 8.0) -> Array:
+    """Currents of moves to and fro with rests between them, A."""
+    time = np.arange(0.0, seconds, 1.0 / RATE)
+    return np.asarray(5e-4 * np.sin(2.0 * np.pi * time) * (np.sin(np.pi * time / 2.0) > 0.0))
+
+
+def logged(machine: Model, sent: Array, seed: int, *, drive: float = 0.0) -> Experiment:
+    """Log of currents that were ``sent``; the drive adds noise that no log holds."""
+    random, time = np.random.default_rng(seed), np.arange(len(sent)) / RATE
+    command = Experiment.from_arrays(
+        time, {"servo.command": sent + drive * random.standard_normal(len(sent))}, model=machine, name="bench"
+    )
+    ran = vpm.simulate(machine, command, mode="free_run")
+    noise = {"axis.position": 1e-6, **dict.fromkeys(PRESSURES, 3e3)}
+    read = {name: ran[name] + size * random.standard_normal(len(time)) for name, size in noise.items()}
+    return Experiment.from_arrays(time, {"servo.command": sent, **read}, model=machine, name="bench")
+
+
+def test_a_pressure_is_drawn_to_its_gauge_as_the_integrator_that_it_is() -> None:
+    """Its error dies away with the bandwidth: x[k+1] = x[k] + (1 - exp(-2 pi f dt)) (y - x)."""
+    model, band = rig(), 2.0
+    gains = tracker_gains(model, ("axis.position", *PRESSURES), (band, band), (400, 1.0 / RATE), model.theta)
+    place = model.state_names.index("servo.chamber_a")
+    assert gains[-1, place, 1] == pytest.approx(-np.expm1(-2.0 * np.pi * band / RATE))
+    assert np.count_nonzero(gains[:, :, 1]) == len(gains)
+    assert np.all(np.diff(gains[:, place, 1]) <= 0.0)
+
+
+def test_noise_of_a_drive_does_not_carry_pressures_away_while_the_piston_stands() -> None:
+    model = rig()
+    tracked = TrackedRecords(model, [logged(model, currents(), 1, drive=2e-5)], Settings())
+    free = TrackedRecords(model, tracked.experiments, Settings())
+    free.drawn_to = free.drawn_joints
+    assert free.drawn_to == ("axis.position",)
+    left = [Fitter(one, Settings()).unfitted(_bare(model), Tracker(1.0)).residual for one in (tracked, free)]
+    drawn, undrawn = (np.sqrt(np.mean(one[500:] ** 2, axis=0)) for one in left)
+    assert np.all(drawn[1:] < 0.4 * undrawn[1:])
+
+
+def _bare(model: Model) -> Structure:
+    return Structure(model, model.theta, {})
+
+
+def test_a_late_drive_is_named_and_not_all_of_its_sensors() -> None:
+    """One late drive explains what three sensors would. Few steps within a sample diverge while its piston stands."""
+    model = rig(coulomb={"value": 24.0, "uncertainty": 6.0})
+    late = rig().with_effect("input_delay", "servo", time=7.3e-3)
+    ranking = vpm.rank(model, logged(late, currents(), 2, drive=5e-6), effects=["input_delay", "sensor_delay"])
+    assert [(one.effect, one.site) for one in ranking.effects] == [("input_delay", "servo")]
+    assert ranking.model.parameters["servo.delay.time"].value == pytest.approx(7.3e-3, rel=0.05)
+
+
+def test_a_law_at_the_end_of_its_range_begins_anew_in_the_middle() -> None:
+    model = rig()
+    turning, dry = "axis.friction.transition_velocity", "axis.friction.coulomb"
+    priors = {turning: Prior(1e-3, 1.0, 1e-5, 1e-1, logarithmic=True), dry: Prior(20.0, 5.0, 0.0, np.inf)}
+    structure = Structure(model, model.theta, priors)
+    stuck = structure.at(np.array([-1e3, -1e3]))
+    assert stuck.values == {turning: pytest.approx(1e-5), dry: 0.0}
+    freed = stuck.off_its_ends
+    assert freed.values == {turning: pytest.approx(1e-3), dry: 0.0}
+    assert freed.off_its_ends is freed
+
+
+def test_what_takes_nearly_all_of_the_error_counts_though_few_pieces_show_it() -> None:
+    """An end of a way that is met twice leaves all other pieces as they are."""
+    met_twice = Judgement(removed=0.999, least=0.99, score=1.4, size=0.9, beside=1.0, shape=1.0)
+    assert met_twice.counts(Settings())
+    assert not replace(met_twice, least=0.5).counts(Settings())
