@@ -158,12 +158,14 @@ class Look:
         All parts of the record are asked where one leaves it open, of fits that have ``ended``.
 
         Nobody knows how exact a model can be in each channel. So the errors of all have scales of their own, of which
-        each is the most likely one, and shares of error power that are left multiply.
+        each is the most likely one, and shares of error power that are left multiply. In one channel at least enough has
+        to go: a little of each of many is what a law takes that has numbers to spare.
         """
         left = self._squares(fitted.residual)
-        shares = [1.0 - float(np.prod(self._ratio([b], [a]))) for b, a in zip(self.left, left, strict=True)]
         ratio = self._ratio(self.left, left)
         removed, place = max(1.0 - float(np.prod(ratio)), 1e-12), int(np.argmin(ratio))
+        apart = [self._ratio([b], [a]) for b, a in zip(self.left, left, strict=True)]
+        shares = [1.0 - max(float(np.prod(one)), float(one[place])) for one in apart]
         there = max(1.0 - float(ratio[place]), 1e-12)
         curve = np.zeros(len(ratio)) if key is None else self._curve(key)
         powers = (self.explained, self.added, curve)
