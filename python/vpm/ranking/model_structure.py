@@ -125,12 +125,12 @@ class Structure:
 
     @property
     def off_its_ends(self) -> Structure:
-        """Structure with shapes that lie at an end of their range back in the middle of their priors.
+        """Structure with values that lie at an end of their range back in the middle of their priors.
 
-        At its end a law answers to nothing: a fit that got there to make up for what was missing does not come back.
+        At its end a law answers to nothing, as friction that turns round at once and oil as soft as air. A fit that got
+        there to make up for what was missing does not come back.
         """
-        shapes = np.array([prior.logarithmic for prior in self.priors.values()], dtype=bool)
-        stuck = shapes & np.any(np.abs(self.standard[:, None] - self.ends) < ROUNDED, axis=1)
+        stuck = np.any(np.abs(self.standard[:, None] - self.ends) < ROUNDED, axis=1)
         return self.at(np.where(stuck, 0.0, self.standard)) if np.any(stuck) else self
 
     def is_far(self, most: float) -> bool:

@@ -28,6 +28,7 @@ from vpm.ranking.settings import (
     DRAWS,
     LONGEST,
     LONGEST_OF_FOURTH_ORDER,
+    OF_PRESSURES,
     PARTS,
     SEED,
     STEPS,
@@ -502,8 +503,8 @@ def is_position(model: Model, channel: str) -> bool:
 
 
 def _gains(channel: str, band: float, dt: float) -> tuple[float, float]:
-    """Gains of a tracker from an error of a position, or of a velocity, to the position and its rate."""
-    turn = 2.0 * np.pi * band * dt
+    """Gains of a tracker from an error of a position, or of a velocity or pressure, to the position and its rate."""
+    turn = 2.0 * np.pi * (band if channel.endswith(("position", "velocity")) else OF_PRESSURES) * dt
     if not channel.endswith(".position"):
         return 0.0, float(-np.expm1(-turn))
     return float(-np.expm1(-2.0 * DAMPING * turn)), turn**2 / dt

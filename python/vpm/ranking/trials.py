@@ -137,7 +137,11 @@ class Trials:
         """Most promising effects of a search round, fitted under one tracker from the structure that was ``begun``."""
         asked = self.names if names is None else names
         chosen = proposals(begun, self.fitter, self.data, self.extensions, self.each, asked, self.bands)
-        return [Trial.of(fitted, look, ended=False) for fitted in raced(chosen, begun, self.fitter, self.each)]
+        fits = raced(chosen, begun, self.fitter, self.each)
+        if fits and begun is not look:  # they begin far away, and take more steps
+            best = min(fits, key=lambda one: one.cost)
+            fits = [self.fitter.finished(best, View(begun.view.noise)), *(one for one in fits if one is not best)]
+        return [Trial.of(fitted, look, ended=False) for fitted in fits]
 
     def finished(self, tried: Sequence[Trial]) -> list[Trial]:
         """Fits of one tracker in a search round that are worth it, finished to the end."""
