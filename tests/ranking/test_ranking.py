@@ -348,6 +348,13 @@ def test_commands_that_were_read_and_not_sent_hide_no_effect() -> None:
     assert vpm.rank(model, pushed(seed=1, duration=2.0), effects=[]).hold == "zero_order"
 
 
+def test_a_fast_tracker_shows_that_commands_were_read_beside_a_slow_force() -> None:
+    """The slow one leaves a hundred times more of the force, and none of the catalogue's effects is like it."""
+    ranking = vpm.rank(Model.from_toml(SLEDGE), [swung(1, tide=3.0), swung(2, tide=3.0)], effects=["torque_ripple"])
+    assert ranking.effects == ()
+    assert ranking.hold == "cubic"
+
+
 #: A rod without a mass to speak of, that a press moves through a damper.
 ROD = on_rail("rod", "1e-3", joint="way", drive="press") + effect_text(
     "viscous_friction", "way", viscous="{ value = 1000.0, uncertainty = 10000.0, min = 0.0 }"

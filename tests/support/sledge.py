@@ -8,6 +8,7 @@ from scipy.signal import lfilter
 from model_texts import effect_text, on_rail
 from vpm.experiment import Experiment
 from vpm.model import Model
+from vpm.numbers import Array
 
 #: A sledge that a motor pushes, with friction of oil; the file is a tenth off.
 SLEDGE = on_rail("sledge", "{ value = 3.3, uncertainty = 0.33 }", joint="way", drive="motor", gain="4.0") + effect_text(
@@ -121,16 +122,23 @@ def _mean_decay(turn: float) -> float:
     return float(-np.expm1(-turn) / turn)
 
 
-def swung(seed: int) -> Experiment:
-    """The sledge from rest under a force that is read and not sent: ``m v' = f sin wt - c v``, summed over three w."""
-    random, time = np.random.default_rng(seed), 5e-3 * np.arange(1200)
-    command, place = np.zeros_like(time), np.zeros_like(time)
+def swung(seed: int, tide: float = 0.0) -> Experiment:
+    """The sledge from rest under a force that is read and not sent: ``m v' = f sin wt - c v``, summed over three w.
+
+    A slow force of the size ``tide`` acts beside it, of which no log tells.
+    """
+    random, time = np.random.default_rng(seed), np.arange(0.0, 6.0, 5e-3)
+    command, place = np.zeros_like(time), tide * _swing(0.5, time)
     for turn in random.uniform((2.0, 6.0, 20.0), (4.0, 12.0, 40.0)):
-        force, slow = 5.0 * GAIN, MASS * turn
-        decay = MASS / OIL * -np.expm1(-OIL / MASS * time)
-        swing = OIL / turn * (1.0 - np.cos(turn * time)) - MASS * np.sin(turn * time) + slow * decay
         command += 5.0 * np.sin(turn * time)
-        place += force / (OIL**2 + slow**2) * swing
+        place += 5.0 * GAIN * _swing(turn, time)
     readings = place + READING * random.standard_normal(len(time))
     channels = {"motor.command": command, "way.position": readings}
     return Experiment.from_arrays(time, channels, model=Model.from_toml(SLEDGE), name=f"swing {seed}")
+
+
+def _swing(turn: float, time: Array) -> Array:
+    """Place of the sledge from rest under a force ``sin wt`` of size one."""
+    slow, decay = MASS * turn, MASS / OIL * -np.expm1(-OIL / MASS * time)
+    swing = OIL / turn * (1.0 - np.cos(turn * time)) - MASS * np.sin(turn * time) + slow * decay
+    return np.asarray(swing / (OIL**2 + slow**2))

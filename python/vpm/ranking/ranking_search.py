@@ -100,16 +100,25 @@ class Search(Trials):
         band = max((one.band for one in ranking.effects), default=self.settings.bands[0])
         return gaps(held_out, (self.start.model, ranking.recalibrated, ranking.model), band)
 
-    def _held(self, looks: list[Look], best: Trial | None) -> list[Look]:
+    def _held(self, looks: Sequence[Look], best: Trial | None) -> list[Look]:
         """Search again with commands that change between samples, where no effect does as well; else none.
+
+        Where an effect counts, they are compared under its tracker. Where none does, a fast tracker shows what a slow
+        one hides behind all else that is missing.
+        """
+        if self.fitter.tracked.setup.hold != AUTOMATIC:
+            return []
+        told = (self._held_under(look, best) for look in (looks if best is None else [best.look]))
+        return next((smooth for smooth in told if smooth), [])
+
+    def _held_under(self, now: Look, best: Trial | None) -> list[Look]:
+        """Search again with commands that change between samples, if that counts under one tracker; else none.
 
         Commands that are held for a sample come half a sample late. A spring takes nearly all of that back, with three
         numbers more. It may leave less because it answers to noise otherwise, so samples have to be more probable by
         it. How a command was recorded is no law of the machine, so that its effect may be slight.
         """
-        if self.fitter.tracked.setup.hold != AUTOMATIC:
-            return []
-        now, settings = looks[0] if best is None else best.look, self.settings
+        settings = self.settings
         ways: list[tuple[Judgement, Fitter, Fitted]] = []
         for course in SMOOTH:
             smooth, view = Fitter(self.fitter.tracked.with_hold(course), settings), View(now.view.noise)
