@@ -69,7 +69,7 @@ FoundHold = Annotated[
     str,
     typer.Option(
         help="What commands of a log do between samples: zero_order (sent by a controller), first_order or cubic (read "
-        "back); auto finds out from the logs of machines that a ranking covers."
+        "back); auto finds out from the logs, but not where drives have states."
     ),
 ]
 Check = Annotated[

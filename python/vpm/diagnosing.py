@@ -51,12 +51,11 @@ from vpm.ranking import Ranking, Settings
 from vpm.ranking.by_tracker import diagnosed_by_tracker
 from vpm.ranking.substitute_records import why_unbalanced
 from vpm.simulate import Setup, judging_mode
+from vpm.simulate.setup import READ_BACK
 from vpm.tasks import done_by
 
 #: Most effects to accept, if not given, of machines with few joints.
 LEAST_LIMIT = 6
-#: Said where the logs tell what commands do between samples.
-FOUND_HOLD = "commands run from sample to sample, as readings of a drive do; simulate with hold {hold} too"
 #: Said where Ctrl-C came after the naming.
 STOPPED_UNMEASURED = "stopped by Ctrl-C before what was named was measured on validation records"
 STOPPED_UNJUDGED = "stopped by Ctrl-C before the noise floor, and what is left above it, was examined"
@@ -309,7 +308,7 @@ def _measured(job: _Job, ranking: Ranking | None) -> Diagnosis | list[Drift]:
     """Diagnosis from a ranking, or by a search where there is none, measured on validation records."""
     model, request, (training, validation, notes) = job.model, job.request, job.records
     if ranking is not None and ranking.hold != job.setup.course:
-        notes.append(FOUND_HOLD.format(hold=ranking.hold))
+        notes.append(READ_BACK.format(hold=ranking.hold))
         job = replace(job, setup=replace(job.setup, hold=ranking.hold))
     if ranking is not None and (reason := why_unbalanced(model, training)):
         return _measured_by_tracker(job, ranking, reason)

@@ -1,10 +1,12 @@
 """A fit knows when it is wrong: false and missed warnings counted, intervals that cover, gains that do not collapse."""
 
+import re
 from dataclasses import replace
 from typing import Any, cast
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 from scipy.linalg import expm
 
 import vpm
@@ -77,6 +79,35 @@ def test_no_more_than_one_in_a_hundred_right_models_is_suspected(kind: str) -> N
 def test_nineteen_of_twenty_missing_effects_are_suspected(lacking: str) -> None:
     for kind in KINDS:
         assert sum(suspects(fit) for fit in fits(LACKING[lacking], kind, 100, seed=40, effort=0.02)) >= 95, kind
+
+
+def stamped(samples: float) -> Experiment:
+    """Record of an axis whose commands are stamped so many samples early."""
+    (log,) = records(Axis(), "white", 1, seed=20, effort=0.005)
+    course = CubicSpline(log.time, log["drive.command"])
+    return log.with_channel("drive.command", course(log.time + samples * float(log.time[1])), "A")
+
+
+def test_commands_that_were_read_back_are_found_by_a_fit() -> None:
+    """A drive's force runs on between readings: held for each sample it is half of that late, which is no effect."""
+    log, machine = stamped(-0.5), Axis()
+    found, held = (
+        identify(machine.model, log, machine.free, setup=Setup(hold=hold)) for hold in ("auto", "zero_order")
+    )
+    assert found.setup is not None
+    assert found.setup.hold in {"first_order", "cubic"}
+    assert "commands run from sample to sample" in found.warnings[0]
+    assert suspects(held)
+    assert not suspects(found)
+
+
+def test_a_part_of_a_sample_is_no_missing_effect() -> None:
+    """When within a sample a drive acts its stamps need not tell; that it acts two samples later is a delay."""
+    (warning,) = identify(Axis().model, stamped(0.25), Axis().free).warnings
+    told = re.search(r"later than stamped; give them a delay of (.*) ms", warning)
+    assert told is not None
+    assert float(told[1]) == pytest.approx(-0.5, rel=0.1)
+    assert suspects(identify(Axis().model, stamped(2.0), Axis().free))
 
 
 def test_ljung_box_is_a_level() -> None:

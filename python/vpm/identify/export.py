@@ -11,6 +11,7 @@ from vpm.files import make_folder, replacing, write_text
 from vpm.identify.fit_result import Fit
 from vpm.identify.intervals import Bootstrap, Profile, bootstrap, profile_intervals
 from vpm.identify.problem import Gaps
+from vpm.simulate import HOLDS
 
 _COLUMNS = ("name", "start", "value", "std", "low", "high", "unit")
 
@@ -25,7 +26,9 @@ def told(fit: Fit) -> list[str]:
     lines += [f"noise of {channel}: {level:.4g}" for channel, level in fit.noise.items()]
     lines += [f"first states: {fit.first_states}"] if fit.first_states else []
     if fit.mode == "inverse_dynamics" and not fit.expected.size:
-        lines.append("no simulation of the model stays by the records: intervals are those of inverse dynamics alone")
+        held = fit.setup is None or fit.setup.course == HOLDS[0]
+        why = "no simulation of the model stays by the records" if held else "simulations beside a log hold commands"
+        lines.append(f"{why}: intervals are those of inverse dynamics alone")
     lines += fit.warnings
     lines += [
         f"residual {channel}: {rms:.4g} {unit}, {_of_the_signal(share)}"

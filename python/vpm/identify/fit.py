@@ -24,6 +24,7 @@ from vpm.identify.engine import Found, fit_problem
 from vpm.identify.estimation import Estimate, Progress, blinded, estimate, limits
 from vpm.identify.fit_result import Fit, fit_of
 from vpm.identify.identifiability import column_lengths
+from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.identify.missing import missing_effects, whiteness
 from vpm.identify.moments import on_the_border
 from vpm.identify.output_error import offset_blocks, taken_by_offsets, with_offsets
@@ -39,13 +40,15 @@ from vpm.identify.refitting import (
     with_first_states,
     with_noise,
 )
+from vpm.identify.response_along_motion import has_own_drives
 from vpm.identify.settings import Checks, Fitting
 from vpm.identify.shooting import ShootingProblem
 from vpm.identify.statistics import freedom, record_groups, sandwich
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.one_thread import in_one_thread
-from vpm.simulate import Setup
+from vpm.simulate import AUTOMATIC, HOLDS, Setup
+from vpm.simulate.setup import READ_BACK
 
 #: Times that an observer gets gains of the values that it led to, and the move (in deviations) after which it need not.
 RENEWALS, SETTLED = 4, 0.1
@@ -85,7 +88,8 @@ def identify(
     cutoff : float, optional
         Cut-off frequency of the motion filter, Hz.
     setup : Setup, optional
-        Integrator, substeps and horizon of the simulated modes.
+        Integrator, substeps and horizon of the simulated modes, and the hold of commands. Where that is ``auto``,
+        inverse dynamics also tries commands that were read back, if an effect seems to be missing.
     ties : mapping of str to str, optional
         Parameters that take the value of another: ``{"gauge_2.gain.value": "gauge_1.gain.value"}`` fits one gain for
         two gauges. The other may be free or not; the fitted model holds the common value in both.
@@ -108,8 +112,43 @@ def identify(
     IdentificationError
         Nothing is free, a name is unknown, a channel that the mode needs is missing, or a tie has no single meaning.
     """
-    records, names, ties, checks = as_records(experiments), _names(model, free), dict(ties or {}), checks or Checks()
+    records, names, checks = as_records(experiments), _names(model, free), checks or Checks()
+    setup = setup or Setup()
     records = followed(model, records, mode, names)
+    fitted = partial(
+        _fitted, model, records, names, mode, cutoff, dict(ties or {}), tolerance, progress, fitting, checks, executor
+    )
+    fit = fitted(setup)
+    # Held for a sample, commands that were read back come half a sample late: no effect is missing then.
+    held = setup.hold == AUTOMATIC and mode == InverseDynamicsProblem.mode and not has_own_drives(model)
+    if not held or fit.interrupted or not {*missing_effects(fit.whiteness, checks)} & {*fit.warnings}:
+        return fit
+    best = min((fit, *(fitted(replace(setup, hold=hold)) for hold in HOLDS[1:])), key=_left)
+    if _left(best) > (1.0 - checks.read_back) * _left(fit):
+        return fit
+    return replace(best, warnings=(READ_BACK.format(hold=(best.setup or setup).hold), *best.warnings))
+
+
+def _left(fit: Fit) -> float:
+    """Mean square that a fit leaves, as a share of each signal, summed over channels."""
+    return sum(share**2 for _, share, _ in fit.after.values())
+
+
+def _fitted(
+    model: Model,
+    records: Sequence[Experiment],
+    names: tuple[str, ...],
+    mode: str,
+    cutoff: float | None,
+    ties: dict[str, str],
+    tolerance: float,
+    progress: Progress | None,
+    fitting: Fitting | None,
+    checks: Checks,
+    executor: Executor | Callable[[], Executor] | None,
+    setup: Setup,
+) -> Fit:
+    """Fit with a given setup."""
     data = comparison(model, records, mode, cutoff=cutoff, setup=setup, ties=ties, fitting=fitting, free=names)
     check_ties(model, ties, names)
     data = _with_own_gains(model, data, names, tolerance)

@@ -5,6 +5,7 @@ from itertools import product
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 
 from vpm.catalogue import effects_for_site
 from vpm.errors import VpmError
@@ -13,6 +14,7 @@ from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.identify.problem import FEWEST_SAMPLES, Block, Problem, untied
 from vpm.identify.settings import Checks
 from vpm.identify.whiteness import (
+    REACH,
     SHARPNESS,
     Whiteness,
     default_lags,
@@ -61,15 +63,25 @@ def whiteness(
         else _of_log(model, record, checks)
         for number, record in enumerate(records)
     }
+    timed = isinstance(plain, InverseDynamicsProblem)
+    steps = {record.name: float(record.time[1] - record.time[0]) * timed for record in records}
     judged = (
-        _judge(model, block, residual[block.samples], jacobian[block.samples], groups[block.experiment], checks)
+        _judge(
+            model,
+            block,
+            residual[block.samples],
+            jacobian[block.samples],
+            groups[block.experiment],
+            steps[block.experiment],
+            checks,
+        )
         for block in data.blocks
     )
     return tuple(one for one in judged if one is not None)
 
 
 def _judge(
-    model: Model, block: Block, residual: Array, slopes: Array, groups: Groups, checks: Checks
+    model: Model, block: Block, residual: Array, slopes: Array, groups: Groups, step: float, checks: Checks
 ) -> Whiteness | None:
     counts = block.moving > 0.0
     n = int(counts.sum())
@@ -80,7 +92,18 @@ def _judge(
         added = groups(_joints(model, block.channel), block)
     except VpmError:  # no motion can be had from this log
         added = []
-    size = block.scale * block.weight
+    share, chance = _explained(added, block, residual, slopes, checks)
+    late = _late(added, block, residual, slopes, step, checks) if step and chance < checks.level else 0.0
+    visible = explained_size(share, residual[counts], block.weight) / block.scale
+    white = ljung_box(residual[counts], lags)
+    return Whiteness(block.experiment, block.channel, lags, white, share, chance, visible, late)
+
+
+def _explained(
+    laws: Sequence[_Law], block: Block, residual: Array, slopes: Array, checks: Checks
+) -> tuple[float, float]:
+    """Share of a residual that the best of some laws explains beside what was fitted, and its probability."""
+    counts, size = block.moving > 0.0, block.scale * block.weight
 
     def explained(law: _Law) -> tuple[float, float]:
         columns = law.columns
@@ -88,11 +111,20 @@ def _judge(
             columns = tuple(heard(each, residual, slopes, counts, checks.clear / size) for each in columns)
         return max((explained_by(residual, slopes, each, counts) for each in columns), key=lambda test: test[1])
 
-    tests = [explained(law) for law in added]
+    tests = [explained(law) for law in laws]
     share, chance = min(tests, key=lambda test: test[1], default=(0.0, 1.0))
-    visible = explained_size(share, residual[counts], block.weight) / block.scale
-    white = ljung_box(residual[counts], lags)
-    return Whiteness(block.experiment, block.channel, lags, white, share, min(1.0, len(tests) * chance), visible)
+    return share, min(1.0, len(tests) * chance)
+
+
+def _late(laws: Sequence[_Law], block: Block, residual: Array, slopes: Array, step: float, checks: Checks) -> float:
+    """Time by which an effort acts later than logged, if less than half a ``step`` explains a residual, else 0."""
+    for effort in (law.columns[-1][:, REACH] for law in laws if law.late):
+        change = block.weight * step * CubicSpline(block.time, effort)(block.time, 1)
+        columns, counts = np.column_stack([slopes, change]), block.moving > 0.0
+        (*_, part), *_ = np.linalg.lstsq(columns[counts], residual[counts], rcond=None)
+        explains = abs(part) < 0.5 and _explained(laws, block, residual, columns, checks)[1] >= checks.level
+        return float(part) * step if explains else 0.0
+    return 0.0
 
 
 def _joints(model: Model, channel: str) -> tuple[str, ...]:
@@ -178,8 +210,15 @@ def missing_effects(judged: Sequence[Whiteness], checks: Checks) -> list[str]:
     level = checks.level / max(1, len(judged))
     return [
         f"the residual of {one.channel} in {one.experiment} repeats with the motion, which explains "
-        f"{100.0 * one.explained:.0f} % of it (Ljung-Box p = {one.white:.1g} over {one.lags} lags): an effect may be "
-        "missing, run `vpm diagnose`"
+        f"{100.0 * one.explained:.0f} % of it (Ljung-Box p = {one.white:.1g} over {one.lags} lags): {_reason(one)}"
         for one in judged
         if one.chance < level and one.visible >= checks.visible
     ]
+
+
+def _reason(one: Whiteness) -> str:
+    if not one.late:
+        return "an effect may be missing, run `vpm diagnose`"
+    way = "later" if one.late > 0.0 else "earlier"
+    lag = f"{-1e3 * one.late:.2g} ms"
+    return f"commands act less than half a sample {way} than stamped; give them a delay of {lag} in the channel table"

@@ -128,10 +128,11 @@ class Checks(Storable):
     waves_each: int = 4  #: How many of them are asked at a time.
     #: Probability that first states are taken as unknown although those that the log suggests are right.
     begun: float = 0.05
+    read_back: float = 0.1  #: Share of the mean square that a fit has to leave less if commands were read back.
 
     def __post_init__(self) -> None:
         """Check the settings' numbers."""
-        names = ("level", "visible", "far", "clear", "waves", "waves_each", "begun")
+        names = ("level", "visible", "far", "clear", "waves", "waves_each", "begun", "read_back")
         _positive({name: getattr(self, name) for name in names})
 
 

@@ -51,6 +51,9 @@ class Whiteness(Storable):
         Probability that noise that knows nothing of the motion is explained as well as that.
     visible : float
         Root mean square of what the motion explains, as a share of the measured signal.
+    late : float
+        By how much later than logged an effort acts, s, where that is less than half a sample and explains as much; 0
+        elsewhere.
     """
 
     experiment: str
@@ -60,6 +63,7 @@ class Whiteness(Storable):
     explained: float
     chance: float
     visible: float
+    late: float = 0.0
 
 
 def ljung_box(residual: Array, lags: int) -> float:

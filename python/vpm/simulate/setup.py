@@ -14,6 +14,8 @@ AUTOMATIC = "auto"
 INTEGRATORS = (AUTOMATIC, *FIXED_STEP, "guarded", "adaptive")
 #: What commands of a log do between its samples.
 HOLDS = ("zero_order", "first_order", "cubic")
+#: Said where logs show that commands were read back.
+READ_BACK = "commands run from sample to sample, as readings of a drive do; simulate with hold {hold} too"
 
 #: Most integration steps per sample, as the core has it.
 MOST_SUBSTEPS = 1_000_000
@@ -57,7 +59,7 @@ class Setup(Storable):
         goes straight to the next sample, ``cubic`` smoothly: for signals that are continuous and were sampled, such as
         an analog reference or a command of a far faster controller. What controllers of the model command is always
         held.
-        ``auto`` is ``zero_order``, but where a ranking finds out from the logs, see `vpm.rank`.
+        ``auto`` is ``zero_order``, but where `vpm.rank` or `vpm.identify` finds out from the logs.
     """
 
     integrator: str = AUTOMATIC
