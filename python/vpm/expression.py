@@ -272,4 +272,7 @@ def _same(quantities: Sequence[Quantity], words: str) -> None:
     for other in quantities[1:]:
         if other.dimension != first:
             kinds = " and ".join(Unit("", 1.0, each, ()).kind for each in (first, other.dimension))
-            raise VpmError(f'takes {kinds} together in "{words}"; state the units of its columns')
+            raise VpmError(
+                f'takes {kinds} together in "{words}"; state the units of its columns (numbers have none: for 5 mm a '
+                'count say "5*count" and that the unit of count is mm)'
+            )
