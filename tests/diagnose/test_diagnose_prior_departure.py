@@ -85,3 +85,20 @@ actuators.drive = { joint = "axis", gain = 1.0, command_unit = "N m" }
     (note,) = [note for note in why.notes if "stopped at" in note]
     assert "arm.inertia.yy" in note
     assert "the moment xx, 0.5 kg m^2" in note
+
+
+def test_a_file_that_is_wrong_beside_a_missing_effect_is_told() -> None:
+    """A load of twice the stated mass, ten stated uncertainties away, under a constant force."""
+    model, time = vpm.Model.from_toml(AXIS), np.arange(1500) / 300.0
+    speeds = np.array([3.1, 5.3, 7.9])
+
+    def record(seed: int) -> vpm.Experiment:
+        random = np.random.default_rng(seed)
+        phases = speeds * time[:, None] + random.uniform(0.0, 6.0, 3)
+        force = 3.0 - 2.0 * np.sum(np.sin(phases) * speeds**2, axis=1)
+        place = np.sum(np.sin(phases), axis=1) + random.normal(0.0, 1e-5, len(time))
+        return vpm.Experiment.from_arrays(time, {"axis.position": place, "drive.command": force}, model=model)
+
+    why = vpm.diagnose(model, [record(1)], [record(2)], names="search", effects=["bias_force"], check=False, workers=1)
+    assert [effect.name for effect in why.effects] == ["bias_force"]
+    assert f"But {MASS} is 10.0 times its stated uncertainty away from the model file" in why.summary

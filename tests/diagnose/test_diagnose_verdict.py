@@ -43,9 +43,8 @@ def test_without_efforts_an_effect_that_leaves_the_error_explains_nothing(after:
     found: Any = SimpleNamespace(
         accepted=(effect,), left={"shaft": after**2}, within_laws=False, interrupted=False, final=final, ranked=None
     )
-    judged: Any = SimpleNamespace(model=model)
     gap = {"shaft.velocity": ChannelGap(1.0, 1.0, after, NOISE, "rad/s", SIGNAL, "observed")}
-    assert verdict(None, judged, judged, found, gap, None, None)[0] == word
+    assert verdict(None, final, final, found, gap, None, None)[0] == word
 
 
 @pytest.mark.parametrize(("after", "word"), [(2.1e-4, "effect_found"), (1.403e-3, "unexplained")])
@@ -64,14 +63,13 @@ def test_an_effect_that_leaves_the_deflection_behind_its_joint_explains_nothing(
     found: Any = SimpleNamespace(
         accepted=(effect,), left=shares, within_laws=False, interrupted=False, final=final, ranked=None
     )
-    judged: Any = SimpleNamespace(model=model)
     data: Any = SimpleNamespace(training=SimpleNamespace(joints=("knee",)))
     gap = {
         "knee.effort": ChannelGap(0.772, 0.4033, 0.2701, 0.09834, "N m", 7.27, "inverse_dynamics"),
         "knee_deflection.position (observed)": ChannelGap(2e-3, 1.449e-3, after, 1.969e-4, "rad", 9.24e-3, "observed"),
     }
     left: Any = SimpleNamespace(present=True)
-    assert verdict(data, judged, judged, found, gap, left, None)[0] == word
+    assert verdict(data, final, final, found, gap, left, None)[0] == word
 
 
 @pytest.mark.parametrize(
@@ -98,14 +96,13 @@ def test_a_play_that_does_most_of_the_work_is_the_explanation(effect: str, left:
     found: Any = SimpleNamespace(
         accepted=(entry,), left={"shoulder": left}, within_laws=False, interrupted=False, final=final, ranked=None
     )
-    judged: Any = SimpleNamespace(model=model)
     data: Any = SimpleNamespace(training=SimpleNamespace(joints=("shoulder",)))
     gap = {
         "shoulder.effort": ChannelGap(0.0364, 0.0351, 0.0365, 0.0132, "N m", 1.0, "inverse_dynamics"),
         "shoulder.position (observed)": ChannelGap(7.4e-5, 6.6e-5, 6.6e-5 * left**0.5, 9e-6, "rad", 0.68, "observed"),
     }
     rest: Any = SimpleNamespace(present=True)
-    assert verdict(data, judged, judged, found, gap, rest, None)[0] == word
+    assert verdict(data, final, final, found, gap, rest, None)[0] == word
 
 
 def test_an_error_that_grew_is_not_told_as_a_gap_that_closed() -> None:

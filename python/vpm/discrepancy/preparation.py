@@ -233,7 +233,8 @@ def ruled_out(model: Model, recalibrated: Judged) -> dict[str, float]:
     """Stated uncertainties by which a recalibration clearly moved parameters far from their prior."""
     found = {}
     for name, std in zip(recalibrated.free, recalibrated.fit.std, strict=True):
-        before = model.parameters[name]
+        if (before := model.parameters.get(name)) is None:
+            continue
         away, spread = abs(recalibrated.model.parameters[name].value - before.value), stated(before)
         if away - NORMAL_95 * float(std) > FAR * spread:
             found[name] = away / spread

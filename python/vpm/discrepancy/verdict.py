@@ -78,7 +78,9 @@ def verdict(
     errors = _Errors.of(data, found, gap, left, rest)
     if found.accepted:
         away = driven_away(nominal.model, recalibrated, found.final, found.ranked)
-        return _of_named(found, data, gap, errors, left, rest, {} if found.interrupted else away)
+        word, summary, more = _of_named(found, data, gap, errors, left, rest, {} if found.interrupted else away)
+        doubt = _doubt(nominal.model, recalibrated, found.final) if word == "effect_found" else ""
+        return word, summary + doubt, more
     if not errors.remaining:
         return (*_nothing_missing(data, nominal, recalibrated, (errors.main, errors.beside), errors.worst), False)
     clear = f"The residual is structured and {errors.above:.2g} times the noise floor, and"
@@ -248,9 +250,10 @@ def _nothing_missing(
     return "no_disagreement", f"The nominal model agrees with the data. Error on validation data: {numbers}."
 
 
-def _doubt(nominal: Model, recalibrated: Judged) -> str:
-    """Sentence of the verdict on the parameter that closes the gap farthest from the model file, or ""."""
-    away = ruled_out(nominal, recalibrated)
+def _doubt(nominal: Model, recalibrated: Judged, *final: Judged) -> str:
+    """Sentence of the verdict on the parameter farthest from the model file, with effects and without, or ""."""
+    before, *after = (ruled_out(nominal, one) for one in (recalibrated, *final))
+    away = {name: times for name, times in before.items() if all(name in one for one in after)}
     if not away:
         return ""
     name = max(away, key=lambda one: away[one])
