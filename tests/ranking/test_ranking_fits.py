@@ -494,6 +494,22 @@ def test_fits_under_the_next_tracker_begin_where_the_first_one_ended(monkeypatch
     assert then == pytest.approx(MASS, rel=0.02)
 
 
+def test_values_are_those_that_predict_best_under_all_trackers(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fit under the slow tracker that ended at a mass far off, as one does where a joint sticks and slips."""
+    model, fitted = Model.from_toml(SLEDGE), Search.fitted
+
+    def astray(search: Search, structure: Structure, tracker: Tracker) -> Any:
+        if tracker.band == Settings().bands[0]:
+            off = model.with_parameters({"sledge.mass": 1.3 * MASS}).theta
+            return search.fitter.unfitted(replace(structure, theta=off), tracker)
+        return fitted(search, structure, tracker)
+
+    monkeypatch.setattr(Search, "fitted", astray)
+    ranking = vpm.rank(model, pushed(seed=1, duration=2.0), effects=[])
+    assert ranking.model.parameters["sledge.mass"].value == pytest.approx(MASS, rel=0.02)
+    assert ranking.recalibrated.parameters["sledge.mass"].value == pytest.approx(1.3 * MASS)
+
+
 @pytest.mark.parametrize(("share", "begins"), [(0.5, [MASS, 3.3]), (2.0, [MASS])])
 def test_fits_begin_at_the_file_where_nothing_counts_from_afar(
     monkeypatch: pytest.MonkeyPatch, share: float, begins: list[float]

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+
+import numpy as np
 
 from vpm.discrepancy.screening.candidates import Key
 from vpm.numbers import rough_percent
@@ -14,6 +16,7 @@ from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
 from vpm.ranking.free_shape import against_free_shapes
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
+from vpm.ranking.model_structure import Structure
 from vpm.ranking.noise_model import fitted_noise
 from vpm.ranking.result import Gap, Ranked, Ranking
 from vpm.ranking.several_at_once import brought_back, several_at_once
@@ -76,21 +79,37 @@ class Search(Trials):
                     looks = self._out_of_a_dead_end(best, looks)
         except KeyboardInterrupt:
             interrupted = True
-        found = looks[0].fitted.structure
-        recalibrated = next(iter(self.first.values())).fitted.structure.repaired
-        hold = self.fitter.tracked.setup.course
-        effects = tuple(replace(named[key], side=found.side(key)) for key in found.effects)
-        ranking = Ranking(
-            effects, tuple(rounds), found.repaired, recalibrated, {}, interrupted, hold, self._notes(looks)
-        )
+        ranking = self._ranking(looks, named, rounds, interrupted=interrupted)
         try:
-            return replace(ranking, gaps=self._gaps(held_out.with_hold(hold), ranking))
+            return replace(ranking, gaps=self._gaps(held_out.with_hold(ranking.hold), ranking))
         except KeyboardInterrupt:
             return replace(ranking, interrupted=True)
 
-    def _notes(self, looks: list[Look]) -> tuple[str, ...]:
+    def _ranking(
+        self, looks: Sequence[Look], named: Mapping[Key, Ranked], rounds: list[tuple[Ranked, ...]], *, interrupted: bool
+    ) -> Ranking:
+        """Ranking of a search, with the values under the tracker by which all of them predict the records best."""
+        best = max(looks, key=lambda look: self._foresight(look.fitted.structure, looks))
+        found = best.fitted.structure
+        recalibrated = next(iter(self.first.values())).fitted.structure.repaired
+        hold = self.fitter.tracked.setup.course
+        effects = tuple(replace(named[key], side=found.side(key)) for key in found.effects)
+        return Ranking(effects, tuple(rounds), found.repaired, recalibrated, {}, interrupted, hold, self._notes(best))
+
+    def _foresight(self, structure: Structure, looks: Sequence[Look]) -> float:
+        """Log-density of the fitted samples as a searched structure predicts them under all trackers together.
+
+        Values that fit under one of them may be nonsense under another, as where a slow one lets a joint stick and
+        slip at times of its own.
+        """
+        with contextlib.suppress(*ASTRAY):
+            told = (self.fitter.unfitted(structure, look.fitted.tracker) for look in looks)
+            return sum(self.predictive_density(fitted) for fitted in told)
+        return -np.inf
+
+    def _notes(self, look: Look) -> tuple[str, ...]:
         """Notes of the search on records that what it found does not explain."""
-        return tuple(disturbed(self.fitter.tracked, looks[0].fitted, self.settings))
+        return tuple(disturbed(self.fitter.tracked, look.fitted, self.settings))
 
     def _gaps(self, held_out: TrackedRecords, ranking: Ranking) -> dict[str, Gap]:
         """Errors of what the search found on validation records, under the fastest tracker that an effect came in by.

@@ -108,10 +108,10 @@ class Trials:
         """
         if look.fitted.tracker.band <= slower.fitted.tracker.band:
             return False
-        told = (self._predictive_density(one.fitted) for one in (look, slower))
+        told = (self.predictive_density(one.fitted) for one in (look, slower))
         return next(told) + self.settings.odds < next(told)
 
-    def _predictive_density(self, fitted: Fitted) -> float:
+    def predictive_density(self, fitted: Fitted) -> float:
         """Log-density of the fitted samples as a tracker predicts them, whitened by their own spectrum."""
         noise = fitted_noise(fitted.residual, self.fitter.tracked.parts, self.settings.order)
         return float(np.sum(self.fitter.log_density(fitted, noise)))
