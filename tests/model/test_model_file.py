@@ -512,6 +512,8 @@ REFUSALS = [
     ('measures = "axis.position"', 'measures = "axis.positon"', "sensors.encoder.measures", '"axis.position"'),
     ('actuator = "drive"', 'actuator = "drve"', "controllers.servo.actuator", 'did you mean "drive"?'),
     ('"axis.position" =', '"axis.positio" =', 'channels."axis.positio"', 'did you mean "axis.position"?'),
+    ('"axis.position" =', '"axis.gauge" =', 'channels."axis.gauge"', "axis has axis.acceleration, axis.effort"),
+    ('"axis.position" =', '"carriage.position" =', 'channels."carriage.position"', "carriage has none; a joint has"),
     ("[controllers.servo]", "[controllers.axis]", "controllers.axis", "same name as joints.axis"),
     ("[bodies.carriage]", "[bodies.world]", "bodies.world", "reserved"),
     ("[bodies.carriage]", '[bodies."a b"]', 'bodies."a b"', "after a letter"),

@@ -6,7 +6,7 @@ The value of a channel is ``scale column + offset``, in ``unit``; the samples ar
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Annotated, Self
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, model_validator
@@ -105,10 +105,19 @@ def channel_problems(document: Document, structure: Structure) -> Iterator[Probl
     known = ("time", *structure.channels)
     for name, entry in (document.channels or {}).items():
         if name not in known and name not in structure.deflections:
-            repair = near_match(name, known, what="its channels are")
-            yield Problem(place("channels", name), f"is no channel of the model; {repair}")
+            yield Problem(place("channels", name), f"is no channel of the model; {_repair(name, known, document)}")
             continue
         try:
             require_dimension(entry.unit, "s" if name == "time" else structure.unit(name))
         except UnitError as error:
             yield Problem(place("channels", name, "unit"), f"is wrong: {error}")
+
+
+def _repair(name: str, known: Sequence[str], document: Document) -> str:
+    """Repair of a name that is no channel: one of the same component, or what that may have in its place."""
+    owner = name.rpartition(".")[0]
+    if own := [channel for channel in known if channel.rpartition(".")[0] == owner]:
+        return near_match(name, own, what=f"{owner} has")
+    if owner in document.bodies or owner in document.beams:
+        return f"{owner} has none; a joint has its motion, a marker on {owner} its place, a gauge on a beam its strain"
+    return near_match(name, known, what="its channels are")
