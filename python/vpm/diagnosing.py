@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
@@ -34,28 +35,35 @@ from vpm.discrepancy.rivals.discriminating_experiment import experiments as expe
 from vpm.discrepancy.screening.candidates import asked_for
 from vpm.discrepancy.search.search import Search
 from vpm.discrepancy.search.search_round import Request, Tell
-from vpm.discrepancy.settings import FLOOR_FACTOR
+from vpm.discrepancy.settings import FLOOR_FACTOR, WORTH_A_NAME
 from vpm.discrepancy.verdict import is_negligible, only_where_closed, verdict
-from vpm.errors import DiagnosisError
+from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment, as_records
 from vpm.experiment.signal import check_cutoff
 from vpm.identify.fit_result import fit_of
 from vpm.identify.parallel import worker_count
+from vpm.identify.response_along_motion import has_own_drives
 from vpm.log_check import refuse_mistakes
 from vpm.log_check.checking import UNCHECKED
 from vpm.model import Model
 from vpm.naming import BROKEN, FAILED, RANKING, STOPPED, Names, named, ranked_notes, ranking_of, until_stopped
+from vpm.numbers import power
 from vpm.observer import measured_outputs
 from vpm.one_thread import in_one_thread
 from vpm.ranking import Ranking, Settings
 from vpm.ranking.by_tracker import diagnosed_by_tracker
 from vpm.ranking.substitute_records import why_unbalanced
-from vpm.simulate import Setup, judging_mode
+from vpm.simulate import AUTOMATIC, HOLDS, Setup, judging_mode
 from vpm.simulate.setup import READ_BACK
 from vpm.tasks import done_by
 
 #: Most effects to accept, if not given, of machines with few joints.
 LEAST_LIMIT = 6
+#: Said where commands seem to be read back, and effects were sought for held ones.
+IF_READ_BACK = (
+    "the recalibrated model is nearer to the data if commands run from sample to sample: say hold {hold} where the log "
+    "holds readings of a drive, and not what a controller sent"
+)
 #: Said where Ctrl-C came after the naming.
 STOPPED_UNMEASURED = "stopped by Ctrl-C before what was named was measured on validation records"
 STOPPED_UNJUDGED = "stopped by Ctrl-C before the noise floor, and what is left above it, was examined"
@@ -318,6 +326,8 @@ def _measured(job: _Job, ranking: Ranking | None) -> Diagnosis | list[Drift]:
     request.tell("recalibrating the nominal parameters")
     start = None if ranking is None else ranking.recalibrated
     recalibrated = recalibrated_of(model, data, notes, request.each, start)
+    if ranking is None:
+        notes.extend(_if_read_back(job, recalibrated))
     try:
         found, ambiguous, late = named(ranking, recalibrated, data, request, notes)
     except NoResidualError as error:
@@ -335,6 +345,20 @@ def _measured(job: _Job, ranking: Ranking | None) -> Diagnosis | list[Drift]:
         notes.append(STOPPED_UNJUDGED)
         gap = gaps_of(data, nominal, recalibrated, found.final, {})
         return replace(bare(), verdict="effect_found" if found.accepted else "interrupted", gap=gap, interrupted=True)
+
+
+def _if_read_back(job: _Job, recalibrated: Judged) -> list[str]:
+    """Note of a diagnosis by a search that commands seem to be read back, which a ranking finds out itself."""
+    if job.setup.hold != AUTOMATIC or has_own_drives(job.model):
+        return []
+    (training, validation, _), setup = job.records, replace(job.setup, hold=HOLDS[1])
+    with suppress(VpmError, ArithmeticError):
+        data = data_of(job.model, training, validation, job.mode, job.cutoff, setup, [])
+        read = recalibrated_of(job.model, data, [], job.request.each)
+        pairs = (recalibrated.fit.residual, read.fit.residual), (recalibrated.validation, read.validation)
+        if all(power(after) < (1.0 - WORTH_A_NAME) * power(before) for before, after in pairs):
+            return [IF_READ_BACK.format(hold=HOLDS[1])]
+    return []
 
 
 def _measured_by_tracker(job: _Job, ranking: Ranking, reason: str) -> Diagnosis:

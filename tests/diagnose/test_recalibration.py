@@ -1,9 +1,14 @@
 """Recalibration of a pendulum that carries more than its file says, and of a spring; torques are of closed forms."""
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
 import vpm
+from sledge import SLEDGE, pushed
+from sledge import swung as read_back
+from vpm.experiment import Experiment
 from vpm.simulate import Setup
 
 GRAVITY, RATE, SECONDS = 9.81, 100.0, 5.0
@@ -159,3 +164,11 @@ def test_a_fit_of_efforts_that_cannot_see_a_spring_says_which_mode_does() -> Non
     other = vpm.identify(model, record, mode="restarts", setup=SMOOTH)
     assert other["coil.spring.stiffness"] == pytest.approx(STIFFNESS, rel=0.01)
     assert not any("was compared" in sentence for sentence in other.warnings)
+
+
+@pytest.mark.parametrize(("record", "told"), [(read_back, True), (pushed, False)])
+def test_a_search_says_where_commands_seem_to_be_read_back(record: Callable[..., Experiment], told: bool) -> None:
+    """A force that runs on between samples, and one that is held for each of them."""
+    model, logs = vpm.Model.from_toml(SLEDGE), [record(seed=seed) for seed in (1, 2)]
+    why = vpm.diagnose(model, logs[0], logs[1], names="search", effects=["bias_force"], check=False, workers=1)
+    assert any("say hold first_order" in note for note in why.notes) == told
