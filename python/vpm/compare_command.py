@@ -9,7 +9,6 @@ from vpm.command import (
     Channels,
     Cutoff,
     Interpolate,
-    Mode,
     ModelPath,
     OneLog,
     Plot,
@@ -26,7 +25,14 @@ EXAMPLES = "Example:  vpm compare examples/emps/model.toml log.csv --mode invers
 def compare(
     model: ModelPath,
     log: OneLog,
-    mode: Mode = "inverse_dynamics",
+    mode: Annotated[
+        str | None,
+        typer.Option(
+            help="free_run, inverse_dynamics, restarts, closed_loop or prescribed_motion; by default inverse_dynamics, "
+            "or restarts where drives have states of their own.",
+            metavar="MODE",
+        ),
+    ] = None,
     channels: Channels = None,
     interpolate: Interpolate = False,
     cutoff: Cutoff = None,
@@ -41,10 +47,11 @@ def compare(
     """Say where a model and a log part: error, fit, correlation, and where the residual lives."""
     from vpm.compare import compare as compare_run
     from vpm.compare import write_mcap
+    from vpm.simulate import comparing_mode
     from vpm.simulate import simulate as simulate_log
 
     machine, record = load_pair(model, log, channels, interpolate)
-    comparison = compare_run(simulate_log(machine, record, mode, cutoff=cutoff), record)
+    comparison = compare_run(simulate_log(machine, record, mode or comparing_mode(machine), cutoff=cutoff), record)
     give(comparison=comparison)
     console.print(str(comparison), markup=False)
     for channel in comparison.channels:

@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from command_line import ran, vpm
@@ -15,8 +16,11 @@ from places import EXAMPLES
 from sledge import SLEDGE, pushed
 from vpm import __version__
 from vpm.demo import MODEL, TRAIN, VALIDATION
+from vpm.experiment import Experiment
 from vpm.model import Model
+from vpm.simulate import simulate
 
+RIG = EXAMPLES / "servo_cylinder" / "rig.toml"
 STEP = EXAMPLES / "emps" / "step.toml"
 COMMANDS = (
     *("info", "simulate", "compare", "identify", "diagnose", "rank", "report"),
@@ -101,6 +105,19 @@ def test_a_run_of_a_scenario_that_fails_is_named_and_the_others_are_shown(tmp_pa
 def test_compare_says_where_the_residual_lives() -> None:
     done = ran("compare", MODEL, VALIDATION)
     assert "of the residual's energy" in done.stdout
+
+
+def test_compare_takes_a_machine_whose_efforts_do_not_follow_from_commands(tmp_path: Path) -> None:
+    """Oil has states of its own: such a machine is compared by short predictions unless a mode is asked for."""
+    rig = Model.load(RIG)
+    time = 1e-3 * np.arange(600)
+    log = Experiment.from_arrays(time, {"servo.command": 2e-3 * np.sin(20.0 * time)}, model=rig)
+    run = simulate(rig, log)
+    for channel in ("axis.position", "servo.pressure_a"):
+        log = log.with_channel(channel, run[channel], rig.channel_unit(channel))
+    log.save(tmp_path / "log.npz")
+    done = ran("compare", RIG, tmp_path / "log.npz")
+    assert "servo.pressure_a" in done.stdout
 
 
 def test_identify_prints_values_and_writes_the_model(tmp_path: Path) -> None:

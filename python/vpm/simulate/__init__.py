@@ -1,7 +1,15 @@
 """Simulation of a log: `modes.py` says which question each mode answers."""
 
 from vpm.simulate.inputs import restart_grid, simulation_inputs
-from vpm.simulate.modes import MODES, check_balance, judging_mode, simulate, simulate_arrays, simulated_rows
+from vpm.simulate.modes import (
+    MODES,
+    check_balance,
+    comparing_mode,
+    judging_mode,
+    simulate,
+    simulate_arrays,
+    simulated_rows,
+)
 from vpm.simulate.resolution import Resolution
 from vpm.simulate.run import Run, SimulatedArrays, copied_channels, judged
 from vpm.simulate.setup import AUTOMATIC, FIXED_STEP, HOLDS, INTEGRATORS, Setup
@@ -17,6 +25,7 @@ __all__ = [
     "Setup",
     "SimulatedArrays",
     "check_balance",
+    "comparing_mode",
     "copied_channels",
     "judged",
     "judging_mode",

@@ -145,6 +145,12 @@ def judging_mode(model: Model, records: Sequence[Experiment]) -> str:
     return "closed_loop" if held and known else "restarts"
 
 
+def comparing_mode(model: Model) -> str:
+    """Mode in which a model is compared with a log: inverse dynamics, or restarts where drives have states."""
+    follow = all(model.follows_command(name) for name in model.actuators)
+    return "inverse_dynamics" if follow else "restarts"
+
+
 def simulated_rows(
     experiment: Experiment, mode: str, setup: Setup, followed: Motion | None = None
 ) -> NDArray[np.int64]:
