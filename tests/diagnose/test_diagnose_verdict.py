@@ -8,7 +8,7 @@ import pytest
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.diagnosis import ChannelGap
-from vpm.discrepancy.verdict import _nothing_missing, verdict
+from vpm.discrepancy.verdict import _nothing_missing, _unheard, verdict
 
 SIGNAL, NOISE = 1.0, 1e-3
 
@@ -17,7 +17,7 @@ def told(elbow: float) -> str:
     """Verdict on a structured residual with a strain of 2 ‰ at twice its noise, and so much at the elbow."""
     noise = np.random.default_rng(1).normal(0.0, 1.0, 400)
     data: Any = SimpleNamespace(validation=SimpleNamespace(blocks=(SimpleNamespace(samples=slice(0, 400)),)))
-    nominal: Any = SimpleNamespace(validation=3.0 * noise, model=None)
+    nominal: Any = SimpleNamespace(validation=3.0 * noise, model=SimpleNamespace(deflections=()))
     recalibrated: Any = SimpleNamespace(validation=noise, free=(), fit=SimpleNamespace(std=()))
     found: Any = SimpleNamespace(accepted=(), left={}, within_laws=False, interrupted=False)
     left: Any = SimpleNamespace(present=True)
@@ -31,6 +31,17 @@ def told(elbow: float) -> str:
 @pytest.mark.parametrize(("elbow", "word"), [(8e-3, "parameters_only"), (1.4e-2, "unexplained")])
 def test_a_trifle_above_its_noise_says_nothing_of_another_channel(elbow: float, word: str) -> None:
     assert told(elbow) == word
+
+
+@pytest.mark.parametrize(("floor", "said"), [(0.6, True), (0.1, False)])
+def test_what_noise_hides_is_no_evidence_that_nothing_is_missing(floor: float, said: bool) -> None:
+    """Oil integrates the noise of a coarse encoder: a pressure of which 57 % is left may say nothing of the machine."""
+    model: Any = SimpleNamespace(deflections=("arm_bending.position",))
+    gap = {
+        "servo.pressure_a": ChannelGap(0.6, 0.57, 0.57, floor, "Pa", SIGNAL, "inverse_dynamics"),
+        "arm_bending.position": ChannelGap(1.0, 1.0, 1.0, 1.0, "rad", SIGNAL, "inverse_dynamics"),
+    }
+    assert ("Nothing is said of servo.pressure_a: noise" in _unheard(gap, model)) is said
 
 
 @pytest.mark.parametrize(("after", "word"), [(0.1, "effect_found"), (0.9, "unexplained")])
