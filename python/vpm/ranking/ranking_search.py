@@ -198,6 +198,7 @@ class Search(Trials):
             if any(not trial.look.has_room(trial.fitted) for trial in counting):
                 break  # nothing could be missing beside it
         told: list[Trial] = []
+        counting += self._counting_elsewhere(counting)
         while counting:
             best, *others = weighed(counting, self.fitter)
             if best.evidence > self.settings.odds:
@@ -207,6 +208,19 @@ class Search(Trials):
             told.append(best)
             counting = [trial for trial in counting if trial.fitted is not best.fitted]
         return None, told + tried
+
+    def _counting_elsewhere(self, counting: Sequence[Trial]) -> list[Trial]:
+        """Effects of the search that count under another tracker alone, fitted under the one by which all are weighed.
+
+        Evidence compares effects under one tracker. A race there may have given one up that is the better name.
+        """
+        if not counting:
+            return []
+        first = min(counting, key=lambda trial: trial.left)
+        there = {trial.key for trial in counting if trial.look is first.look}
+        missing = {trial.key: trial.fitted.structure for trial in counting if trial.key not in there}
+        ends = self.in_its_place(first.look, list(missing.values()))
+        return [trial for trial in (against_free_shapes(end, self.fitter) for end in ends) if trial.counts]
 
     def _out_of_a_dead_end(self, last: Trial, looks: list[Look]) -> list[Look]:
         """Search without its last effect, if that only led the fit of others out of a dead end."""
