@@ -158,8 +158,8 @@ class Look:
         All parts of the record are asked where one leaves it open, of fits that have ``ended``.
 
         Nobody knows how exact a model can be in each channel. So the errors of all have scales of their own, of which
-        each is the most likely one, and shares of error power that are left multiply. In one channel at least enough has
-        to go: a little of each of many is what a law takes that has numbers to spare.
+        each is the most likely one, and shares of error power that are left multiply. In one channel at least enough
+        has to go: a little of each of many is what a law takes that has numbers to spare.
         """
         left = self._squares(fitted.residual)
         ratio = self._ratio(self.left, left)
