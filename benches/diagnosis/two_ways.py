@@ -1,4 +1,4 @@
-"""Names by a ranking beside names by the search, on blind cases of machines that go by the search: who is right, when.
+"""Names by a ranking beside names by the search, on blind cases of machines with oil and with links that bend.
 
     python benches/diagnosis/two_ways.py --machine flexible_arm --seeds 9700-9702 --out two_ways.json
 
