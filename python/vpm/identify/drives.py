@@ -7,7 +7,6 @@ from functools import partial
 import numpy as np
 
 from vpm.experiment import Experiment, Motion
-from vpm.experiment.signal import settling_samples
 from vpm.initial import measured_states
 from vpm.model import Model
 from vpm.numbers import Array
@@ -91,29 +90,14 @@ def driven(
     integrator: str = AUTOMATIC,
     every: int = 1,
 ) -> tuple[Array, Array]:
-    """Outputs and efforts of the drives on their joints, and their derivative, at ``every`` so many samples.
-
-    Where states are measured the run begins anew from their readings behind the first edge of the motion filter. What
-    nobody knows lies before that: where spools were, and how the motion began. Chambers would keep its error for long.
-    """
+    """Outputs and efforts of the drives on their joints, and their derivative, at ``every`` so many samples."""
     setup = Setup(integrator)
-    edge = min(settling_samples(1.0 / m.dt, m.cutoff), len(m.time) - 1) // every
     m = m if every == 1 else _thinned(m, every)
+    motion = (m.position, m.velocity, m.acceleration, m.inputs)
     places, seen = _measured_states(model, experiment)
-    seen, stepping = seen[::every], (m.dt, setup.substeps, setup.method(model), list(columns))
-
-    def run(rows: slice, begun: Array) -> tuple[Array, Array, Array]:
-        motion = (m.position[rows], m.velocity[rows], m.acceleration[rows], m.inputs[rows])
-        return model.core.simulate_drives(theta, *motion, begun, places, seen[rows], *stepping)
-
-    if not places:
-        outputs, _, jacobian = run(slice(None), internal)
-        return outputs, jacobian
-    first, states, first_slopes = run(slice(edge + 1), internal)
-    behind = np.array(states[edge, 2 * len(model.joints) :])
-    behind[places] = seen[edge]
-    outputs, _, jacobian = run(slice(edge, None), behind)
-    return np.concatenate([first[:edge], outputs]), np.concatenate([first_slopes[:edge], jacobian])
+    stepping = (m.dt, setup.substeps, setup.method(model), list(columns))
+    outputs, _, jacobian = model.core.simulate_drives(theta, *motion, internal, places, seen[::every], *stepping)
+    return outputs, jacobian
 
 
 def _measured_states(model: Model, experiment: Experiment) -> tuple[list[int], Array]:
