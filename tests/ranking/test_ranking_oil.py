@@ -8,12 +8,14 @@ import pytest
 
 import vpm
 from places import EXAMPLES
+from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.ranking.fit import Fitter
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.model_structure import Structure
+from vpm.ranking.ranking_search import Search
 from vpm.ranking.settings import Settings
 from vpm.ranking.tracked_records import TrackedRecords, Tracker, tracker_gains
 from vpm.weighing import Prior
@@ -37,24 +39,24 @@ def currents(seconds: float = 8.0) -> Array:
     return np.asarray(5e-4 * np.sin(2.0 * np.pi * time) * (np.sin(np.pi * time / 2.0) > 0.0))
 
 
-def logged(machine: Model, sent: Array, seed: int, *, drive: float = 0.0) -> Experiment:
+def logged(machine: Model, sent: Array, seed: int, *, drive: float = 0.0, gauge: float = 3e3) -> Experiment:
     """Log of currents that were ``sent``; the drive adds noise that no log holds."""
     random, time = np.random.default_rng(seed), np.arange(len(sent)) / RATE
     command = Experiment.from_arrays(
         time, {"servo.command": sent + drive * random.standard_normal(len(sent))}, model=machine, name="bench"
     )
     ran = vpm.simulate(machine, command, mode="free_run")
-    noise = {"axis.position": 1e-6, **dict.fromkeys(PRESSURES, 3e3)}
+    noise = {"axis.position": 1e-6, **dict.fromkeys(PRESSURES, gauge)}
     read = {name: ran[name] + size * random.standard_normal(len(time)) for name, size in noise.items()}
     return Experiment.from_arrays(time, {"servo.command": sent, **read}, model=machine, name="bench")
 
 
 def test_a_pressure_is_drawn_to_its_gauge_as_the_integrator_that_it_is() -> None:
-    """Its error dies away with the bandwidth: x[k+1] = x[k] + (1 - exp(-2 pi f dt)) (y - x)."""
-    model, band = rig(), 2.0
-    gains = tracker_gains(model, ("axis.position", *PRESSURES), (band, band), (400, 1.0 / RATE), model.theta)
+    """Its error dies away with a bandwidth of its own: x[k+1] = x[k] + (1 - exp(-2 pi f dt)) (y - x)."""
+    model = rig()
+    gains = tracker_gains(model, ("axis.position", *PRESSURES), (2.0, 2.0), (400, 1.0 / RATE), model.theta, 30.0)
     place = model.state_names.index("servo.chamber_a")
-    assert gains[-1, place, 1] == pytest.approx(-np.expm1(-2.0 * np.pi * band / RATE))
+    assert gains[-1, place, 1] == pytest.approx(-np.expm1(-2.0 * np.pi * 30.0 / RATE))
     assert np.count_nonzero(gains[:, :, 1]) == len(gains)
     assert np.all(np.diff(gains[:, place, 1]) <= 0.0)
 
@@ -74,6 +76,15 @@ def _bare(model: Model) -> Structure:
     return Structure(model, model.theta, {})
 
 
+@pytest.mark.parametrize(("drive", "gauge", "band"), [(1e-4, 1e3, 100.0), (0.0, 5e4, 1.0)])
+def test_records_tell_how_fast_pressures_are_drawn(drive: float, gauge: float, band: float) -> None:
+    """Noise of a drive is in the machine, and followed; that of gauges is not."""
+    record = logged(rig(), currents(), 1, drive=drive, gauge=gauge)
+    search = Search(rig(), [record], [], Settings(), None, ParallelCandidates(1, None), lambda _: None)
+    search.draw_pressures()
+    assert search.fitter.tracked.of_pressures == band
+
+
 def test_a_late_drive_is_named_and_not_all_of_its_sensors() -> None:
     """One late drive explains what three sensors would. Few steps within a sample diverge while its piston stands."""
     model = rig(coulomb={"value": 24.0, "uncertainty": 6.0})
@@ -83,15 +94,17 @@ def test_a_late_drive_is_named_and_not_all_of_its_sensors() -> None:
     assert ranking.model.parameters["servo.delay.time"].value == pytest.approx(7.3e-3, rel=0.05)
 
 
-def test_a_law_at_the_end_of_its_range_begins_anew_in_the_middle() -> None:
+def test_a_value_at_the_end_of_its_range_begins_anew_in_the_middle() -> None:
     model = rig()
-    turning, dry = "axis.friction.transition_velocity", "axis.friction.coulomb"
-    priors = {turning: Prior(1e-3, 1.0, 1e-5, 1e-1, logarithmic=True), dry: Prior(20.0, 5.0, 0.0, np.inf)}
+    turning, oil, dry = "axis.friction.transition_velocity", "pump.oil.bulk_modulus", "axis.friction.coulomb"
+    priors = {
+        turning: Prior(1e-3, 1.0, 1e-5, 1e-1, logarithmic=True),
+        oil: Prior(1.2e9, 0.2e9, 1e5, np.inf),
+        dry: Prior(20.0, 5.0, 0.0, np.inf),
+    }
     structure = Structure(model, model.theta, priors)
-    stuck = structure.at(np.array([-1e3, -1e3]))
-    assert stuck.values == {turning: pytest.approx(1e-5), dry: 0.0}
-    freed = stuck.off_its_ends
-    assert freed.values == {turning: pytest.approx(1e-3), dry: 0.0}
+    freed = structure.at(np.array([-1e3, -1e3, 1.0])).off_its_ends
+    assert freed.values == {turning: pytest.approx(1e-3), oil: pytest.approx(1.2e9), dry: pytest.approx(25.0)}
     assert freed.off_its_ends is freed
 
 

@@ -16,9 +16,9 @@ def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: Parallel
 
     Each has to gain what makes it worth while. The most promising one is fitted first, then the next two, four, and so
     on. Each has to save a share of the cost that the best one before saved (O. Maron and A. Moore, *Advances in Neural
-    Information Processing Systems* 6, 1994: those that cannot win leave a race early). A part of another one is fitted
-    all the same: a rotor may seem to gain little where a spring takes it along. The outcome does not depend on how many
-    are fitted at a time.
+    Information Processing Systems* 6, 1994: those that cannot win leave a race early); where a fit takes derivatives of
+    its own, by its prediction already. A part of another one is fitted all the same: a rotor may seem to gain little
+    where a spring takes it along. The outcome does not depend on how many are fitted at a time.
 
     Parameters
     ----------
@@ -33,7 +33,8 @@ def raced(chosen: Sequence[Proposal], look: Look, fitter: Fitter, each: Parallel
     parts = [one for one in ordered[1:] if any(is_part(model, one.key, key) for key in keys)]
     ends, wanted = list[Fitted](), look.needed
     for several in _doubling([one for one in ordered if one not in parts]):
-        ended = _fitted(several, wanted, look, fitter, each)
+        hopeful = [one for one in several if one.neutral or fitter.settings.patience * one.gain >= wanted]
+        ended = _fitted(hopeful, wanted, look, fitter, each)
         wanted = max([wanted, *(fitter.settings.share * (look.fitted.cost - one.cost) for one in ended)])
         ends += ended
     return ends + _fitted(parts, look.needed, look, fitter, each)

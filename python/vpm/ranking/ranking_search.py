@@ -36,6 +36,7 @@ class Search(Trials):
     def run(self, held_out: TrackedRecords) -> Ranking:
         """Run the search of a ranking, see `rank`."""
         self.say("fitting what is uncertain")
+        self.draw_pressures()
         looks = self.looks(self.start)
         self.first = {look.fitted.tracker.band: look for look in looks}
         named: dict[Key, Ranked] = {}
@@ -117,6 +118,7 @@ class Search(Trials):
         A slow one lets a machine stick and slip where its own controller held it.
         """
         band = max((one.band for one in ranking.effects), default=self.settings.bands[0])
+        held_out = held_out.with_pressures(self.fitter.tracked.of_pressures)
         return gaps(held_out, (self.start.model, ranking.recalibrated, ranking.model), band)
 
     def _held(self, looks: Sequence[Look], best: Trial | None) -> list[Look]:

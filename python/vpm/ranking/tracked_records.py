@@ -89,7 +89,9 @@ class TrackedRecords:
         self.records = tuple(_records(model, self.experiments))
         #: Channels to which the model is drawn.
         self.drawn_to = _drawn(model, self.records[0].channels) if self.records else ()
-        #: Those of them that show a joint, and no pressure.
+        #: Bandwidth with which pressures are drawn, Hz.
+        self.of_pressures = OF_PRESSURES[1]
+        #: Channels of those drawn that show a joint, and no pressure.
         self.drawn_joints = tuple(name for name in self.drawn_to if not _chamber(model, name))
         self._starts: WeakKeyDictionary[Model, list[Array]] = WeakKeyDictionary()
         ends = np.cumsum([len(record.time) for record in self.records])
@@ -116,7 +118,18 @@ class TrackedRecords:
         """Tracked records with another hold of commands between samples."""
         if hold == self.setup.course:
             return self
-        return TrackedRecords(self.model, self.experiments, self.settings, replace(self.setup, hold=hold))
+        other = TrackedRecords(self.model, self.experiments, self.settings, replace(self.setup, hold=hold))
+        return other.with_pressures(self.of_pressures)
+
+    def with_pressures(self, band: float) -> TrackedRecords:
+        """Tracked records with pressures that are drawn with another bandwidth, Hz."""
+        other = copy.copy(self)
+        other.of_pressures = band
+        return other
+
+    def _band(self, channel: str, band: float) -> float:
+        """Bandwidth with which a tracker of some bandwidth draws to a channel, Hz."""
+        return band if channel in self.drawn_joints else self.of_pressures
 
     def holding_back(self, part: int) -> TrackedRecords:
         """Tracked records with another part of each stretch held back, counted from 0."""
@@ -176,7 +189,7 @@ class TrackedRecords:
         for end, record in zip(np.cumsum([len(one.time) for one in self.records]), self.records, strict=True):
             for column, channel in enumerate(record.channels):
                 if channel in self.drawn_to:
-                    zeros, poles = _free_mass(channel, band, record.dt)
+                    zeros, poles = _free_mass(channel, self._band(channel, band), record.dt)
                     reading = record.readings[:, column] - record.readings[0, column]
                     left[end - len(reading) : end, column] = lfilter(zeros, poles, reading)
         return left
@@ -266,7 +279,8 @@ class TrackedRecords:
             passed = read_noise(self.experiments[place], channel, lines)
             if channel in self.drawn_to:
                 turns = np.exp(2j * np.pi * lines)
-                zeros, poles = (np.polyval(one, turns) for one in _free_mass(channel, band, self.records[place].dt))
+                mass = _free_mass(channel, self._band(channel, band), self.records[place].dt)
+                zeros, poles = (np.polyval(one, turns) for one in mass)
                 passed = passed * np.abs(zeros / poles) ** 2
             found.append(passed)
         return found
@@ -377,7 +391,7 @@ class TrackedRecords:
         known = [column for column, name in enumerate(record.channels) if name in model.output_channels]
         channels = [record.channels[column] for column in known]
         bands = tracker.band, max(tracker.band, *self.settings.bands)
-        gains = tracker_gains(model, channels, bands, (len(record.time), record.dt), theta)
+        gains = tracker_gains(model, channels, bands, (len(record.time), record.dt), theta, self.of_pressures)
         gains[:, :, [name not in self.drawn_to for name in channels]] = 0.0
         method, steps = self.stepping(model, tracker, record.dt)
         outputs, states, slopes = model.core.observe(
@@ -447,7 +461,12 @@ def _divided(stretches: Sequence[NDArray[np.int_]], held: int) -> tuple[Parts, P
 
 
 def tracker_gains(
-    model: Model, channels: Sequence[str], bands: tuple[float, float], grid: tuple[int, float], theta: Array
+    model: Model,
+    channels: Sequence[str],
+    bands: tuple[float, float],
+    grid: tuple[int, float],
+    theta: Array,
+    of_pressures: float = OF_PRESSURES[1],
 ) -> Array:
     """Gains of a tracker: by how much each channel's error moves each state at each sample of a grid (N, nx, m).
 
@@ -464,14 +483,15 @@ def tracker_gains(
     gains = np.zeros((samples, len(model.state_names), len(channels)))
     for column, channel in enumerate(channels):
         joint, _, quantity = channel.rpartition(".")
+        own_bands = bands
         if chamber := _chamber(model, channel):
-            places = [model.state_names.index(chamber)]
+            places, own_bands = [model.state_names.index(chamber)], (of_pressures, of_pressures)
         elif joint in coordinates and quantity in {"position", "velocity"}:
             places = [coordinates.index(joint), len(coordinates) + coordinates.index(joint)]
         else:
             continue
         own = slice(-len(places), None)  # of a pressure the rate alone is drawn
-        slow, quick = (np.array(_gains(channel, band, dt))[own] for band in bands)
+        slow, quick = (np.array(_gains(channel, band, dt))[own] for band in own_bands)
         factor = _factor(model, channel, theta)
         gains[:, places, column] = slow / factor
         gains[: len(count), places, column] = np.clip(_gains_of_line(channel, count, dt)[:, own], slow, quick) / factor
@@ -504,7 +524,7 @@ def is_position(model: Model, channel: str) -> bool:
 
 def _gains(channel: str, band: float, dt: float) -> tuple[float, float]:
     """Gains of a tracker from an error of a position, or of a velocity or pressure, to the position and its rate."""
-    turn = 2.0 * np.pi * (band if channel.endswith(("position", "velocity")) else OF_PRESSURES) * dt
+    turn = 2.0 * np.pi * band * dt
     if not channel.endswith(".position"):
         return 0.0, float(-np.expm1(-turn))
     return float(-np.expm1(-2.0 * DAMPING * turn)), turn**2 / dt

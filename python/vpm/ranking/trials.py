@@ -23,7 +23,7 @@ from vpm.ranking.posterior import robust_probabilities
 from vpm.ranking.proposal_fits import raced
 from vpm.ranking.proposals import proposals
 from vpm.ranking.result import Ranked
-from vpm.ranking.settings import Settings
+from vpm.ranking.settings import OF_PRESSURES, Settings
 from vpm.ranking.short_waves import wider_bands
 from vpm.ranking.structure_extensions import Extensions
 from vpm.ranking.substitute_records import shown, why_unbalanced
@@ -59,6 +59,22 @@ class Trials:
         )
         self.first: dict[float, Look] = {}  # looks at the model as it was, by bandwidth
         self.others: dict[Key, list[Structure]] = {}  # what counted as well when an effect came in
+
+    def draw_pressures(self) -> None:
+        """Draw pressures, in all trials, with the bandwidth by which the uncertain model predicts the records best.
+
+        Predictions of the same samples are compared as in `_predicts_worse`.
+        """
+        tracked = self.fitter.tracked
+        if tracked.drawn_to == tracked.drawn_joints:
+            return
+        told: list[tuple[float, Fitter]] = []
+        for band in OF_PRESSURES:
+            self.fitter = Fitter(tracked.with_pressures(band), self.settings)
+            with contextlib.suppress(*ASTRAY):
+                fitted = self.fitted(self.start, Tracker(self.settings.bands[0]))
+                told.append((self.predictive_density(fitted), self.fitter))
+        _, self.fitter = max(told, key=lambda one: one[0], default=(0.0, Fitter(tracked, self.settings)))
 
     def looks(self, structure: Structure, known: Look | None = None) -> list[Look]:
         """Looks of the search at a structure under each tracker that can follow it.
