@@ -133,10 +133,6 @@ class Structure:
         stuck = np.any(np.abs(self.standard[:, None] - self.ends) < ROUNDED, axis=1)
         return self.at(np.where(stuck, 0.0, self.standard)) if np.any(stuck) else self
 
-    def is_far(self, most: float) -> bool:
-        """Whether a structure without effects lies more than so many deviations from what its model file states."""
-        return not self.effects and bool(np.any(np.abs(self._from_file) > most))
-
     @property
     def doubt(self) -> float:
         """How improbable a structure's values are by its model file, and those of its effects by their priors, nats."""

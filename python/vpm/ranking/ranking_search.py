@@ -166,11 +166,12 @@ class Search(Trials):
     def _round(self, looks: Sequence[Look]) -> tuple[Trial | None, list[Trial]]:
         """Round of the search: the best additional effect, if one counts, and all that were tried.
 
-        Where much is missing, known parameters go far astray to make up for it, and fits from there need not lead back.
-        Where nothing counts then, fits begin at what the model file states.
+        Where much is missing, known parameters go astray to make up for it, to values that are improbable by the model
+        file. Fits from there need not lead back: where nothing counts then, they begin at what the file states.
         """
         best, tried = self._best(looks, [self._off_its_ends(look) for look in looks])
-        if best is not None or not looks[0].fitted.structure.is_far(self.settings.reach):
+        found = looks[0].fitted.structure
+        if best is not None or found.effects or found.doubt <= self.settings.odds:
             return best, tried
         with contextlib.suppress(*ASTRAY):
             stated = [self.look(self.fitter.unfitted(self.start, look.fitted.tracker)) for look in looks]

@@ -51,8 +51,11 @@ def _backlash(start: Mapping[str, float]) -> Mapping[str, float]:
 
 
 def _stop(start: Mapping[str, float], site: str, model: Model, sizes: Sizes) -> Mapping[str, float]:
-    """Start values of an end stop: stiff enough to reverse the fastest motion on the way seen beyond it."""
+    """Start values of an end stop: stiff enough to reverse the fastest motion on the way seen beyond it.
+
+    So of the drive that pushes on, which with oil does far more than the inertia of what it moves.
+    """
     low, high, speed = sizes.ways[site][0], sizes.ways[site][1], sizes.joints[site][1]
     beyond = max(high - start.get("high", high), start.get("low", low) - low, 1e-3 * (high - low))
-    stiffness = moved(model, site) * (speed / beyond) ** 2
+    stiffness = max(moved(model, site) * (speed / beyond) ** 2, sizes.joints[site][0] / beyond)
     return {**start, "stiffness": stiffness, "damping": LOSS / speed}
