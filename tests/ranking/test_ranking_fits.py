@@ -514,7 +514,7 @@ def test_values_are_those_that_predict_best_under_all_trackers(monkeypatch: pyte
 def test_fits_begin_at_the_file_where_nothing_counts_from_afar(
     monkeypatch: pytest.MonkeyPatch, share: float, begins: list[float]
 ) -> None:
-    """Known parameters that stand in for what is missing need not lead back to the machine."""
+    """Known parameters that stand in for what is missing need not lead back; the file rules such values out."""
     model, begun = Model.from_toml(SLEDGE), list[float]()
 
     def nothing(_: Search, __: Look, start: Look) -> list[Any]:
@@ -524,7 +524,7 @@ def test_fits_begin_at_the_file_where_nothing_counts_from_afar(
     monkeypatch.setattr(Search, "tried", nothing)
     monkeypatch.setattr(Look, "has_room", lambda *_: True)
     gone = abs(MASS - 3.3) / float(model.parameters["sledge.mass"].uncertainty or 0.0)
-    vpm.rank(model, pushed(seed=1, duration=2.0), effects=["spring"], settings=Settings(reach=share * gone))
+    vpm.rank(model, pushed(seed=1, duration=2.0), effects=["spring"], settings=Settings(odds=share * 0.5 * gone**2))
     assert begun == pytest.approx(begins, rel=0.02)
 
 
