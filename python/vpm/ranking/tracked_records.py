@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import VpmError
 from vpm.experiment import Experiment, drawn_noise, read_noise
+from vpm.identify.shooting import state_channel
 from vpm.initial import initial_state, joints_by_velocity
 from vpm.model import Model
 from vpm.numbers import Array
@@ -500,9 +501,8 @@ def tracker_gains(
 
 def _chamber(model: Model, channel: str) -> str:
     """State of a tracked model that a channel shows, if it is the pressure of a chamber, or ""."""
-    drive, _, quantity = channel.rpartition(".")
-    name = f"{drive}.{quantity.replace('pressure_', 'chamber_')}"
-    return name if name != channel and name in model.state_names else ""
+    pressures = (name for name in model.internal_names if ".chamber_" in name and state_channel(model, name) == channel)
+    return next(pressures, "")
 
 
 def _gains_of_line(channel: str, count: Array, dt: float) -> Array:
