@@ -74,6 +74,9 @@ pub struct Description {
     /// Frames to watch.
     #[serde(default)]
     pub markers: Vec<Marker>,
+    /// Frames of inertial measurement units.
+    #[serde(default)]
+    pub imus: Vec<Marker>,
     /// Straight connections.
     #[serde(default)]
     pub lines: Vec<Line<usize>>,
@@ -216,6 +219,7 @@ impl Description {
             load_cells: self.load_cells.len(),
             balls: self.balls.len(),
             loops: self.loops.len(),
+            imus: self.imus.len(),
         }
     }
 
@@ -327,6 +331,7 @@ impl Description {
             lines: self.lines.iter().map(|line| line.map(number)).collect(),
             transmissions,
             markers: self.markers.clone(),
+            imus: self.imus.clone(),
             gauges: self.gauges.clone(),
             attachments: self.attachments(),
             closed: !self.loops.is_empty(),

@@ -38,6 +38,7 @@ pub struct Model<S> {
     lines: Vec<Wire<S>>,
     shafts: Vec<Shaft<S>>,
     markers: Vec<Place>,
+    imus: Vec<Place>,
     attachments: Vec<Place>,
     gauges: Vec<Strip>,
     n_coordinates: usize,
@@ -328,6 +329,12 @@ impl<S: Scalar> Model<S> {
     #[inline]
     pub(crate) fn markers(&self) -> &[Place] {
         &self.markers
+    }
+
+    /// Inertial measurement units of the model.
+    #[inline]
+    pub(crate) fn imus(&self) -> &[Place] {
+        &self.imus
     }
 
     /// Frames of the model that contacts and bushings act on.

@@ -145,6 +145,13 @@ pub enum Channel {
         /// Which component.
         component: Component,
     },
+    /// A reading of an inertial measurement unit, in its own axes.
+    Imu {
+        /// Number of the unit.
+        imu: usize,
+        /// Which.
+        quantity: ImuQuantity,
+    },
 }
 
 /// What a hydraulic drive shows.
@@ -209,6 +216,24 @@ pub enum BallQuantity {
     Wz,
 }
 
+/// What an inertial measurement unit reads in its own axes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ImuQuantity {
+    /// First component of the specific force, acceleration less that of gravity, m/s^2.
+    Ax,
+    /// Second component of it, m/s^2.
+    Ay,
+    /// Third component of it, m/s^2.
+    Az,
+    /// First component of the angular velocity, rad/s.
+    Wx,
+    /// Second component of it, rad/s.
+    Wy,
+    /// Third component of it, rad/s.
+    Wz,
+}
+
 /// A component of a wrench.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -232,7 +257,8 @@ pub enum Component {
 /// In this order: position, velocity, acceleration, effort of each joint; command, force of each actuator; length, rate, force of each
 /// line; strain of each gauge; x, y, z, rx, ry, rz of each marker; spool, pressure a, pressure b, flow a, flow b of each hydraulic drive;
 /// current of each motor; pressure, flow of each supply; depth, normal force, fx, fy, fz of each contact; mx, my, mz, fx, fy, fz of each
-/// bushing and of each load cell; qw, qx, qy, qz, wx, wy, wz of each ball joint; mx, my, mz, fx, fy, fz of each closed loop.
+/// bushing and of each load cell; qw, qx, qy, qz, wx, wy, wz of each ball joint; mx, my, mz, fx, fy, fz of each closed loop; ax, ay, az,
+/// wx, wy, wz of each inertial measurement unit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Layout {
     /// Joints.
@@ -261,6 +287,8 @@ pub struct Layout {
     pub balls: usize,
     /// Closed loops.
     pub loops: usize,
+    /// Inertial measurement units.
+    pub imus: usize,
 }
 
 impl Layout {
@@ -324,6 +352,11 @@ impl Layout {
         self.balls() + 7 * self.balls
     }
 
+    /// Where the outputs of the inertial measurement units begin.
+    pub fn imus(self) -> usize {
+        self.loops() + 6 * self.loops
+    }
+
     /// Whether the state alone decides an output, so that its sensor needs no rates. See
     /// [`crate::system::Dynamics::observe_motion`]; not said of contacts and bushings.
     pub(crate) fn is_of_motion(self, column: usize) -> bool {
@@ -337,7 +370,7 @@ impl Layout {
 
     /// Number of all outputs that sensors may show.
     pub fn count(self) -> usize {
-        self.loops() + 6 * self.loops
+        self.imus() + 6 * self.imus
     }
 }
 
@@ -369,6 +402,7 @@ impl Channel {
             Self::Ball { ball, quantity } => layout.balls() + 7 * ball + quantity as usize,
             Self::Loop { closure, component } => layout.loops() + 6 * closure + component as usize,
             Self::LoadCell { load_cell, component } => layout.load_cells() + 6 * load_cell + component as usize,
+            Self::Imu { imu, quantity } => layout.imus() + 6 * imu + quantity as usize,
         }
     }
 }

@@ -79,6 +79,8 @@ def structure_text(checked: Checked) -> str:
     }
     if document.transmissions:  # older programs know no such key
         content["transmissions"] = those("transmissions")
+    if document.imus:
+        content["imus"] = those("imus")
     if document.loops:
         content["loops"] = those("loops")
     if structure.balls:

@@ -110,6 +110,11 @@ class Components(DriveComponents):
         """Frames to watch of a model, by name."""
         return tuple(self._checked.document.markers)
 
+    @property
+    def imus(self) -> tuple[str, ...]:
+        """Inertial measurement units of a model, by name."""
+        return tuple(self._checked.document.imus)
+
     @cached_property
     def coordinates(self) -> tuple[str, ...]:
         """Names of all coordinates: `joints`, then those of each beam, ``upper.bending_x.0``."""

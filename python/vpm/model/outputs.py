@@ -51,6 +51,7 @@ def owners(structure: Structure) -> Iterator[Owners]:
     yield from those("load_cell", "load_cells", "component")
     yield Owners("ball", tuple(structure.balls), BALL, "quantity")
     yield from those("loop", "loops", "component")
+    yield from those("imu", "imus", "quantity")
 
 
 def outputs_of(structure: Structure) -> tuple[str, ...]:

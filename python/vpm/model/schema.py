@@ -21,6 +21,7 @@ from vpm.model.drives.actuator import ACTUATOR_TYPES, Actuator
 from vpm.model.drives.supply import Supply
 from vpm.model.effects import EffectEntry
 from vpm.model.entry import Entry, Quantity, Switch, Text, Vector
+from vpm.model.imu import Imu
 from vpm.model.joint import Joint
 from vpm.model.line import Line
 from vpm.model.load_cell import LoadCell
@@ -48,6 +49,7 @@ class Document(Entry):
     transmissions: dict[str, Transmission] = Field(default_factory=dict)
     gauges: dict[str, Gauge] = Field(default_factory=dict)
     markers: dict[str, Marker] = Field(default_factory=dict)
+    imus: dict[str, Imu] = Field(default_factory=dict)
     supplies: dict[str, Supply] = Field(default_factory=dict)
     actuators: dict[str, Actuator] = Field(default_factory=dict)
     sensors: dict[str, Sensor] = Field(default_factory=dict)
@@ -75,6 +77,7 @@ SECTIONS: Mapping[str, tuple[type[BaseModel], ...]] = {
     "transmissions": (Transmission,),
     "gauges": (Gauge,),
     "markers": (Marker,),
+    "imus": (Imu,),
     "supplies": (Supply,),
     "actuators": tuple(ACTUATOR_TYPES.values()),
     "sensors": (Sensor,),

@@ -42,7 +42,7 @@ def tree_problems(document: Document) -> Iterator[Problem]:
 
 def _attachments(document: Document) -> Iterator[tuple[tuple[str, ...], str, float | None]]:
     """Attachments in the tree: their place in the file, their parent, and how far along that."""
-    for section in ("joints", "beams", "markers"):
+    for section in ("joints", "beams", "markers", "imus"):
         for name, entry in getattr(document, section).items():
             yield (section, name), entry.parent, entry.at
     for name, line in document.lines.items():

@@ -88,7 +88,7 @@ class Skeleton:
             self._add_line(line)
         for contact in content["contacts"]:
             self._add_contact(contact)
-        for marker in content["markers"]:
+        for marker in (*content["markers"], *content.get("imus", ())):
             self._add_marker(marker)
         self._draws.insert(0, self._bars)
 

@@ -219,6 +219,7 @@ pub(super) fn channel(what: &str, channel: Channel, description: &Description) -
         Channel::Ball { ball, .. } => within(what, "ball joint", ball, description.balls.len()),
         Channel::Loop { closure, .. } => within(what, "loop", closure, description.loops.len()),
         Channel::LoadCell { load_cell, .. } => within(what, "load cell", load_cell, description.load_cells.len()),
+        Channel::Imu { imu, .. } => within(what, "inertial measurement unit", imu, layout.imus),
     }
 }
 

@@ -79,7 +79,7 @@ impl Description {
 
     /// Contacts, bushings and load cells with the parameters `theta`, on the frames of `model`.
     pub(super) fn connections<S: Scalar>(&self, theta: &[S], model: &Model<S>) -> Result<Connections<S>> {
-        if self.contacts.is_empty() && self.bushings.is_empty() && self.load_cells.is_empty() {
+        if self.contacts.is_empty() && self.bushings.is_empty() && self.load_cells.is_empty() && self.imus.is_empty() {
             return Ok(Connections::default());
         }
         let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();

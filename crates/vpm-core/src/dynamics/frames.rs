@@ -153,17 +153,14 @@ pub(crate) fn shafts<S: Scalar>(model: &Model<S>, data: &mut Data<S>, q: &[S], v
 /// Lines between frames as [`lines`], but without the velocities per unit rate of the coordinates.
 pub(super) fn bare_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     let Data { composite: Composite { frames, lines, .. }, drifts, .. } = data;
-    let keeps = model.keeps_velocity_terms();
     for (Wire { from, to, .. }, slot) in model.lines().iter().zip(lines) {
         let LineSlot { length, direction, from: begin, to: end, .. } = slot;
         for (place, point) in [(from, &mut *begin), (to, &mut *end)] {
-            move_point(&frames[place.frame], place, point, keeps);
-            // The lines themselves keep their products of rates, whatever the frames do.
-            if keeps && !model.products()[place.frame].own() {
-                let Twist { angular, linear } = drifts[place.frame];
-                let at = Vector3::from_f64(place.pose.translation.to_array());
-                point.acceleration += frames[place.frame].pose.rotation * (linear + angular.cross(at));
-            }
+            let FrameSlot { pose, .. } = &frames[place.frame];
+            let (at, speed, change) = at_place(model, frames, drifts, place);
+            point.place = pose.point(at);
+            point.velocity = pose.rotation * speed;
+            point.acceleration = pose.rotation * change;
         }
         let across = end.place - begin.place;
         *length = across.dot(across).sqrt();
@@ -171,17 +168,38 @@ pub(super) fn bare_lines<S: Scalar>(model: &Model<S>, data: &mut Data<S>) {
     }
 }
 
-/// A point fixed to a frame: where it is and how it moves.
-fn move_point<S: Scalar>(frame: &FrameSlot<S>, place: &Place, point: &mut PointSlot<S>, keeps: bool) {
+/// A point fixed to a frame: where it is and how it moves, in the axes of the frame.
+fn at_place<S: Scalar>(
+    model: &Model<S>,
+    frames: &[FrameSlot<S>],
+    drifts: &[Twist<S>],
+    place: &Place,
+) -> (Vector3<S>, Vector3<S>, Vector3<S>) {
     let at = Vector3::from_f64(place.pose.translation.to_array());
-    let FrameSlot { pose, velocity, acceleration, .. } = frame;
+    let FrameSlot { velocity, acceleration, .. } = &frames[place.frame];
     let speed = velocity.linear + velocity.angular.cross(at);
-    // The conventional acceleration of a point from the spatial one (Featherstone 2008, section 2.11).
-    let change = acceleration.linear + acceleration.angular.cross(at);
-    let change = if keeps { change + velocity.angular.cross(speed) } else { change };
-    point.place = pose.point(at);
-    point.velocity = pose.rotation * speed;
-    point.acceleration = pose.rotation * change;
+    let mut change = acceleration.linear + acceleration.angular.cross(at);
+    if model.keeps_velocity_terms() {
+        // The conventional acceleration of a point from the spatial one (Featherstone 2008, section 2.11).
+        change += velocity.angular.cross(speed);
+        // Points keep their products of rates, whatever the frames do.
+        if !model.products()[place.frame].own() {
+            let Twist { angular, linear } = drifts[place.frame];
+            change += linear + angular.cross(at);
+        }
+    }
+    (at, speed, change)
+}
+
+/// Specific force and angular velocity of a frame fixed to another one, in its own axes.
+///
+/// Law: an accelerometer shows the acceleration of its place less that of gravity, a gyroscope the angular velocity (Titterton
+/// and Weston 2004, "Strapdown Inertial Navigation Technology", section 3.2). Checked: against the second derivative of the pose.
+pub(crate) fn specific_force<S: Scalar>(model: &Model<S>, data: &Data<S>, place: &Place) -> [Vector3<S>; 2] {
+    let frames = &data.composite.frames;
+    let (_, _, change) = at_place(model, frames, &data.drifts, place);
+    let turned = Pose::from_f64(place.pose).rotation;
+    [change, frames[place.frame].velocity.angular].map(|vector| turned.transpose_mul(vector))
 }
 
 /// Hands out, for every coordinate that moves a frame, the twist per unit rate in the axes and at the origin of the world.

@@ -24,9 +24,7 @@ pub(crate) fn reactions<S: Scalar>(
     tensions: &[S],
     applied: impl FnOnce(&mut Data<S>),
 ) {
-    let [q, v, a] = motion;
-    frames(model, data, q, v);
-    accelerate(model, data, a, extra);
+    accelerated(model, data, motion, extra);
     poses(model, data);
     bare_lines(model, data);
     weigh_frames(model, &mut data.composite.frames, Stations::Each);
@@ -36,6 +34,17 @@ pub(crate) fn reactions<S: Scalar>(
     }
     applied(data);
     inward(model, data);
+}
+
+/// Motion of every frame as by [`frames`], with the accelerations of the coordinates, as reactions need it.
+pub(crate) fn accelerated<S: Scalar>(
+    model: &Model<S>,
+    data: &mut Data<S>,
+    [q, v, a]: Motion<'_, S>,
+    extra: &mut [Twist<S>],
+) {
+    frames(model, data, q, v);
+    accelerate(model, data, a, extra);
 }
 
 /// Takes a wrench that acts on a frame, about its origin and in its axes, off its reaction.

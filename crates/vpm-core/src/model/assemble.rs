@@ -31,6 +31,8 @@ pub struct Parts<S> {
     pub transmissions: Vec<Transmission<S>>,
     /// Markers.
     pub markers: Vec<Marker>,
+    /// Frames of inertial measurement units.
+    pub imus: Vec<Marker>,
     /// Strain gauges.
     pub gauges: Vec<Gauge>,
     /// Frames that contacts and bushings act on.
@@ -86,6 +88,7 @@ impl<S: Scalar> Parts<S> {
         let welds = self.welds.iter().map(|weld| (format!("body `{}`", weld.name), weld.on));
         let beams = self.beams.iter().map(|beam| (format!("beam `{}`", beam.name), beam.on));
         let markers = self.markers.iter().map(|marker| (format!("marker `{}`", marker.name), marker.on));
+        let imus = self.imus.iter().map(|imu| (format!("inertial measurement unit `{}`", imu.name), imu.on));
         let gauge =
             |gauge: &Gauge| (format!("gauge `{}`", gauge.name), Mount::Section { beam: gauge.beam, at: gauge.at });
         let ends = self.lines.iter().flat_map(|line| {
@@ -96,6 +99,7 @@ impl<S: Scalar> Parts<S> {
             .chain(welds)
             .chain(beams)
             .chain(markers)
+            .chain(imus)
             .chain(self.gauges.iter().map(gauge))
             .chain(ends)
             .chain(attachments)

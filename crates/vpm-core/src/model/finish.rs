@@ -36,6 +36,7 @@ impl<S: Scalar> Assembly<'_, S> {
             Ok(self.aligned(self.resolved(marker.on).beyond(pose)))
         };
         let markers = self.parts.markers.iter().map(marker).collect::<Result<_>>()?;
+        let imus = self.parts.imus.iter().map(marker).collect::<Result<_>>()?;
         let attachments = self.parts.attachments.iter().map(marker).collect::<Result<_>>()?;
         let carrying = links.iter().map(|link| link.parent).chain(self.beams.iter().map(|beam| beam.root.frame));
         carrying.for_each(|frame| self.heavy[frame] = true);
@@ -88,6 +89,7 @@ impl<S: Scalar> Assembly<'_, S> {
             lines,
             shafts,
             markers,
+            imus,
             attachments,
             gauges: self.parts.gauges.iter().map(|gauge| self.strip(gauge)).collect(),
             beams: self.beams,

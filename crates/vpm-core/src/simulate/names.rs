@@ -121,6 +121,10 @@ pub(crate) fn output_name(description: &Description, column: usize) -> String {
         let names: Vec<_> = d.load_cells.iter().map(|cell| cell.name.as_str()).collect();
         return pick(layout.load_cells(), &WRENCH, "load cell", &names);
     }
+    if column >= layout.imus() {
+        let names: Vec<_> = d.imus.iter().map(|imu| imu.name.as_str()).collect();
+        return pick(layout.imus(), &["ax", "ay", "az", "wx", "wy", "wz"], "inertial measurement unit", &names);
+    }
     if column >= layout.loops() {
         let names: Vec<_> = d.loops.iter().map(|closure| closure.name.as_str()).collect();
         return pick(layout.loops(), &WRENCH, "loop", &names);

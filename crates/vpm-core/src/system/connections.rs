@@ -16,7 +16,7 @@ pub struct Connections<S> {
     pub(crate) bushings: Vec<PlacedBushing<S>>,
     /// Numbers of the joints whose reactions are read.
     pub(crate) cells: Vec<usize>,
-    /// A motion of each frame, for the reactions.
+    /// A motion of each frame, for the reactions and the inertial measurement units.
     pub(super) extra: Vec<Twist<S>>,
 }
 
@@ -87,7 +87,7 @@ impl<S: Scalar> Connections<S> {
         };
         let contacts = contacts.into_iter().zip(points).map(contact).collect::<Result<_>>()?;
         let bushings = bushings.into_iter().zip(ends.chunks_exact(2)).map(bushing).collect::<Result<_>>()?;
-        let extra = vec![Twist::zero(); if cells.is_empty() { 0 } else { model.n_frames() }];
+        let extra = vec![Twist::zero(); if cells.is_empty() && model.imus().is_empty() { 0 } else { model.n_frames() }];
         Ok(Self { contacts, bushings, cells, extra })
     }
 

@@ -174,7 +174,7 @@ impl<S: Scalar> Guided<S> {
             dynamics.observe_efforts(x, rate, outputs);
             dynamics.add_drives(applied);
         } else {
-            dynamics.observe_reactions([&x[..n], &x[n..2 * n], &rate[n..2 * n]], outputs);
+            dynamics.observe_accelerated([&x[..n], &x[n..2 * n], &rate[n..2 * n]], outputs);
         }
         for ((channels, &a), &effort) in outputs.chunks_exact_mut(4).zip(&rate[n..]).zip(&*load).take(joints) {
             (channels[2], channels[3]) = (a, effort);

@@ -4,7 +4,7 @@ use super::Dynamics;
 use super::connections::into_body;
 use crate::ball::angular_velocity;
 use crate::contact::ContactFriction;
-use crate::dynamics::{Motion, frames, lines, poses, reactions, shafts};
+use crate::dynamics::{Motion, accelerated, frames, lines, poses, reactions, shafts, specific_force};
 use crate::scalar::Scalar;
 use crate::sensor::Layout;
 use crate::spatial::{Pose, Quaternion};
@@ -26,6 +26,7 @@ impl<S: Scalar> Dynamics<S> {
             load_cells: self.connections.cells.len(),
             balls: self.balls.len(),
             loops: self.loops.as_ref().map_or(0, |loops| loops.len()),
+            imus: self.model.imus().len(),
         }
     }
 
@@ -97,8 +98,23 @@ impl<S: Scalar> Dynamics<S> {
         }
     }
 
+    /// Observes load cells and inertial measurement units in the motion `[q, v, a]`.
+    pub(crate) fn observe_accelerated(&mut self, motion: Motion<'_, S>, outputs: &mut [S]) {
+        if self.model.imus().is_empty() {
+            return self.observe_reactions(motion, outputs);
+        }
+        let Self { model, data, connections, .. } = self;
+        accelerated(model, data, motion, &mut connections.extra);
+        for (channels, place) in outputs[self.layout().imus()..].chunks_exact_mut(6).zip(self.model.imus()) {
+            let [force, turning] = specific_force(&self.model, &self.data, place);
+            channels[..3].copy_from_slice(&force.to_array());
+            channels[3..].copy_from_slice(&turning.to_array());
+        }
+        self.observe_reactions(motion, outputs);
+    }
+
     /// Observes the reactions at load cells' joints in the motion `[q, v, a]`, with the forces on lines.
-    pub(crate) fn observe_reactions(&mut self, motion: Motion<'_, S>, outputs: &mut [S]) {
+    fn observe_reactions(&mut self, motion: Motion<'_, S>, outputs: &mut [S]) {
         if self.connections.cells.is_empty() {
             return;
         }
@@ -147,6 +163,6 @@ impl<S: Scalar> Dynamics<S> {
         {
             channels.copy_from_slice(values);
         }
-        self.observe_reactions([&x[..n], &x[n..2 * n], accelerations], outputs);
+        self.observe_accelerated([&x[..n], &x[n..2 * n], accelerations], outputs);
     }
 }

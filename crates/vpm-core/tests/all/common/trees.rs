@@ -31,6 +31,7 @@ pub fn lift<S: Scalar>(parts: &Parts<f64>) -> Parts<S> {
         lines: parts.lines.iter().map(|line| line.map(number)).collect(),
         transmissions: parts.transmissions.iter().map(|shaft| shaft.map(number)).collect(),
         markers: parts.markers.clone(),
+        imus: parts.imus.clone(),
         gauges: parts.gauges.clone(),
         attachments: parts.attachments.clone(),
         drop_velocity_terms: parts.drop_velocity_terms,
@@ -160,7 +161,7 @@ pub fn try_description(parts: &Parts<f64>, change: impl FnOnce(&mut Value)) -> R
         effects.push(json!({"type": "payload", site: place, "mass": mass, "position": position}));
     }
     let mut content = json!({"gravity": parts.gravity, "bodies": bodies, "welds": welds, "beams": beams, "lines": lines,
-        "markers": parts.markers, "gauges": parts.gauges, "effects": effects,
+        "markers": parts.markers, "imus": parts.imus, "gauges": parts.gauges, "effects": effects,
         "parameters": numbers.values, "parameter_names": numbers.names});
     change(&mut content);
     Description::from_json(&content.to_string())

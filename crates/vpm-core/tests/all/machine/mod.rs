@@ -2,6 +2,7 @@
 
 pub(crate) mod balls;
 mod flexible;
+mod imus;
 mod linearize;
 mod load_cells;
 mod parts;
