@@ -5,9 +5,9 @@ use std::sync::Arc;
 use super::Dynamics;
 use super::functions::Function;
 use super::recorded::{Kind, Places};
-use super::routine::{Routine, code_pays};
+use super::routine::code_pays;
 use crate::error::Result;
-use crate::graph::{Evaluator, Lanes};
+use crate::graph::{Evaluator, Lanes, Work};
 use crate::scalar::Scalar;
 use crate::spatial::Pose;
 
@@ -18,8 +18,18 @@ pub(crate) enum Engine {
     Laws(Box<Dynamics<f64>>, Kind),
     /// Eight motions at once, operation by operation.
     Blocks(Evaluator<Lanes>),
-    /// Machine code.
-    Code(Box<Routine<f64>>),
+    /// Machine code, two motions at once.
+    Code(Pairs),
+}
+
+/// Machine code of a function for two motions at a time, with the memory for it.
+#[derive(Clone)]
+pub(crate) struct Pairs {
+    function: Arc<Function>,
+    /// Motion, parameters and what follows from them, each twice.
+    inputs: Vec<f64>,
+    outputs: Vec<f64>,
+    work: Work,
 }
 
 impl Engine {
@@ -46,9 +56,7 @@ impl Engine {
         if !code_pays(rows) {
             return None;
         }
-        let mut routine = Box::new(Routine::new(function().ok()?, theta));
-        routine.compile().ok()?;
-        Some(Self::Code(routine))
+        Pairs::new(function().ok()?, theta).map(Self::Code)
     }
 
     /// Runs an engine: outputs of many rows of inputs, `made` for each.
@@ -56,11 +64,41 @@ impl Engine {
         let rows = inputs.chunks_exact(places.first_parameter()).zip(outputs.chunks_exact_mut(made.max(1)));
         match self {
             Self::Blocks(evaluator) => evaluator.run(inputs, outputs),
-            Self::Code(routine) => rows.for_each(|(inputs, outputs)| outputs.copy_from_slice(routine.at(inputs))),
+            Self::Code(pairs) => pairs.run(inputs, outputs, [places.first_parameter(), made.max(1)]),
             Self::Laws(dynamics, kind) => rows.for_each(|(inputs, outputs)| {
                 let (state, a) = (&inputs[..places.states], &inputs[places.accelerations()..]);
                 dynamics.answer(kind, state, &a[..places.coordinates], outputs);
             }),
+        }
+    }
+}
+
+impl Pairs {
+    /// Machine code for the parameters `theta`, if there is any.
+    fn new(function: Arc<Function>, theta: &[f64]) -> Option<Self> {
+        let native = function.pairs().ok()?;
+        let (outputs, work) = (vec![0.0; native.n_outputs()], native.work());
+        let inputs = function.inputs(theta).into_iter().flat_map(|value| [value; 2]).collect();
+        Some(Self { function, inputs, outputs, work })
+    }
+
+    /// Outputs of two rows of inputs after two, rows of these lengths.
+    fn run(&mut self, inputs: &[f64], outputs: &mut [f64], [wide, made]: [usize; 2]) {
+        let Ok(native) = self.function.pairs() else { return };
+        for (inputs, outputs) in inputs.chunks(2 * wide).zip(outputs.chunks_mut(2 * made)) {
+            let (first, second) = inputs.split_at(wide);
+            // A row without a second stands for it.
+            let second = if second.is_empty() { first } else { second };
+            for (pair, (&a, &b)) in self.inputs.chunks_exact_mut(2).zip(first.iter().zip(second)) {
+                pair.copy_from_slice(&[a, b]);
+            }
+            // The lengths are those of the function, so that this cannot fail.
+            let done = native.call(&self.inputs, &mut self.outputs, &mut self.work);
+            debug_assert!(done.is_ok());
+            for (lane, row) in outputs.chunks_exact_mut(made).enumerate() {
+                let lanes = self.outputs.chunks_exact(2).map(|pair| pair[lane]);
+                row.iter_mut().zip(lanes).for_each(|(output, value)| *output = value);
+            }
         }
     }
 }

@@ -4,7 +4,8 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 use super::recorded::{Kind, Placed, Places};
 use crate::error::Result;
-use crate::graph::{Evaluator, Lanes, Native, Program};
+use crate::graph::{Evaluator, Lanes, Native, Program, Unavailable};
+use crate::scalar::Scalar;
 
 /// Functions that are kept of a machine: its own, some twenty kinds, and those of the last lists of parameters and of followed joints. A fit
 /// asks for up to four of each list, again and again, and takes few parameters in a list; what a search asked for and left, the next list
@@ -49,6 +50,7 @@ pub(crate) struct Function {
     /// What is differentiated along directions, where the entries would be too many operations.
     pub(crate) directions: Option<Program>,
     native: OnceLock<std::result::Result<Native, String>>,
+    pairs: OnceLock<std::result::Result<Native, String>>,
     /// Whether it holds for the parameters of the recording alone.
     pub(crate) of_values: bool,
 }
@@ -104,29 +106,48 @@ impl Function {
         let Placed { program, entries, directions, places, of_values } = placed;
         let stages = program.split(|number| number >= places.first_parameter());
         let (seldom, often) = (stages.seldom, stages.often);
-        Self { places, seldom, often, entries, directions, native: OnceLock::new(), of_values }
+        Self { places, seldom, often, entries, directions, native: OnceLock::new(), pairs: OnceLock::new(), of_values }
+    }
+
+    /// Inputs of a recorded function, with the parameters `theta` and what follows from them.
+    pub(crate) fn inputs<S: Scalar>(&self, theta: &[S]) -> Vec<S> {
+        let (first, given) = (self.places.first_parameter(), self.places.count());
+        let mut inputs = vec![S::zero(); self.often.n_inputs()];
+        inputs[first..given].copy_from_slice(theta);
+        let (known, constants) = inputs.split_at_mut(given);
+        Evaluator::new(&self.seldom).evaluate(known, constants);
+        inputs
     }
 
     /// Recorded function for many inputs at once, with the parameters `theta`.
     pub(crate) fn blocks(&self, theta: &[f64]) -> Evaluator<Lanes> {
-        let (first, given) = (self.places.first_parameter(), self.places.count());
-        let mut inputs = vec![0.0; self.often.n_inputs()];
-        inputs[first..given].copy_from_slice(theta);
-        let (known, constants) = inputs.split_at_mut(given);
-        Evaluator::new(&self.seldom).evaluate(known, constants);
+        let first = self.places.first_parameter();
         let mut evaluator: Evaluator<Lanes> = Evaluator::new(&self.often);
-        evaluator.hold(first, &inputs[first..]);
+        evaluator.hold(first, &self.inputs(theta)[first..]);
         evaluator
     }
 
     /// Machine code of a recorded function, compiled at the first call, or why there is none.
     pub(crate) fn native(&self) -> std::result::Result<&Native, String> {
+        self.compiled(&self.native, Native::compile)
+    }
+
+    /// Machine code of a recorded function for two motions at a time, likewise.
+    pub(crate) fn pairs(&self) -> std::result::Result<&Native, String> {
+        self.compiled(&self.pairs, Native::compile_pairs)
+    }
+
+    fn compiled<'a>(
+        &self,
+        kept: &'a OnceLock<std::result::Result<Native, String>>,
+        compile: impl Fn(&Program) -> std::result::Result<Native, Unavailable>,
+    ) -> std::result::Result<&'a Native, String> {
         if self.directions.is_some() {
             return Err(
                 "the derivatives are too many operations to compile; they are worked out directly instead".into()
             );
         }
-        let made = self.native.get_or_init(|| Native::compile(&self.often).map_err(|reason| reason.to_string()));
+        let made = kept.get_or_init(|| compile(&self.often).map_err(|reason| reason.to_string()));
         made.as_ref().map_err(Clone::clone)
     }
 }

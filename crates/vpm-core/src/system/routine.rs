@@ -73,11 +73,7 @@ struct Directions<S> {
 impl<S: Scalar> Routine<S> {
     /// Routine for a machine's function with the parameters `theta`.
     pub(crate) fn new(function: Arc<Function>, theta: &[S]) -> Self {
-        let (first, given) = (function.places.first_parameter(), function.places.count());
-        let mut inputs = vec![S::zero(); function.often.n_inputs()];
-        inputs[first..given].copy_from_slice(theta);
-        let (known, constants) = inputs.split_at_mut(given);
-        Evaluator::new(&function.seldom).evaluate(known, constants);
+        let (given, inputs) = (function.places.count(), function.inputs(theta));
         let (outputs, engine) = (vec![S::zero(); function.often.outputs().len()], Evaluator::new(&function.often));
         let directions = function.directions.as_ref().map(|program| {
             let values: Vec<f64> = inputs[..given].iter().map(Scalar::re).collect();

@@ -12,9 +12,9 @@ use cranelift_jit::{JITBuilder, JITModule};
 use cranelift_module::{FuncId, Linkage, Module, ModuleError, default_libcall_names};
 
 use super::super::operation::Function;
-use super::Unavailable;
 use super::emit::{Arrays, Emitter, Pool};
 use super::plan::Plan;
+use super::{Lanes, Unavailable};
 use crate::scalar::{ARGUMENTS, Search};
 
 type Called = extern "C" fn(f64) -> f64;
@@ -59,22 +59,28 @@ pub(super) struct Code {
     module: Mutex<Option<JITModule>>,
     pieces: Vec<Piece>,
     constants: Box<[f64]>,
+    /// Numbers of each array, lanes counted.
     pub inputs: usize,
     pub outputs: usize,
     pub work: usize,
 }
 
 impl Code {
-    /// Makes the code of `plan` for a program with so many `numbers`.
-    pub fn new(plan: &Plan, numbers: usize, [inputs, outputs]: [usize; 2]) -> Result<Self, Unavailable> {
+    /// Makes the code of `plan` for a program with so many `numbers`, of one lane or two.
+    pub fn new(plan: &Plan, numbers: usize, lengths: [usize; 2], lanes: Lanes) -> Result<Self, Unavailable> {
         let module = Mutex::new(Some(module()?));
         let (pieces, constants) = (Vec::new(), Box::default());
-        let mut code = Self { module, pieces, constants, inputs, outputs, work: plan.work };
-        code.fill(plan, numbers)?;
+        let [inputs, outputs, work] = [lengths[0], lengths[1], plan.work].map(|length| length * lanes as usize);
+        let mut code = Self { module, pieces, constants, inputs, outputs, work };
+        code.fill(plan, numbers, lanes)?;
         Ok(code)
     }
 
-    fn fill(&mut self, plan: &Plan, numbers: usize) -> Result<(), Unavailable> {
+    fn fill(&mut self, plan: &Plan, numbers: usize, lanes: Lanes) -> Result<(), Unavailable> {
+        let number = match lanes {
+            Lanes::One => types::F64,
+            Lanes::Two => types::F64X2,
+        };
         let slot = self.module.get_mut().unwrap_or_else(PoisonError::into_inner);
         let Some(module) = slot else { return Ok(()) };
         let (mut pool, mut registers) = (Pool::default(), vec![None; numbers]);
@@ -87,7 +93,7 @@ impl Code {
             let search = module.declare_func_in_func(search, &mut context.func);
             emit(&mut context, |code, arrays| {
                 let registers = &mut registers;
-                let mut emitter = Emitter { code, arrays, pool: &mut pool, registers, called: &calls, search };
+                let mut emitter = Emitter { code, arrays, pool: &mut pool, registers, called: &calls, search, number };
                 let sound = steps.iter().all(|step| emitter.step(step).is_some());
                 emitter.code.ins().return_(&[]);
                 sound
@@ -103,7 +109,7 @@ impl Code {
         // called by `run` alone, which borrows `self`, and so before `drop` frees its memory.
         let piece = |id| unsafe { std::mem::transmute::<*const u8, Piece>(module.get_finalized_function(id)) };
         self.pieces = pieces.into_iter().map(piece).collect();
-        self.constants = pool.values.into();
+        self.constants = pool.values.into_iter().flat_map(|value| std::iter::repeat_n(value, lanes as usize)).collect();
         Ok(())
     }
 
@@ -116,7 +122,7 @@ impl Code {
             // SAFETY: the code reads inputs below `self.inputs` and constants below their length, reads and writes outputs below
             // `self.outputs` and work below `self.work`: so `Plan` made it from a checked program, and these are the lengths of
             // the arrays. The borrows keep the arrays apart and alive. The code calls functions that cannot unwind only; `search` it
-            // hands the address of a static and the work array, which `Plan` begins with the arguments of a search, if there is one.
+            // hands the address of a static and, in the work array, the arguments of its lane, with which `Plan` begins it.
             unsafe { piece(inputs.as_ptr(), outputs.as_mut_ptr(), work.as_mut_ptr(), self.constants.as_ptr()) };
         }
         true

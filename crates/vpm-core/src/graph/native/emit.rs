@@ -9,7 +9,10 @@ use cranelift_codegen::ir::{FuncRef, InstBuilder, MemFlagsData, Type, Value, typ
 use super::super::operation::Function;
 use super::plan::{Place, Step};
 use super::task::{Kind, NONE};
-use crate::scalar::Search;
+use crate::scalar::{ARGUMENTS, Search};
+
+/// Memory that is there, on the boundaries of `f64`: vectors may begin at any of them.
+const NOTRAP: MemFlagsData = MemFlagsData::new().with_notrap();
 
 /// The constants of a program, each once.
 #[derive(Debug, Default)]
@@ -47,6 +50,8 @@ pub(super) struct Emitter<'a> {
     pub called: &'a [FuncRef],
     /// The function that calls a search.
     pub search: FuncRef,
+    /// The type of a number: it has one lane or two.
+    pub number: Type,
 }
 
 impl Emitter<'_> {
@@ -60,7 +65,8 @@ impl Emitter<'_> {
                     Place::Work(place) => (self.arrays.work, place),
                     _ => return None,
                 };
-                self.code.ins().store(MemFlagsData::trusted(), value, array, offset(place)?);
+                let place = self.offset(place)?;
+                self.code.ins().store(NOTRAP, value, array, place);
             }
             Step::Do { task, arguments } => {
                 let mut values = [Value::from_u32(0); 4];
@@ -86,13 +92,15 @@ impl Emitter<'_> {
             Place::Output(place) => (self.arrays.outputs, place),
             Place::Work(place) => (self.arrays.work, place),
         };
-        Some(self.code.ins().load(types::F64, MemFlagsData::trusted(), array, offset(place)?))
+        let place = self.offset(place)?;
+        Some(self.code.ins().load(self.number, NOTRAP, array, place))
     }
 
     /// Emits a constant, from memory: cheaper than to make it from its bits.
     pub fn constant(&mut self, value: f64) -> Option<Value> {
         let place = self.pool.place(value);
-        Some(self.code.ins().load(types::F64, MemFlagsData::trusted(), self.arrays.constants, offset(place)?))
+        let place = self.offset(place)?;
+        Some(self.code.ins().load(self.number, NOTRAP, self.arrays.constants, place))
     }
 
     fn compute(&mut self, kind: Kind, [a, b, c, d]: [Value; 4]) -> Option<[Value; 2]> {
@@ -115,25 +123,47 @@ impl Emitter<'_> {
             Kind::SineCosine => return self.sine_cosine(a),
             Kind::Call(function) => self.call(function, a)?,
             Kind::Select => self.select([a, b, c, d]),
-            Kind::Argument(place) => {
-                self.code.ins().store(MemFlagsData::trusted(), a, self.arrays.work, offset(place)?);
-                a
+            Kind::Argument(place) => self.by_lane(a, |own, value, lane| {
+                let place = argument(place, lane)?;
+                own.code.ins().store(NOTRAP, value, own.arrays.work, place);
+                Some(value)
+            })?,
+            Kind::Search(search) => {
+                let zero = self.constant(0.0)?;
+                self.by_lane(zero, |own, _, lane| own.search(search, lane))?
             }
-            Kind::Search(search) => self.search(search)?,
         };
         Some([value, value])
     }
 
-    fn call(&mut self, function: Function, argument: Value) -> Option<Value> {
-        let place = super::code::CALLED.iter().position(|&(known, _)| known == function)?;
-        let call = self.code.ins().call(*self.called.get(place)?, &[argument]);
-        self.code.func.dfg.inst_results(call).first().copied()
+    /// Emits what `each` makes of a number, lane by lane.
+    fn by_lane(&mut self, number: Value, each: impl Fn(&mut Self, Value, u8) -> Option<Value>) -> Option<Value> {
+        if self.number == types::F64 {
+            return each(self, number, 0);
+        }
+        let mut made = number;
+        for lane in 0..2 {
+            let value = self.code.ins().extractlane(number, lane);
+            let value = each(self, value, lane)?;
+            made = self.code.ins().insertlane(made, value, lane);
+        }
+        Some(made)
     }
 
-    fn search(&mut self, search: &'static Search) -> Option<Value> {
+    fn call(&mut self, function: Function, argument: Value) -> Option<Value> {
+        let place = super::code::CALLED.iter().position(|&(known, _)| known == function)?;
+        let called = *self.called.get(place)?;
+        self.by_lane(argument, |own, value, _| {
+            let call = own.code.ins().call(called, &[value]);
+            own.code.func.dfg.inst_results(call).first().copied()
+        })
+    }
+
+    fn search(&mut self, search: &'static Search, lane: u8) -> Option<Value> {
         let address = std::ptr::from_ref(search).expose_provenance();
         let address = self.code.ins().iconst(types::I64, i64::try_from(address).ok()?);
-        let call = self.code.ins().call(self.search, &[address, self.arrays.work]);
+        let arguments = self.code.ins().iadd_imm_s(self.arrays.work, i64::from(argument(0, lane)?));
+        let call = self.code.ins().call(self.search, &[address, arguments]);
         self.code.func.dfg.inst_results(call).first().copied()
     }
 
@@ -146,14 +176,19 @@ impl Emitter<'_> {
         self.narrow(chosen)
     }
 
-    /// Emits a number in the first lane of a vector.
+    /// Emits a number as a vector of two lanes, of which the last may be unused.
     pub fn wide(&mut self, value: Value) -> Value {
-        self.code.ins().scalar_to_vector(types::F64X2, value)
+        if self.number == types::F64 { self.code.ins().scalar_to_vector(types::F64X2, value) } else { value }
     }
 
-    /// Emits the first lane of a vector of numbers.
+    /// Emits the number that [`Self::wide`] made a vector of.
     pub fn narrow(&mut self, value: Value) -> Value {
-        self.code.ins().extractlane(value, 0)
+        if self.number == types::F64 { self.code.ins().extractlane(value, 0) } else { value }
+    }
+
+    /// Bytes from the beginning of an array to the number at this place.
+    fn offset(&self, place: u32) -> Option<i32> {
+        i32::try_from(place).ok()?.checked_mul(i32::try_from(self.number.bytes()).ok()?)
     }
 
     /// Emits the bits of `value` as the type `to`, without changing them.
@@ -162,6 +197,7 @@ impl Emitter<'_> {
     }
 }
 
-fn offset(place: u32) -> Option<i32> {
-    i32::try_from(place).ok()?.checked_mul(8)
+/// Bytes from the beginning of the work array to an argument of a search: those of one lane stand together.
+fn argument(place: u32, lane: u8) -> Option<i32> {
+    i32::try_from(usize::from(lane) * ARGUMENTS + place as usize).ok()?.checked_mul(8)
 }

@@ -47,6 +47,13 @@ pub enum Unavailable {
     },
 }
 
+/// How many numbers each number of a program stands for.
+#[derive(Clone, Copy)]
+enum Lanes {
+    One = 1,
+    Two = 2,
+}
+
 /// A program as machine code. Threads may share it, each with a [`Work`] of its own.
 pub struct Native {
     code: Code,
@@ -62,6 +69,19 @@ impl Native {
     /// # Errors
     /// [`Unavailable`], with the reason.
     pub fn compile(program: &Program) -> std::result::Result<Self, Unavailable> {
+        Self::of(program, Lanes::One)
+    }
+
+    /// Compiles `program` to native machine code that works it out twice at a time, in the two lanes of vectors: number
+    /// k of an array is entry 2 k for the one and entry 2 k + 1 for the other.
+    ///
+    /// # Errors
+    /// [`Unavailable`], with the reason.
+    pub fn compile_pairs(program: &Program) -> std::result::Result<Self, Unavailable> {
+        Self::of(program, Lanes::Two)
+    }
+
+    fn of(program: &Program, lanes: Lanes) -> std::result::Result<Self, Unavailable> {
         let size = program.size();
         if size > LARGEST {
             return Err(Unavailable::Size { size });
@@ -73,15 +93,15 @@ impl Native {
         }
         let plan = Plan::new(program, PIECE);
         let lengths = [program.n_inputs(), program.outputs().len()];
-        Ok(Self { code: Code::new(&plan, program.operations().len(), lengths)? })
+        Ok(Self { code: Code::new(&plan, program.operations().len(), lengths, lanes)? })
     }
 
-    /// Number of inputs of native code.
+    /// Number of inputs of native code, lanes counted.
     pub fn n_inputs(&self) -> usize {
         self.code.inputs
     }
 
-    /// Number of outputs of native code.
+    /// Number of outputs of native code, lanes counted.
     pub fn n_outputs(&self) -> usize {
         self.code.outputs
     }

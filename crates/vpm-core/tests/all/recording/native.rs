@@ -140,6 +140,22 @@ proptest! {
     }
 
     #[test]
+    fn pairs_are_bitwise_what_each_of_the_two_is_alone(seeds in seeds(1..400), seed in any::<u64>()) {
+        let (graph, made) = graph(&seeds, 9);
+        let outputs: Vec<Node> = made.iter().rev().step_by(7).copied().collect();
+        let program = Program::new(&graph, &outputs, INPUTS);
+        let (single, pairs) = (Native::compile(&program).unwrap(), Native::compile_pairs(&program).unwrap());
+        let mut random = Random::new(seed);
+        let [first, second] = [(); 2].map(|()| inputs(&mut random));
+        let both: Vec<f64> = first.iter().zip(&second).flat_map(|(&a, &b)| [a, b]).collect();
+        for (lane, inputs) in [first, second].iter().enumerate() {
+            for (pair, expected) in run(&pairs, &both).chunks_exact(2).zip(run(&single, inputs)) {
+                prop_assert!(same(pair[lane], expected), "{} against {expected}", pair[lane]);
+            }
+        }
+    }
+
+    #[test]
     fn fused_programs_stay_within_rounding(seeds in seeds(1..400), seed in any::<u64>()) {
         let (graph, made) = graph(&seeds, 9);
         let outputs: Vec<Node> = made.iter().rev().step_by(7).copied().collect();
