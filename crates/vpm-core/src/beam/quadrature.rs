@@ -1,6 +1,11 @@
 //! Gauss-Legendre quadrature.
 
+use std::borrow::Cow;
 use std::f64::consts::PI;
+use std::sync::OnceLock;
+
+/// Roots with slopes of Legendre polynomials of low degree, each made at its first use: a beam asks for them at all of its stations.
+static ROOTS: [OnceLock<Vec<(f64, f64)>>; 32] = [const { OnceLock::new() }; 32];
 
 /// One station of a quadrature rule.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,18 +22,22 @@ pub struct Station {
 /// (Press et al. 2007, "Numerical Recipes", section 4.6). Checked: exact for those polynomials to rounding.
 pub fn gauss(count: usize, begin: f64, end: f64) -> Vec<Station> {
     let (middle, half) = (0.5 * (begin + end), 0.5 * (end - begin));
-    (0..count)
-        .rev()
-        .map(|k| {
-            let (root, slope) = root(count, k);
-            Station { place: middle + half * root, weight: 2.0 * half / ((1.0 - root * root) * slope * slope) }
-        })
-        .collect()
+    let station = |&(root, slope): &(f64, f64)| Station {
+        place: middle + half * root,
+        weight: 2.0 * half / ((1.0 - root * root) * slope * slope),
+    };
+    roots(count).iter().map(station).collect()
 }
 
 /// Quadrature rule of `count` points on each piece between neighbouring `breaks`.
 pub fn composite(count: usize, breaks: &[f64]) -> Vec<Station> {
     breaks.windows(2).flat_map(|piece| gauss(count, piece[0], piece[1])).collect()
+}
+
+/// Quadrature points: roots of the Legendre polynomial of degree `n`, ascending, with the slopes there.
+fn roots(n: usize) -> Cow<'static, [(f64, f64)]> {
+    let made = || (0..n).rev().map(|k| root(n, k)).collect::<Vec<_>>();
+    ROOTS.get(n).map_or_else(|| Cow::Owned(made()), |kept| Cow::Borrowed(&kept.get_or_init(made)[..]))
 }
 
 /// Quadrature point: root `k` (descending) of the Legendre polynomial of degree `n`, with the slope there.
