@@ -26,12 +26,13 @@ sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "support"), str(ROOT /
 
 import markdown  # noqa: E402
 import vpm  # noqa: E402
-from reference_arm import MOTIONS, P, errors, log, tip_and_strains  # noqa: E402
+from reference_arm import P, errors, log, tip_and_strains  # noqa: E402
 from validation.machines import arm  # noqa: E402
 
 Array = NDArray[np.float64]
 Run = Callable[[], tuple[Array, Array]]
 
+MOTIONS = ("slow", "fast")
 #: Level of both links and step (s).
 OWN = (
     ("strain(3)", 12.5e-3),
