@@ -8,7 +8,7 @@ removes it later. So the filter of the states may be as fast as their noise allo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -118,7 +118,7 @@ def recalibrated_of(
     recalibrated, stopped = judged_anyhow(model, (*free, *transitions), alone, bounds)
     unseen = {name for one in recalibrated.fit.unseen for name in one.names}
     if ranked is not None and unseen:
-        start = recalibrated.model.with_parameters({name: ranked.parameters[name].value for name in unseen})
+        start = with_unseen(recalibrated.model, ranked, unseen)
         recalibrated, stopped = judged_anyhow(start, (*free, *transitions), alone, bounds)
     if stopped:
         notes.append(f"the recalibrated model could not simulate the validation records: {stopped}")
@@ -128,6 +128,16 @@ def recalibrated_of(
     notes.extend(changed_between(fit.names, fit.values, fit.residual, fit.jacobian, blocks, units, blind, Checks()))
     notes.extend(moved_far(model, recalibrated))
     return recalibrated
+
+
+def with_unseen(recalibrated: Model, ranked: Model, unseen: Collection[str]) -> Model:
+    """Prepared model with what the residual does not show as in the ranked one, and other moments of the same bodies.
+
+    A residual that shows one moment of a thin rod says nothing of the other, which has to be as large.
+    """
+    bodies = {f"{name.rpartition('.inertia.')[0]}.inertia." for name in unseen if ".inertia." in name}
+    moments = {name for name in recalibrated.parameters if name.startswith(tuple(bodies))}
+    return recalibrated.with_parameters({name: ranked.parameters[name].value for name in {*unseen, *moments}})
 
 
 def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[float, float]]:
