@@ -15,7 +15,7 @@ import vpm
 from second_suite import arm
 from sledge import GAIN, MASS, OIL, SLEDGE, pushed
 from vpm.catalogue import EFFECTS
-from vpm.catalogue.kinds import in_words
+from vpm.catalogue.kinds import Side, in_words
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import candidates
 from vpm.experiment import Experiment
@@ -681,3 +681,17 @@ def test_parameters_that_only_show_together_count_as_one(seed: int) -> None:
     errors, column = random.standard_normal(400), 1e12 * random.standard_normal((400, 1))
     alone = counted_too_often(errors, column, 1, 20)
     assert counted_too_often(errors, np.hstack([column, column]), 1, 20) == pytest.approx(alone, rel=1e-6)
+
+
+def test_an_effect_on_both_sides_of_a_joint_goes_from_the_side_that_is_said() -> None:
+    model = Model.from_toml(SLEDGE).with_effect("joint_compliance", "way", stiffness=1e4, inertia=1.0)
+    key = ("coulomb_friction", "way")
+    for side in ("link", "motor"):
+        model = model.with_effect(*key, side=side, coulomb=1.0)
+    structure = replace(structure_of(model), effects=(key, key))
+    assert [one.side for one in structure.added] == ["link", "motor"]
+    pairs: list[tuple[Side, Side]] = [("link", "motor"), ("motor", "link")]
+    for gone, stays in pairs:
+        left = structure.without(key, gone)
+        assert (left.effects, [one.side for one in left.added]) == ((key,), [stays])
+    assert structure.without(key).side(key) == "link"

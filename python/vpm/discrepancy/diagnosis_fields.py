@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from vpm.catalogue import EFFECTS
-from vpm.catalogue.kinds import Side
+from vpm.catalogue.kinds import Side, in_words
 from vpm.compare import compare
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, in_time, is_clear, weaker
 from vpm.discrepancy.diagnosis import (
@@ -145,7 +145,7 @@ def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
     return AcceptedEffect(
         candidate.effect.name,
         candidate.site,
-        _sentence(candidate.key, estimates),
+        _sentence(candidate.key, entry.side, estimates),
         estimates,
         entry.trial.validation.relative,
         entry.trial.validation.score,
@@ -164,9 +164,9 @@ def _estimates(model: Model, key: Key, side: Side, std: Callable[[str], float]) 
     )
 
 
-def _sentence(key: Key, estimates: Sequence[EffectParameterEstimate]) -> str:
+def _sentence(key: Key, side: Side, estimates: Sequence[EffectParameterEstimate]) -> str:
     texts = {one.name: f"{one.value:.4g} {one.unit}" for one in estimates}
-    return EFFECTS[key[0]].sentence.format(at=key[1], **texts)
+    return EFFECTS[key[0]].sentence.format(at=in_words(key[1], side), **texts)
 
 
 def classes(accepted: Sequence[Accepted], ambiguous: Sequence[Rivals]) -> tuple[tuple[str, ...], ...]:
@@ -238,7 +238,7 @@ def _effect(one: Ranked, model: Model) -> AcceptedEffect:
     return AcceptedEffect(
         one.effect,
         one.site,
-        _sentence(one.key, estimates),
+        _sentence(one.key, one.side, estimates),
         estimates,
         np.nan,
         np.nan,

@@ -144,16 +144,18 @@ def staged(
     """
     stages, accepted = [Stage("recalibrated", "", "", recalibrated)], list[Accepted]()
     outside: dict[Key, str] = {}
+    lost: list[Ranked] = []
     interrupted = ranking.interrupted
     try:
         for place, one in enumerate(ranking.effects):
-            gone = [other for other in ranking.effects if other.key in outside] + list(ranking.effects[place + 1 :])
+            gone = [*lost, *ranking.effects[place + 1 :]]
             try:
                 trial = beside(stages[-1].judged, _without(ranking.model, gone), one)
             except NoResidualError:
                 raise
             except VpmError as error:
                 outside[one.key] = f"it {_removes(one)}, but no residual can be computed: {error}"
+                lost.append(one)
                 continue
             accepted.append(Accepted(trial, one.rivals, one.evidence, one.probability, one.side, one.class_probability))
             stages.append(Stage("added", *one.key, trial.judged))

@@ -146,7 +146,7 @@ def _of_named(
     away: Mapping[str, float],
 ) -> tuple[str, str, bool]:
     """Verdict on named effects, of which ``away`` are parameters that they drive away from the model file."""
-    names, worst = ", then ".join(e.trial.probe.candidate.label for e in found.accepted), errors.worst
+    names, worst = ", then ".join(e.label for e in found.accepted), errors.worst
     numbers = f"Error on validation data: {_stages(worst)}, {_percent(worst.after, worst)} after."
     if away:
         name, times = next(iter(away.items()))

@@ -244,7 +244,7 @@ class Look:
     def _added(self, before: Array) -> Array:
         """Error power in a look that added inexact effects remove of the error ``before`` them."""
         structure = self.fitted.structure
-        added = [structure.model.effect(*key, structure.side(key)) for key in structure.effects]
+        added = structure.added
         approximate = [one for one in added if not one.type.exact]
         power = self._beside(before)
         return power if len(approximate) == len(added) else np.minimum(power, self._removed(approximate))
@@ -254,8 +254,8 @@ class Look:
 
         What is left without a play or a spring that holds a load, and is not fitted anew, may be anything.
         """
-        added = self.fitted.structure.effects
-        given = [one for one in effects if (one.name, one.at) not in added]
+        added = {(one.name, one.at, one.side) for one in self.fitted.structure.added}
+        given = [one for one in effects if (one.name, one.at, one.side) not in added]
         power = self._removed(effects)
         return power if len(given) == len(effects) else np.minimum(power, self._removed(given) + self.added)
 

@@ -233,21 +233,34 @@ class Structure:
             renamed.update({name: new.parameter_names[short] for short, name in old.parameter_names.items()})
         return self.carried(model, renamed)
 
-    def side(self, key: Key) -> Side:
-        """Side of its joint on which an effect of a structure is."""
-        return next(effect.side for effect in reversed(self.model.effects) if (effect.name, effect.at) == key)
+    @property
+    def added(self) -> tuple[Effect, ...]:
+        """Effects that were added, in order; one may be there twice, on both sides of a joint that is split."""
+        return tuple(self._alike(key)[-self.effects[place:].count(key)] for place, key in enumerate(self.effects))
 
-    def without(self, key: Key) -> Structure:
+    def side(self, key: Key) -> Side:
+        """Side of its joint on which an effect of a structure is; the last one that came, if it is on both."""
+        return self._alike(key)[-1].side
+
+    def _alike(self, key: Key) -> list[Effect]:
+        return [effect for effect in self.model.effects if (effect.name, effect.at) == key]
+
+    def without(self, key: Key, side: Side | None = None) -> Structure:
         """Structure without one of its effects.
+
+        - ``side``: of its joint, where the effect is on both; otherwise it goes where it is
 
         Raises
         ------
         ModelError
             Another effect rests on it.
         """
-        rest = self.carried(self.model.without_effect(*key, self.side(key)))
-        left = {(effect.name, effect.at) for effect in rest.model.effects}
-        return replace(rest, effects=tuple(one for one in self.effects if one != key and one in left))
+        sides = [effect.side for effect in self._alike(key)]
+        gone = side if side in sides else self.side(key)
+        rest = self.carried(self.model.without_effect(*key, gone))
+        left = {(effect.name, effect.at, effect.side) for effect in rest.model.effects}
+        there = ((one.name, one.at, one.side) for one in self.added)
+        return replace(rest, effects=tuple((name, at) for name, at, own in there if (name, at, own) in left))
 
     def with_last_of(self, other: Structure) -> Structure:
         """Structure with the last effect of another structure added.

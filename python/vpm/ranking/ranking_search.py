@@ -5,10 +5,12 @@ from __future__ import annotations
 import contextlib
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import TypeAlias
 
 import numpy as np
 
-from vpm.discrepancy.screening.candidates import Key
+from vpm.catalogue.kinds import Side
+from vpm.model import Effect
 from vpm.numbers import rough_percent
 from vpm.ranking.choice_by_evidence import evidence, weighed
 from vpm.ranking.disturbed_records import disturbed
@@ -26,6 +28,8 @@ from vpm.ranking.tried_effect import Trial
 from vpm.ranking.validation_errors import gaps
 from vpm.simulate.setup import AUTOMATIC
 
+#: Effect, site, and side of a joint that is split.
+_Place: TypeAlias = tuple[str, str, Side]
 #: What commands do between samples that were read, and not sent.
 SMOOTH = ("first_order", "cubic")
 
@@ -39,39 +43,40 @@ class Search(Trials):
         self.draw_pressures()
         looks = self.looks(self.start)
         self.first = {look.fitted.tracker.band: look for look in looks}
-        named: dict[Key, Ranked] = {}
+        named: dict[_Place, Ranked] = {}
         rounds: list[tuple[Ranked, ...]] = []
         interrupted = False
-        before: list[frozenset[Key]] = []
+        before: list[frozenset[_Place]] = []
         try:
             looks, rounds = brought_back(self, looks)
-            named = {ranked.key: ranked for ranked, *_ in rounds}
+            named = {_place(ranked): ranked for ranked, *_ in rounds}
             for _ in range(2 * self.settings.effects):  # effects may replace each other, but not for ever
-                present = looks[0].fitted.structure.effects
-                if len(present) == self.settings.effects or frozenset(present) in before:
+                present, there = looks[0].fitted.structure.effects, looks[0].fitted.structure.added
+                places = frozenset((one.name, one.at, one.side) for one in there)
+                if len(present) == self.settings.effects or places in before:
                     break
                 best, tried = self._round(looks)
                 if smooth := self._held(looks, best):
                     looks = smooth
                     continue
-                before.append(frozenset(present))
+                before.append(places)
                 looks, together = several_at_once(self, looks, best, tried)
                 rounds.append(self.listed(None if together else best, tried))
                 if together:
                     rounds += together
-                    named |= {ranked.key: ranked for ranked, *_ in together}
+                    named |= {_place(ranked): ranked for ranked, *_ in together}
                     continue
                 if best is None:
                     break
-                named[best.key] = rounds[-1][0]
+                named[_place(rounds[-1][0])] = rounds[-1][0]
                 was, looks = looks, [self.look(best.fitted)]  # known, should the next fits be interrupted
                 self.say(f"{best.label} {best.removing}")
                 looks = self.all_looks(looks[0])
-                for key in present:
-                    looks, several = self._reconsidered(key, looks)
+                for one in there:
+                    looks, several = self._reconsidered(one, looks)
                     if several:
                         rounds.append(several)
-                        named[several[0].key] = several[0]
+                        named[_place(several[0])] = several[0]
                 if _is_worse(looks, was):
                     self.say(f"{best.label} does not do the work of what it makes needless")
                     looks = was
@@ -87,14 +92,19 @@ class Search(Trials):
             return replace(ranking, interrupted=True)
 
     def _ranking(
-        self, looks: Sequence[Look], named: Mapping[Key, Ranked], rounds: list[tuple[Ranked, ...]], *, interrupted: bool
+        self,
+        looks: Sequence[Look],
+        named: Mapping[_Place, Ranked],
+        rounds: list[tuple[Ranked, ...]],
+        *,
+        interrupted: bool,
     ) -> Ranking:
         """Ranking of a search, with the values under the tracker by which all of them predict the records best."""
         best = max(looks, key=lambda look: self._foresight(look.fitted.structure, looks))
         found = best.fitted.structure
         recalibrated = next(iter(self.first.values())).fitted.structure.repaired
         hold = self.fitter.tracked.setup.course
-        effects = tuple(replace(named[key], side=found.side(key)) for key in found.effects)
+        effects = tuple(_named(named, one) for one in found.added)
         return Ranking(effects, tuple(rounds), found.repaired, recalibrated, {}, interrupted, hold, self._notes(best))
 
     def _foresight(self, structure: Structure, looks: Sequence[Look]) -> float:
@@ -237,16 +247,17 @@ class Search(Trials):
         self.say(f"no longer needed: {last.label}")
         return self.all_looks(bare)
 
-    def _reconsidered(self, key: Key, looks: list[Look]) -> tuple[list[Look], tuple[Ranked, ...]]:
+    def _reconsidered(self, one: Effect, looks: list[Look]) -> tuple[list[Look], tuple[Ranked, ...]]:
         """Search with an earlier effect dropped or replaced by a better one.
 
         What was found before the others came in was fitted to what they leave, too. A fast tracker hides what a slow
         one shows: an effect that counts under any of them stays.
         """
         bare: list[Look] = []
+        key = (one.name, one.at)
         for look in looks:
             try:
-                bare.append(self.without(key, look))
+                bare.append(self.without(key, look, one.side))
             except ASTRAY:  # it runs away without, or another one rests on it
                 return looks, ()
             now = Trial.of(look.fitted, bare[-1], key)
@@ -266,6 +277,17 @@ class Search(Trials):
             return looks, ()
         self.say(f"{ordered[0].label} does better than {now.label}")
         return self.all_looks(self.look(ordered[0].fitted)), self.listed(ordered[0], ordered)
+
+
+def _place(ranked: Ranked) -> _Place:
+    return *ranked.key, ranked.side
+
+
+def _named(named: Mapping[_Place, Ranked], effect: Effect) -> Ranked:
+    """Ranked effect of a searched structure; what split its joint may have taken it to another side since."""
+    own = named.get((effect.name, effect.at, effect.side))
+    same = [one for one in named.values() if one.key == (effect.name, effect.at)]
+    return replace(own or same[-1], side=effect.side)
 
 
 def _is_worse(now: Sequence[Look], before: Sequence[Look]) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from vpm.catalogue.kinds import Side
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import Key
 from vpm.errors import VpmError
@@ -148,9 +149,9 @@ class Trials:
         view = View(self.fitter.noise_of(structure, tracker))
         return self.fitter.finished(self.fitter.fitted(structure, tracker, view), view)
 
-    def without(self, key: Key, look: Look) -> Look:
+    def without(self, key: Key, look: Look, side: Side | None = None) -> Look:
         """Searched structure without one effect, fitted again under its tracker."""
-        return self.look(self.fitted(look.fitted.structure.without(key), look.fitted.tracker))
+        return self.look(self.fitted(look.fitted.structure.without(key, side), look.fitted.tracker))
 
     def tried(self, look: Look, begun: Look, names: Sequence[str] | None = None) -> list[Trial]:
         """Most promising effects of a search round, fitted under one tracker from the structure that was ``begun``."""

@@ -14,7 +14,7 @@ from functools import partial
 import numpy as np
 
 from vpm.catalogue import EFFECTS, EffectType
-from vpm.catalogue.kinds import Side
+from vpm.catalogue.kinds import Side, in_words
 from vpm.discrepancy.confirmation.confirmation import Data, Trial
 from vpm.discrepancy.screening.candidates import Candidate, Key
 from vpm.discrepancy.screening.compliance_and_stop_start import coupled
@@ -50,8 +50,8 @@ class Accepted:
 
     @property
     def label(self) -> str:
-        """Label of an accepted candidate: ``effect at site``."""
-        return self.trial.probe.candidate.label
+        """Label of an accepted candidate: ``effect at site``, with its side behind what gives way."""
+        return in_words(self.trial.probe.candidate.label, self.side)
 
     @property
     def ranked(self) -> bool:
