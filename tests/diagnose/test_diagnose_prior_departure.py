@@ -102,3 +102,31 @@ def test_a_file_that_is_wrong_beside_a_missing_effect_is_told() -> None:
     why = vpm.diagnose(model, [record(1)], [record(2)], names="search", effects=["bias_force"], check=False, workers=1)
     assert [effect.name for effect in why.effects] == ["bias_force"]
     assert f"But {MASS} is 10.0 times its stated uncertainty away from the model file" in why.summary
+
+
+def test_a_load_that_spreads_over_mass_and_centre_is_told_in_the_summary() -> None:
+    """Torques show mass times centre and the inertia about the axis: three parameters take a load up, none for sure."""
+    arm = vpm.Model.from_toml("""
+name = "arm"
+gravity = [0.0, 0.0, -9.81]
+bodies.arm.mass = { value = 4.0, uncertainty = 0.4 }
+bodies.arm.center_of_mass = [{ value = 0.2, uncertainty = 0.02 }, 0.0, 0.0]
+bodies.arm.inertia = [0.05, { value = 0.05, uncertainty = 0.01 }, 0.05, 0.0, 0.0, 0.0]
+joints.axis = { type = "revolute", parent = "world", child = "arm", axis = [0, -1, 0] }
+actuators.drive = { joint = "axis", gain = 1.0, command_unit = "N m" }
+""")
+    time, load, lever = np.arange(1500) / 300.0, 2.0, 0.4
+    speeds = np.array([1.1, 2.3, 4.9])
+
+    def record(seed: int) -> vpm.Experiment:
+        random = np.random.default_rng(seed)
+        phases = speeds * time[:, None] + random.uniform(0.0, 6.0, 3)
+        angle, acceleration = 0.5 * np.sum(np.sin(phases), axis=1), -0.5 * np.sum(np.sin(phases) * speeds**2, axis=1)
+        inertia, moment = 0.05 + 4.0 * 0.2**2 + load * lever**2, 4.0 * 0.2 + load * lever
+        torque = inertia * acceleration + 9.81 * moment * np.cos(angle)
+        angle = angle + random.normal(0.0, 1e-5, len(time))
+        return vpm.Experiment.from_arrays(time, {"axis.position": angle, "drive.command": torque}, model=arm)
+
+    why = vpm.diagnose(arm, [record(1)], [record(2)], names="search", effects=["bias_force"], check=False, workers=1)
+    assert why.verdict == "parameters_only"
+    assert "at the most probable values that explain the records" in why.summary

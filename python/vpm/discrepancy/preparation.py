@@ -227,8 +227,7 @@ def moved_far(model: Model, recalibrated: Judged) -> list[str]:
         f"{times:.1f} times its stated uncertainty"
         for name, times in ruled_out(model, recalibrated).items()
     ]
-    together = {name: away for name, away in _least_departures(model, recalibrated).items() if away > FAR}
-    if together:
+    if together := ruled_out_together(model, recalibrated):
         notes.append(
             f"the records show {', '.join(together)} only together; no values that explain them lie nearer to the "
             f"model file than {max(together.values()):.1f} times their stated uncertainties: question the file, or "
@@ -249,6 +248,15 @@ def ruled_out(model: Model, recalibrated: Judged) -> dict[str, float]:
         if away - NORMAL_95 * float(std) > FAR * spread:
             found[name] = away / spread
     return found
+
+
+def ruled_out_together(model: Model, recalibrated: Judged) -> dict[str, float]:
+    """Stated uncertainties by which all values of parameters that explain the records are far from their prior.
+
+    Records may show parameters only together, and no one of them for sure: a load that was taken along is spread over
+    mass, centre and inertia of what carries it.
+    """
+    return {name: away for name, away in _least_departures(model, recalibrated).items() if away > FAR}
 
 
 def _least_departures(model: Model, recalibrated: Judged) -> dict[str, float]:

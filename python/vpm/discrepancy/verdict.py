@@ -11,7 +11,7 @@ from scipy.special import ndtri
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
 from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RefusedEffect
 from vpm.discrepancy.noise.noise_floor import Structure
-from vpm.discrepancy.preparation import ruled_out, stated
+from vpm.discrepancy.preparation import ruled_out, ruled_out_together, stated
 from vpm.discrepancy.remainder.remainder import Remainder
 from vpm.discrepancy.screening.candidates import joint_at
 from vpm.discrepancy.search.candidate_choice import Accepted
@@ -276,15 +276,15 @@ def _unheard(gap: Mapping[str, ChannelGap], model: Model) -> str:
 
 def _doubt(nominal: Model, recalibrated: Judged, *final: Judged) -> str:
     """Sentence of the verdict on the parameter farthest from the model file, with effects and without, or ""."""
-    before, *after = (ruled_out(nominal, one) for one in (recalibrated, *final))
-    away = {name: times for name, times in before.items() if all(name in one for one in after)}
-    if not away:
-        return ""
-    name = max(away, key=lambda one: away[one])
-    return (
-        f" But {name} is {away[name]:.1f} times its stated uncertainty away from the model file: the file is wrong "
-        "there, or what is missing acts as that parameter does."
-    )
+    for far, where in ((ruled_out, ""), (ruled_out_together, " at the most probable values that explain the records")):
+        before, *after = (far(nominal, one) for one in (recalibrated, *final))
+        if away := {name: times for name, times in before.items() if all(name in one for one in after)}:
+            name = max(away, key=lambda one: away[one])
+            return (
+                f" But {name} is {away[name]:.1f} times its stated uncertainty away from the model file{where}: the file "
+                "is wrong there, or what is missing acts as that parameter does."
+            )
+    return ""
 
 
 def _is_better(nominal: Judged, recalibrated: Judged, data: Data) -> bool:
