@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from vpm import Model
+from vpm import Experiment, Model, identify
 from vpm.identify.moments import beside_known, free_moments, on_the_border, real_bodies, to_the_border
 
 BODY = """
@@ -54,3 +54,21 @@ def test_a_moment_is_named_that_no_measurement_tells_from_the_sum_of_the_others(
         told.append([names for names, _ in on_the_border(model, list(model.adjustable))])
     (name,) = model.adjustable
     assert told == [[[name]], [[name]], []]
+
+
+@pytest.mark.parametrize(("highest", "found"), [(0.2, 0.06), (0.05, 0.05)])
+def test_bounds_of_two_moments_do_not_hold_back_what_a_slender_body_has(highest: float, found: float) -> None:
+    """The motion shows one moment across a rod; the other one, which nothing shows, has to be as large."""
+    across = f"{{ value = 0.035, uncertainty = 0.01, min = 1e-3, max = {highest} }}"
+    model = Model.from_toml(BODY % (across, 0.002, across) + 'actuators.drive = { joint = "hinge", gain = 1.0 }')
+    time, speeds = np.arange(1500) / 300.0, np.array([3.1, 5.3, 7.9])
+    phases = speeds * time[:, None]
+    channels = {
+        "hinge.position": np.sum(np.sin(phases), axis=1) + np.random.default_rng(1).normal(0.0, 1e-5, len(time)),
+        "drive.command": -0.06 * np.sum(np.sin(phases) * speeds**2, axis=1),
+    }
+    fit = identify(model, Experiment.from_arrays(time, channels, model=model))
+    values = {name: fit.model.parameters[f"arm.inertia.{name}"].value for name in ("xx", "zz")}
+    assert values["zz"] == pytest.approx(found, rel=1e-3)
+    assert abs(values["zz"] - values["xx"]) <= 0.002 * (1.0 + 1e-6)
+    assert ("arm.inertia.zz" in fit.at_bounds) == (found == highest)

@@ -281,8 +281,8 @@ def _doubt(nominal: Model, recalibrated: Judged, *final: Judged) -> str:
         if away := {name: times for name, times in before.items() if all(name in one for one in after)}:
             name = max(away, key=lambda one: away[one])
             return (
-                f" But {name} is {away[name]:.1f} times its stated uncertainty away from the model file{where}: the file "
-                "is wrong there, or what is missing acts as that parameter does."
+                f" But {name} is {away[name]:.1f} times its stated uncertainty away from the model file{where}: "
+                "the file is wrong there, or what is missing acts as that parameter does."
             )
     return ""
 

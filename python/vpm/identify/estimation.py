@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.optimize import least_squares, lsq_linear
@@ -106,17 +106,36 @@ def estimate(
     KeyboardInterrupt
         Ctrl-C before the start was evaluated; later it ends the fit with the best values until then.
     """
-    columns = [model.index(name) for name in free]
     box = limits(model, free, bounds or {})
-    frame, low, high = real_bodies(model, free, *box)
-    counter = _Counter(model, data, columns, progress, worth, frame)
-    first = start = np.clip(frame.at(model.theta[columns]), low, high)
+
+    def among(bodies: tuple[Coordinates, Array, Array]) -> Estimate:
+        frame, *ends = bodies
+        counter = _Counter(model, data, [model.index(name) for name in free], progress, worth, frame)
+        found = _started(counter, (ends[0], ends[1]), tolerance, most_evaluations, linear_only, nearest)
+        return replace(found, at_bounds=touching(free, found.values, *box, near=NEAR_ZERO))
+
+    found = among(real_bodies(model, free, *box))
+    inside = np.clip(found.values, *box)
+    if np.allclose(found.values, inside, rtol=TOUCHING, atol=NEAR_ZERO):
+        return replace(found, values=inside)
+    if found.interrupted:
+        return replace(standing(model, data, free), interrupted=True)
+    return among(real_bodies(model, free, *box, inside=True))
+
+
+def _started(
+    counter: _Counter, box: tuple[Array, Array], tolerance: float, most: int, linear_only: bool, nearest: bool
+) -> Estimate:
+    """Estimate from the values of the model, in a box of coordinates."""
+    model, data, free = counter.model, counter.data, counter.names
+    frame, (low, high) = counter.frame, box
+    first = start = np.clip(frame.at(model.theta[counter.columns]), low, high)
     interrupted = early = False
     try:
-        if columns:
+        if counter.columns:
             start = _linear_step(counter, start, low, high)
             if not linear_only:
-                start = _refine(counter, start, low, high, tolerance, most_evaluations, descends=not nearest)
+                start = _refine(counter, start, low, high, tolerance, most, descends=not nearest)
         start = _nearest(counter, start, first, low, high) if nearest else start
         residual, jacobian = counter(start)
         # Derivatives may leave all bounds where the motion itself does not; the best with derivatives stands then.
@@ -131,10 +150,7 @@ def estimate(
     values, jacobian = frame.parameters(start), frame.by_parameters(jacobian)
     unseen = unseen_combinations(jacobian, free)
     covariance = _covariance(data, residual, jacobian, unseen, free)
-    at_bounds = touching(free, values, *box, near=NEAR_ZERO)
-    return Estimate(
-        tuple(free), values, residual, jacobian, covariance, unseen, at_bounds, counter.count, interrupted, early
-    )
+    return Estimate(tuple(free), values, residual, jacobian, covariance, unseen, (), counter.count, interrupted, early)
 
 
 def standing(model: Model, data: Problem, free: Sequence[str]) -> Estimate:

@@ -54,13 +54,16 @@ class Coordinates:
         return jacobian if self.matrix is None else np.asarray(np.linalg.solve(self.matrix.T, jacobian.T).T)
 
 
-def real_bodies(model: Model, free: Sequence[str], low: Array, high: Array) -> tuple[Coordinates, Array, Array]:
+def real_bodies(
+    model: Model, free: Sequence[str], low: Array, high: Array, *, inside: bool = False
+) -> tuple[Coordinates, Array, Array]:
     """Coordinates of free parameters in a box, with those of moments of inertia inside what bodies can have.
 
     ``low``, ``high``: shape (p,), bounds of the parameters.
 
-    - result ``low``, ``high``: shape (p,), bounds of the coordinates. Moments that have bounds of their own, or
-      products of inertia beside them, stay coordinates.
+    - ``inside``: bounds that moments have of their own hold in all of the box; else some of its corners lie beyond them
+    - result ``low``, ``high``: shape (p,), bounds of the coordinates. Moments with products of inertia beside them stay
+      coordinates.
     """
     matrix, low, high = np.eye(len(free)), low.copy(), high.copy()
     for names in free_moments(model, free):
@@ -68,16 +71,30 @@ def real_bodies(model: Model, free: Sequence[str], low: Array, high: Array) -> t
         if ends := beside_known(model, names):
             low[mine], high[mine] = np.maximum(low[mine], ends[0]), np.minimum(high[mine], ends[1])
             continue
-        if any(low[k] > 0.0 or np.isfinite(high[k]) for k in mine):
-            continue
         if len(mine) == 3:
+            if inside and any(low[k] > 0.0 or np.isfinite(high[k]) for k in mine):
+                continue
             matrix[np.ix_(mine, mine)] = 1.0 - np.eye(3)
-            low[mine], high[mine] = 0.0, np.inf
+            low[mine], high[mine] = 0.0, [min(high[k] for k in mine if k != own) for own in mine]
         elif len(mine) == 2:
             (third,) = _known(model, names)
-            matrix[np.ix_(mine, mine)] = [[0.5, 0.5], [0.5, -0.5]]
-            low[mine], high[mine] = [third, -third], [np.inf, third]
+            least, most = _sum_and_difference(third, low[mine], high[mine], inside=inside)
+            if np.all(least <= most):
+                matrix[np.ix_(mine, mine)] = [[0.5, 0.5], [0.5, -0.5]]
+                low[mine], high[mine] = least, most
     return Coordinates(None if np.array_equal(matrix, np.eye(len(free))) else matrix), low, high
+
+
+def _sum_and_difference(third: float, low: Array, high: Array, *, inside: bool) -> tuple[Array, Array]:
+    """Bounds (2,) of sum and difference of two moments of inertia beside a known third.
+
+    - ``inside``: all moments of that box are within their own bounds; else the box just holds all that are
+    """
+    least, most = max(-third, low[0] - high[1]), min(third, high[0] - low[1])
+    sums = float(np.sum(low)), float(np.sum(high))
+    if inside:
+        sums = max(2.0 * low[0] - least, 2.0 * low[1] + most), min(2.0 * high[0] - most, 2.0 * high[1] + least)
+    return np.array([max(third, sums[0]), least]), np.array([sums[1], most])
 
 
 def free_moments(model: Model, free: Collection[str]) -> list[list[str]]:
