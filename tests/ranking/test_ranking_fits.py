@@ -21,7 +21,7 @@ from vpm.discrepancy.screening.candidates import candidates
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
-from vpm.ranking.fit import Fitter, View, by_secant, counted_too_often
+from vpm.ranking.fit import Fitter, View, bounded_step, by_secant, counted_too_often
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
 from vpm.ranking.model_structure import Structure
@@ -695,3 +695,24 @@ def test_an_effect_on_both_sides_of_a_joint_goes_from_the_side_that_is_said() ->
         left = structure.without(key, gone)
         assert (left.effects, [one.side for one in left.added]) == ((key,), [stays])
     assert structure.without(key).side(key) == "link"
+
+
+@pytest.mark.parametrize("along", [0.0, 2e-3])
+def test_the_moments_of_a_slender_body_move_together(along: float) -> None:
+    """Records show one moment across; the other one differs from it by no more than the moment along the body."""
+    across = "{ value = 0.035, uncertainty = 0.01 }"
+    model = Model.from_toml(f"""
+name = "shank"
+gravity = [0.0, 0.0, 0.0]
+bodies.shank = {{ mass = 3.0, inertia = [{across}, {across}, {along}, 0.0, 0.0, 0.0] }}
+joints.knee = {{ type = "revolute", parent = "world", child = "shank", axis = [1, 0, 0] }}
+""")
+    names = ("shank.inertia.xx", "shank.inertia.yy")
+    structure = Structure(model, model.theta.copy(), dict.fromkeys(names, Prior(0.035, 0.01, 0.0, np.inf)))
+    goal, shown = 0.055, 1e4 * np.linspace(-1.0, 1.0, 50)
+    for _ in range(3):
+        slopes = np.column_stack([shown, np.zeros(50)]) * structure.slopes
+        errors = shown * (structure.values[names[0]] - goal)
+        structure = structure.moved(bounded_step(structure, errors, slopes, np.inf, variance=1.0))
+    assert structure.values[names[0]] == pytest.approx(goal, rel=1e-4)
+    assert structure.values[names[1]] == pytest.approx(goal - along, rel=1e-4)

@@ -22,6 +22,8 @@ from vpm.ranking.tracked_records import NOTHING, By, TrackedRecords, Tracker
 RUNAWAY = 1e100
 #: What rounding leaves of the diagonal of scaled normal equations.
 ROUNDED = 1e-12
+#: Weight of borders that a step has to keep beside what it wants to reach, and deviations of priors short of them.
+FIRM, HAIR = 1e6, 1e-6
 #: What is raised of structures that the records contradict, that cannot be computed, or whose bodies are not real.
 ASTRAY = (ValueError, ArithmeticError)
 
@@ -356,9 +358,10 @@ def by_secant(slopes: Array, change: Array, move: Array) -> Array:
 def bounded_step(
     structure: Structure, errors: Array, slopes: Array, reach: float, variance: float | None = None
 ) -> Array:
-    """Gauss-Newton step of a fit in deviations of the priors, within bounds (bounded least squares).
+    """Gauss-Newton step of a fit in deviations of the priors, within bounds and what bodies can have.
 
-    Errors have the ``variance`` that is given, or else their own.
+    Errors have the ``variance`` that is given, or else their own. Where a moment of inertia that records show would
+    leave those of its body behind, they come along: else it stops at what they allow.
     """
     z, scale = structure.standard, max(float(np.mean(errors**2)) if variance is None else variance, 1e-300)
     far = np.isin(np.arange(len(z)), [place for _, place in structure.leaning])
@@ -373,4 +376,14 @@ def bounded_step(
     target = np.linalg.solve(root.T, pull)
     low = np.where(far, -np.inf, np.minimum(np.maximum(structure.ends[:, 0] - z, -reach), -1e-12)) / sizes
     high = np.where(far, np.inf, np.maximum(np.minimum(structure.ends[:, 1] - z, reach), 1e-12)) / sizes
-    return np.asarray(lsq_linear(root, target, (low, high), method="bvls").x * sizes)
+    room, changes = structure.room
+    rows, held = changes * sizes, np.zeros(len(room), dtype=bool)
+    while True:
+        heavy = FIRM * np.max(np.abs(target), initial=1.0) / np.linalg.norm(rows[held], axis=1)
+        matrix = np.vstack([heavy[:, None] * rows[held], root])
+        wanted = np.concatenate([heavy * (HAIR * np.linalg.norm(changes[held], axis=1) - room[held]), target])
+        move = np.asarray(lsq_linear(matrix, wanted, (low, high), method="bvls").x * sizes)
+        short = ~held & np.any(rows != 0.0, axis=1) & (room + changes @ move < 0.0)
+        if not np.any(short):
+            return move
+        held |= short

@@ -181,6 +181,20 @@ class Structure:
         return [[self.place(one) for one in moments_of(names[0])] for names in free_moments(self.model, self.priors)]
 
     @cached_property
+    def room(self) -> tuple[Array, Array]:
+        """By how much two moments of inertia of a structure's bodies exceed the third (r,), and its change (r, k).
+
+        The change is by prior deviations of what is unknown. No body has less than none.
+        """
+        excess = np.ones((3, 3)) - 2.0 * np.eye(3)
+        rooms, changes = [np.zeros(0)], [np.zeros((0, len(self.columns)))]
+        for moments in self._moments:
+            moved = np.equal.outer(moments, self.columns) * self.slopes
+            rooms.append(excess @ self.theta[moments])
+            changes.append(excess @ moved)
+        return np.concatenate(rooms), np.vstack(changes)
+
+    @cached_property
     def _rods(self) -> list[list[int]]:
         """Places of unknown moments of inertia in a structure that are equal, for no body has others."""
         return [[self.place(name) for name in pair] for pair in rods(self.model, self.priors)]
