@@ -120,6 +120,20 @@ def test_compare_takes_a_machine_whose_efforts_do_not_follow_from_commands(tmp_p
     assert "servo.pressure_a" in done.stdout
 
 
+def test_machines_with_closed_loops_are_compared_by_short_predictions(tmp_path: Path) -> None:
+    """Loops share efforts among their joints: one encoder is enough for predictions, and no motion tells efforts."""
+    linkage = EXAMPLES / "loops" / "parallelogram.toml"
+    machine, time = Model.load(linkage), 1e-3 * np.arange(800)
+    log = Experiment.from_arrays(time, {"motor.command": 3.0 * np.sin(8.0 * time)}, model=machine)
+    place = simulate(machine, log)["left_crank.position"]
+    log.with_channel("left_crank.position", place, "rad").save(tmp_path / "log.npz")
+    assert "left_crank.position" in ran("compare", linkage, tmp_path / "log.npz").stdout
+    refused = vpm("identify", linkage, tmp_path / "log.npz")
+    assert refused.returncode == 1
+    assert "compare in the mode restarts" in refused.stderr
+    assert "left_crank.friction.viscous" in ran("identify", linkage, tmp_path / "log.npz", "--mode", "restarts").stdout
+
+
 def test_identify_prints_values_and_writes_the_model(tmp_path: Path) -> None:
     fitted = tmp_path / "fitted.toml"
     done = ran("identify", MODEL, TRAIN, "--free", "shoulder.friction.viscous", "--out", fitted)

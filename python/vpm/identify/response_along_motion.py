@@ -71,6 +71,11 @@ def has_hidden(model: Model, joints: Sequence[str]) -> bool:
 
 def check_along(model: Model, joints: Sequence[str]) -> None:
     """Raise an error for a machine without a response along a measured motion, because efforts do not follow."""
+    if model.loops:
+        raise SimulationError(
+            f"no effort can be balanced along a motion, for the closed loops ({', '.join(model.loops)}) share efforts "
+            "among them; compare in the mode restarts or free_run"
+        )
     for name in model.actuators:
         if model.actuator_type(name) in SAMPLED_TYPES:
             raise SimulationError(

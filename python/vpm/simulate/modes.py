@@ -146,8 +146,8 @@ def judging_mode(model: Model, records: Sequence[Experiment]) -> str:
 
 
 def comparing_mode(model: Model) -> str:
-    """Mode in which a model is compared with a log: inverse dynamics, or restarts where drives have states."""
-    follow = all(model.follows_command(name) for name in model.actuators)
+    """Mode in which a model is compared with a log: inverse dynamics, or restarts if loops or drives forbid that."""
+    follow = not model.loops and all(model.follows_command(name) for name in model.actuators)
     return "inverse_dynamics" if follow else "restarts"
 
 
