@@ -54,3 +54,30 @@ def test_a_moment_that_a_known_one_settles_stays() -> None:
     fit = vpm.identify(model, [swing(model)])
     assert fit["rod.inertia.yy"] == pytest.approx(0.2, rel=1e-6)
     assert "rod.inertia.yy" in fit.at_bounds
+
+
+def test_a_moment_about_an_axis_that_no_drive_turns_has_no_effect() -> None:
+    """Rounding of other forces is no sight of it: the arm's effort along any swing is free of the moment across."""
+    model = vpm.Model.from_toml("""
+name = "rod on an arm"
+gravity = [0.0, 0.0, -9.81]
+bodies.arm = { mass = 0.1, inertia = [0.01, 0.01, { value = 0.01, uncertainty = 2e-3 }, 0.0, 0.0, 0.0] }
+[bodies.rod]
+mass = 0.15
+center_of_mass = [0.0, 0.0, -0.16]
+inertia = [{ value = 1.6e-3, uncertainty = 3e-4 }, 1.6e-3, 1e-3, 0.0, 0.0, 0.0]
+[joints]
+turn = { type = "revolute", parent = "world", child = "arm", axis = [0.0, 0.0, 1.0] }
+swing = { type = "revolute", parent = "arm", child = "rod", translation = [0.2, 0.0, 0.0], axis = [1.0, 0.0, 0.0] }
+[actuators]
+drive = { joint = "turn", gain = 1.0 }
+""")
+    time = np.arange(2000) / 500.0
+    torque = 0.2 * np.sin(4.0 * time) + 0.1 * np.sin(9.0 * time)
+    log = vpm.Experiment.from_arrays(time, {"drive.command": torque}, model=model)
+    run = vpm.simulate(model, log)
+    for channel in ("turn.position", "swing.position"):
+        log = log.with_channel(channel, run[channel], "rad")
+    fit = vpm.identify(model, log)
+    assert [one.names for one in fit.unidentifiable] == [("rod.inertia.xx",)]
+    assert not any("bound" in sentence for sentence in fit.warnings)

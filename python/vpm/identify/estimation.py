@@ -8,7 +8,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.optimize import least_squares, lsq_linear
 
-from vpm.identify.identifiability import RANK_TOLERANCE, Combination, column_lengths, unseen_combinations
+from vpm.identify.identifiability import (
+    RANK_TOLERANCE,
+    Combination,
+    above_rounding,
+    column_lengths,
+    unseen_combinations,
+)
 from vpm.identify.moments import AXES, PAIRS, Coordinates, real_bodies
 from vpm.identify.problem import Problem, segments
 from vpm.identify.solver import DAMPING, Box, Point, descend, sizes
@@ -157,6 +163,7 @@ def standing(model: Model, data: Problem, free: Sequence[str]) -> Estimate:
     """Estimate of ``free`` parameters at the values they have: residual, derivatives and uncertainty, nothing moved."""
     columns = [model.index(name) for name in free]
     residual, jacobian = data.evaluate(model, model.theta, columns)
+    jacobian = above_rounding(jacobian, model, columns)
     unseen = unseen_combinations(jacobian, free)
     covariance = _covariance(data, residual, jacobian, unseen, free)
     return Estimate(tuple(free), model.theta[columns], residual, jacobian, covariance, unseen, (), 1)
@@ -271,7 +278,7 @@ class _Counter:
         theta[self.columns] = self.frame.parameters(x)
         try:
             residual, jacobian = self.data.evaluate(self.model, theta, columns)
-            return residual, self.frame.by_coordinates(jacobian)
+            return residual, self.frame.by_coordinates(above_rounding(jacobian, self.model, columns))
         except ValueError:
             if self.count == 0:  # the start itself: an error of the input, not of a step
                 raise

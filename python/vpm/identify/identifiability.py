@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import qr, solve_triangular
 
+from vpm.model import Model
 from vpm.numbers import Array
 from vpm.results import Storable
 
@@ -27,7 +28,7 @@ ALIAS_REST = 0.1
 COPY_SHARE = 0.9999
 #: Weight below which a dependent parameter is no part of a combination, on columns of equal length.
 SMALLEST_WEIGHT = 1e-6
-#: Length of a column, relative to the longest, that is nothing but rounding of terms that cancel.
+#: Length of a column, or of what a parameter does, relative to the longest, that is nothing but rounding.
 NOTHING = 1e-13
 #: Length of what is new in columns of unit length, below which it is rounding.
 NEW_DIRECTION = 1e-10
@@ -65,6 +66,19 @@ def column_lengths(jacobian: Array) -> Array:
     """Euclidean length of each column, for identifiability; 1 for a column of zeros."""
     lengths: Array = np.linalg.norm(jacobian, axis=0)
     return np.where(lengths > 0.0, lengths, 1.0)
+
+
+def above_rounding(jacobian: Array, model: Model, columns: Sequence[int]) -> Array:
+    """Jacobian (n, p) with zeros where a parameter does nothing but for what rounding leaves of it.
+
+    Columns are judged by what changes as large as the parameters, or as their uncertainties, do. A moment of inertia
+    about an axis that no drive turns shows to the last digit of the other forces, and would be taken for seen.
+    """
+    known = [model.parameters[model.parameter_names[column]] for column in columns]
+    sizes = np.array([max(abs(one.value), one.uncertainty or 0.0) for one in known])
+    done = np.linalg.norm(jacobian, axis=0) * np.where(np.isfinite(sizes), sizes, 1.0)
+    nothing = (sizes > 0.0) & (done < NOTHING * np.max(done, initial=0.0, where=np.isfinite(done)))
+    return np.where(nothing, 0.0, jacobian)
 
 
 def least_step(jacobian: Array, residual: Array, tolerance: float = 1e-10) -> Array:
