@@ -18,7 +18,7 @@ def told(elbow: float) -> str:
     noise = np.random.default_rng(1).normal(0.0, 1.0, 400)
     data: Any = SimpleNamespace(validation=SimpleNamespace(blocks=(SimpleNamespace(samples=slice(0, 400)),)))
     nominal: Any = SimpleNamespace(validation=3.0 * noise, model=SimpleNamespace(deflections=()))
-    recalibrated: Any = SimpleNamespace(validation=noise, free=(), fit=SimpleNamespace(std=()))
+    recalibrated: Any = SimpleNamespace(validation=noise, free=(), fit=SimpleNamespace(std=(), unseen=()))
     found: Any = SimpleNamespace(accepted=(), left={}, within_laws=False, interrupted=False)
     left: Any = SimpleNamespace(present=True)
     gap = {
@@ -48,9 +48,9 @@ def test_what_noise_hides_is_no_evidence_that_nothing_is_missing(floor: float, s
 def test_without_efforts_an_effect_that_leaves_the_error_explains_nothing(after: float, word: str) -> None:
     """An observer alone tells what is left: a share of 0.81 of the error power is no explanation."""
     effect: Any = SimpleNamespace(key=("lugre_friction", "shaft"), trial=SimpleNamespace())
-    effect.trial.probe = SimpleNamespace(candidate=SimpleNamespace(label="lugre_friction at shaft"))
+    effect.label = "lugre_friction at shaft"
     model: Any = SimpleNamespace(effects=(), bodies=(), joints=("shaft",), parameters={}, joint_behind={}.get)
-    final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=()))
+    final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=(), unseen=()))
     found: Any = SimpleNamespace(
         accepted=(effect,), left={"shaft": after**2}, within_laws=False, interrupted=False, final=final, ranked=None
     )
@@ -65,11 +65,11 @@ def test_an_effect_that_leaves_the_deflection_behind_its_joint_explains_nothing(
     Errors are those of its record; the noise of the link's encoder is 2e-4 rad.
     """
     effect: Any = SimpleNamespace(key=("cubic_spring", "knee"), trial=SimpleNamespace())
-    effect.trial.probe = SimpleNamespace(candidate=SimpleNamespace(label="cubic_spring at knee"))
+    effect.label = "cubic_spring at knee"
     model: Any = SimpleNamespace(
         effects=(), bodies=(), joints=("knee",), parameters={}, joint_behind=lambda joint: f"{joint}_deflection"
     )
-    final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=()))
+    final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=(), unseen=()))
     shares = {"knee": 0.04, "knee_deflection": (after / 1.449e-3) ** 2}
     found: Any = SimpleNamespace(
         accepted=(effect,), left=shares, within_laws=False, interrupted=False, final=final, ranked=None
@@ -94,7 +94,7 @@ def test_an_effect_that_leaves_the_deflection_behind_its_joint_explains_nothing(
 def test_a_play_that_does_most_of_the_work_is_the_explanation(effect: str, left: float, word: str) -> None:
     """Its impacts are no more where they were in the log, and the residual with it is as large as without."""
     entry: Any = SimpleNamespace(key=(effect, "shoulder"), trial=SimpleNamespace())
-    entry.trial.probe = SimpleNamespace(candidate=SimpleNamespace(label=f"{effect} at shoulder"))
+    entry.label = f"{effect} at shoulder"
     added: Any = SimpleNamespace(type=EFFECTS[effect], at="shoulder")
     model: Any = SimpleNamespace(
         effects=(added,),
@@ -103,7 +103,7 @@ def test_a_play_that_does_most_of_the_work_is_the_explanation(effect: str, left:
         parameters={},
         joint_behind=lambda joint: f"{joint}_deflection",
     )
-    final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=()))
+    final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=(), unseen=()))
     found: Any = SimpleNamespace(
         accepted=(entry,), left={"shoulder": left}, within_laws=False, interrupted=False, final=final, ranked=None
     )
@@ -121,7 +121,7 @@ def test_an_error_that_grew_is_not_told_as_a_gap_that_closed() -> None:
     noise = np.random.default_rng(0).standard_normal(2000)
     data: Any = SimpleNamespace(validation=SimpleNamespace(blocks=(SimpleNamespace(samples=slice(0, 2000)),)))
     nominal: Any = SimpleNamespace(validation=5.0 * noise, model=None)
-    recalibrated: Any = SimpleNamespace(validation=noise, free=(), fit=SimpleNamespace(std=()))
+    recalibrated: Any = SimpleNamespace(validation=noise, free=(), fit=SimpleNamespace(std=(), unseen=()))
     closed = ChannelGap(0.5, 0.1, 0.1, 0.01, "N", 1.0, "inverse_dynamics")
     grew = ChannelGap(0.19, 0.2, 0.2, 0.01, "N", 1.0, "inverse_dynamics")
     word, summary = _nothing_missing(data, nominal, recalibrated, ([closed, grew], []), grew)

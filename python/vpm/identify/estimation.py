@@ -112,11 +112,12 @@ def estimate(
     KeyboardInterrupt
         Ctrl-C before the start was evaluated; later it ends the fit with the best values until then.
     """
+    columns = [model.index(name) for name in free]
     box = limits(model, free, bounds or {})
 
     def among(bodies: tuple[Coordinates, Array, Array]) -> Estimate:
         frame, *ends = bodies
-        counter = _Counter(model, data, [model.index(name) for name in free], progress, worth, frame)
+        counter = _Counter(model, data, columns, progress, worth, frame)
         found = _started(counter, (ends[0], ends[1]), tolerance, most_evaluations, linear_only, nearest)
         return replace(found, at_bounds=touching(free, found.values, *box, near=NEAR_ZERO))
 
