@@ -13,9 +13,9 @@ from vpm.ranking.calibration import shipped
 
 #: Damping of the error of a tracker: flat up to the bandwidth, and falling off from there (S. Butterworth, 1930).
 DAMPING = float(np.sqrt(0.5))
-#: Bandwidths with which pressures of chambers may be drawn, Hz. Noise of a drive moves pressures as fast as its valve
-#: does, noise of gauges does not: records tell which is the larger.
-OF_PRESSURES = (1.0, 10.0, 100.0)
+#: Bandwidths with which pressures of chambers may be drawn, Hz; with the last one they are those that were read. Noise
+#: of a drive moves pressures as fast as its valve does, noise of gauges does not: records tell which is the larger.
+OF_PRESSURES = (1.0, 10.0, 100.0, np.inf)
 #: Fewest steps of the integrator within a sample where a joint is split: contacts and gears ring fast.
 STEPS = 4
 #: Longest steps where structures are compared and errors are not controlled, of order 2 and of order 4, s.

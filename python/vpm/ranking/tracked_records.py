@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import copy
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -207,11 +207,12 @@ class TrackedRecords:
     ) -> list[Structured]:
         """Part of a tracked residual (N, m) above the noise of each channel.
 
-        A ``model`` near the machine says what noise of commands does to it, with its own parameters or ``theta``; of
-        commands that are ``held``, too, if asked for.
+        A ``model`` near the machine says what noise of gauges and commands does to it, with its own parameters or
+        ``theta``; of commands that are ``held``, too, if asked for.
         """
-        smooth = self.setup.course != HOLDS[0]
-        moved = self._moved_by_commands(model, model.theta if theta is None else theta, band) if smooth or held else []
+        noisy = [name for name in self.drawn_to if name not in self.drawn_joints]
+        noisy += self.model.input_channels if held or self.setup.course != HOLDS[0] else ()
+        moved = self._moved_by_noise(model, model.theta if theta is None else theta, band, noisy) if noisy else []
         return [
             Structured.of(
                 [values[part] for part in parts],
@@ -221,29 +222,32 @@ class TrackedRecords:
             for place, (values, channel) in enumerate(zip(residual.T, self.records[0].channels, strict=True))
         ]
 
-    def _moved_by_commands(self, model: Model, theta: Array, band: float) -> list[Array]:
-        """Changes of a tracked residual (N, m) by noise of commands, drawn several times.
+    def _moved_by_noise(self, model: Model, theta: Array, band: float, channels: Collection[str]) -> list[Array]:
+        """Changes of a tracked residual (N, m) by noise of other ``channels``, drawn several times.
 
         A command that is held from sample to sample is mostly what a controller sent, and exact. One that runs on in
         between was read like any output: what its noise does to the machine, such as the ringing of a shaft, is not
-        missing.
+        missing. Nor is what noise of gauges does to a piston whose pressures are drawn to them.
         """
         random, tracker = np.random.default_rng(SEED), Tracker(band).coarse
+        others = [name not in channels for name in self.records[0].channels]
         with contextlib.suppress(VpmError, ArithmeticError):
             quiet, _ = self.follow(model, theta, tracker)
-            return [self._with_noise_of_commands(random).follow(model, theta, tracker)[0] - quiet for _ in range(DRAWS)]
+            draws = (self._with_noise_of(channels, random).follow(model, theta, tracker)[0] for _ in range(DRAWS))
+            return [(one - quiet) * others for one in draws]
         return []
 
-    def _with_noise_of_commands(self, random: np.random.Generator) -> TrackedRecords:
-        """Tracked records whose commands have noise as in their logs once more."""
+    def _with_noise_of(self, channels: Collection[str], random: np.random.Generator) -> TrackedRecords:
+        """Tracked records some channels of which have noise as in their logs once more."""
         other = copy.copy(self)
         noisy = []
         for record, log in zip(self.records, self.experiments, strict=True):
-            inputs = record.inputs.copy()
-            for column, channel in enumerate(self.model.input_channels):
-                if channel in log:
-                    inputs[:, column] += drawn_noise(log, channel, random)
-            noisy.append(replace(record, inputs=inputs))
+            inputs, readings = record.inputs.copy(), record.readings.copy()
+            for values, names in ((inputs, self.model.input_channels), (readings, record.channels)):
+                for column, channel in enumerate(names):
+                    if channel in channels and channel in log:
+                        values[:, column] += drawn_noise(log, channel, random)
+            noisy.append(replace(record, inputs=inputs, readings=readings))
         other.records = tuple(noisy)
         return other
 
