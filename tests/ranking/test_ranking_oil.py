@@ -76,13 +76,24 @@ def _bare(model: Model) -> Structure:
     return Structure(model, model.theta, {})
 
 
-@pytest.mark.parametrize(("drive", "gauge", "band"), [(1e-4, 1e3, 100.0), (0.0, 5e4, 1.0)])
+@pytest.mark.parametrize(("drive", "gauge", "band"), [(1e-4, 1e3, np.inf), (0.0, 5e4, 1.0)])
 def test_records_tell_how_fast_pressures_are_drawn(drive: float, gauge: float, band: float) -> None:
     """Noise of a drive is in the machine, and followed; that of gauges is not."""
     record = logged(rig(), currents(), 1, drive=drive, gauge=gauge)
     search = Search(rig(), [record], [], Settings(), None, ParallelCandidates(1, None), lambda _: None)
     search.draw_pressures()
     assert search.fitter.tracked.of_pressures == band
+
+
+def test_what_noise_of_gauges_does_to_a_piston_is_not_missing() -> None:
+    """Read pressures push the piston with their noise, many times that of its encoder; the machine is exact."""
+    model = rig()
+    tracked = TrackedRecords(model, [logged(model, currents(), 3, gauge=2e4)], Settings()).with_pressures(np.inf)
+    left = Fitter(tracked, Settings()).unfitted(_bare(model), Tracker(1.0)).residual
+    size = float(np.sqrt(np.mean([np.mean(left[part, 0] ** 2) for part in tracked.parts])))
+    told = tracked.structured(left, 1.0, tracked.parts, model)[0]
+    assert size > 5e-6
+    assert told.noise > 0.7 * size
 
 
 def test_a_late_drive_is_named_and_not_all_of_its_sensors() -> None:

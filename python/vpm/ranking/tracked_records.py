@@ -229,12 +229,12 @@ class TrackedRecords:
         between was read like any output: what its noise does to the machine, such as the ringing of a shaft, is not
         missing. Nor is what noise of gauges does to a piston whose pressures are drawn to them.
         """
-        random, tracker = np.random.default_rng(SEED), Tracker(band).coarse
-        others = [name not in channels for name in self.records[0].channels]
-        with contextlib.suppress(VpmError, ArithmeticError):
-            quiet, _ = self.follow(model, theta, tracker)
-            draws = (self._with_noise_of(channels, random).follow(model, theta, tracker)[0] for _ in range(DRAWS))
-            return [(one - quiet) * others for one in draws]
+        random, others = np.random.default_rng(SEED), [name not in channels for name in self.records[0].channels]
+        for tracker in (Tracker(band).coarse, Tracker(band)):  # few steps diverge behind a piston that stands
+            with contextlib.suppress(VpmError, ArithmeticError):
+                quiet, _ = self.follow(model, theta, tracker)
+                draws = (self._with_noise_of(channels, random).follow(model, theta, tracker)[0] for _ in range(DRAWS))
+                return [(one - quiet) * others for one in draws]
         return []
 
     def _with_noise_of(self, channels: Collection[str], random: np.random.Generator) -> TrackedRecords:
