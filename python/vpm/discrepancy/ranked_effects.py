@@ -42,17 +42,14 @@ BEHIND = ".link."
 
 
 def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
-    """Why names do not come from a ranking, or "": it covers up to three joints, rigid links, and drives without oil.
+    """Why names do not come from a ranking, or "": it covers up to three joints, and rigid links.
 
-    It covers oil where a joint has no drive, for no search sees that. A bending that a log holds is compared by a
-    ranking, but on a log of a real arm a search names its friction more plausibly. Where a second encoder shows how far
-    a load stays behind its drive, friction bends what is between, if it acts on the load: only a ranking tries that.
+    A bending that a log holds is compared by a ranking, but on a log of a real arm a search names its friction more
+    plausibly. Where a second encoder shows how far a load stays behind its drive, friction bends what is between, if it
+    acts on the load: only a ranking tries that.
     """
     if bends(model):
         return "links bend"
-    oil = [name for name in model.actuators if model.actuator_type(name) == "hydraulic"]
-    if oil and not free_joints(model):
-        return f"the actuator {oil[0]} has type hydraulic"
     own = set(model.joints) - set(model.added_joints)
     if len(own) > RANKED_JOINTS:
         return f"there are {len(own)} joints, more than {RANKED_JOINTS}"
