@@ -43,10 +43,11 @@ def logged(model: Model) -> list[Experiment]:
     return logs
 
 
-def test_a_ranking_covers_oil() -> None:
+def test_a_ranking_covers_several_cylinders_where_a_joint_has_no_drive() -> None:
     assert free_joints(leg()) == ("slider",)
     assert why_not_ranked(leg(), ()) == ""
-    assert why_not_ranked(Model.load(HYL / "hydraulic.toml"), ()) == ""
+    driven = Model.load(HYL / "hydraulic.toml")
+    assert why_not_ranked(driven, ()) == "the actuators hip_drive and knee_drive have type hydraulic"
 
 
 def test_what_no_balance_sees_is_told_where_a_search_names(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -42,14 +42,18 @@ BEHIND = ".link."
 
 
 def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
-    """Why names do not come from a ranking, or "": it covers up to three joints, and rigid links.
+    """Why names do not come from a ranking, or "": it covers up to three joints, rigid links, and one drive with oil.
 
-    A bending that a log holds is compared by a ranking, but on a log of a real arm a search names its friction more
-    plausibly. Where a second encoder shows how far a load stays behind its drive, friction bends what is between, if it
-    acts on the load: only a ranking tries that.
+    Several of these take it many times as long as a search, and it names no better there; a joint without a drive no
+    search sees. A bending that a log holds is compared by a ranking, but on a log of a real arm a search names its
+    friction more plausibly. Where a second encoder shows how far a load stays behind its drive, friction bends what is
+    between, if it acts on the load: only a ranking tries that.
     """
     if bends(model):
         return "links bend"
+    oil = [name for name in model.actuators if model.actuator_type(name) == "hydraulic"]
+    if len(oil) > 1 and not free_joints(model):
+        return f"the actuators {' and '.join(oil)} have type hydraulic"
     own = set(model.joints) - set(model.added_joints)
     if len(own) > RANKED_JOINTS:
         return f"there are {len(own)} joints, more than {RANKED_JOINTS}"
