@@ -254,8 +254,8 @@ class Look:
 
         What is left without a play or a spring that holds a load, and is not fitted anew, may be anything.
         """
-        added = {(one.name, one.at, one.side) for one in self.fitted.structure.added}
-        given = [one for one in effects if (one.name, one.at, one.side) not in added]
+        added = {one.key for one in self.fitted.structure.added}
+        given = [one for one in effects if one.key not in added]
         power = self._removed(effects)
         return power if len(given) == len(effects) else np.minimum(power, self._removed(given) + self.added)
 

@@ -272,9 +272,8 @@ class Structure:
         sides = [effect.side for effect in self._alike(key)]
         gone = side if side in sides else self.side(key)
         rest = self.carried(self.model.without_effect(*key, gone))
-        left = {(effect.name, effect.at, effect.side) for effect in rest.model.effects}
-        there = ((one.name, one.at, one.side) for one in self.added)
-        return replace(rest, effects=tuple((name, at) for name, at, own in there if (name, at, own) in left))
+        left = {effect.key for effect in rest.model.effects}
+        return replace(rest, effects=tuple((one.name, one.at) for one in self.added if one.key in left))
 
     def with_last_of(self, other: Structure) -> Structure:
         """Structure with the last effect of another structure added.

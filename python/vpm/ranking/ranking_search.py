@@ -46,13 +46,13 @@ class Search(Trials):
         named: dict[_Place, Ranked] = {}
         rounds: list[tuple[Ranked, ...]] = []
         interrupted = False
-        before: list[frozenset[_Place]] = []
+        before: list[frozenset[tuple[str, ...]]] = []
         try:
             looks, rounds = brought_back(self, looks)
             named = {_place(ranked): ranked for ranked, *_ in rounds}
             for _ in range(2 * self.settings.effects):  # effects may replace each other, but not for ever
                 present, there = looks[0].fitted.structure.effects, looks[0].fitted.structure.added
-                places = frozenset((one.name, one.at, one.side) for one in there)
+                places = frozenset(one.key for one in there)
                 if len(present) == self.settings.effects or places in before:
                     break
                 best, tried = self._round(looks)
