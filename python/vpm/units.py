@@ -223,6 +223,15 @@ def parse_unit(text: str) -> Unit:
     return Unit(text, factor, dimension, tuple(terms.items()))
 
 
+def is_unit(text: str) -> bool:
+    """Whether a text is a unit that can be converted; blanks are none."""
+    try:
+        parse_unit(text)
+    except UnitError:
+        return False
+    return bool(text.strip())
+
+
 def factor_to_si(unit: str) -> float:
     """SI value of a difference of one `unit`: 0.001 for ``"mm"``."""
     return parse_unit(unit).factor

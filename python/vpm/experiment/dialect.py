@@ -8,9 +8,9 @@ from itertools import islice
 from os import PathLike
 from pathlib import Path
 
-from vpm.errors import ExperimentError, UnitError
+from vpm.errors import ExperimentError
 from vpm.experiment.dates import STAMP_BYTES
-from vpm.units import parse_unit
+from vpm.units import is_unit
 
 #: Separators that are looked for; where a file has none of them, blanks separate.
 DELIMITERS = (",", ";", "\t", "|")
@@ -144,16 +144,8 @@ def _units(cells: Sequence[str], columns: int) -> tuple[str, ...]:
     """Units line of a dialect below the names, if all of its cells are units; else none."""
     units = tuple(re.sub(r"^[\[(](.*)[\])]$", r"\1", cell.strip()) for cell in cells)
     units = tuple("1" if unit in ("", "-") else unit for unit in units)
-    are_units = len(units) == columns and not any(map(is_number, cells)) and all(map(_is_unit, units))
+    are_units = len(units) == columns and not any(map(is_number, cells)) and all(map(is_unit, units))
     return units if are_units else ()
-
-
-def _is_unit(text: str) -> bool:
-    try:
-        parse_unit(text)
-    except UnitError:
-        return False
-    return True
 
 
 def _is_numbers(line: str) -> bool:

@@ -10,19 +10,28 @@ from vpm.experiment.table import Table, missing_column
 
 
 @contextmanager
-def reading(path: str | PathLike[str]) -> Iterator[None]:
+def reading(path: str | PathLike[str], kind: str = "") -> Iterator[None]:
     """Context for every reader's parser: whatever it raises about a broken file becomes one sentence."""
     try:
         yield
     except VpmError:
         raise
-    except Exception as error:  # the parsers of five formats raise what they stumble over
-        told = str(error).splitlines()[0] if str(error).strip() else type(error).__name__
-        raise ExperimentError(
-            f"{path} cannot be read ({told[:200]}); check that it was closed when it was written, and that its ending "
-            "says what it is",
-            path=str(path),
-        ) from error
+    except Exception as error:  # parsers raise what they stumble over
+        raise broken(path, kind, error) from error
+
+
+def broken(path: str | PathLike[str], kind: str, error: Exception | str) -> ExperimentError:
+    """Error for a file that its parser does not take.
+
+    ``kind``: as ``"a TDMS file"``; "" where nobody knows yet.
+    """
+    told = str(error).strip().splitlines()
+    reason = (told[0] if told else type(error).__name__)[:200]
+    return ExperimentError(
+        f"{path} cannot be read{f' as {kind}' if kind else ''} ({reason}); check that it was closed when it was "
+        "written, and that its ending says what it is",
+        path=str(path),
+    )
 
 
 class Log(ABC):

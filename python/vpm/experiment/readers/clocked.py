@@ -4,14 +4,11 @@ import logging
 from abc import abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
-from os import PathLike
 from typing import ClassVar
 
-from vpm.errors import ExperimentError, UnitError
 from vpm.experiment.readers.base import Log
 from vpm.experiment.table import Table
 from vpm.numbers import Array
-from vpm.units import parse_unit
 
 #: The clock of whichever group is read.
 TIME = "time"
@@ -78,29 +75,6 @@ class ClockedLog(Log):
     @abstractmethod
     def values(self, column: str) -> Array:
         """Numbers of a column of a log whose groups have clocks."""
-
-
-def readable_unit(unit: str) -> bool:
-    """Whether a unit that a file of clocked groups states can be converted."""
-    try:
-        parse_unit(unit)
-    except UnitError:
-        return False
-    return bool(unit.strip())
-
-
-def broken(path: str | PathLike[str], kind: str, error: Exception | str) -> ExperimentError:
-    """Error for a file of clocked groups that its parser does not take.
-
-    ``kind``: as ``"a TDMS file"``.
-    """
-    told = str(error).strip().splitlines()
-    reason = (told[0] if told else type(error).__name__)[:200]
-    return ExperimentError(
-        f"{path} cannot be read as {kind} ({reason}); check that it was closed when it was written, and that its "
-        "ending says what it is",
-        path=str(path),
-    )
 
 
 @contextmanager

@@ -21,8 +21,8 @@ from weakref import finalize
 import numpy as np
 
 from vpm.errors import ExperimentError, MissingExtraError
-from vpm.experiment.readers.base import Log
-from vpm.experiment.readers.clocked import ClockedLog, broken
+from vpm.experiment.readers.base import Log, broken
+from vpm.experiment.readers.clocked import ClockedLog
 from vpm.experiment.table import Table
 from vpm.numbers import Array
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vpm.errors import ExperimentError, needs
+from vpm.errors import needs
 from vpm.experiment.readers.arrays import ArrayLog, shape_of_vector
+from vpm.experiment.readers.base import reading
 from vpm.numbers import Array
 
 if TYPE_CHECKING:
@@ -67,14 +68,8 @@ class Hdf5Log(ArrayLog):
 def _opened(path: str | PathLike[str]) -> h5py.File:
     with needs("h5py", "hdf5"):
         import h5py
-    try:
+    with reading(path, "an HDF5 file"):
         return h5py.File(path, "r")
-    except OSError as error:
-        raise ExperimentError(
-            f"{path} cannot be read as an HDF5 file ({str(error).splitlines()[0]}); check that it was closed when it "
-            "was written, and that its ending says what it is",
-            path=str(path),
-        ) from error
 
 
 def _data_sets(group: h5py.Group, prefix: str) -> Iterator[tuple[str, h5py.Dataset]]:

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from vpm.errors import ExperimentError
-from vpm.experiment.readers.base import Log
-from vpm.experiment.readers.clocked import TIME, ClockedLog, broken, readable_unit
+from vpm.experiment.readers.base import Log, reading
+from vpm.experiment.readers.clocked import TIME, ClockedLog
 from vpm.experiment.readers.ros import BagLog
 from vpm.numbers import Array
+from vpm.units import is_unit
 
 
 def open_mcap(path: str | PathLike[str]) -> Log:
@@ -48,12 +48,8 @@ class JsonLog(ClockedLog):
         self._stamps: dict[str, list[int]] = {}
         self._columns: dict[str, list[float]] = {}
         self._fields: dict[str, dict[str, list[float]]] = {}
-        try:
+        with reading(path, self.kind):
             self._collect()
-        except ExperimentError:
-            raise
-        except Exception as error:  # the parser raises what it stumbles over
-            raise broken(path, self.kind, error) from error
         if not self._columns:
             raise self.error(f"{path} holds no messages with numbers; record its topics anew")
         self.clocks = {topic: topic for topic in self._stamps}
@@ -91,7 +87,7 @@ class JsonLog(ClockedLog):
             self.groups[column] = topic
             self._columns[column] = self._fields[topic][name] = []
             unit = str(described.get(name, {}).get("description", ""))
-            if readable_unit(unit):
+            if is_unit(unit):
                 self.units[column] = unit
 
     def times(self, group: str) -> Array:

@@ -16,10 +16,11 @@ from numpy.typing import NDArray
 
 from vpm.errors import VpmError
 from vpm.experiment.readers import guarded
-from vpm.experiment.readers.base import Log
-from vpm.experiment.readers.clocked import TIME, ClockedLog, broken, readable_unit, silent
+from vpm.experiment.readers.base import Log, reading
+from vpm.experiment.readers.clocked import TIME, ClockedLog, silent
 from vpm.expression import Quantity, read_expression
 from vpm.numbers import Array
+from vpm.units import is_unit
 
 if TYPE_CHECKING:
     from asammdf import MDF
@@ -99,7 +100,7 @@ class MdfLog(ClockedLog):
         channel = group.channels[place.channel]
         conversion = self._formulas.get(place, channel.conversion)
         unit = str(getattr(conversion, "unit", "") or getattr(channel, "unit", ""))
-        if readable_unit(unit):
+        if is_unit(unit):
             self.units[name] = unit
 
     @contextmanager
@@ -140,17 +141,16 @@ class MdfLog(ClockedLog):
     def _opened(self) -> Iterator[MDF]:
         from asammdf import MDF
 
-        try:
-            # Through a stream of our own, because the library leaves files that it cannot read open.
-            with silent("asammdf"), _stream(self.path) as stream, MDF(stream, **_AS_IT_IS) as file:
-                _check_records(file)
-                self._formulas = _without_formulas(file)
-                yield file
-        except VpmError:
-            raise
-        except Exception as error:  # the parser raises what it stumbles over
-            _close_halves(error)
-            raise broken(self.path, self.kind, error) from error
+        with reading(self.path, self.kind):
+            try:
+                # Through a stream of our own, because the library leaves files that it cannot read open.
+                with silent("asammdf"), _stream(self.path) as stream, MDF(stream, **_AS_IT_IS) as file:
+                    _check_records(file)
+                    self._formulas = _without_formulas(file)
+                    yield file
+            except Exception as error:
+                _close_halves(error)
+                raise
 
 
 def _stream(path: str | PathLike[str]) -> io.BufferedReader | io.BytesIO:

@@ -5,8 +5,8 @@ from os import PathLike
 
 import numpy as np
 
-from vpm.errors import ExperimentError, needs
-from vpm.experiment.readers.base import Log
+from vpm.errors import needs
+from vpm.experiment.readers.base import Log, reading
 from vpm.experiment.table import Table
 from vpm.numbers import Array
 
@@ -24,14 +24,8 @@ class ParquetLog(Log):
             import pyarrow as pa
             import pyarrow.parquet as pq
         self.path = path
-        try:
+        with reading(path, "a Parquet file"):
             table = pq.read_table(path)
-        except (pa.ArrowException, OSError, ValueError) as error:
-            raise ExperimentError(
-                f"{path} cannot be read as a Parquet file ({str(error).splitlines()[0]}); "
-                "check that it was closed when it was written, and that its ending says what it is",
-                path=str(path),
-            ) from error
         while any(pa.types.is_struct(field.type) for field in table.schema):
             table = table.flatten()
         self.refused: dict[str, str] = {}

@@ -10,10 +10,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vpm.errors import VpmError, needs
-from vpm.experiment.readers.clocked import TIME, ClockedLog, broken, readable_unit, silent
+from vpm.errors import needs
+from vpm.experiment.readers.base import broken, reading
+from vpm.experiment.readers.clocked import TIME, ClockedLog, silent
 from vpm.experiment.table import Table
 from vpm.numbers import Array
+from vpm.units import is_unit
 
 if TYPE_CHECKING:
     from nptdms import TdmsChannel, TdmsFile
@@ -82,7 +84,7 @@ class TdmsLog(ClockedLog):
             if "wf_start_time" in properties:
                 starts[name] = int(np.datetime64(properties["wf_start_time"], "us").astype(np.int64))
         unit = next((str(properties[key]) for key in UNIT_PROPERTIES if key in properties), "")
-        if readable_unit(unit):
+        if is_unit(unit):
             self.units[name] = unit
 
     def find(self, column: str) -> str | None:
@@ -139,14 +141,9 @@ class TdmsLog(ClockedLog):
     def _opened(self) -> Iterator[TdmsFile]:
         with needs("npTDMS", "tdms"):
             from nptdms import TdmsFile
-        try:
-            with silent("nptdms"), Path(self.path).open("rb") as stream:
-                if stream.read(len(TAG)) != TAG:
-                    raise broken(self.path, "a TDMS file", f"it does not begin with {TAG.decode()}")
-                stream.seek(0)
-                with TdmsFile.open(stream) as file:
-                    yield file
-        except VpmError:
-            raise
-        except Exception as error:  # the parser raises what it stumbles over
-            raise broken(self.path, "a TDMS file", error) from error
+        with reading(self.path, self.kind), silent("nptdms"), Path(self.path).open("rb") as stream:
+            if stream.read(len(TAG)) != TAG:
+                raise broken(self.path, self.kind, f"it does not begin with {TAG.decode()}")
+            stream.seek(0)
+            with TdmsFile.open(stream) as file:
+                yield file

@@ -12,7 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError, needs
-from vpm.experiment.readers.clocked import TIME, ClockedLog, broken
+from vpm.experiment.readers.base import reading
+from vpm.experiment.readers.clocked import TIME, ClockedLog
 from vpm.numbers import Array
 
 if TYPE_CHECKING:
@@ -80,8 +81,5 @@ def _parsed(path: str | PathLike[str]) -> ULog:
     """All messages of a ULog file; damage that its parser prints goes to the record's history."""
     with needs("pyulog", "ulog"):
         from pyulog import ULog
-    try:
-        with redirect_stdout(io.StringIO()), Path(path).open("rb") as stream:
-            return ULog(stream)
-    except Exception as error:  # the parser raises what it stumbles over
-        raise broken(path, "a ULog file", error) from error
+    with reading(path, UlogLog.kind), redirect_stdout(io.StringIO()), Path(path).open("rb") as stream:
+        return ULog(stream)
