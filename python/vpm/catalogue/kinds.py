@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 from vpm.catalogue.formula import Formula
 from vpm.catalogue.signature import ANYWHERE, Signature
@@ -12,17 +12,7 @@ from vpm.errors import ModelError, near_match
 
 #: A cylinder is a hydraulic actuator with its valve, named as it.
 SiteKind = Literal["joint", "body", "link", "beam", "actuator", "cylinder", "supply", "sensor", "world"]
-SITE_KINDS: tuple[SiteKind, ...] = (
-    "joint",
-    "body",
-    "link",
-    "beam",
-    "actuator",
-    "cylinder",
-    "supply",
-    "sensor",
-    "world",
-)
+SITE_KINDS: tuple[SiteKind, ...] = get_args(SiteKind)
 
 JointKind = Literal["prismatic", "revolute", "helical"]
 
@@ -56,6 +46,25 @@ Scale = Literal[
     "one",
 ]
 
+#: What sets the size of a parameter, by its unit; "one" where the unit is another one.
+SCALES: Mapping[str, Scale] = {
+    "{E}": "effort",
+    "{E} s/{C}": "effort_per_speed",
+    "{E} s^2/{C}^2": "effort_per_speed_squared",
+    **dict.fromkeys(("{E}/{C}", "N m/rad"), "effort_per_coordinate"),
+    "{E}/{C}^3": "effort_per_coordinate_cubed",
+    **dict.fromkeys(("{C}", "m"), "coordinate"),
+    "{C}/s": "speed",
+    "kg": "mass",
+    **dict.fromkeys(("{E} s^2/{C}", "kg m^2"), "inertia"),
+    "s/{C}": "one_per_speed",
+    "s": "time",
+    "{U}": "command",
+    "{S}": "channel",
+    "m^3/(s Pa)": "leakage",
+    "Pa s/m^3": "resistance",
+}
+
 Range = tuple[float, float]
 
 #: Least value of what has to be positive: "greater than zero" as a closed bound, far below anything measurable.
@@ -74,14 +83,15 @@ class EffectParameter:
     ----------
     name : str
         Short name: the key in a model file and the keyword of ``with_effect``.
-    suffix : str
-        What follows the site in the dotted name: ``friction.viscous`` makes ``axis.friction.viscous``.
     unit : str
         Template, for example ``"{E} s/{C}"``.
-    scale : str
-        What in a record sets its natural size, see `Scale`.
     meaning : str
         Half a sentence for reference pages.
+    scale : str
+        What in a record sets its natural size, see `Scale`.
+    suffix : str
+        What follows the site in the dotted name: ``friction.viscous`` makes ``axis.friction.viscous``. By default the
+        group of its effect and its name.
     neutral : float or None
         Value at which the effect is not there (SI); None for a parameter that no value switches off.
     start : float or (float, float) or None
@@ -104,11 +114,11 @@ class EffectParameter:
     """
 
     name: str
-    suffix: str
     unit: str
-    scale: Scale
     meaning: str
     _: KW_ONLY
+    scale: Scale
+    suffix: str = ""
     neutral: float | None
     start: float | tuple[float, float] | None
     physical: Range
@@ -170,6 +180,11 @@ class EffectType(Traits):
     signature: Signature = ANYWHERE
     formula: Formula | None = None
 
+    def __post_init__(self) -> None:
+        """Name the parameters of an effect after its group."""
+        named = (replace(one, suffix=one.suffix or f"{self.group}.{one.name}") for one in self.parameters)
+        object.__setattr__(self, "parameters", tuple(named))
+
     @property
     def has_law(self) -> bool:
         """Whether a kind of effect has a law of its own, and is no form for what no law explains."""
@@ -207,42 +222,46 @@ class EffectType(Traits):
 
 def size(
     name: str,
-    suffix: str,
     unit: str,
-    scale: Scale,
     meaning: str,
     *,
     physical: Range = ANY,
     neutral: float = 0.0,
     linear: bool = True,
+    suffix: str = "",
 ) -> EffectParameter:
     """Kind of parameter: size of a law, in which the effort is linear unless said otherwise."""
     return EffectParameter(
-        name, suffix, unit, scale, meaning, neutral=neutral, start=neutral, physical=physical, linear=linear
+        name,
+        unit,
+        meaning,
+        scale=SCALES.get(unit, "one"),
+        suffix=suffix,
+        neutral=neutral,
+        start=neutral,
+        physical=physical,
+        linear=linear,
     )
 
 
 def shape(
     name: str,
-    suffix: str,
     unit: str,
-    scale: Scale,
     meaning: str,
     *,
     start: float | tuple[float, float] | None,
     bounds: Range = ABOVE_ZERO,
     learnt: bool = False,
+    suffix: str = "",
 ) -> EffectParameter:
     """Kind of parameter: shape; law and physics have the same range."""
-    sized = size(name, suffix, unit, scale, meaning, physical=bounds, linear=False)
+    sized = size(name, unit, meaning, physical=bounds, linear=False, suffix=suffix)
     return replace(sized, neutral=None, start=start, evaluable=bounds, shape=True, learnt=learnt)
 
 
 def nonlinear(
     name: str,
-    suffix: str,
     unit: str,
-    scale: Scale,
     meaning: str,
     *,
     neutral: float,
@@ -251,5 +270,5 @@ def nonlinear(
     typical: float = 1.0,
 ) -> EffectParameter:
     """Kind of parameter: size of an effect in which nothing is linear."""
-    sized = size(name, suffix, unit, scale, meaning, physical=physical, neutral=neutral, linear=False)
+    sized = size(name, unit, meaning, physical=physical, neutral=neutral, linear=False)
     return replace(sized, evaluable=evaluable, typical=typical)

@@ -3,6 +3,7 @@
 import math
 import re
 from collections.abc import Collection, Mapping
+from dataclasses import replace
 
 from vpm.catalogue.formula import Formula, compile_formula
 from vpm.catalogue.kinds import ABOVE_ZERO, ANY, NOT_NEGATIVE, EffectParameter, EffectType, shape, size
@@ -43,9 +44,7 @@ def entry_of(
     parameters = [
         size(
             short,
-            f"{name}.{short}",
             _checked_unit(name, short, unit),
-            "one",
             f"{short} of {name}",
             physical=NOT_NEGATIVE if short in not_negative else ANY,
             linear=linear,
@@ -58,7 +57,7 @@ def entry_of(
         name=name,
         site="joint",
         group=name,
-        parameters=tuple(parameters),
+        parameters=tuple(replace(one, scale="one") for one in parameters),
         law=f"tau = {law}",
         sentence=sentence,
         impossible=impossible or "either sign is possible",
@@ -95,7 +94,7 @@ def _shape(name: str, short: str, unit: str, start: float, positive: bool) -> Ef
         raise ModelError(f"the shape {short} of {name} starts at {start:g}; give {rest}", where=name)
     bounds = ABOVE_ZERO if positive else ANY
     unit = _checked_unit(name, short, unit)
-    return shape(short, f"{name}.{short}", unit, "one", f"{short} of {name}", start=start, bounds=bounds, learnt=True)
+    return shape(short, unit, f"{short} of {name}", start=start, bounds=bounds, learnt=True)
 
 
 def _check_law(name: str, formula: Formula, sizes: Mapping[str, str], shapes: list[float]) -> bool:

@@ -6,7 +6,7 @@ and C. Canudas de Wit, "A survey of models, analysis tools and compensation meth
 friction", Automatica 30 (1994).
 """
 
-from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectParameter, Range, Scale, nonlinear, shape, size
+from vpm.catalogue.kinds import ANY, NOT_NEGATIVE, EffectParameter, Range, nonlinear, shape, size
 
 #: Transition velocity where none is given: prismatic (m/s), revolute (rad/s).
 TRANSITION = (1e-3, 1e-2)
@@ -25,24 +25,17 @@ NEGATIVE_SHARE = "a negative share would give out more power than goes in"
 SLOW_AND_FAST = "Motion in both directions at several constant speeds, with slow starts from rest"
 
 
-def transition(suffix: str) -> EffectParameter:
+def transition(suffix: str = "") -> EffectParameter:
     """Shared parameter: speed at which a friction law bends."""
-    return shape(
-        "transition_velocity",
-        suffix,
-        "{C}/s",
-        "speed",
-        "speed below which the law bends from one sign to the other",
-        start=TRANSITION,
-        learnt=True,
-    )
+    meaning = "speed below which the law bends from one sign to the other"
+    return shape("transition_velocity", "{C}/s", meaning, start=TRANSITION, learnt=True, suffix=suffix)
 
 
 def shares(driving: str, driven: str) -> tuple[EffectParameter, EffectParameter]:
     """Shares of an effort that friction takes, each with its meaning."""
 
     def share(name: str, meaning: str) -> EffectParameter:
-        return size(name, f"friction.{name}", "1", "one", meaning, physical=_SHARE, linear=False)
+        return size(name, "1", meaning, physical=_SHARE, linear=False)
 
     return share("driving", driving), share("driven", driven)
 
@@ -55,39 +48,17 @@ def law_of_load(effort: str) -> str:
     )
 
 
-def motor_inertia(suffix: str) -> EffectParameter:
+def motor_inertia() -> EffectParameter:
     """Shared parameter: inertia before a spring or backlash."""
-    return shape(
-        "inertia",
-        suffix,
-        "{E} s^2/{C}",
-        "inertia",
-        "inertia on the motor side, as the joint feels it, beside a rotor_inertia that is described",
-        start=0.0,
-        bounds=NOT_NEGATIVE,
-        learnt=True,
-    )
+    meaning = "inertia on the motor side, as the joint feels it, beside a rotor_inertia that is described"
+    return shape("inertia", "{E} s^2/{C}", meaning, start=0.0, bounds=NOT_NEGATIVE, learnt=True)
 
 
 def delay(meaning: str) -> EffectParameter:
     """Shared parameter of a delay: time by which something is late."""
-    return nonlinear(
-        "time", "delay.time", "s", "time", meaning, neutral=0.0, physical=NOT_NEGATIVE, evaluable=NOT_NEGATIVE
-    )
+    return nonlinear("time", "s", meaning, neutral=0.0, physical=NOT_NEGATIVE, evaluable=NOT_NEGATIVE)
 
 
-def over_described(
-    name: str, suffix: str, unit: str, scale: Scale, meaning: str, typical: float, evaluable: Range = ANY
-) -> EffectParameter:
+def over_described(name: str, unit: str, meaning: str, typical: float, evaluable: Range = ANY) -> EffectParameter:
     """Shared size of what comes on top of a described value of a hydraulic drive."""
-    return nonlinear(
-        name,
-        suffix,
-        unit,
-        scale,
-        meaning,
-        neutral=0.0,
-        physical=NOT_NEGATIVE,
-        evaluable=evaluable,
-        typical=typical,
-    )
+    return nonlinear(name, unit, meaning, neutral=0.0, physical=NOT_NEGATIVE, evaluable=evaluable, typical=typical)

@@ -16,9 +16,7 @@ EFFECT = EffectType(
     parameters=(
         nonlinear(
             "time_constant",
-            "lag.time_constant",
             "s",
-            "time",
             "time after which 63 % of a step have arrived",
             neutral=POSITIVE,
             physical=ABOVE_ZERO,

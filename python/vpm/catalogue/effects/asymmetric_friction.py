@@ -12,20 +12,8 @@ EFFECT = EffectType(
     site="joint",
     group="friction",
     parameters=(
-        size(
-            "coulomb_difference",
-            "friction.coulomb_difference",
-            "{E}",
-            "effort",
-            "Coulomb friction in positive minus in negative direction",
-        ),
-        size(
-            "viscous_difference",
-            "friction.viscous_difference",
-            "{E} s/{C}",
-            "effort_per_speed",
-            "viscous friction in positive minus in negative direction",
-        ),
+        size("coulomb_difference", "{E}", "Coulomb friction in positive minus in negative direction"),
+        size("viscous_difference", "{E} s/{C}", "viscous friction in positive minus in negative direction"),
         transition("friction.asymmetric_transition_velocity"),
     ),
     law=(

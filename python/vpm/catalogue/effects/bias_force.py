@@ -10,7 +10,7 @@ EFFECT = EffectType(
     name="bias_force",
     site="joint",
     group="bias",
-    parameters=(size("force", "bias.force", "{E}", "effort", "load that the drive has to overcome"),),
+    parameters=(size("force", "{E}", "load that the drive has to overcome"),),
     law="tau = -force",
     sentence="{at} carries a constant load of {force}, in either direction and at rest.",
     impossible="either sign is possible: it says in which direction the load pulls",

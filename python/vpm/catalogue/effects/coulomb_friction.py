@@ -13,15 +13,8 @@ EFFECT = EffectType(
     site="joint",
     group="friction",
     parameters=(
-        size(
-            "coulomb",
-            "friction.coulomb",
-            "{E}",
-            "effort",
-            "resistance that does not depend on speed",
-            physical=NOT_NEGATIVE,
-        ),
-        transition("friction.transition_velocity"),
+        size("coulomb", "{E}", "resistance that does not depend on speed", physical=NOT_NEGATIVE),
+        transition(),
     ),
     law="tau = -coulomb tanh(v/transition_velocity)",
     sentence="{at} resists motion with {coulomb} at any speed, against the direction of motion.",

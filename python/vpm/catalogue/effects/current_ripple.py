@@ -13,14 +13,12 @@ EFFECT = EffectType(
     parameters=(
         shape(
             "period",
-            "current_ripple.period",
             "{C}",
-            "coordinate",
             "way after which the ripple repeats; it follows from the motor: a turn, or a pair of its poles",
             start=None,
         ),
-        size("cosine", "current_ripple.cosine", "1", "one", "share of the actuators' effort that is lost at zero"),
-        size("sine", "current_ripple.sine", "1", "one", "share of it that is lost a quarter of a period later"),
+        size("cosine", "1", "share of the actuators' effort that is lost at zero"),
+        size("sine", "1", "share of it that is lost a quarter of a period later"),
     ),
     law=(
         "tau = -u (cosine cos(2 pi q/period) + sine sin(2 pi q/period)), u the effort of the actuators on the joint,"

@@ -12,14 +12,7 @@ EFFECT = EffectType(
     group="dead_zone",
     parameters=(
         nonlinear(
-            "width",
-            "dead_zone.width",
-            "{U}",
-            "command",
-            "command below which nothing happens",
-            neutral=0.0,
-            physical=NOT_NEGATIVE,
-            evaluable=ANY,
+            "width", "{U}", "command below which nothing happens", neutral=0.0, physical=NOT_NEGATIVE, evaluable=ANY
         ),
     ),
     law="u_out = sign(u) max(|u| - width, 0)",

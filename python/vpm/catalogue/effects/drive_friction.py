@@ -16,7 +16,7 @@ EFFECT = EffectType(
             "share of the effort of this actuator that is lost where it drives",
             "share of its effort that brakes besides where it is driven",
         ),
-        transition("friction.transition_velocity"),
+        transition(),
     ),
     law=law_of_load("the effort of this actuator"),
     sentence=(

@@ -9,22 +9,19 @@ Source: data alone.
 from dataclasses import replace
 
 from vpm.catalogue.empirical import TERMS
-from vpm.catalogue.kinds import ABOVE_ZERO, ANY, EffectParameter, EffectType, Scale, shape, size
+from vpm.catalogue.kinds import ABOVE_ZERO, ANY, EffectParameter, EffectType, shape, size
 from vpm.catalogue.signature import Signature
 
 
 def _shape(
     name: str, unit: str, meaning: str, start: float | None, bounds: tuple[float, float] = ABOVE_ZERO
 ) -> EffectParameter:
-    scale: Scale = "speed" if unit.endswith("/s") else "coordinate"
-    return shape(name, f"empirical.{name}", unit, scale, meaning, start=start, bounds=bounds)
+    return shape(name, unit, meaning, start=start, bounds=bounds)
 
 
 def _term(name: str, text: str) -> EffectParameter:
     of_load = name.startswith("load")
-    entry = size(
-        name, f"empirical.{name}", "1" if of_load else "{E}", "one" if of_load else "effort", f"coefficient of {text}"
-    )
+    entry = size(name, "1" if of_load else "{E}", f"coefficient of {text}")
     return replace(entry, optional=True)
 
 

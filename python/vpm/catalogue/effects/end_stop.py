@@ -12,27 +12,18 @@ EFFECT = EffectType(
     site="joint",
     group="end_stop",
     parameters=(
-        size(
-            "stiffness",
-            "end_stop.stiffness",
-            "{E}/{C}",
-            "effort_per_coordinate",
-            "effort per way beyond an end",
-            physical=NOT_NEGATIVE,
-        ),
+        size("stiffness", "{E}/{C}", "effort per way beyond an end", physical=NOT_NEGATIVE),
         shape(
             "damping",
-            "end_stop.damping",
             "s/{C}",
-            "one_per_speed",
             "share by which the effort grows per approaching speed",
             start=0.0,
             bounds=NOT_NEGATIVE,
             learnt=True,
         ),
-        shape("low", "end_stop.low", "{C}", "coordinate", "lower end of the way", start=-NEVER, bounds=ANY),
-        shape("high", "end_stop.high", "{C}", "coordinate", "upper end of the way", start=NEVER, bounds=ANY),
-        shape("width", "end_stop.width", "{C}", "coordinate", "way over which a contact closes", start=CONTACT),
+        shape("low", "{C}", "lower end of the way", start=-NEVER, bounds=ANY),
+        shape("high", "{C}", "upper end of the way", start=NEVER, bounds=ANY),
+        shape("width", "{C}", "way over which a contact closes", start=CONTACT),
     ),
     law=(
         "tau = -stiffness (p(q - high) r(damping v) - p(low - q) r(-damping v)), p(x) = 1/2 (x + sqrt(x^2 + width^2)),"

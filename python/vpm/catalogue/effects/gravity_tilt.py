@@ -13,7 +13,7 @@ _UPRIGHT = (-0.5 * math.pi, 0.5 * math.pi)
 
 def _angle(name: str, which: str) -> EffectParameter:
     meaning = f"angle by which gravity is turned about the {which} horizontal axis of the world"
-    return nonlinear(name, f"tilt.{name}", "rad", "one", meaning, neutral=0.0, physical=_UPRIGHT, evaluable=ANY)
+    return nonlinear(name, "rad", meaning, neutral=0.0, physical=_UPRIGHT, evaluable=ANY)
 
 
 EFFECT = EffectType(

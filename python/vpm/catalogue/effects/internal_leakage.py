@@ -14,9 +14,7 @@ EFFECT = EffectType(
     parameters=(
         over_described(
             "coefficient",
-            "internal_leakage.coefficient",
             "m^3/(s Pa)",
-            "leakage",
             "laminar flow past the piston per difference of the pressures, on top of the described one",
             1e-12,
         ),

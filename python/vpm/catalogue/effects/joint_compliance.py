@@ -14,24 +14,14 @@ EFFECT = EffectType(
     parameters=(
         nonlinear(
             "stiffness",
-            "compliance.stiffness",
             "{E}/{C}",
-            "effort_per_coordinate",
             "effort per deflection between motor side and link side",
             neutral=RIGID,
             physical=NOT_NEGATIVE,
             evaluable=ANY,
         ),
-        size(
-            "damping",
-            "compliance.damping",
-            "{E} s/{C}",
-            "effort_per_speed",
-            "resistance per rate of the deflection",
-            physical=NOT_NEGATIVE,
-            linear=False,
-        ),
-        motor_inertia("compliance.inertia"),
+        size("damping", "{E} s/{C}", "resistance per rate of the deflection", physical=NOT_NEGATIVE, linear=False),
+        motor_inertia(),
     ),
     law="tau = -stiffness d - damping dd/dt on the deflection d, with inertia on the motor side",
     sentence=(

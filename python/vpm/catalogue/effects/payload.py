@@ -8,9 +8,7 @@ from vpm.catalogue.signature import Signature
 
 
 def _coordinate(name: str) -> EffectParameter:
-    return shape(
-        name, f"payload.{name}", "m", "coordinate", f"{name} of the payload in the body's frame", start=0.0, bounds=ANY
-    )
+    return shape(name, "m", f"{name} of the payload in the body's frame", start=0.0, bounds=ANY)
 
 
 EFFECT = EffectType(
@@ -18,7 +16,7 @@ EFFECT = EffectType(
     site="body",
     group="payload",
     parameters=(
-        size("mass", "payload.mass", "kg", "mass", "mass of the payload, a point", physical=NOT_NEGATIVE),
+        size("mass", "kg", "mass of the payload, a point", physical=NOT_NEGATIVE),
         _coordinate("x"),
         _coordinate("y"),
         _coordinate("z"),

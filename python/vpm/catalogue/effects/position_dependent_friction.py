@@ -14,14 +14,13 @@ EFFECT = EffectType(
     parameters=(
         shape(
             "period",
-            "friction.position_period",
             "{C}",
-            "coordinate",
             "way after which the level repeats; it follows from the machine: a turn of a shaft, screw or gear",
+            suffix="friction.position_period",
             start=None,
         ),
-        size("cosine", "friction.position_cosine", "{E}", "effort", "part of the level that is greatest at zero"),
-        size("sine", "friction.position_sine", "{E}", "effort", "part of the level that vanishes at zero"),
+        size("cosine", "{E}", "part of the level that is greatest at zero", suffix="friction.position_cosine"),
+        size("sine", "{E}", "part of the level that vanishes at zero", suffix="friction.position_sine"),
         transition("friction.position_transition_velocity"),
     ),
     law="tau = -(cosine cos(2 pi q/period) + sine sin(2 pi q/period)) tanh(v/transition_velocity)",

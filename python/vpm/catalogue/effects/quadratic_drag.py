@@ -13,10 +13,9 @@ EFFECT = EffectType(
     parameters=(
         size(
             "drag",
-            "friction.quadratic",
             "{E} s^2/{C}^2",
-            "effort_per_speed_squared",
             "resistance per square of the speed",
+            suffix="friction.quadratic",
             physical=NOT_NEGATIVE,
         ),
     ),

@@ -13,9 +13,7 @@ EFFECT = EffectType(
     parameters=(
         size(
             "inertia",
-            "rotor.inertia",
             "{E} s^2/{C}",
-            "inertia",
             "inertia of the rotor as the joint feels it, ratio squared times its own",
             physical=NOT_NEGATIVE,
         ),

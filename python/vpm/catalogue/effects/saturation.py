@@ -14,14 +14,7 @@ EFFECT = EffectType(
     group="saturation",
     parameters=(
         nonlinear(
-            "limit",
-            "saturation.limit",
-            "{U}",
-            "command",
-            "largest command that is followed",
-            neutral=NEVER,
-            physical=ABOVE_ZERO,
-            evaluable=ABOVE_ZERO,
+            "limit", "{U}", "largest command that is followed", neutral=NEVER, physical=ABOVE_ZERO, evaluable=ABOVE_ZERO
         ),
     ),
     law="u_out = min(max(u, -limit), limit)",

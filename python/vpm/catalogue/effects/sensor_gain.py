@@ -11,16 +11,7 @@ EFFECT = EffectType(
     site="sensor",
     group="gain",
     parameters=(
-        nonlinear(
-            "value",
-            "gain.value",
-            "1",
-            "one",
-            "reading per true value",
-            neutral=1.0,
-            physical=ABOVE_ZERO,
-            evaluable=ABOVE_ZERO,
-        ),
+        nonlinear("value", "1", "reading per true value", neutral=1.0, physical=ABOVE_ZERO, evaluable=ABOVE_ZERO),
     ),
     law="y = value x",
     sentence="{at} reads {value} times the true value.",

@@ -13,22 +13,9 @@ EFFECT = EffectType(
     site="joint",
     group="friction",
     parameters=(
-        size(
-            "stribeck",
-            "friction.stribeck",
-            "{E}",
-            "effort",
-            "friction close to rest in excess of the Coulomb friction",
-            physical=NOT_NEGATIVE,
-        ),
+        size("stribeck", "{E}", "friction close to rest in excess of the Coulomb friction", physical=NOT_NEGATIVE),
         shape(
-            "stribeck_velocity",
-            "friction.stribeck_velocity",
-            "{C}/s",
-            "speed",
-            "speed at which the excess has fallen to 37 %",
-            start=STRIBECK,
-            learnt=True,
+            "stribeck_velocity", "{C}/s", "speed at which the excess has fallen to 37 %", start=STRIBECK, learnt=True
         ),
         transition("friction.stribeck_transition_velocity"),
     ),

@@ -13,9 +13,7 @@ EFFECT = EffectType(
     parameters=(
         nonlinear(
             "time",
-            "structural_damping.time",
             "s",
-            "time",
             "damping per stiffness beside what is described",
             neutral=0.0,
             physical=NOT_NEGATIVE,

@@ -17,21 +17,9 @@ EFFECT = EffectType(
     group="drop",
     parameters=(
         over_described(
-            "resistance",
-            "drop.resistance",
-            "Pa s/m^3",
-            "resistance",
-            "pressure lost on the way to the valves per flow that they draw",
-            1e10,
+            "resistance", "Pa s/m^3", "pressure lost on the way to the valves per flow that they draw", 1e10
         ),
-        shape(
-            "time_constant",
-            "drop.time_constant",
-            "s",
-            "time",
-            "time after which 63 % of a loss are there",
-            start=_HOSES,
-        ),
+        shape("time_constant", "s", "time after which 63 % of a loss are there", start=_HOSES),
     ),
     law="p_valve = p - d, time_constant dd/dt = resistance q - d",
     sentence="Between {at} and its valves {resistance} times the flow is lost of the pressure.",

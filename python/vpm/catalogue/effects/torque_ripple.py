@@ -13,14 +13,12 @@ EFFECT = EffectType(
     parameters=(
         shape(
             "period",
-            "ripple.period",
             "{C}",
-            "coordinate",
             "way after which the ripple repeats; it follows from the machine: pole pitch, screw lead, teeth",
             start=None,
         ),
-        size("cosine", "ripple.cosine", "{E}", "effort", "part that is greatest at the zero position"),
-        size("sine", "ripple.sine", "{E}", "effort", "part that is zero at the zero position"),
+        size("cosine", "{E}", "part that is greatest at the zero position"),
+        size("sine", "{E}", "part that is zero at the zero position"),
     ),
     law="tau = -(cosine cos(2 pi q/period) + sine sin(2 pi q/period))",
     sentence="{at} is loaded by a ripple that repeats every {period}, with {cosine} (cosine) and {sine} (sine).",

@@ -13,13 +13,7 @@ EFFECT = EffectType(
     group="valve_dynamics",
     parameters=(
         over_described(
-            "time",
-            "valve_dynamics.time",
-            "s",
-            "time",
-            "what is added to the inverse of the spool's natural frequency (in rad/s)",
-            1e-3,
-            NOT_NEGATIVE,
+            "time", "s", "what is added to the inverse of the spool's natural frequency (in rad/s)", 1e-3, NOT_NEGATIVE
         ),
     ),
     law="1/w = 1/frequency + time, z'' = w^2 (u - z) - 2 damping w z'",

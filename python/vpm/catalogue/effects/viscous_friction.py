@@ -10,16 +10,7 @@ EFFECT = EffectType(
     name="viscous_friction",
     site="joint",
     group="friction",
-    parameters=(
-        size(
-            "viscous",
-            "friction.viscous",
-            "{E} s/{C}",
-            "effort_per_speed",
-            "resistance per speed",
-            physical=NOT_NEGATIVE,
-        ),
-    ),
+    parameters=(size("viscous", "{E} s/{C}", "resistance per speed", physical=NOT_NEGATIVE),),
     law="tau = -viscous v",
     sentence="{at} resists motion in proportion to its speed, with {viscous}.",
     impossible="a negative viscous friction would feed energy into the motion instead of taking it out",

@@ -13,32 +13,10 @@ EFFECT = EffectType(
     site="joint",
     group="warming",
     parameters=(
-        size(
-            "coulomb",
-            "warming.coulomb",
-            "{E}",
-            "effort",
-            "cold less warm resistance that does not depend on speed",
-            physical=NOT_NEGATIVE,
-        ),
-        size(
-            "viscous",
-            "warming.viscous",
-            "{E} s/{C}",
-            "effort_per_speed",
-            "cold less warm resistance per speed",
-            physical=NOT_NEGATIVE,
-        ),
-        shape(
-            "time_constant",
-            "warming.time_constant",
-            "s",
-            "time",
-            "time after which 63 % of these are gone",
-            start=None,
-            bounds=ABOVE_ZERO,
-        ),
-        transition("warming.transition_velocity"),
+        size("coulomb", "{E}", "cold less warm resistance that does not depend on speed", physical=NOT_NEGATIVE),
+        size("viscous", "{E} s/{C}", "cold less warm resistance per speed", physical=NOT_NEGATIVE),
+        shape("time_constant", "s", "time after which 63 % of these are gone", start=None, bounds=ABOVE_ZERO),
+        transition(),
     ),
     law=(
         "tau = -(1 - w) (coulomb tanh(v/transition_velocity) + viscous v), dw/dt = (1 - w)/time_constant,"
