@@ -33,8 +33,7 @@ def plot_parameters(
     """
     value, sigma, begin = (np.asarray(each, dtype=np.float64) for each in (values, std, start))
     scale = np.where(begin == 0.0, np.where(value == 0.0, 1.0, np.abs(value)), np.abs(begin))
-    figure, axes = panels(1, height=0.6 + 0.34 * len(names))
-    axis = axes[0][0]
+    figure, ((axis,),) = panels(1, height=0.6 + 0.34 * len(names))
     rows = np.arange(len(names))
     axis.plot(begin / scale, rows, "|", color=SOFT, markersize=13, markeredgewidth=2, label="start")
     error = np.where(np.isfinite(sigma), 1.96 * sigma / scale, 0.0)
@@ -54,8 +53,7 @@ def plot_gap(gaps: Mapping[str, ChannelGap]) -> Figure:
     from matplotlib.lines import Line2D
     from matplotlib.patches import Patch
 
-    figure, axes = panels(1, height=0.5 + 0.85 * max(1, len(gaps)))
-    axis = axes[0][0]
+    figure, ((axis,),) = panels(1, height=0.5 + 0.85 * max(1, len(gaps)))
     stages = (("before", SOFT), ("recalibrated", ORANGE), ("after", BLUE))
     largest = 0.0
     for row, gap in enumerate(gaps.values()):
@@ -91,8 +89,7 @@ def plot_candidates(candidates: Sequence[RankedCandidate]) -> Figure:
     from matplotlib.patches import Patch
 
     chosen = drawn_candidates(candidates)
-    figure, axes = panels(1, height=0.5 + 0.36 * max(1, len(chosen)))
-    axis = axes[0][0]
+    figure, ((axis,),) = panels(1, height=0.5 + 0.36 * max(1, len(chosen)))
     for row, each in enumerate(chosen):
         axis.barh(row + 0.17, 100.0 * np.nan_to_num(each.screened), height=0.3, color=LINE)
         axis.barh(row - 0.17, 100.0 * np.nan_to_num(each.unseen), height=0.3, color=GREEN if each.accepted else ORANGE)
@@ -140,8 +137,7 @@ def plot_ladder(
     - ``allowed``: share of the period that a step may take, s
     - ``limit``: largest error that is allowed
     """
-    figure, axes = panels(1, height=3.0)
-    axis = axes[0][0]
+    figure, ((axis,),) = panels(1, height=3.0)
     times, gaps = 1e6 * np.asarray(seconds), 100.0 * np.asarray(errors)
     axis.plot(times, gaps, "o", color=SOFT, alpha=0.7, markersize=5, label="tried")
     if len(front):
@@ -164,8 +160,7 @@ def plot_step_cost(quantiles: Mapping[str, float], period: float) -> Figure:
 
     ``quantiles``: name of the quantile to seconds; ``period``: s.
     """
-    figure, axes = panels(1, height=0.5 + 0.4 * max(1, len(quantiles)))
-    axis = axes[0][0]
+    figure, ((axis,),) = panels(1, height=0.5 + 0.4 * max(1, len(quantiles)))
     times = 1e6 * np.array(list(quantiles.values()))
     late = times > 1e6 * period
     low = 0.5 * min(float(times.min()), 1e6 * period)
@@ -195,8 +190,7 @@ def plot_climb(levels: Sequence[Level], top: str) -> Figure:
 
     ``levels``: simplest first; ``top``: name of the level at which detail stops to pay.
     """
-    figure, axes = panels(2, height=2.4, share_x=True)
-    above, below = axes[0][0], axes[1][0]
+    figure, ((above,), (below,)) = panels(2, height=2.4, share_x=True)
     places, errors = np.arange(len(levels)), np.array([100.0 * level.error for level in levels])
     above.plot(places, errors, color=SOFT, linewidth=1.2)
     for place, (error, level) in enumerate(zip(errors, levels, strict=True)):

@@ -101,8 +101,7 @@ def _spectra(evidence: Evidence) -> Figure:
     """Amplitude densities of plotted evidence (Welch's method): both residuals and the law."""
     from scipy.signal import welch
 
-    figure, axes = panels(1, height=3.0)
-    axis = axes[0][0]
+    figure, ((axis,),) = panels(1, height=3.0)
     step = float(np.median(np.diff(evidence.time)))
     length = min(evidence.time.size, max(128, evidence.time.size // 6))
     rows = (

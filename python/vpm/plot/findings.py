@@ -49,8 +49,7 @@ def plot_joint_over_time(picture: Picture, stages: Mapping[str, Array]) -> Figur
 
     ``stages``: each of shape (n,), residuals; NaN, where a sample does not count, leaves a gap.
     """
-    figure, axes = panels(2, height=2.2, share_x=True)
-    above, below = axes[0][0], axes[1][0]
+    figure, ((above,), (below,)) = panels(2, height=2.2, share_x=True)
     time, measured = thinned(picture.time, picture.measured)
     above.plot(time, measured, color=SOFT, alpha=0.5, linewidth=3.2, label="measured")
     last = list(stages)[-1]
@@ -115,8 +114,7 @@ def plot_parameter_correlation(names: Sequence[str], correlation: Array) -> Figu
 
     ``correlation``: shape (p, p).
     """
-    figure, axes = panels(1, height=0.8 + 0.34 * len(names), width=min(11.0, 4.4 + 0.55 * len(names)))
-    axis = axes[0][0]
+    figure, ((axis,),) = panels(1, height=0.8 + 0.34 * len(names), width=min(11.0, 4.4 + 0.55 * len(names)))
     shown = axis.imshow(correlation, cmap="RdBu_r", vmin=-1.0, vmax=1.0, aspect="auto")
     if len(names) <= MOST_NUMBERS:
         for row, values in enumerate(correlation):

@@ -33,8 +33,7 @@ def plot_narx_run(run: NarxRun) -> Figure:
 @styled
 def plot_narx_terms(names: Sequence[str], error_reduction: Array) -> Figure:
     """Draw the energy share still unexplained after each NARX term, in the order of choice."""
-    figure, axes = panels(1, height=0.8 + 0.22 * len(names))
-    axis = axes[0][0]
+    figure, ((axis,),) = panels(1, height=0.8 + 0.22 * len(names))
     rest = np.maximum(1.0 - np.cumsum(np.nan_to_num(error_reduction)), np.finfo(np.float64).eps)
     places = np.arange(len(names))
     axis.plot(rest, places, "o-", color=BLUE)
