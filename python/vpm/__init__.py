@@ -32,14 +32,7 @@ if TYPE_CHECKING:
     from vpm.discrepancy import Diagnosis
     from vpm.errors import VpmError
     from vpm.experiment import Campaign, Experiment
-    from vpm.identify import (
-        Fit,
-        Fitting,
-        InertialFit,
-        InertialRegression,
-        identify,
-        identify_inertial,
-    )
+    from vpm.identify import Fit, Fitting, InertialFit, InertialRegression, identify, identify_inertial
     from vpm.linear import LinearModel
     from vpm.log_check import LogCheck, check_log
     from vpm.many_diagnoses import Case, diagnose_many

@@ -8,18 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vpm.command import (
-    Channels,
-    Hold,
-    Integrator,
-    Interpolate,
-    Logs,
-    ModelPath,
-    Workers,
-    console,
-    load_all,
-    searching,
-)
+from vpm.command import Channels, Hold, Integrator, Interpolate, Logs, ModelPath, Workers, console, load_all, searching
 from vpm.command_output import give, wrote
 from vpm.errors import ModelError
 from vpm.files import probe_file, write_text

@@ -5,18 +5,7 @@ from typing import Annotated
 
 import typer
 
-from vpm.command import (
-    Channels,
-    Cutoff,
-    Interpolate,
-    ModelPath,
-    OneLog,
-    Plot,
-    console,
-    load_pair,
-    save_plot,
-    writable,
-)
+from vpm.command import Channels, Cutoff, Interpolate, ModelPath, OneLog, Plot, console, load_pair, save_plot, writable
 from vpm.command_output import give, wrote
 
 EXAMPLES = "Example:  vpm compare examples/emps/model.toml log.csv --mode inverse_dynamics"

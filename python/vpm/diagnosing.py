@@ -12,16 +12,7 @@ from typing import Any, TypedDict, get_args
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis
-from vpm.discrepancy.diagnosis_fields import (
-    examined,
-    gaps_of,
-    of_search,
-    pictures,
-    so_far,
-    traces,
-    unmeasured,
-    where,
-)
+from vpm.discrepancy.diagnosis_fields import examined, gaps_of, of_search, pictures, so_far, traces, unmeasured, where
 from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.noise.sensor_drift import Drift, sensor_drifts, without_drifts
 from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress

@@ -9,13 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vpm.command import (
-    Plot,
-    console,
-    progress,
-    save_plot,
-    writable,
-)
+from vpm.command import Plot, console, progress, save_plot, writable
 from vpm.command_output import give, wrote
 from vpm.errors import ExcitationError
 

@@ -7,17 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from vpm.command import (
-    FORMATS,
-    Channels,
-    Interpolate,
-    ModelPath,
-    console,
-    load_model,
-    load_record,
-    progress,
-    writable,
-)
+from vpm.command import FORMATS, Channels, Interpolate, ModelPath, console, load_model, load_record, progress, writable
 from vpm.command_output import give, note, wrote
 from vpm.errors import VpmError
 

@@ -5,19 +5,7 @@ import pytest
 
 import vpm
 from drive_texts import RIG
-from hydraulic_reference import (
-    AREA,
-    OIL_FREQUENCY,
-    RATIO,
-    REST,
-    STALL_IN,
-    STALL_OUT,
-    STEP,
-    SUPPLY,
-    TANK,
-    chirp,
-    held,
-)
+from hydraulic_reference import AREA, OIL_FREQUENCY, RATIO, REST, STALL_IN, STALL_OUT, STEP, SUPPLY, TANK, chirp, held
 from model_texts import changed
 from vpm.batch import Trial, simulate_batch
 from vpm.errors import DivergedError, ExperimentError, SimulationError

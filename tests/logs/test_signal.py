@@ -18,13 +18,7 @@ from vpm.experiment import (
     quantisation_step,
 )
 from vpm.experiment.motion import Motion
-from vpm.experiment.signal import (
-    anti_alias,
-    differentiator_gain,
-    interpolate,
-    interpolation_gain,
-    settling_samples,
-)
+from vpm.experiment.signal import anti_alias, differentiator_gain, interpolate, interpolation_gain, settling_samples
 from vpm.numbers import Array
 
 RATE = 1000.0

@@ -6,12 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 from vpm.numbers import Array
-from vpm.plot.signals import (
-    amplitude_density,
-    draw_correlation,
-    draw_residual_against,
-    draw_residual_time,
-)
+from vpm.plot.signals import amplitude_density, draw_correlation, draw_residual_against, draw_residual_time
 from vpm.plot.style import BLUE, INK, ORANGE, SOFT, label, legend_above, panels, styled, thinned
 
 if TYPE_CHECKING:

@@ -11,13 +11,7 @@ from vpm.errors import IdentificationError
 from vpm.numbers import NORMAL_95, Array
 from vpm.results import Result
 from vpm.studies.oil.check import Channels, check_answer, check_choices, check_record
-from vpm.studies.oil.equations import (
-    CylinderGeometry,
-    Equation,
-    balances,
-    pressures_from_force,
-    through_spool,
-)
+from vpm.studies.oil.equations import CylinderGeometry, Equation, balances, pressures_from_force, through_spool
 from vpm.studies.oil.solve import integral_rows, noise_share, rate_rows, solve
 
 _UNITS = {"compliance": "1/Pa", "flow_gain": "m^3/(s Pa^0.5)", "leakage": "m^3/(s Pa)", "air": "1", "offset": ""}
