@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import CoreError
+from vpm.numbers import Array
 
 __all__ = [
     "Diverged",
@@ -45,8 +46,8 @@ class Diverged(CoreError):
     """
 
     sample_index: int
-    outputs: NDArray[np.float64]
-    states: NDArray[np.float64]
+    outputs: Array
+    states: Array
 
 def stop_when(asked: Callable[[], bool] | None) -> None:
     """Let long computations of the calling thread stop with ``KeyboardInterrupt`` when ``asked()`` is true.
@@ -54,7 +55,7 @@ def stop_when(asked: Callable[[], bool] | None) -> None:
     Ctrl-C reaches Python's main thread only; this is how it tells the threads that work for it. None ends it.
     """
 
-def zero_phase(sections: ArrayLike, values: ArrayLike, padding: int, every: int) -> NDArray[np.float64]:
+def zero_phase(sections: ArrayLike, values: ArrayLike, padding: int, every: int) -> Array:
     """Columns of ``values`` (N, k) filtered forward and backward; every ``every``-th sample (ceil(N / every), k).
 
     Each row of ``sections`` (s, 6) is ``b0 b1 b2 a0 a1 a2`` with ``a0 = 1``. Both ends are continued by ``padding``
@@ -79,17 +80,15 @@ class Dynamics:
     """
 
     def __new__(cls, system: System, theta: ArrayLike) -> Dynamics: ...
-    def inverse_dynamics(
-        self, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike
-    ) -> NDArray[np.float64]:
+    def inverse_dynamics(self, position: ArrayLike, velocity: ArrayLike, acceleration: ArrayLike) -> Array:
         """Efforts (n,) that accelerations (n,) need: ``M a + h - effects``; what no actuator gives has to be zero."""
-    def forward_dynamics(self, position: ArrayLike, velocity: ArrayLike, effort: ArrayLike) -> NDArray[np.float64]:
+    def forward_dynamics(self, position: ArrayLike, velocity: ArrayLike, effort: ArrayLike) -> Array:
         """Accelerations (n,) under efforts (n,), with all effects."""
-    def mass_matrix(self, position: ArrayLike) -> NDArray[np.float64]:
+    def mass_matrix(self, position: ArrayLike) -> Array:
         """Mass matrix (n, n), payloads included."""
     def energy(self, position: ArrayLike, velocity: ArrayLike) -> tuple[float, float]:
         """Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential."""
-    def jacobian(self, position: ArrayLike, marker: int) -> NDArray[np.float64]:
+    def jacobian(self, position: ArrayLike, marker: int) -> Array:
         """Jacobian (6, n) of a marker by number: angular velocity, then velocity of its origin, in world axes."""
 
 @final
@@ -119,17 +118,17 @@ class Kalman:
         substeps: int,
         integrator: str,
     ) -> Kalman: ...
-    def step(self, readings: ArrayLike, inputs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def step(self, readings: ArrayLike, inputs: ArrayLike) -> tuple[Array, Array]:
         """State (nx,) corrected by the readings (m,), and innovations (m,); inputs are held to the next sample."""
-    def covariances(self) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def covariances(self) -> tuple[Array, Array]:
         """Covariance of the last estimate (nx, nx) and of the last innovations (m, m)."""
-    def expected(self) -> NDArray[np.float64]:
+    def expected(self) -> Array:
         """State (nx,) that is expected at the coming sample."""
     def reset(self, state: ArrayLike, covariance: ArrayLike) -> None:
         """Begin again in a state (nx,) of this covariance (nx, nx)."""
     def hold_gain(self, gain: ArrayLike, covariance: ArrayLike, spread: ArrayLike) -> None:
         """Keep a gain (nx, m) under which estimates and innovations have these covariances."""
-    def linearised(self, inputs: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def linearised(self, inputs: ArrayLike) -> tuple[Array, Array, Array]:
         """Transition (nx, nx) over a sample, outputs by the state (m, nx), covariance of what moves it (nx, nx)."""
 
 @final
@@ -180,13 +179,7 @@ class Simulation:
     """
 
     def __new__(
-        cls,
-        system: System,
-        theta: ArrayLike,
-        state: ArrayLike,
-        time_step: float,
-        substeps: int,
-        integrator: str,
+        cls, system: System, theta: ArrayLike, state: ArrayLike, time_step: float, substeps: int, integrator: str
     ) -> Simulation: ...
     def compile(self) -> str | None:
         """Go on by machine code from now on.
@@ -200,14 +193,14 @@ class Simulation:
     def time(self) -> float:
         """Time since the beginning, s."""
     @property
-    def state(self) -> NDArray[np.float64]:
+    def state(self) -> Array:
         """State now (n_states,); a copy."""
     @property
-    def outputs(self) -> NDArray[np.float64]:
+    def outputs(self) -> Array:
         """What the sensors show now (n_outputs,); a copy."""
-    def step(self, inputs: ArrayLike) -> NDArray[np.float64]:
+    def step(self, inputs: ArrayLike) -> Array:
         """Hold ``inputs`` (n_inputs,) for one sample; outputs (n_outputs,) at its end, with the inputs still held."""
-    def run(self, inputs: ArrayLike) -> NDArray[np.float64]:
+    def run(self, inputs: ArrayLike) -> Array:
         """A step for each row of ``inputs`` (N, n_inputs); outputs (N, n_outputs)."""
     def reset(self, state: ArrayLike) -> None:
         """Begin again at time zero in ``state`` (n_states,), with nothing remembered."""
@@ -216,9 +209,7 @@ class Simulation:
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to where it was when the snapshot was taken."""
 
-def step_all(
-    simulations: Sequence[Simulation], inputs: ArrayLike, samples: int
-) -> tuple[NDArray[np.float64], list[str | None]]:
+def step_all(simulations: Sequence[Simulation], inputs: ArrayLike, samples: int) -> tuple[Array, list[str | None]]:
     """Hold ``inputs`` (E, n_inputs) in E simulations of one machine over so many samples.
 
     Returns
@@ -292,7 +283,7 @@ class System:
         integrator: str,
         sensitivities: Sequence[int] = ...,
         hold: str = ...,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[Array, Array, Array]:
         """Free run on ``inputs`` (N, m); between samples they do as ``hold`` says: zero_order, first_order or cubic.
 
         Returns
@@ -319,7 +310,7 @@ class System:
         substeps: int,
         integrator: str,
         hold: str = ...,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[Array, Array, Array, Array, Array]:
         """An extended Kalman filter on ``readings`` (N, m) of the outputs at the places ``channels``.
 
         Parameters
@@ -357,7 +348,7 @@ class System:
         hold: str = ...,
         alone: bool = ...,
         moves: ArrayLike | None = ...,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[Array, Array, Array]:
         """Follow ``readings`` (N, m) with given ``gains`` (N, nx * m); as `simulate`, before each correction.
 
         Derivatives (N, m, k) are those of the measured outputs alone; outputs are, too, where ``alone``. They are those
@@ -372,7 +363,7 @@ class System:
         motions: Sequence[ArrayLike],
         by_motion: bool = ...,
         parameters: Sequence[int] = ...,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[Array, Array]:
         """Answers about N motions: positions, rates, accelerations or efforts, each (N, n).
 
         Returns
@@ -384,14 +375,8 @@ class System:
     def compile(self, theta: ArrayLike, integrator: str) -> str | None:
         """Make the machine code of steps by ``integrator``, as long runs do; or say why there is none."""
     def resolution(
-        self,
-        theta: ArrayLike,
-        state: ArrayLike,
-        time_step: float,
-        substeps: int,
-        integrator: str,
-        duration: float,
-    ) -> tuple[float, NDArray[np.float64]]:
+        self, theta: ArrayLike, state: ArrayLike, time_step: float, substeps: int, integrator: str, duration: float
+    ) -> tuple[float, Array]:
         """What steps do not resolve in a run of ``duration`` (s) about ``state``.
 
         Returns
@@ -404,13 +389,7 @@ class System:
             leaves in that time, shift of its frequency as a share of it.
         """
     def unstuck(
-        self,
-        theta: ArrayLike,
-        state: ArrayLike,
-        commands: ArrayLike,
-        time_step: float,
-        substeps: int,
-        integrator: str,
+        self, theta: ArrayLike, state: ArrayLike, commands: ArrayLike, time_step: float, substeps: int, integrator: str
     ) -> list[tuple[str, float]]:
         """Where dry friction does not bring to rest in these steps what it brakes, at ``state`` under ``commands``.
 
@@ -429,7 +408,7 @@ class System:
         substeps: int,
         integrator: str,
         sensitivities: Sequence[int] = ...,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[Array, Array, Array]:
         """Closed loop on ``references``; ``disturbances`` add to the commands; both (N, m); else as `simulate`."""
     def restart(
         self,
@@ -443,7 +422,7 @@ class System:
         integrator: str,
         sensitivities: Sequence[int] = ...,
         hold: str = ...,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[Array, Array]:
         """Free runs of ``horizon`` samples from each of the S samples ``starts``, row 0 being the start itself.
 
         Returns
@@ -460,7 +439,7 @@ class System:
         inputs: ArrayLike,
         time_step: float,
         sensitivities: Sequence[int] = ...,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[Array, Array, Array]:
         """Effort that a measured motion (N, n) needs, and effort that the actuators deliver under ``inputs`` (N, m).
 
         Returns
@@ -480,7 +459,7 @@ class System:
         acceleration: ArrayLike,
         time_step: float,
         sensitivities: Sequence[int] = ...,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[Array, Array]:
         """Effort (N, n) that a measured motion needs, as in `inverse_dynamics`, and its derivatives (N, n, k).
 
         The drives may be any: what they deliver does not enter.
@@ -489,7 +468,7 @@ class System:
         """Raise CoreError for parameters with which the machine does not exist."""
     def delivered(
         self, theta: ArrayLike, inputs: ArrayLike, time_step: float, sensitivities: Sequence[int] = ...
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[Array, Array]:
         """Effort of ideal drives on the joints (N, n_joints) under ``inputs`` (N, m), as in `inverse_dynamics`.
 
         Unlike there, the machine may have coordinates that nobody measured; all drives have to act on joints.
@@ -499,11 +478,9 @@ class System:
         applied, jacobian : ndarray
             (N, n_joints), and its derivatives (N, n_joints, k).
         """
-    def forward_dynamics(
-        self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike, effort: ArrayLike
-    ) -> NDArray[np.float64]:
+    def forward_dynamics(self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike, effort: ArrayLike) -> Array:
         """Accelerations (n_coordinates,) with all effects under ``effort`` (n,) on the joints."""
-    def mass_matrix(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:
+    def mass_matrix(self, theta: ArrayLike, position: ArrayLike) -> Array:
         """Mass matrix over all coordinates, payloads included."""
     def energy(self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike) -> tuple[float, float]:
         """Kinetic and potential energy in J: of bodies in gravity, and of effects that have a potential."""
@@ -517,9 +494,7 @@ class System:
         free: Sequence[int] = ...,
     ) -> tuple[str, str]:
         """The texts of ``NAME.h`` and ``NAME.c``; parameters numbered ``free`` are arguments, others constants."""
-    def linearize(
-        self, theta: ArrayLike, state: ArrayLike, inputs: ArrayLike
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def linearize(self, theta: ArrayLike, state: ArrayLike, inputs: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """Exact derivatives at ``state`` (n_states,) under standing commands ``inputs`` (m,).
 
         Delays pass their input unchanged; dead zones and saturations have the slope at the command.
@@ -544,7 +519,7 @@ class System:
         strain_gain: ArrayLike | None = ...,
         first: int = ...,
         departure: ArrayLike | None = ...,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[Array, Array, Array]:
         """Joints follow a measured motion (N, n), beams respond from rest; position sensors are undone.
 
         Joints in ``passive`` move freely with their effects, from rest; their columns of the motion mean nothing.
@@ -571,7 +546,7 @@ class System:
         substeps: int,
         integrator: str,
         sensitivities: Sequence[int] = ...,
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    ) -> tuple[Array, Array, Array]:
         """Joints follow a measured motion (N, n), drives and supplies answer to it and to ``inputs`` (N, nu).
 
         They begin in the states ``internal`` (n_states - 2 n,). Position sensors are undone. States of drives that were
@@ -585,33 +560,31 @@ class System:
         states : ndarray, shape (N, nx)
         jacobian : ndarray, shape (N, ny + n, k)
         """
-    def internal_state(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:
+    def internal_state(self, theta: ArrayLike, position: ArrayLike) -> Array:
         """What follows coordinates and rates in a state of a machine that has stood without commands.
 
         It stood at ``position`` (n_coordinates,). Shape (n_states - 2 n_coordinates,): lags, currents and spools zero,
         visco-elastic elements settled, chambers without net force, sagging supplies at their pressure.
         """
-    def memories(self, theta: ArrayLike, position: ArrayLike, time_step: float) -> NDArray[np.float64]:
+    def memories(self, theta: ArrayLike, position: ArrayLike, time_step: float) -> Array:
         """Memories (N, effects that remember) at every sample of a path of the joints (N, n), relaxed at the first."""
-    def equilibrium(self, theta: ArrayLike, position: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def equilibrium(self, theta: ArrayLike, position: ArrayLike) -> tuple[Array, Array]:
         """Coordinates (n_coordinates,) at rest with the joints held at ``position``, and the holding efforts (n,)."""
-    def natural_frequencies(self, theta: ArrayLike, position: ArrayLike) -> NDArray[np.float64]:
+    def natural_frequencies(self, theta: ArrayLike, position: ArrayLike) -> Array:
         """Natural frequencies (n_elastic,) in Hz with the joints locked at ``position`` (n,), slowest first.
 
         A negative one is the rate of growth of a beam that buckles.
         """
-    def loops(
-        self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike
-    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    def loops(self, theta: ArrayLike, position: ArrayLike, velocity: ArrayLike) -> tuple[Array, Array, Array, Array]:
         """Gap (m,) of the closed loops, its derivative (m, n), drift ``J' v`` (m,), and 1.0 where independent (m,)."""
-    def slopes(self, theta: ArrayLike, states: ArrayLike) -> NDArray[np.float64]:
+    def slopes(self, theta: ArrayLike, states: ArrayLike) -> Array:
         """Largest slope (N, n_beams) in rad of each beam; not a number where the kinematics are exact."""
     @property
     def slope_limit(self) -> float:
         """Slope in rad up to which the kinematics of small slopes are right within 1 %."""
-    def jacobian(self, theta: ArrayLike, position: ArrayLike, marker: int) -> NDArray[np.float64]:
+    def jacobian(self, theta: ArrayLike, position: ArrayLike, marker: int) -> Array:
         """Jacobian (6, n_coordinates) of a marker by number: angular velocity, then velocity, in world axes."""
-    def marker_poses(self, theta: ArrayLike, positions: ArrayLike) -> NDArray[np.float64]:
+    def marker_poses(self, theta: ArrayLike, positions: ArrayLike) -> Array:
         """Poses (N, markers, 12) along ``positions`` (N, n_coordinates): origin in the world, then axes by rows."""
     def time_steps(
         self,
@@ -624,7 +597,7 @@ class System:
         count: int,
         states: int,
         compiled: bool,
-    ) -> tuple[NDArray[np.float64], int, int, list[tuple[str, float, float]], str | None]:
+    ) -> tuple[Array, int, int, list[tuple[str, float, float]], str | None]:
         """Single steps on the way through ``inputs`` again and again.
 
         Duration (count,) of each in s; how often they asked for memory; bytes that a simulation holds; at so many
@@ -632,7 +605,6 @@ class System:
         directly.
         """
 
-_Array = NDArray[np.float64]
 _Pair = Sequence[float]
 
 @final
@@ -655,25 +627,25 @@ class Karl:
     @staticmethod
     def prototype() -> tuple[float, float, float, list[list[float]], list[float], list[float], list[float]]:
         """Dimensions of the prototype, in the order of the class's arguments."""
-    def direct(self, strokes: _Pair) -> _Array:
+    def direct(self, strokes: _Pair) -> Array:
         """Joint angles (4, 2) of all assembly modes at two strokes."""
-    def inverse(self, target: _Pair) -> _Array:
+    def inverse(self, target: _Pair) -> Array:
         """Angles and strokes (8, 4) of all configurations that put the end point at ``target``."""
-    def end_point(self, angles: ArrayLike) -> _Array:
+    def end_point(self, angles: ArrayLike) -> Array:
         """End points (N, 2) at joint angles (N, 2)."""
-    def end_point_determinant(self, angles: ArrayLike) -> _Array:
+    def end_point_determinant(self, angles: ArrayLike) -> Array:
         """Determinants (N,) of the end point's Jacobian, m^2."""
-    def transmission(self, angles: ArrayLike, strokes: ArrayLike) -> _Array:
+    def transmission(self, angles: ArrayLike, strokes: ArrayLike) -> Array:
         """Diagonals (N, 2) of Lambda, rad/m."""
-    def determinants(self, angles: ArrayLike, strokes: ArrayLike) -> _Array:
+    def determinants(self, angles: ArrayLike, strokes: ArrayLike) -> Array:
         """Determinants (N, 2) of Psi and Omega, m^2."""
-    def stroke_slopes(self, angles: ArrayLike, strokes: ArrayLike) -> _Array:
+    def stroke_slopes(self, angles: ArrayLike, strokes: ArrayLike) -> Array:
         """Derivatives (N, 2) of the constraints by the strokes, m."""
-    def torques(self, angles: ArrayLike, strokes: ArrayLike, forces: ArrayLike) -> _Array:
+    def torques(self, angles: ArrayLike, strokes: ArrayLike, forces: ArrayLike) -> Array:
         """Joint torques (N, 2) of actuator forces (N, 2)."""
-    def alignments(self, actuator: int) -> _Array:
+    def alignments(self, actuator: int) -> Array:
         """Rows (stroke, angle, extended) where an actuator loses control of its joint."""
-    def perpendiculars(self, actuator: int) -> _Array:
+    def perpendiculars(self, actuator: int) -> Array:
         """Rows (stroke, angle) where a rod is perpendicular to its stroke."""
     def span(self, actuator: int, mode: float) -> float:
         """Turn of a joint in rad between two alignments, in mode +1 or -1."""
@@ -697,21 +669,21 @@ class Leg:
         parts: Sequence[_Pair],
         gravity: float,
     ) -> Leg: ...
-    def strokes(self, angles: ArrayLike) -> _Array:
+    def strokes(self, angles: ArrayLike) -> Array:
         """Lengths (N, 2) of hip and knee cylinder."""
-    def levers(self, angles: ArrayLike) -> _Array:
+    def levers(self, angles: ArrayLike) -> Array:
         """Lever arms (N, 2) of the cylinders, m/rad."""
-    def points(self, angles: ArrayLike) -> _Array:
+    def points(self, angles: ArrayLike) -> Array:
         """Points (N, 7, 2): hip, knee, foot, bases of hip and knee cylinder, their tips."""
-    def terms(self, angles: ArrayLike, rates: ArrayLike, derivation: str) -> tuple[_Array, _Array, _Array]:
+    def terms(self, angles: ArrayLike, rates: ArrayLike, derivation: str) -> tuple[Array, Array, Array]:
         """Mass matrices (N, 2, 2), velocity terms (N, 2), gravity terms (N, 2); virtual_work or lagrange."""
-    def reactions(self, angles: ArrayLike, rates: ArrayLike, accelerations: ArrayLike) -> _Array:
+    def reactions(self, angles: ArrayLike, rates: ArrayLike, accelerations: ArrayLike) -> Array:
         """Rows (N, 23): torques, cylinder forces, ground, guide (2), pins (6 x 2), bearings (2 x 2)."""
-    def cylinder_forces(self, angles: ArrayLike, torques: ArrayLike) -> _Array:
+    def cylinder_forces(self, angles: ArrayLike, torques: ArrayLike) -> Array:
         """Cylinder forces (N, 2) that give joint torques (N, 2)."""
-    def accelerations(self, angles: ArrayLike, rates: ArrayLike, torques: ArrayLike) -> _Array:
+    def accelerations(self, angles: ArrayLike, rates: ArrayLike, torques: ArrayLike) -> Array:
         """Joint accelerations (N, 2) under joint torques (N, 2)."""
-    def shares(self, angles: ArrayLike, rate: float, acceleration: float, samples: int, definition: str) -> _Array:
+    def shares(self, angles: ArrayLike, rate: float, acceleration: float, samples: int, definition: str) -> Array:
         """Largest shares (N, 3) of inertia, velocity and gravity over all sampled motions."""
 
 def hyq_parameters(
@@ -742,10 +714,10 @@ class Narx:
     def texts(self) -> list[str]:
         """Terms as they are written."""
 
-    def simulate_free_run(self, name: str, output: ArrayLike, inputs: ArrayLike, limit: float) -> NDArray[np.float64]:
+    def simulate_free_run(self, name: str, output: ArrayLike, inputs: ArrayLike, limit: float) -> Array:
         """Output (N,) from the simulated past; raises ``Diverged`` with the samples before."""
 
-    def predict_one_step(self, name: str, output: ArrayLike, inputs: ArrayLike) -> NDArray[np.float64]:
+    def predict_one_step(self, name: str, output: ArrayLike, inputs: ArrayLike) -> Array:
         """Output (N,) from the measured past."""
 
     def stepper(self) -> NarxStepper:
@@ -770,7 +742,7 @@ def narx_fit(
     signals: Sequence[str],
     terms: Sequence[Sequence[tuple[int, int]]],
     records: Sequence[tuple[str, ArrayLike, ArrayLike]],
-) -> NDArray[np.float64]:
+) -> Array:
     """Coefficients of given terms by least squares over records (name, output (N,), inputs (N, m))."""
 
 def narx_select(
@@ -780,13 +752,7 @@ def narx_select(
     most: int,
     stop: str,
     value: float,
-) -> tuple[
-    list[list[tuple[int, int]]],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    NDArray[np.float64],
-    list[tuple[str, str]],
-]:
+) -> tuple[list[list[tuple[int, int]]], Array, Array, Array, list[tuple[str, str]]]:
     """Terms chosen by error-reduction ratio: terms, coefficients, ratios, values of the criterion, dependent ones."""
 
 @final
@@ -804,7 +770,5 @@ class MaxwellNarx:
     """
 
     def __new__(cls, k0: ArrayLike, s0: ArrayLike, k1: float, c1: float, step: float, scheme: str) -> MaxwellNarx: ...
-    def simulate_free_run(
-        self, start: Sequence[float], drive: ArrayLike, length: ArrayLike, limit: float
-    ) -> NDArray[np.float64]:
+    def simulate_free_run(self, start: Sequence[float], drive: ArrayLike, length: ArrayLike, limit: float) -> Array:
         """Forces (N,) in N; the first two are `start`."""
