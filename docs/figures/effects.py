@@ -299,12 +299,12 @@ def _remarks(effect: EffectType) -> str:
 
 
 def _confused(effect: EffectType) -> str:
-    """Effects that look alike; where both entries say the same, what discriminates them stands at the first."""
+    """Effects that look alike; what discriminates two of them stands at the first."""
     told, links = [], []
     names = list(EFFECTS)
     for other, how in effect.confused_with.items():
         link = f"[{other}](#{other})"
-        if names.index(other) < names.index(effect.name) and EFFECTS[other].confused_with.get(effect.name) == how:
+        if names.index(other) < names.index(effect.name):
             links.append(link)
         else:
             told.append(f"- {link}: {how}")

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import KW_ONLY, dataclass, replace
+from dataclasses import KW_ONLY, dataclass, field, replace
 from typing import Literal, get_args
 
 from vpm.catalogue.formula import Formula
@@ -162,7 +162,7 @@ class EffectType(Traits):
     impossible : str
         What a value outside the physical range would mean.
     confused_with : mapping of str to str
-        Effects that records may not tell from this one, and what tells them apart.
+        Effects that records may not tell from this one, and what tells them apart; of two effects one has to say it.
     signature : Signature
         Where it shows: the state that its picture is drawn over, and what is to be seen there.
     formula : Formula or None
@@ -176,7 +176,7 @@ class EffectType(Traits):
     law: str
     sentence: str
     impossible: str
-    confused_with: Mapping[str, str]
+    confused_with: Mapping[str, str] = field(default_factory=dict)
     signature: Signature = ANYWHERE
     formula: Formula | None = None
 

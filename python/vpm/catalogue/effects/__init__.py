@@ -1,12 +1,15 @@
 """The effects, one file each, and the order in which a page lists them.
 
-Of effects that no digit of the data parts, a diagnosis names the one that stands first here.
+Of effects that no digit of the data parts, a diagnosis names the one that stands first here. Of two that records
+confuse, the later one says what tells them apart.
 
 The command passes the effects of an actuator in the order delay, dead zone, saturation, lag, gain. A sensor reads
 ``y = gain x(t - delay) + offset``. A cylinder, the valve that is screwed on it, and the actuator have one name; what is
 described of leakage, air and frequency stays, and an effect comes on top of it.
 """
 
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from importlib import import_module
 
 from vpm.catalogue.kinds import EffectType
@@ -51,5 +54,14 @@ ORDER = (
 )
 """Files of this folder."""
 
-BUILT_IN: tuple[EffectType, ...] = tuple(import_module(f"{__name__}.{name}").EFFECT for name in ORDER)
+
+def _mutual(effects: Sequence[EffectType]) -> Iterator[EffectType]:
+    """Effects each of which is confused with those that are confused with it."""
+    told = {frozenset((one.name, other)): how for one in effects for other, how in one.confused_with.items()}
+    for one in effects:
+        pairs = {other.name: frozenset((one.name, other.name)) for other in effects}
+        yield replace(one, confused_with={other: told[pair] for other, pair in pairs.items() if pair in told})
+
+
+BUILT_IN = tuple(_mutual([import_module(f"{__name__}.{name}").EFFECT for name in ORDER]))
 """Their entries."""

@@ -28,10 +28,7 @@ EFFECT = EffectType(
     impossible="a negative time constant would mean a drive that runs away from its command",
     confused_with={
         "joint_compliance": "both delay the motion of the link; free vibration after a stop shows the spring alone",
-        "valve_dynamics": "a lag is a pole before the spool, the other is the spool itself; fast commands discriminate",
-        "entrained_air": "both delay the force behind the command; pressures at a loaded piston discriminate",
         "input_delay": "they agree for slow commands; steps and fast commands discriminate",
-        "sensor_delay": "they agree for slow motion; steps and fast motion discriminate",
         "viscous_friction": "both weaken fast motion; steady motion at several speeds shows the friction alone",
     },
     late="lag",

@@ -25,12 +25,6 @@ EFFECT = EffectType(
         " {viscous_difference} in proportion to speed (positive minus negative direction)."
     ),
     impossible="either sign is possible; the friction of each direction as a whole has to stay above zero",
-    confused_with={
-        "bias_force": (
-            "a difference of Coulomb friction and a constant load agree wherever the joint moves; only standstill and"
-            " starts from rest discriminate"
-        ),
-    },
     contains=("bias_force",),
     fixed=("transition_velocity",),
     usual="force",

@@ -33,9 +33,6 @@ EFFECT = EffectType(
         " {damping} within it as well."
     ),
     impossible="a negative stiffness would pull the contacts into each other, a negative damping would feed energy in",
-    confused_with={
-        "joint_compliance": "they agree where the load never changes its sign; reversals and small motion discriminate",
-    },
     contains=("rotor_inertia",),
     motion="deflection",
     impacts=True,

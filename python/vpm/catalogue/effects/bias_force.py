@@ -15,15 +15,11 @@ EFFECT = EffectType(
     sentence="{at} carries a constant load of {force}, in either direction and at rest.",
     impossible="either sign is possible: it says in which direction the load pulls",
     confused_with={
-        "gravity_tilt": "they agree where gravity's lever does not change; other poses discriminate",
         "coulomb_friction": "motion in one direction alone does not discriminate; motion in both directions does",
         "asymmetric_friction": (
             "a difference of Coulomb friction and a constant load agree wherever the joint moves; only standstill and"
             " starts from rest discriminate"
         ),
-        "payload": "they agree where gravity's lever does not change; other poses or fast motion discriminate",
-        "sensor_offset": "through gravity or a spring a shifted zero acts like a load; other poses discriminate",
-        "spring": "they agree over a short way; motion over a longer way discriminates",
     },
     usual="force",
     signature=Signature(

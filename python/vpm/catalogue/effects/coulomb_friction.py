@@ -20,11 +20,7 @@ EFFECT = EffectType(
     sentence="{at} resists motion with {coulomb} at any speed, against the direction of motion.",
     impossible="a negative Coulomb friction would push along the motion and feed energy into it",
     confused_with={
-        "bias_force": "motion in one direction alone does not discriminate; motion in both directions does",
         "viscous_friction": "motion at one speed alone does not discriminate; records at several speeds do",
-        "stribeck_friction": "they differ only at low speed; slow motion and starts from rest discriminate",
-        "dead_zone": "they agree wherever command and velocity have the same sign; braking discriminates",
-        "hysteresis": "they agree but after a reversal; short strokes and slow reversals discriminate",
     },
     sticks=True,
     usual="friction",

@@ -35,7 +35,6 @@ EFFECT = EffectType(
     impossible="a negative stiffness would pull the joint beyond its end",
     confused_with={
         "spring": "they agree over a way beyond the end alone; motion on both sides of it discriminates",
-        "saturation": "both stop the motion at large commands; the same command in the middle of the way discriminates",
     },
     impacts=True,
     link_side_alone=True,

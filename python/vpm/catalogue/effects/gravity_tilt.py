@@ -27,7 +27,6 @@ EFFECT = EffectType(
     confused_with={
         "bias_force": "they agree where gravity's lever does not change; other poses discriminate",
         "payload": "both change the load of gravity; fast motion shows the payload's inertia",
-        "sensor_offset": "a shifted zero of an angle turns gravity for all that hangs on it; other poses discriminate",
     },
     exact=True,
     signature=Signature(

@@ -15,11 +15,6 @@ EFFECT = EffectType(
     law="u_delayed(t) = u(t - time)",
     sentence="{at} acts on a command {time} late.",
     impossible="a negative delay would mean that the drive acts before it is told to: check the time stamps of the log",
-    confused_with={
-        "valve_dynamics": "they agree for slow commands; steps and fast commands discriminate",
-        "actuator_lag": "they agree for slow commands; steps and fast commands discriminate",
-        "sensor_delay": "from commands to readings only their sum shows; a second sensor or time stamps discriminate",
-    },
     late="delay",
     signature=Signature(("command_rate",), "A straight line over the rate of the command", "Steps and fast commands"),
 )

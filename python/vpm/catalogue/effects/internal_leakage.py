@@ -24,7 +24,6 @@ EFFECT = EffectType(
     impossible="less leakage than described: a negative one means that the described leakage is too large; correct it",
     confused_with={
         "viscous_friction": "both let a loaded piston give way; the pressures of both chambers discriminate",
-        "supply_drop": "both lower the pressures under load; a load held at rest shows the leakage alone",
     },
     signature=Signature(
         ("pressure_difference",),

@@ -31,9 +31,6 @@ EFFECT = EffectType(
     impossible="a negative stiffness would drive motor and link apart, a negative damping would feed energy in",
     confused_with={
         "backlash": "they agree where the load never changes its sign; reversals and small motion discriminate",
-        "link_flexibility": "behind one motor both are a spring; a strain gauge or the motion of the tip discriminates",
-        "rotor_inertia": "far below the resonance only the inertias show; faster motion discriminates",
-        "actuator_lag": "both delay the motion of the link; free vibration after a stop shows the spring alone",
     },
     contains=("rotor_inertia",),
     motion="deflection",

@@ -24,7 +24,6 @@ EFFECT = EffectType(
         " it brakes where the joint pushes the drive."
     ),
     impossible=NEGATIVE_SHARE,
-    confused_with={},
     screened=False,
     motor_side_alone=True,
     takes_effort=True,

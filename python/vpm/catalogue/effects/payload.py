@@ -25,12 +25,10 @@ EFFECT = EffectType(
     sentence="{at} carries {mass} more than described, at ({x}, {y}, {z}) of its frame.",
     impossible="a negative payload would mean that the body is lighter than described: correct the mass of the body",
     confused_with={
-        "gravity_tilt": "both change the load of gravity; fast motion shows the payload's inertia",
         "rotor_inertia": "both need effort to accelerate; a payload has weight and loads the joints before it too",
         "bias_force": "they agree where gravity's lever does not change; other poses or fast motion discriminate",
         "spring": "near the hanging position gravity acts like a spring; large angles or fast motion discriminate",
         "torque_ripple": "gravity repeats once per turn; a vertical axis or fast motion discriminates",
-        "sensor_gain": "both scale the effort that an acceleration needs; a record with a known load discriminates",
     },
     exact=True,
     signature=Signature(

@@ -26,7 +26,6 @@ EFFECT = EffectType(
     law="tau = -(cosine cos(2 pi q/period) + sine sin(2 pi q/period)) tanh(v/transition_velocity)",
     sentence="{at} rubs differently along its way, by {cosine} (cosine) and {sine} (sine), every {period} alike.",
     impossible="either sign is possible; the friction of each place as a whole has to stay above zero",
-    confused_with={},
     requires="coulomb_friction",
     screened=False,
     signature=Signature(

@@ -22,8 +22,6 @@ EFFECT = EffectType(
     sentence="{at} has to accelerate {inertia} more than its links have: that of a rotor, which no gravity acts on.",
     impossible="a negative inertia of a rotor would mean that the links are too heavy: correct their inertia",
     confused_with={
-        "payload": "both need effort to accelerate; a payload has weight and loads the joints before it too",
-        "sensor_gain": "both scale the effort that an acceleration needs; a record with a known load discriminates",
         "joint_compliance": "far below the resonance only the inertias show; faster motion discriminates",
     },
     exact=True,

@@ -22,7 +22,6 @@ EFFECT = EffectType(
     impossible="a limit of zero or less would mean that the drive never acts",
     confused_with={
         "end_stop": "both stop the motion at large commands; the same command in the middle of the way discriminates",
-        "supply_drop": "both limit the speed; a log of the pressure at the valve discriminates",
         "viscous_friction": "both weaken large commands; large commands at low speed discriminate",
     },
     tried=(Tried("limit", "command", (0.95, 0.7, 0.4), (0.02, 1.0)),),

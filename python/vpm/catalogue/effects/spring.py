@@ -19,12 +19,7 @@ EFFECT = EffectType(
     sentence="{at} is pulled back towards {rest} with {stiffness}.",
     impossible="a negative stiffness would push the joint away from its rest position",
     confused_with={
-        "end_stop": "they agree over a way beyond the end alone; motion on both sides of it discriminates",
         "bias_force": "they agree over a short way; motion over a longer way discriminates",
-        "payload": "near the hanging position gravity acts like a spring; large angles or fast motion discriminate",
-        "sensor_offset": "a shifted rest position and a shifted zero agree; a reference position discriminates",
-        "torque_ripple": "they agree over less than a quarter of a period; a longer way discriminates",
-        "hysteresis": "they agree over ways that are too short to slide; a longer way discriminates",
     },
     tried=(Tried("rest", "way", (0.0,), (-10.0, 10.0)),),
     link_side_alone=True,

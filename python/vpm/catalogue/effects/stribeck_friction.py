@@ -27,8 +27,6 @@ EFFECT = EffectType(
     impossible="a negative Stribeck level would mean friction that is lower close to rest than in motion",
     confused_with={
         "coulomb_friction": "they differ only at low speed; slow motion and starts from rest discriminate",
-        "dead_zone": "both hold the joint at rest under small commands; slow reversals under load discriminate",
-        "hysteresis": "both shape the start of a motion; starts at several accelerations discriminate",
     },
     requires="coulomb_friction",
     sticks=True,

@@ -25,7 +25,6 @@ EFFECT = EffectType(
     impossible="either sign is possible: the signs say where in the period the ripple is greatest",
     confused_with={
         "spring": "they agree over less than a quarter of a period; a longer way discriminates",
-        "payload": "gravity repeats once per turn; a vertical axis or fast motion discriminates",
     },
     signature=Signature(
         ("position",),

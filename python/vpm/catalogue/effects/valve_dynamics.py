@@ -22,7 +22,6 @@ EFFECT = EffectType(
     confused_with={
         "actuator_lag": "a lag is a pole before the spool, the other is the spool itself; fast commands discriminate",
         "input_delay": "they agree for slow commands; steps and fast commands discriminate",
-        "entrained_air": "both delay the force behind the command; the spool or both pressures discriminate",
     },
     late="spool",
     signature=Signature(
