@@ -207,9 +207,6 @@ class ComputedTorque(Sampled):
 
 Controller = Annotated[Cascade | Pid | Pd | ForceLoop | ComputedTorque, Field(discriminator="type")]
 
-#: Types of controllers, as a model file names them.
-TYPES: tuple[type[Sampled], ...] = (Cascade, Pid, Pd, ForceLoop, ComputedTorque)
-
 
 def controller_problems(document: Document, structure: Structure) -> Iterator[Problem]:
     """Controllers that name what is not there, command what is commanded already, or cannot do what they are to."""

@@ -16,8 +16,8 @@ from vpm.model.bushing import Bushing
 from vpm.model.channels import ChannelEntry
 from vpm.model.component import Component
 from vpm.model.contact import Contact
-from vpm.model.controller import TYPES, Controller
-from vpm.model.drives.actuator import ACTUATOR_TYPES, Actuator
+from vpm.model.controller import Controller
+from vpm.model.drives.actuator import Actuator
 from vpm.model.drives.supply import Supply
 from vpm.model.effects import EffectEntry
 from vpm.model.entry import Entry, Quantity, Switch, Text, Vector
@@ -68,28 +68,6 @@ class Document(Entry):
             yield from ((section, name, component) for name, component in named.items())
 
 
-#: Tables of named components, in the order in which a file is written.
-SECTIONS: Mapping[str, tuple[type[BaseModel], ...]] = {
-    "bodies": (Body,),
-    "joints": (Joint,),
-    "beams": (Beam,),
-    "lines": (Line,),
-    "transmissions": (Transmission,),
-    "gauges": (Gauge,),
-    "markers": (Marker,),
-    "imus": (Imu,),
-    "supplies": (Supply,),
-    "actuators": tuple(ACTUATOR_TYPES.values()),
-    "sensors": (Sensor,),
-    "controllers": TYPES,
-    "contacts": (Contact,),
-    "bushings": (Bushing,),
-    "load_cells": (LoadCell,),
-    "loops": (Loop,),
-    "channels": (ChannelEntry,),
-}
-
-
 def keys_of(*entries: type[BaseModel]) -> tuple[str, ...]:
     """Keys of the schema that a table takes, as they are written in a file."""
     return tuple(field.alias or name for entry in entries for name, field in entry.model_fields.items())
@@ -137,3 +115,13 @@ def _inside(kind: object, key: str | int) -> Iterator[tuple[object, tuple[object
             yield from _members(Quantity)
     elif get_origin(kind) in {dict, tuple}:
         yield from _members(next(inner for inner in reversed(get_args(kind)) if inner is not Ellipsis))
+
+
+def _kinds_of(section: str) -> Tables:
+    """Kinds of the named components of a section of the schema."""
+    named = (kind for kind, _ in _inside(Document, section) if get_origin(kind) is dict)
+    return tuple(kind for names in named for kind, _ in _inside(names, "") if isinstance(kind, type))
+
+
+#: Kinds of named components by section, in the order in which a file is written.
+SECTIONS: Mapping[str, Tables] = {section: kinds for section in Document.model_fields if (kinds := _kinds_of(section))}

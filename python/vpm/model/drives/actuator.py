@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, get_args
 
 from pydantic import Discriminator, Tag
 
@@ -44,15 +44,9 @@ Actuator = Annotated[
     Discriminator(_type_of),
 ]
 
+#: Kinds of actuators by their type in a model file.
 ACTUATOR_TYPES: Mapping[str, type[Drive]] = {
-    "ideal": Ideal,
-    "dc_motor": DcMotor,
-    "spring_damper": SpringDamper,
-    "maxwell": Maxwell,
-    "hydraulic": Hydraulic,
-    "table": Table,
-    "narx": Narx,
-    "maxwell_narx": MaxwellNarx,
+    tag.tag: kind for kind, tag in map(get_args, get_args(get_args(Actuator)[0]))
 }
 
 
