@@ -64,87 +64,41 @@ _BROKEN = (
 _MISFIT = (ArithmeticError, AttributeError, LookupError, RecursionError, TypeError, ValueError)
 _TAG = "$"
 
-#: Modules of the classes that stand in files, by the names that files give them: loading a file imports nothing else.
-#: A class of a program's own has to be imported by that program before.
+#: Modules whose classes stand in files, by their package: loading a file imports nothing else. A class of a program's
+#: own has to be imported by that program before.
 _MODULES: Mapping[str, tuple[str, ...]] = {
-    "vpm.budget.report": ("BudgetReport", "Stage"),
-    "vpm.climb.result": ("Climb", "Level"),
-    "vpm.compare.comparison": ("ChannelComparison", "Comparison"),
-    "vpm.compare.correlation": ("Correlation",),
-    "vpm.compare.regions": ("Bin", "Region", "Where"),
-    "vpm.control.feedback": ("StateFeedback",),
-    "vpm.control.plan": ("FlexibleFeedforward",),
-    "vpm.control.schedule": ("Schedule",),
-    "vpm.discrepancy.diagnosis": (
-        "AcceptedEffect",
-        "Ambiguity",
-        "ChannelGap",
-        "Diagnosis",
-        "EffectParameterEstimate",
-        "Empirical",
-        "EmpiricalTerm",
-        "Picture",
-        "ProposedExperiment",
-        "RankedCandidate",
-        "RefusedEffect",
-        "Step",
-        "Trace",
+    "vpm": ("linear",),
+    "vpm.budget": ("report",),
+    "vpm.climb": ("result",),
+    "vpm.compare": ("comparison", "correlation", "regions"),
+    "vpm.control": ("feedback", "plan", "schedule"),
+    "vpm.discrepancy": ("diagnosis", "evidence", "provenance"),
+    "vpm.excitation": ("base_parameters", "excitation", "fourier", "limits"),
+    "vpm.experiment": ("campaign", "motion", "record"),
+    "vpm.identify": (
+        "fit_result",
+        "identifiability",
+        "inertial_fit",
+        "inertial_regression",
+        "intervals",
+        "settings",
+        "whiteness",
     ),
-    "vpm.discrepancy.evidence": ("Evidence",),
-    "vpm.discrepancy.provenance": ("Provenance", "Source"),
-    "vpm.excitation.base_parameters": ("BaseParameters",),
-    "vpm.excitation.excitation": ("Excitation",),
-    "vpm.excitation.fourier": ("FourierTrajectory",),
-    "vpm.excitation.limits": ("JointLimits",),
-    "vpm.experiment.campaign": ("Campaign",),
-    "vpm.experiment.motion": ("Motion",),
-    "vpm.experiment.record": ("Experiment",),
-    "vpm.identify.fit_result": ("Fit",),
-    "vpm.identify.identifiability": ("Combination",),
-    "vpm.identify.inertial_fit": ("InertialFit",),
-    "vpm.identify.inertial_regression": ("InertialRegression",),
-    "vpm.identify.intervals": ("Bootstrap", "Profile"),
-    "vpm.identify.settings": ("Checks", "Fitting"),
-    "vpm.identify.whiteness": ("Whiteness",),
-    "vpm.linear": ("LinearModel",),
-    "vpm.log_check.finding": ("Finding", "LogCheck"),
-    "vpm.model.model": ("Model",),
-    "vpm.narx.maxwell": ("MaxwellNarx",),
-    "vpm.narx.maxwell_records": ("MaxwellSignals",),
-    "vpm.narx.maxwell_result": ("MaxwellFit",),
-    "vpm.narx.model": ("Narx",),
-    "vpm.narx.run": ("NarxRun", "ResidualTests"),
-    "vpm.narx.validation": ("NarxValidation",),
-    "vpm.observer.noise": ("Noise",),
-    "vpm.observer.observation": ("Observation",),
-    "vpm.optimise.optimum": ("Optimum",),
-    "vpm.ranking.judgement": ("Judgement",),
-    "vpm.ranking.result": ("Gap", "Ranked", "Ranking"),
-    "vpm.realtime.loop": ("LoopReport",),
-    "vpm.scenario.outcome": ("ScenarioRun",),
-    "vpm.simplify.pareto_front": ("Ladder", "Rung"),
-    "vpm.simplify.reductions": ("Reduction",),
-    "vpm.simplify.replacement": ("Replacement",),
-    "vpm.simulate.resolution": ("Resolution",),
-    "vpm.simulate.run": ("Run",),
-    "vpm.simulate.setup": ("Setup",),
-    "vpm.studies.impedance.decay": ("Decay", "LogarithmicDecrement"),
-    "vpm.studies.impedance.hysteresis_loop": ("Loop",),
-    "vpm.studies.impedance.impact": ("ImpulseBalance", "Stop"),
-    "vpm.studies.impedance.landing": ("Landing",),
-    "vpm.studies.impedance.loss": ("LossLaw",),
-    "vpm.studies.impedance.repeated": ("ImpedanceTable", "Repeated", "RepeatedTests"),
-    "vpm.studies.linkages.dropping": ("DropLimit",),
-    "vpm.studies.linkages.karl": ("KarlGeometry",),
-    "vpm.studies.linkages.karl_results": ("KarlPoses", "KarlSingularities", "KarlWorkspace"),
-    "vpm.studies.linkages.leg_parameters": ("Attachment", "Cylinder", "LegParameters", "LegPart", "Segment"),
-    "vpm.studies.linkages.leg_results": ("LegReactions", "LegStrokes", "LegTerms", "ShareMap"),
-    "vpm.studies.maxwell.maps": ("MaxwellMap",),
-    "vpm.studies.maxwell.runs": ("MaxwellErrors",),
-    "vpm.studies.maxwell.windows": ("MaxwellWindows",),
-    "vpm.studies.oil.equations": ("CylinderGeometry",),
-    "vpm.studies.oil.fit": ("OilFit",),
-    "vpm.weighing.weigh": ("Weighing",),
+    "vpm.log_check": ("finding",),
+    "vpm.model": ("model",),
+    "vpm.narx": ("maxwell", "maxwell_records", "maxwell_result", "model", "run", "validation"),
+    "vpm.observer": ("noise", "observation"),
+    "vpm.optimise": ("optimum",),
+    "vpm.ranking": ("judgement", "result"),
+    "vpm.realtime": ("loop",),
+    "vpm.scenario": ("outcome",),
+    "vpm.simplify": ("pareto_front", "reductions", "replacement"),
+    "vpm.simulate": ("resolution", "run", "setup"),
+    "vpm.studies.impedance": ("decay", "hysteresis_loop", "impact", "landing", "loss", "repeated"),
+    "vpm.studies.linkages": ("dropping", "karl", "karl_results", "leg_parameters", "leg_results"),
+    "vpm.studies.maxwell": ("maps", "runs", "windows"),
+    "vpm.studies.oil": ("equations", "fit"),
+    "vpm.weighing": ("weigh",),
 }
 
 #: Every subclass of `Storable`, by "module:class": the only classes that loading a file can build.
@@ -380,11 +334,16 @@ def _built(kind: type[Storable], items: Mapping[str, Any], path: object) -> Stor
     return built
 
 
+def _holds_results(module: str) -> bool:
+    package, _, own = module.rpartition(".")
+    return own in _MODULES.get(package, ())
+
+
 def _stored_class(name: str, path: object) -> type[Storable]:
     module, _, kind = name.partition(":")
-    if module not in _MODULES:
+    if not _holds_results(module):
         module = present_name(module)
-    if kind in _MODULES.get(module, ()):
+    if _holds_results(module):
         import_module(module)
     try:
         return _STORED_CLASSES[f"{module}:{kind}"]
