@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,6 +10,7 @@ from numpy.typing import ArrayLike
 from vpm._core import Diverged
 from vpm._core import MaxwellNarx as Compiled
 from vpm.errors import DivergedError, IdentificationError, SimulationError
+from vpm.narx.maxwell_recursion import POWER_NAMES, Scheme
 from vpm.numbers import Array
 from vpm.results import Result
 
@@ -44,7 +44,7 @@ class MaxwellNarx(Result):
     k1: float
     c1: float
     step: float
-    scheme: Literal["trapezoidal", "printed", "central_mean"] = "trapezoidal"
+    scheme: Scheme = "trapezoidal"
 
     def __post_init__(self) -> None:
         """Fill both maps of the Maxwell element up to ten coefficients and check the numbers."""
@@ -118,5 +118,4 @@ class MaxwellNarx(Result):
         }
 
     def _frame_columns(self) -> Mapping[str, object]:
-        powers = ("1", "u", "s", "u^2", "u*s", "s^2", "u^3", "u^2*s", "u*s^2", "s^3")
-        return {"power": powers, "k0_N_per_m": self.k0, "s0_m": self.s0}
+        return {"power": POWER_NAMES, "k0_N_per_m": self.k0, "s0_m": self.s0}

@@ -3,6 +3,7 @@
 import base64
 import html
 import json
+from dataclasses import asdict
 from importlib.resources import files
 from os import PathLike
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from vpm.files import write_text
-from vpm.view.looks import GROUND, INK, LOOKS, SOFT, Look
+from vpm.view.looks import GROUND, INK, LOOKS, SOFT
 from vpm.view.scene import Arrow, Box, Scene, Shape, Sphere, Tube
 
 #: Bytes of text that the places may take, and samples that an eye tells apart.
@@ -61,17 +62,13 @@ def _content(scene: Scene) -> dict[str, Any]:
         "stage": STAGE,
         "scales": dict(scene.scales),
         "grid": scene.grid,
-        "looks": {role: _colours(LOOKS[role]) for role in LOOKS if role in scene.roles},
-        "ground": _colours(GROUND),
-        "ink": _colours(INK),
-        "soft": _colours(SOFT),
+        "looks": {role: asdict(LOOKS[role]) for role in LOOKS if role in scene.roles},
+        "ground": asdict(GROUND),
+        "ink": asdict(INK),
+        "soft": asdict(SOFT),
         "shapes": shapes,
         "places": base64.b64encode(numbers.tobytes()).decode("ascii"),
     }
-
-
-def _colours(look: Look) -> dict[str, str | float]:
-    return {"light": look.light, "dark": look.dark, "word": look.word, "solid": look.solid}
 
 
 def _form(shape: Shape) -> dict[str, Any]:
