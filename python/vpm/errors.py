@@ -268,6 +268,15 @@ class MissingExtraError(VpmError, ImportError):
 
 
 @contextmanager
+def refused_as(error: type[VpmError], owner: str = "") -> Iterator[None]:
+    """Error of another kind for what the compiled core or a file refuses, after the name of whose fault it is."""
+    try:
+        yield
+    except (ValueError, OverflowError) as cause:
+        raise error(f"{owner}: {cause}" if owner else str(cause)) from cause
+
+
+@contextmanager
 def needs(package: str, extra: str) -> Iterator[None]:
     """Error where an optional package is missing: one sentence names the extra that brings it."""
     try:

@@ -12,7 +12,7 @@ import typer
 
 from vpm.command import console, writable
 from vpm.command_output import give, note, progressed, wrote
-from vpm.errors import DiagnosisError
+from vpm.errors import DiagnosisError, refused_as
 from vpm.files import exists, write_text
 
 EXAMPLES = (
@@ -57,11 +57,9 @@ def prove(
     if answers is not None:
         found = proving.load_json(answers)
     else:
-        try:
+        with refused_as(DiagnosisError):
             kinds = kind or proving.KINDS
             todo = proving.jobs(machine or (), effect or (), numbers(seeds), noise or (1.0,), kinds, each)
-        except ValueError as error:
-            raise DiagnosisError(str(error)) from None
         kept = None if out is None else out.with_suffix(".partial.json")
         makes = None if executor is None else _maker(executor)
         found = _asked(proving, todo, (workers, limit), kept, makes)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vpm.errors import DivergedError, SimulationError, near_match
+from vpm.errors import DivergedError, SimulationError, near_match, refused_as
 from vpm.model import Model
 from vpm.numbers import Array, array_of
 from vpm.simulate import AUTOMATIC, Resolution, Run, Setup, judged
@@ -74,10 +74,8 @@ class Simulation:
         setup = replace(setup, integrator=setup.method(model))
         self._model, self._time_step, self._setup = model, float(time_step), setup
         self._start = model.state(state)
-        try:
+        with refused_as(SimulationError):
             self._core = Core(model.core, model.theta, self._start, float(time_step), substeps, setup.integrator)
-        except ValueError as error:
-            raise SimulationError(str(error)) from error
         self._not_compiled = self._core.compile() if compiled else None
         self._outputs = self._core.outputs
         # States that a run passed, for links whose kinematics hold up to a slope only; empty where there are none.
@@ -253,10 +251,8 @@ class Simulation:
             By default the one that the simulation was made with.
         """
         start = self._start if state is None else self._model.state(state)
-        try:
+        with refused_as(SimulationError):
             self._core.reset(start)
-        except ValueError as error:
-            raise SimulationError(str(error)) from None
         self._outputs = self._core.outputs
 
     def snapshot(self) -> Snapshot:
@@ -282,10 +278,8 @@ class Simulation:
         SimulationError
             The snapshot is of another model or of other steps.
         """
-        try:
+        with refused_as(SimulationError):
             self._core.restore(snapshot)
-        except ValueError as error:
-            raise SimulationError(str(error)) from None
         self._outputs = self._core.outputs
 
     def _command(self, inputs: ArrayLike | Mapping[str, float]) -> ArrayLike:

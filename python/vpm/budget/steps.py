@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vpm.errors import SimulationError, ValidityWarning
+from vpm.errors import SimulationError, ValidityWarning, refused_as
 from vpm.experiment import Experiment
 from vpm.initial import initial_state
 from vpm.model import Model
@@ -56,8 +56,6 @@ def time_steps(
     - ``inputs``: shape (N, inputs), repeated as often as needed
     - ``start``: shape (states,), where each way through the inputs starts; by default at rest at zero, once
     """
-    from vpm._core import Diverged
-
     method = setup.method(model, bounded=True)
     durations: list[Array] = []
     allocations = memory = done = 0
@@ -68,14 +66,11 @@ def time_steps(
     first = model.state() if start is None else start
     while done < steps:
         count = min(chunk, steps - done)
-        try:
-            with _ahead(rate, priority):
-                looks = 0 if done else states
-                seconds, asked, memory, found, reason = model.core.time_steps(
-                    model.theta, first, inputs, 1.0 / rate, setup.substeps, method, count, looks, compiled
-                )
-        except (Diverged, ValueError) as error:
-            raise SimulationError(f"{model.name}: {error}") from error
+        with refused_as(SimulationError, model.name), _ahead(rate, priority):
+            looks = 0 if done else states
+            seconds, asked, memory, found, reason = model.core.time_steps(
+                model.theta, first, inputs, 1.0 / rate, setup.substeps, method, count, looks, compiled
+            )
         durations.append(seconds)
         stages = stages or found
         direct = direct or reason

@@ -6,7 +6,7 @@ from typing import Literal
 import numpy as np
 
 from vpm._core import narx_candidates, narx_fit, narx_select
-from vpm.errors import IdentificationError
+from vpm.errors import IdentificationError, refused_as
 from vpm.narx.model import Narx
 from vpm.narx.records import RecordLike, as_list, series
 
@@ -94,13 +94,11 @@ def identify(
     number = DEFAULTS.get(criterion, 0.0) if value is None else value
     stop = "terms" if n_terms is not None else str(criterion)
     most = n_terms if isinstance(n_terms, int) else max_terms
-    try:
+    with refused_as(IdentificationError):
         if n_terms == "all":
             theta = narx_fit(signals, pool, triples)
             return Narx(output, tuple(inputs), _frozen(pool), theta, np.full(theta.size, np.nan), limit)
         terms, theta, ratios, values, dependent = narx_select(signals, pool, triples, most, stop, number)
-    except (ValueError, OverflowError) as error:
-        raise IdentificationError(str(error)) from error
     notes = [f"{name} cannot be told from the chosen terms once {by} is among them." for name, by in dependent]
     if n_terms is None and len(terms) == max_terms:
         notes.append(f"The criterion asked for all of the {max_terms} terms allowed; allow more.")

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike
 
 from vpm._core import Diverged
 from vpm._core import MaxwellNarx as Compiled
-from vpm.errors import DivergedError, IdentificationError, SimulationError
+from vpm.errors import DivergedError, IdentificationError, SimulationError, refused_as
 from vpm.narx.maxwell_recursion import POWER_NAMES, Scheme
 from vpm.numbers import Array
 from vpm.results import Result
@@ -59,10 +59,8 @@ class MaxwellNarx(Result):
 
     @cached_property
     def _compiled(self) -> Compiled:
-        try:
+        with refused_as(IdentificationError):
             return Compiled(self.k0, self.s0, self.k1, self.c1, self.step, self.scheme)
-        except ValueError as error:
-            raise IdentificationError(str(error)) from error
 
     @property
     def relaxation_time(self) -> float:

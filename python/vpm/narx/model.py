@@ -11,7 +11,7 @@ import numpy as np
 
 from vpm._core import Diverged, NarxStepper
 from vpm._core import Narx as Compiled
-from vpm.errors import DivergedError, IdentificationError, SimulationError
+from vpm.errors import DivergedError, IdentificationError, SimulationError, refused_as
 from vpm.experiment import Experiment
 from vpm.narx.records import RecordLike, Series, series
 from vpm.narx.run import NarxRun
@@ -82,10 +82,8 @@ class Narx(Result):
     @cached_property
     def _compiled(self) -> Compiled:
         listed = [list(term) for term in self.terms]
-        try:
+        with refused_as(IdentificationError):
             return Compiled([self.output, *self.inputs], listed, self.coefficients)
-        except (ValueError, OverflowError) as error:
-            raise IdentificationError(str(error)) from error
 
     @property
     def longest_lag(self) -> int:
@@ -116,10 +114,8 @@ class Narx(Result):
             The record does not fit the model.
         """
         given = series(record, self.output, self.inputs)
-        try:
+        with refused_as(SimulationError):
             values = self._compiled.predict_one_step(given.name, given.output, given.inputs)
-        except ValueError as error:
-            raise SimulationError(str(error)) from error
         return self._run("one-step prediction", given, values, record)
 
     def simulate_free_run(self, record: RecordLike, *, limit: float | None = None) -> NarxRun:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vpm.errors import DivergedError, SimulationError, check_known
+from vpm.errors import DivergedError, SimulationError, check_known, refused_as
 from vpm.model import Model
 from vpm.numbers import Array, array_of
 from vpm.observer.filtering import first_deviations
@@ -90,7 +90,7 @@ class Observer:
         self._first, self._deviations = first, array_of(spread, "the deviations of the first state", SimulationError)
         readings, forces, states = noise.placed(model, self.channels)
         setup = Setup(integrator, substeps)
-        try:
+        with refused_as(SimulationError, model.name):
             self._core = Kalman(
                 model.core,
                 model.theta,
@@ -101,8 +101,6 @@ class Observer:
                 substeps,
                 setup.method(model),
             )
-        except ValueError as error:
-            raise SimulationError(f"{model.name}: {error}") from error
         self._readings = readings
         self._innovation = np.zeros(len(self.channels))
         self._estimate = first.copy()
@@ -178,10 +176,8 @@ class Observer:
         """
         first = self._first if state is None else self.model.state(state)
         spread = np.diag(self._deviations**2) if covariance is None else covariance
-        try:
+        with refused_as(SimulationError, self.model.name):
             self._core.reset(first, spread)
-        except ValueError as error:
-            raise SimulationError(f"{self.model.name}: {error}") from error
         self._estimate, self._innovation = first.copy(), np.zeros(len(self.channels))
 
     def settled(self, state: Mapping[str, float] | ArrayLike, inputs: Mapping[str, float] | ArrayLike) -> SteadyGain:

@@ -7,7 +7,7 @@ from fnmatch import filter as matching
 from os import PathLike
 from pathlib import Path
 
-from vpm.errors import SimulationError, near_match
+from vpm.errors import SimulationError, near_match, refused_as
 from vpm.files import make_folder, write_text
 from vpm.model import Model
 
@@ -77,8 +77,6 @@ def c_source(model: Model, *, name: str | None = None, parameters: Sequence[str]
     free.sort(key=model.index)
     identifier = re.sub(r"\W", "_", model.name, flags=re.ASCII) if name is None else name
     names = (list(model.state_names), list(model.inputs), list(model.output_channels))
-    try:
+    with refused_as(SimulationError):
         header, source = model.core.c_source(model.theta, identifier, *names, [model.index(one) for one in free])
-    except ValueError as error:
-        raise SimulationError(str(error)) from error
     return CSource(identifier, header, source, tuple(free))

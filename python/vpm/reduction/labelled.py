@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from vpm.errors import ReductionError, VpmError
+from vpm.errors import ReductionError, refused_as
 from vpm.model.beams.reduced import read_bytes
 from vpm.numbers import Array
 from vpm.reduction.structure import Matrix
@@ -94,10 +94,8 @@ def read_labelled_nodes(path: Path) -> dict[int, tuple[float, float, float]]:
 
 
 def _text(path: Path) -> str:
-    try:
+    with refused_as(ReductionError):
         return read_bytes(path).decode("utf-8", errors="replace")
-    except VpmError as error:
-        raise ReductionError(str(error)) from None
 
 
 def _is_data(line: str) -> bool:

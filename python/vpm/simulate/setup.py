@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 
-from vpm.errors import SimulationError
+from vpm.errors import SimulationError, refused_as
 from vpm.model import Model
 from vpm.results import Storable
 
@@ -116,7 +116,5 @@ def _check_integrator(name: str) -> None:
         raise SimulationError(
             f"unknown integrator '{name}'; choose one of {choice} or, with a tolerance, adaptive(1e-8)"
         )
-    try:
+    with refused_as(SimulationError):
         check_integrator(name)
-    except ValueError as error:
-        raise SimulationError(str(error)) from None

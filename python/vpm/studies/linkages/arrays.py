@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import ArrayLike
 
-from vpm.errors import ModelError
+from vpm.errors import ModelError, refused_as
 from vpm.numbers import Array
 
 
@@ -21,8 +21,6 @@ def rowwise(question: Callable[..., Array], *tables: ArrayLike, what: str) -> Ar
         if array.ndim not in {1, 2} or array.shape[-1] != 2:
             raise ModelError(f"{what}: needs the shape (2,) or (N, 2), got {array.shape}; give two numbers per row")
     single = all(array.ndim == 1 for array in arrays)
-    try:
+    with refused_as(ModelError, what):
         answer = question(*np.broadcast_arrays(*(np.atleast_2d(array) for array in arrays)))
-    except ValueError as error:
-        raise ModelError(f"{what}: {error}") from error
     return answer[0] if single else answer

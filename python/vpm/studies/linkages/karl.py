@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vpm._core import Karl as _Karl
-from vpm.errors import ModelError
+from vpm.errors import ModelError, refused_as
 from vpm.numbers import Array
 from vpm.results import Storable
 from vpm.studies.linkages.arrays import rowwise
@@ -84,12 +84,10 @@ class Karl:
         self.geometry = geometry or KarlGeometry()
         self.name = name
         g = self.geometry
-        try:
+        with refused_as(ModelError, name):
             self._core = _Karl(
                 g.medial, g.distal, g.stroke_direction, g.sliders, g.ground_anchor, g.distal_anchor, g.rods
             )
-        except ValueError as error:
-            raise ModelError(f"{name}: {error}") from error
 
     def __repr__(self) -> str:
         g = self.geometry
@@ -113,7 +111,8 @@ class Karl:
             The rods are too long or too short for these strokes.
         """
         pair = self._pair(strokes)
-        angles = self._ask(lambda: self._core.direct(pair))
+        with refused_as(ModelError, self.name):
+            angles = self._core.direct(pair)
         return self._poses(angles, np.tile(pair, (4, 1)))
 
     def inverse(self, target: ArrayLike) -> KarlPoses:
@@ -135,7 +134,8 @@ class Karl:
             The target is out of reach, or an elbow there cannot be driven by any stroke.
         """
         pair = self._pair(target)
-        rows = self._ask(lambda: self._core.inverse(pair))
+        with refused_as(ModelError, self.name):
+            rows = self._core.inverse(pair)
         return self._poses(rows[:, :2], rows[:, 2:])
 
     def end_point(self, angles: ArrayLike) -> Array:
@@ -329,12 +329,6 @@ class Karl:
         if array.shape != (2,):
             raise ModelError(f"{self.name}: needs two numbers, got the shape {array.shape}; give one row")
         return float(array[0]), float(array[1])
-
-    def _ask(self, question: Callable[[], Array]) -> Array:
-        try:
-            return question()
-        except ValueError as error:
-            raise ModelError(f"{self.name}: {error}") from error
 
     def _rows(self, question: Callable[..., Array], *tables: ArrayLike) -> Array:
         return rowwise(question, *tables, what=self.name)

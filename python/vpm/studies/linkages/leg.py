@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from vpm._core import Leg as _Leg
-from vpm.errors import ModelError, near_match
+from vpm.errors import ModelError, near_match, refused_as
 from vpm.numbers import Array
 from vpm.studies.linkages.arrays import rowwise
 from vpm.studies.linkages.leg_parameters import Cylinder, HyqSet, LegParameters, LegPart, Segment
@@ -59,12 +59,10 @@ class Leg:
         self.parameters = p = parameters or LegParameters.hyq()
         self.name = name
         places = [(c.base, c.base_angle, c.tip, c.tip_angle) for c in (p.hip.attachment, p.knee.attachment)]
-        try:
+        with refused_as(ModelError, name):
             self._core = _Leg(
                 p.slider_mass, [_segment(p.upper), _segment(p.lower)], places, _parts(p.hip) + _parts(p.knee), p.gravity
             )
-        except ValueError as error:
-            raise ModelError(f"{name}: {error}") from error
 
     @classmethod
     def hyq(cls, data: HyqSet = "table", *, shank: float = 0.341, thigh: float = 0.350) -> Self:
@@ -124,10 +122,8 @@ class Leg:
             With N rows.
         """
         q, v = self._tables(angles, rates)
-        try:
+        with refused_as(ModelError, self.name):
             mass, velocity, gravity = self._core.terms(q, v, derivation)
-        except ValueError as error:
-            raise ModelError(f"{self.name}: {error}") from error
         return LegTerms(q, v, mass, velocity, gravity)
 
     def reactions(self, angles: ArrayLike, rates: ArrayLike, accelerations: ArrayLike) -> LegReactions:

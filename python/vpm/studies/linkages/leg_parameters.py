@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, Self
 
 from vpm._core import hyq_parameters
-from vpm.errors import ModelError
+from vpm.errors import ModelError, refused_as
 from vpm.results import Storable
 
 HyqSet = Literal["table", "identified", "plausible"]
@@ -112,10 +112,8 @@ class LegParameters(Storable):
         thigh : float
             From hip to knee (m).
         """
-        try:
+        with refused_as(ModelError):
             slider, bodies, places, parts, gravity = hyq_parameters(data, shank)
-        except ValueError as error:
-            raise ModelError(str(error)) from error
         upper, lower = (Segment(length, mass, inertia, (x, y)) for length, mass, inertia, x, y in bodies)
         hip, knee = (
             Cylinder(Attachment(*place), LegPart(*parts[2 * k]), LegPart(*parts[2 * k + 1]))
