@@ -104,14 +104,7 @@ class _Terms:
         self.ca, self.arrays = ca, arrays
         self.local: dict[str, Expression] = {}
         self._functions: dict[str, Callable[[Expression], Expression]] = {
-            "sqrt": ca.sqrt,
-            "exp": ca.exp,
-            "expm1": ca.expm1,
-            "log": ca.log,
-            "sin": ca.sin,
-            "cos": ca.cos,
-            "tanh": ca.tanh,
-            "atan": ca.atan,
+            **{name: getattr(ca, name) for name in ("sqrt", "exp", "expm1", "log", "sin", "cos", "tanh", "atan")},
             "": lambda value: value,  # what derivatives of a simulation take for a constant
         }
 
