@@ -8,6 +8,7 @@ import pytest
 
 import vpm
 from shared_cases import shared_case
+from vpm.discrepancy.preparation import ruled_out_together
 from vpm.discrepancy.verdict import driven_away
 
 AXIS = """
@@ -51,6 +52,15 @@ def test_what_a_balance_of_some_joints_drives_away_may_be_known_better() -> None
     before: Any = SimpleNamespace(model=model)
     assert driven_away(model, before, off, ranked=model.with_parameters({MASS: 1.1})) == {}
     assert driven_away(model, before, off, ranked=off.model) == {MASS: pytest.approx(5.0)}
+
+
+def test_what_only_shows_beside_a_named_effect_is_as_near_to_the_file_as_that_lets_it_be() -> None:
+    """A slide moves by the sum of its mass and its rotor's: 1.6 + 2.0 kg are as well the 1.0 kg of the file and 2.6."""
+    file = vpm.Model.from_toml(AXIS)
+    rotor = file.with_effect("rotor_inertia", at="axis", inertia=2.0).with_parameters({MASS: 1.6})
+    sum_alone = SimpleNamespace(names=(MASS, "axis.rotor.inertia"), weights=(np.sqrt(0.5), -np.sqrt(0.5)))
+    named: Any = SimpleNamespace(model=rotor, free=sum_alone.names, fit=SimpleNamespace(unseen=(sum_alone,)))
+    assert ruled_out_together(file, named) == {}
 
 
 @pytest.mark.nightly

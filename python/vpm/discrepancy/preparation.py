@@ -263,12 +263,13 @@ def _least_departures(model: Model, recalibrated: Judged) -> dict[str, float]:
     """Prior departures, in stated uncertainties, of parameters in unidentifiable combinations.
 
     Values anywhere along these combinations explain the records as well. Those count whose squared departures have the
-    least sum: of Gaussian priors the most probable.
+    least sum: of Gaussian priors the most probable. Of parameters of an effect that was named the model file states
+    nothing, so that they move along at no cost.
     """
     parts = [dict(zip(one.names, one.weights, strict=True)) for one in recalibrated.fit.unseen]
-    if not parts:
+    names = [name for name in recalibrated.free if name in model.parameters and any(name in part for part in parts)]
+    if not names:
         return {}
-    names = [name for name in recalibrated.free if any(name in part for part in parts)]
     spreads = np.array([stated(model.parameters[name]) for name in names])
     moved = [recalibrated.model.parameters[name].value - model.parameters[name].value for name in names]
     along = np.array([[part.get(name, 0.0) for part in parts] for name in names]) / spreads[:, None]
