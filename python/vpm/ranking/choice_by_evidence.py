@@ -20,9 +20,10 @@ from vpm.ranking.tried_effect import Trial
 def weighed(counting: Sequence[Trial], fitter: Fitter) -> list[Trial]:
     """Chosen effect, then its rivals, with the evidence that each adds under one noise model.
 
-    What nobody can tell from each other is probable together. The best is the plainest one of the most probable class.
-    A part of the machine comes before an instrument. A law that a richer one contains comes before it, if it may be
-    enough or has a curve of the same shape: it will be judged again beside later effects.
+    What nobody can tell from each other is probable together. The best is the plainest one of the most probable class,
+    but for those that need values which the model file rules out where another one does not. A part of the machine
+    comes before an instrument. A law that a richer one contains comes before it, if it may be enough or has a curve of
+    the same shape: it will be judged again beside later effects.
     """
     several, richer = _rivals(counting, fitter.settings)
     noise = fitted_noise(several[0].fitted.residual, fitter.tracked.parts, fitter.settings.order)
@@ -30,9 +31,12 @@ def weighed(counting: Sequence[Trial], fitter: Fitter) -> list[Trial]:
     if not told:
         return [replace(several[0], evidence=-np.inf), *several[1:], *richer]
     *shares, _ = probabilities([one.evidence for one in told], fitter.settings.tempering)
-    same = [told[place] for place in _most_probable(shares, fits, fitter, noise)]
+    places = _most_probable(shares, fits, fitter, noise)
+    same = [told[place] for place in places]
     probable = [told[place] for place in _credible(shares, fitter.settings.sure)]
-    best = min(same, key=lambda trial: trial.order)
+    doubts = [_doubt(told[place], fits[place]) for place in places]
+    allowed = [one for one, doubt in zip(same, doubts, strict=True) if doubt - min(doubts) <= fitter.settings.odds]
+    best = min(allowed, key=lambda trial: trial.order)
     enough = best.left / (1.0 - fitter.settings.worth)  # beside what leaves no more, the best would not count
     alike = [one for one in told if one in probable or one.left < enough or same_curve(one.key, best.key)]
     if within := [one for one in alike if best.contains(one)]:
@@ -52,7 +56,8 @@ def as_good(trial: Trial, first: Trial, settings: Settings) -> bool:
 def _rivals(counting: Sequence[Trial], settings: Settings) -> tuple[list[Trial], list[Trial]]:
     """Effects to choose from under the tracker of the best one, and richer ones of the same curve.
 
-    A richer one fits what the laws of a plainer one are wrong by, so that its evidence says nothing.
+    A richer one fits what the laws of a plainer one are wrong by, so that its evidence says nothing. Of several fits of
+    one effect the most probable one counts: some leave as little error by values that the model file all but rules out.
     """
     look = min(counting, key=lambda trial: trial.left).look
     here = sorted((trial for trial in counting if trial.look is look), key=lambda trial: trial.left)
@@ -60,7 +65,7 @@ def _rivals(counting: Sequence[Trial], settings: Settings) -> tuple[list[Trial],
     several: dict[Key, Trial] = {}
     for trial in here:
         if trial not in richer:
-            several.setdefault(trial.key, trial)
+            several[trial.key] = min(several.get(trial.key, trial), trial, key=lambda one: one.fitted.cost)
     return list(several.values()), richer
 
 
@@ -94,6 +99,12 @@ def _with_evidence(several: Sequence[Trial], fitter: Fitter, noise: NoiseModel) 
             told.append(replace(trial, evidence=fitter.evidence(fit, noise) - without))
             fits.append(fit)
     return told, fits
+
+
+def _doubt(trial: Trial, fitted: Fitted) -> float:
+    """How improbable the values are that a chosen effect gives to what was known without it, nats."""
+    known = [name in trial.look.fitted.structure.priors for name in fitted.structure.priors]
+    return 0.5 * float(np.sum(fitted.structure.standard[known] ** 2))
 
 
 def _credible(shares: Sequence[float], sure: float) -> list[int]:

@@ -212,22 +212,20 @@ def _periodic(effect: EffectType, site: str, data: InverseDynamicsProblem, model
 
 
 def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
-    """Start positions of a candidate payload: origin of the body, its centre of mass, and twice as far out.
+    """Start positions of a candidate payload: origin of the body, and to all sides of its centre of mass.
 
-    Beside an unknown mass of the body only what is off the ray from the origin through its centre of mass shows. So the
-    other two are to all sides of the centre of mass there, as far as that is from the origin. Where it is the origin,
-    they are as far as the body's own masses are, by the radius of gyration: at an axis a payload does nothing.
+    On the ray from the origin through the centre of mass a payload scales gravity, as an unknown mass of the body does,
+    or an unknown gain of a drive beside free inertias. So what is off that ray has to be tried. The distance is that of
+    the centre of mass, or of the body's own masses by the radius of gyration where they spread wider, as about an axis
+    on which a body is in equilibrium.
     """
     if body in model.beams:  # in the frame of its tip
         return ({},)
     values = model.parameters
     centre = np.array([values[f"{body}.center_of_mass.{axis}"].value for axis in "xyz"])
-    reach = float(np.linalg.norm(centre))
-    places = [factor * centre for factor in ((0.0, 1.0, 2.0) if reach else (0.0,))]
-    if f"{body}.mass" in model.adjustable or not reach:
-        moments = sum(values[f"{body}.inertia.{axis}"].value for axis in ("xx", "yy", "zz"))
-        aside = reach or float(np.sqrt(0.5 * moments / values[f"{body}.mass"].value))
-        places = [np.zeros(3), *(centre + aside * np.vstack([np.eye(3), -np.eye(3)]))] if aside else places
+    moments = sum(values[f"{body}.inertia.{axis}"].value for axis in ("xx", "yy", "zz"))
+    aside = max(float(np.linalg.norm(centre)), float(np.sqrt(0.5 * moments / values[f"{body}.mass"].value)))
+    places = [np.zeros(3), *(centre + aside * np.vstack([np.eye(3), -np.eye(3)]))] if aside else [np.zeros(3)]
     return tuple(dict(zip("xyz", place.tolist(), strict=True)) for place in places)
 
 
