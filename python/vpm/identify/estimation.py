@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.linalg import qr
 from scipy.optimize import least_squares, lsq_linear
 
 from vpm.identify.identifiability import (
@@ -168,6 +169,27 @@ def standing(model: Model, data: Problem, free: Sequence[str]) -> Estimate:
     unseen = unseen_combinations(jacobian, free)
     covariance = _covariance(data, residual, jacobian, unseen, free)
     return Estimate(tuple(free), model.theta[columns], residual, jacobian, covariance, unseen, (), 1)
+
+
+def beside_stated(found: Estimate, model: Model, data: Problem) -> Estimate:
+    """Estimate with deviations of what the records show only together, from what the model states of it.
+
+    Along each unidentifiable combination one parameter is taken as known, the best stated one for its weight, and its
+    uncertainty moves the others along. Where nothing is stated deviations stay infinite.
+    """
+    stated = [model.parameters[name].uncertainty or np.inf for name in found.names]
+    weights = [dict(zip(one.names, one.weights, strict=True)) for one in found.unseen]
+    along = np.array([[one.get(name, 0.0) for one in weights] for name in found.names]).reshape(len(stated), -1)
+    _, triangle, order = qr((along / np.array(stated)[:, None]).T, mode="economic", pivoting=True)
+    known = order[: len(weights)]
+    if not weights or len(known) < len(weights) or np.any(np.diag(triangle) == 0.0):
+        return found
+    seen = np.setdiff1d(np.arange(len(stated)), known)
+    covariance = np.zeros_like(found.covariance)
+    names = [found.names[place] for place in seen]
+    covariance[np.ix_(seen, seen)] = _covariance(data, found.residual, found.jacobian[:, seen], (), names)
+    moved = along @ np.linalg.inv(along[known]) * np.array(stated)[known]
+    return replace(found, covariance=covariance + moved @ moved.T)
 
 
 @dataclass(frozen=True)

@@ -19,7 +19,7 @@ from vpm.discrepancy.verdict import verdict
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import Estimate, InverseDynamicsProblem, estimate, gain, gaps, segments
-from vpm.identify.estimation import standing
+from vpm.identify.estimation import beside_stated, standing
 from vpm.model import Model
 from vpm.ranking.result import Ranked, Ranking
 from vpm.ranking.settings import Settings
@@ -132,10 +132,13 @@ def _judged(model: Model, free: tuple[str, ...], data: _Followed) -> Judged:
 
 
 def _standing(model: Model, free: tuple[str, ...], training: TrackerResidual) -> Estimate:
-    """Standard deviations of values by tracker; unknown where derivatives diverge, as behind a backlash."""
+    """Standard deviations of values by tracker; unknown where derivatives diverge, as behind a backlash.
+
+    A ranking weighs what the model file states, so that its values are as sure as that where records show no scale.
+    """
     try:
         with np.errstate(over="ignore", invalid="ignore"):
-            return standing(model, training, free)
+            return beside_stated(standing(model, training, free), model, training)
     except (ValueError, ArithmeticError):
         still, unknown = standing(model, training, ()), np.full((len(free), len(free)), np.nan)
         values = model.theta[[model.index(name) for name in free]]

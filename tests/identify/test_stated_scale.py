@@ -1,0 +1,43 @@
+"""Deviations of what records show only together, where the model file states one of it."""
+
+import numpy as np
+import pytest
+
+import vpm
+from vpm.identify.comparison import comparison
+from vpm.identify.estimation import beside_stated, standing
+
+SLIDE = """
+name = "slide"
+gravity = [0.0, 0.0, 0.0]
+bodies.load = {{ mass = {{ value = 2.0, uncertainty = {mass} }} }}
+joints.axis = {{ type = "prismatic", parent = "world", child = "load", axis = [1, 0, 0] }}
+actuators.drive = {{ joint = "axis", gain = {{ value = 3.0, uncertainty = inf }}, command_unit = "A" }}
+effects = [{{ type = "viscous_friction", at = "axis", viscous = {{ value = 4.0, uncertainty = inf }} }}]
+"""
+NAMES = ("load.mass", "drive.gain", "axis.friction.viscous")
+
+
+def swung(model: vpm.Model) -> vpm.Experiment:
+    """Steady swing under m a = k u - c v, by its phasors, with the noise of an encoder."""
+    time, random = np.arange(4000) / 1000.0, np.random.default_rng(1)
+    rates = np.array([3.0, 8.0, 21.0])
+    phasors = np.array([1.0, 2.0, 4.0]) * 3.0 / (4.0j * rates - 2.0 * rates**2)
+    waves = np.exp(1j * np.outer(time, rates))
+    position = np.real(waves @ phasors) + 1e-6 * random.standard_normal(len(time))
+    command = np.real(np.exp(1j * np.outer(time + 5e-4, rates)) @ np.array([1.0, 2.0, 4.0]))  # held: its mean
+    columns = {
+        "axis.position": position,
+        "axis.velocity": np.real(waves @ (1j * rates * phasors)),
+        "drive.command": command,
+    }
+    return vpm.Experiment.from_arrays(time, columns, model=model)
+
+
+@pytest.mark.parametrize(("stated", "expected"), [(0.1, 0.05), ("inf", np.inf)])
+def test_where_positions_show_ratios_alone_all_are_as_sure_as_the_stated_mass(stated: object, expected: float) -> None:
+    model = vpm.Model.from_toml(SLIDE.format(mass=stated))
+    data = comparison(model, [swung(model)], "free_run")
+    found = standing(model, data, NAMES)
+    assert np.all(np.isinf(found.std))
+    np.testing.assert_allclose(beside_stated(found, model, data).std / found.values, expected, rtol=0.02)
