@@ -9,7 +9,7 @@ import pytest
 import vpm
 from shared_cases import shared_case
 from vpm.discrepancy.preparation import ruled_out_together
-from vpm.discrepancy.verdict import driven_away
+from vpm.discrepancy.verdict import _doubt, driven_away
 
 AXIS = """
 name = "axis"
@@ -52,6 +52,16 @@ def test_what_a_balance_of_some_joints_drives_away_may_be_known_better() -> None
     before: Any = SimpleNamespace(model=model)
     assert driven_away(model, before, off, ranked=model.with_parameters({MASS: 1.1})) == {}
     assert driven_away(model, before, off, ranked=off.model) == {MASS: pytest.approx(5.0)}
+
+
+def test_what_an_observer_finds_as_stated_is_no_doubt() -> None:
+    """Noise that a controller answers to is damping to the residual alone."""
+    file = vpm.Model.from_toml(AXIS)
+    fit = SimpleNamespace(std=np.array([0.01]), unseen=())
+    off: Any = SimpleNamespace(model=file.with_parameters({MASS: 1.9}), free=(MASS,), fit=fit)
+    assert f"But {MASS} is 9.0 times its stated uncertainty away" in _doubt(file, None, off)
+    assert f"But {MASS} is 9.0 times" in _doubt(file, file.with_parameters({MASS: 1.8}), off)
+    assert _doubt(file, file.with_parameters({MASS: 1.1}), off) == ""
 
 
 def test_what_only_shows_beside_a_named_effect_is_as_near_to_the_file_as_that_lets_it_be() -> None:

@@ -19,7 +19,7 @@ def told(elbow: float) -> str:
     data: Any = SimpleNamespace(validation=SimpleNamespace(blocks=(SimpleNamespace(samples=slice(0, 400)),)))
     nominal: Any = SimpleNamespace(validation=3.0 * noise, model=SimpleNamespace(deflections=()))
     recalibrated: Any = SimpleNamespace(validation=noise, free=(), fit=SimpleNamespace(std=(), unseen=()))
-    found: Any = SimpleNamespace(accepted=(), left={}, within_laws=False, interrupted=False)
+    found: Any = SimpleNamespace(accepted=(), ranked=None, left={}, within_laws=False, interrupted=False)
     left: Any = SimpleNamespace(present=True)
     gap = {
         "strain": ChannelGap(3e-3, 2e-3, 2e-3, NOISE, "1", SIGNAL, "inverse_dynamics"),
@@ -124,10 +124,10 @@ def test_an_error_that_grew_is_not_told_as_a_gap_that_closed() -> None:
     recalibrated: Any = SimpleNamespace(validation=noise, free=(), fit=SimpleNamespace(std=(), unseen=()))
     closed = ChannelGap(0.5, 0.1, 0.1, 0.01, "N", 1.0, "inverse_dynamics")
     grew = ChannelGap(0.19, 0.2, 0.2, 0.01, "N", 1.0, "inverse_dynamics")
-    word, summary = _nothing_missing(data, nominal, recalibrated, ([closed, grew], []), grew)
+    word, summary = _nothing_missing(data, nominal, recalibrated, ([closed, grew], []), grew, "")
     assert word == "parameters_only"
     assert summary.endswith(
         "50.00 % before, 10.00 % recalibrated; in another channel it grew, 19.00 % before, 20.00 % recalibrated."
     )
-    _, plain = _nothing_missing(data, nominal, recalibrated, ([closed, grew], []), closed)
+    _, plain = _nothing_missing(data, nominal, recalibrated, ([closed, grew], []), closed, "")
     assert plain.endswith("Error on validation data: 50.00 % before, 10.00 % recalibrated.")
