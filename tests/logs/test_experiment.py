@@ -152,6 +152,29 @@ def test_numpys_own_text_is_read(tmp_path: Path) -> None:
     np.testing.assert_allclose(Experiment.load(tmp_path / "log.txt", TABLE)["axis.position"], 0.5e-3 * np.arange(12))
 
 
+@pytest.mark.parametrize("row", ["s;inc;A", ";Inkr;A", "[s];-;[A]", ";;A"])
+def test_words_that_are_no_units_stand_in_a_row_of_units(tmp_path: Path, row: str) -> None:
+    """As loggers of counters write them; the table says what a count is."""
+    path = tmp_path / "run.csv"
+    rows = "".join(f"1000,{number:03};{4096 * number};-0,5\n" for number in range(12))
+    path.write_text(f"Zeit;Zaehler;Strom\n{row}\n{rows}")
+    turns = ChannelEntry(column="Zaehler", unit="rev", scale=1.0 / 4096.0)
+    table = {"time": ChannelEntry(column="Zeit", unit="s"), "axis.position": turns}
+    log = Experiment.load(path, channels=table)
+    np.testing.assert_allclose(log["axis.position"], 2.0 * np.pi * np.arange(12.0))
+
+
+@pytest.mark.parametrize("row", ["none;off;text", "2026-03-14;inc;A", "s;inc;2,5A", "s;nan;A"])
+def test_other_rows_below_the_names_are_no_units(tmp_path: Path, row: str) -> None:
+    path = tmp_path / "run.csv"
+    rows = "".join(f"0,{number:03};1;-0,5\n" for number in range(12))
+    path.write_text(f"time;q;i\n{row}\n{rows}")
+    with pytest.raises(ExperimentError, match="line 2"):
+        Experiment.load(
+            path, channels={"time": ChannelEntry(column="time", unit="s"), "q": ChannelEntry(column="q", unit="rad")}
+        )
+
+
 def test_a_row_of_units_is_that_of_a_log_without_a_table(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     rows = ["time;angle;Strom", "ms;°;mA", *(f"{10 * k};{k},5;{k}" for k in range(12))]

@@ -141,11 +141,16 @@ def _cells(line: str, separator: str | None) -> list[str]:
 
 
 def _units(cells: Sequence[str], columns: int) -> tuple[str, ...]:
-    """Units line of a dialect below the names, if all of its cells are units; else none."""
+    """Units line of a dialect below the names, if it holds units and no number or date; else none.
+
+    Loggers write words there that are no units, such as ``inc`` of a counter; a table says what these are.
+    """
     units = tuple(re.sub(r"^[\[(](.*)[\])]$", r"\1", cell.strip()) for cell in cells)
-    units = tuple("1" if unit in ("", "-") else unit for unit in units)
-    are_units = len(units) == columns and not any(map(is_number, cells)) and all(map(is_unit, units))
-    return units if are_units else ()
+    told = len(units) == columns and any(unit and is_unit(unit) for unit in units)
+    words = all(is_unit(unit) or not re.search(r"\d", unit) for unit in units if unit)
+    if not told or not words or any(map(is_number, cells)):
+        return ()
+    return tuple("1" if unit in ("", "-") else unit for unit in units)
 
 
 def _is_numbers(line: str) -> bool:
