@@ -16,7 +16,7 @@ from vpm.discrepancy.diagnosis_fields import examined, gaps_of, of_search, pictu
 from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.noise.sensor_drift import Drift, sensor_drifts, without_drifts
 from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
-from vpm.discrepancy.preparation import Records, data_of, nominal_of, recalibrated_of, records_of
+from vpm.discrepancy.preparation import Records, begun_anywhere, data_of, nominal_of, recalibrated_of, records_of
 from vpm.discrepancy.provenance import own_settings, provenance
 from vpm.discrepancy.ranked_effects import NoResidualError, tracker_gaps
 from vpm.discrepancy.remainder.empirical_formula import beside
@@ -319,6 +319,9 @@ def _measured(job: _Job, ranking: Ranking | None) -> Diagnosis | list[Drift]:
     recalibrated = recalibrated_of(model, data, notes, request.each, start)
     if ranking is None:
         notes.extend(_if_read_back(job, recalibrated))
+        begun, recalibrated = begun_anywhere(model, data, recalibrated, notes)
+        if begun is not data:
+            data, nominal = begun, nominal_of(model, begun, [])
     try:
         found, ambiguous, late = named(ranking, recalibrated, data, request, notes)
     except NoResidualError as error:

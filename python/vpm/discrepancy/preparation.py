@@ -26,8 +26,10 @@ from vpm.experiment.signal import UNDISTORTED_BAND
 from vpm.identify import InverseDynamicsProblem, OutputErrorProblem
 from vpm.identify.between_records import changed_between
 from vpm.identify.comparison import relative_to_drives
+from vpm.identify.first_states import begun_likeliest, matters
 from vpm.identify.moments import on_the_border
 from vpm.identify.parallel import worker_count
+from vpm.identify.refitting import ROUNDS
 from vpm.identify.response_along_motion import answers_at_once
 from vpm.identify.sample_mask import STANDSTILL_SHARE
 from vpm.identify.settings import Checks
@@ -128,6 +130,32 @@ def recalibrated_of(
     notes.extend(changed_between(fit.names, fit.values, fit.residual, fit.jacobian, blocks, units, blind, Checks()))
     notes.extend(moved_far(model, recalibrated))
     return recalibrated
+
+
+def begun_anywhere(model: Model, data: Data, recalibrated: Judged, notes: list[str]) -> tuple[Data, Judged]:
+    """Prepared data whose records begin where first states are likeliest, if these matter, and the recalibrated model.
+
+    Links may bend where a record begins, also of a machine at rest: the filter of its motion leaves nothing of a jump
+    of the first command. What rings from there for the whole of a record is no missing effect.
+    """
+    first, fit = data.training, recalibrated.fit
+    if not np.any(first.open_states(model)[0]):
+        return data, recalibrated
+    if not matters(recalibrated.model, first, fit.residual, fit.jacobian, Checks()):
+        return data, recalibrated
+    start = model
+    for _ in range(ROUNDS):
+        data = replace(
+            data, training=begun_likeliest(start, data.training), validation=begun_likeliest(start, data.validation)
+        )
+        recalibrated, _ = judged_anyhow(start, recalibrated.free, data, dict(recalibrated.bounds))
+        known, moved = recalibrated.fit.std, np.abs(recalibrated.model.theta - start.theta)
+        start = recalibrated.model
+        if np.all(moved[[model.index(name) for name in recalibrated.free]] <= known):
+            break
+    notes.append("links bend or move where records begin: their first states are unknown, and sought in each record")
+    notes.extend(moved_far(model, recalibrated))
+    return data, recalibrated
 
 
 def with_unseen(recalibrated: Model, ranked: Model, unseen: Collection[str]) -> Model:
