@@ -8,7 +8,7 @@ import pytest
 
 import vpm
 from shared_cases import shared_case
-from vpm.discrepancy.preparation import ruled_out_together
+from vpm.discrepancy.preparation import _as_stated, ruled_out_together
 from vpm.discrepancy.verdict import _doubt, driven_away
 
 AXIS = """
@@ -62,6 +62,8 @@ def test_what_an_observer_finds_as_stated_is_no_doubt() -> None:
     assert f"But {MASS} is 9.0 times its stated uncertainty away" in _doubt(file, None, off)
     assert f"But {MASS} is 9.0 times" in _doubt(file, file.with_parameters({MASS: 1.8}), off)
     assert _doubt(file, file.with_parameters({MASS: 1.1}), off) == ""
+    assert _as_stated(file, file.with_parameters({MASS: 1.8}), [MASS]) == {}
+    assert _as_stated(file, file.with_parameters({MASS: 1.1}), [MASS]) == {MASS: 1.1}
 
 
 def test_what_only_shows_beside_a_named_effect_is_as_near_to_the_file_as_that_lets_it_be() -> None:

@@ -122,6 +122,9 @@ def recalibrated_of(
     if ranked is not None and unseen:
         start = with_unseen(recalibrated.model, ranked, unseen)
         recalibrated, stopped = judged_anyhow(start, (*free, *transitions), alone, bounds)
+    if ranked is not None and (held := _as_stated(model, ranked, ruled_out(model, recalibrated))):
+        start, rest = recalibrated.model.with_parameters(held), tuple(name for name in free if name not in held)
+        recalibrated, stopped = judged_anyhow(start, (*rest, *transitions), alone, bounds)
     if stopped:
         notes.append(f"the recalibrated model could not simulate the validation records: {stopped}")
     fit, units = recalibrated.fit, [model.parameters[name].unit for name in recalibrated.fit.names]
@@ -130,6 +133,17 @@ def recalibrated_of(
     notes.extend(changed_between(fit.names, fit.values, fit.residual, fit.jacobian, blocks, units, blind, Checks()))
     notes.extend(moved_far(model, recalibrated))
     return recalibrated
+
+
+def _as_stated(model: Model, ranked: Model, names: Collection[str]) -> dict[str, float]:
+    """Prepared values of a ranking's observer, of parameters that it finds as the model file states them.
+
+    Noise of an encoder that a controller answers to moves efforts along with rates: damping to the residual, but not to
+    the observer.
+    """
+    values = {name: ranked.parameters[name].value for name in names if name in ranked.parameters}
+    file = model.parameters
+    return {name: value for name, value in values.items() if abs(value - file[name].value) <= FAR * stated(file[name])}
 
 
 def begun_anywhere(model: Model, data: Data, recalibrated: Judged, notes: list[str]) -> tuple[Data, Judged]:
