@@ -136,14 +136,19 @@ _SYMBOLS: Mapping[str, _Symbol] = {
     "rad": _symbol(1.0, (0, 0, 0, 0, 0), "rad", "uµμm"),
     "deg": _symbol(math.pi / 180, (0, 0, 0, 0, 0), "rad"),
     "°": _symbol(math.pi / 180, (0, 0, 0, 0, 0), "rad"),
+    "arcmin": _symbol(math.pi / 10800, (0, 0, 0, 0, 0), "rad"),
+    "arcsec": _symbol(math.pi / 648000, (0, 0, 0, 0, 0), "rad"),
     "rev": _symbol(2 * math.pi, (0, 0, 0, 0, 0), "rad"),
     "r": _symbol(2 * math.pi, (0, 0, 0, 0, 0), "rad"),  # a turn in "r/min" (ISO 80000-3)
     "U": _symbol(2 * math.pi, (0, 0, 0, 0, 0), "rad"),  # a turn in "U/min" (DIN 1301-2)
     "%": _symbol(1e-2, (0, 0, 0, 0, 0), ""),
+    "ppm": _symbol(1e-6, (0, 0, 0, 0, 0), ""),
+    "strain": _symbol(1.0, (0, 0, 0, 0, 0), "", "uµμm"),
+    "ε": _symbol(1.0, (0, 0, 0, 0, 0), "", "uµμm"),
     "N": _symbol(1.0, (1, 1, -2, 0, 0), "N", "uµμmckM"),
     "lbf": _symbol(_POUND * _STANDARD_GRAVITY, (1, 1, -2, 0, 0), "N"),
     "kgf": _symbol(_STANDARD_GRAVITY, (1, 1, -2, 0, 0), "N"),
-    "gn": _symbol(_STANDARD_GRAVITY, (1, 0, -2, 0, 0), "m s^-2"),  # of accelerometers; "g" is the gram
+    "gn": _symbol(_STANDARD_GRAVITY, (1, 0, -2, 0, 0), "m s^-2", "uµμm"),  # of accelerometers; "g" is the gram
     "J": _symbol(1.0, (2, 1, -2, 0, 0), "J", "mkM"),
     "W": _symbol(1.0, (2, 1, -3, 0, 0), "W", "umkM"),
     "Pa": _symbol(1.0, (-1, 1, -2, 0, 0), "Pa", "hkMG"),
@@ -185,6 +190,7 @@ _WORDS: Mapping[str, str] = {
         "A": "amp amps ampere amperes",
         "Ohm": "ohm ohms",
         "%": "percent pct",
+        "ustrain": "microstrain",
     }.items()
     for word in words.split()
 }
