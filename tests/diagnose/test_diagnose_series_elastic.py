@@ -27,6 +27,7 @@ def test_friction_that_is_missing_on_both_sides_of_a_spring_is_named_on_both() -
     assert why.verdict == "effect_found"
     assert "coulomb_friction at knee, link side" in why.summary
     assert [(one.name, one.site) for one in why.effects] == [("coulomb_friction", "knee")] * 2
+    assert {one.label for one in why.effects} == {f"coulomb_friction at knee{side}" for side in ("", ", link side")}
     values = {name: parameter.value for name, parameter in why.model.parameters.items()}
     assert values["knee.friction.coulomb"] == pytest.approx(DRY, rel=0.05)
     assert values["knee.link.friction.coulomb"] == pytest.approx(RUB, rel=0.1)

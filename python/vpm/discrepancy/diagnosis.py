@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from vpm.catalogue.kinds import Side, in_words
 from vpm.discrepancy.evidence import Evidence
 from vpm.discrepancy.provenance import Provenance
 from vpm.files import write_text
@@ -63,6 +64,8 @@ class AcceptedEffect(Storable):
         What it added to the evidence of the records; NaN where no ranking named it.
     class_probability : float
         That it was this or one of those that the records do not tell from it; NaN where no ranking named it.
+    side : str
+        Of a joint that gives way: ``"motor"`` or ``"link"``.
     """
 
     name: str
@@ -75,6 +78,12 @@ class AcceptedEffect(Storable):
     probability: float = float("nan")
     evidence_nats: float = float("nan")
     class_probability: float = float("nan")
+    side: Side = "motor"
+
+    @property
+    def label(self) -> str:
+        """Label of an accepted effect: ``effect at site``, with its side if that is not the motor's."""
+        return f"{self.name} at {in_words(self.site, self.side)}"
 
     def to_dict(self) -> dict[str, object]:
         """Plain numbers and text of an accepted effect, its parameters by name."""
@@ -429,7 +438,7 @@ class Diagnosis(Result):
         return write_text(path, json.dumps(self.to_dict(), indent=2, allow_nan=False) + "\n")
 
     def _headline(self) -> Mapping[str, object]:
-        names = ", ".join(f"{e.name} at {e.site}" for e in self.effects) or "no effect"
+        names = ", ".join(e.label for e in self.effects) or "no effect"
         return {"verdict": self.verdict, "effects": names, "seconds": self.seconds}
 
     def _frame_columns(self) -> Mapping[str, object]:

@@ -153,6 +153,7 @@ def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
         entry.probability,
         entry.evidence,
         entry.class_probability,
+        entry.side,
     )
 
 
@@ -246,6 +247,7 @@ def _effect(one: Ranked, model: Model) -> AcceptedEffect:
         one.probability,
         one.evidence,
         one.class_probability,
+        one.side,
     )
 
 
