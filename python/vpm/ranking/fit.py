@@ -75,11 +75,13 @@ class View:
 class Fitter:
     """Fits structures to the residual of a tracker on the stretches for training.
 
-    Derivatives come from as few steps of the integrator as will do: they only show the way, and cost most.
+    Derivatives come from as few steps of the integrator as will do: they only show the way, and cost most. So may
+    residuals, with an ``offset`` (N, m) by which more steps differ near by (N. Alexandrov and R. Lewis, *Optimization
+    and Engineering* 2, 2001).
     """
 
-    def __init__(self, tracked: TrackedRecords, settings: Settings) -> None:
-        self.tracked, self.settings = tracked, settings
+    def __init__(self, tracked: TrackedRecords, settings: Settings, offset: Array | float = 0.0) -> None:
+        self.tracked, self.settings, self.offset = tracked, settings, offset
 
     def fitted(
         self,
@@ -149,7 +151,15 @@ class Fitter:
         return Fitted(now.structure, now.tracker, now.residual, before, ended), slopes
 
     def finished(self, found: Fitted, view: View) -> Fitted:
-        """Fit continued with all derivatives until nothing is gained."""
+        """Fit continued with all derivatives, by fine steps, until nothing is gained.
+
+        Raises
+        ------
+        VpmError
+            By fine steps the structure runs away from the records.
+        """
+        if not found.tracker.fine:
+            found = self.unfitted(found.structure, Tracker(found.tracker.band), view)
         for _ in range(self.settings.turns):
             if found.ended:
                 break
@@ -178,8 +188,8 @@ class Fitter:
                 return Followed(structure, tracker, tuple(names), residual, jacobian)
         return Followed(structure, tracker, tuple(names), *self._pass(structure, tracker, by))
 
-    def unfitted(self, structure: Structure, tracker: Tracker) -> Fitted:
-        """Structure as it is in the place of a fit.
+    def unfitted(self, structure: Structure, tracker: Tracker, view: View | None = None) -> Fitted:
+        """Structure as it is in the place of a fit, with its cost under a view or under white noise of its own.
 
         Raises
         ------
@@ -187,7 +197,8 @@ class Fitter:
             The structure runs away from the records.
         """
         residual, _ = self._pass(structure, tracker)
-        cost = self.cost(structure, residual, white_noise(residual, self.tracked.parts))
+        noise = white_noise(residual, self.tracked.parts) if view is None else view.noise
+        cost = self.cost(structure, residual, noise)
         return Fitted(structure, tracker, residual, cost)
 
     def noise_of(self, structure: Structure, tracker: Tracker) -> NoiseModel:
@@ -296,7 +307,7 @@ class Fitter:
             residual, jacobian = self.tracked.follow(structure.model, structure.theta, tracker, by[0])
         if not all(np.max(np.abs(numbers), initial=0.0) < RUNAWAY for numbers in (residual, jacobian)):
             raise VpmError(f"{structure.model.name} runs away from the records")
-        return residual, jacobian
+        return residual + self.offset, jacobian
 
     def _is_unstable(self, structure: Structure, tracker: Tracker, by: By, residual: Array, jacobian: Array) -> bool:
         """Whether approximate derivatives of a fit move the model farther than the records move, and a move does not.

@@ -63,6 +63,15 @@ class Look:
             return self._fitter.followed(fitted.structure, fitted.tracker.coarse, names)
         return self._fitter.followed(fitted.structure, fitted.tracker, names, fitted.residual)
 
+    @cached_property
+    def coarse_fitter(self) -> Fitter | None:
+        """Fitter by coarse steps beside a look, if these change what it leaves by less than an effect has to."""
+        offset = self.fitted.residual - self.coarse.residual
+        rows = np.concatenate([offset[part] for part in self._fitter.tracked.parts])
+        share = np.sum(rows**2, axis=0) / (len(rows) * np.array(self.view.noise.deviations) ** 2)
+        near = bool(np.max(share) < self.settings.worth)
+        return Fitter(self._fitter.tracked, self.settings, offset) if near else None
+
     def predicted_gain(self, other: Followed) -> float:
         """Gain that a look predicts for another structure by one step of a fit, nats.
 

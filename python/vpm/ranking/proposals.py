@@ -10,6 +10,7 @@ from itertools import product
 
 import numpy as np
 
+from vpm.catalogue import EFFECTS
 from vpm.catalogue.kinds import Side
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.discrepancy.screening.candidates import Candidate, Key, candidates
@@ -39,6 +40,11 @@ class Proposal:
     def key(self) -> Key:
         """Effect and site of a proposal."""
         return self.structure.effects[-1]
+
+    @property
+    def splits(self) -> bool:
+        """Whether a proposal splits a joint."""
+        return EFFECTS[self.key[0]].splits
 
     def seen_in(self, look: Look) -> tuple[View, Array | None]:
         """View and first residual for the fit of a proposal.

@@ -21,6 +21,7 @@ from vpm.ranking.look import Look
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.noise_model import fitted_noise
 from vpm.ranking.result import Gap, Ranked, Ranking
+from vpm.ranking.settings import OFF_ENDS
 from vpm.ranking.several_at_once import brought_back, several_at_once
 from vpm.ranking.tracked_records import TrackedRecords
 from vpm.ranking.trials import Trials
@@ -190,11 +191,20 @@ class Search(Trials):
         return best, tried
 
     def _off_its_ends(self, look: Look) -> Look:
-        """Look of the search from which fits with another effect can come back, see `Structure.off_its_ends`."""
+        """Look of the search from which fits with another effect can come back, see `Structure.off_its_ends`.
+
+        No farther from their ends than an effect has to gain: else each fit has to come all the way back first.
+        """
         fitted = look.fitted
-        if (other := fitted.structure.off_its_ends) is not fitted.structure:
+        middle = fitted.structure.off_its_ends
+        if middle is fitted.structure:
+            return look
+        for share in OFF_ENDS:
+            begun = fitted.structure.moved(share * (middle.standard - fitted.structure.standard))
             with contextlib.suppress(*ASTRAY):
-                return self.look(self.fitter.unfitted(other, fitted.tracker))
+                other = self.fitter.unfitted(begun, fitted.tracker, look.view)
+                if other.cost - fitted.cost < look.needed:
+                    return self.look(other)
         return look
 
     def _best(self, looks: Sequence[Look], begun: Sequence[Look]) -> tuple[Trial | None, list[Trial]]:

@@ -16,8 +16,9 @@ DAMPING = float(np.sqrt(0.5))
 #: Bandwidths with which pressures of chambers may be drawn, Hz; with the last one they are those that were read. Noise
 #: of a drive moves pressures as fast as its valve does, noise of gauges does not: records tell which is the larger.
 OF_PRESSURES = (1.0, 10.0, 100.0, np.inf)
-#: Fewest steps of the integrator within a sample where a joint is split: contacts and gears ring fast.
-STEPS = 4
+#: Fewest steps of the integrator within a sample where a joint is split: contacts ring fast. Where derivatives are all
+#: that is asked and no contact opens, steps of a spring may be as long as this, s.
+STEPS, COARSE = 4, 2e-3
 #: Longest steps where structures are compared and errors are not controlled, of order 2 and of order 4, s.
 LONGEST, LONGEST_OF_FOURTH_ORDER = 6e-4, 2e-3
 #: Short steps that cost as much as one of controlled error.
@@ -59,6 +60,8 @@ LOSS = 0.1
 #: Where a place that may lie anywhere begins, as multiples of half of the way that is seen, from its middle: within the
 #: way, just outside on either side, and so far away that it pulls nearly the same everywhere.
 PLACES = (0.0, -2.0, 2.0, -8.0, 8.0)
+#: Shares of the way from the end of a range to the middle of its prior where fits with another effect may begin.
+OFF_ENDS = (1.0, 0.5, 0.25, 0.125)
 #: Delay that is nothing unusual, s: a few intervals of a field bus.
 DELAY = 5e-3
 

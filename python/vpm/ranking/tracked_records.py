@@ -24,6 +24,7 @@ from vpm.observer import Record
 from vpm.ranking.hidden_first_states import STEP, HiddenFirstStates, hidden_states
 from vpm.ranking.noise_model import NoiseModel, Parts, Structured, frequencies
 from vpm.ranking.settings import (
+    COARSE,
     CONTROLLED,
     DAMPING,
     DRAWS,
@@ -356,6 +357,8 @@ class TrackedRecords:
         own, fewest = self.setup.method(model, drawn=True), STEPS if model.added_joints else 1
         automatic, linear = self.setup.integrator == AUTOMATIC, own == "additive"
         if not tracker.fine:
+            if not any(effect.type.has_play for effect in model.effects):
+                fewest = min(fewest, int(np.ceil(dt / COARSE)))
             return ("crank_nicolson" if automatic and linear else own), fewest
         short = int(np.ceil(dt / (LONGEST_OF_FOURTH_ORDER if linear else LONGEST)))
         if automatic and short > CONTROLLED * fewest and not model.levels:

@@ -1,0 +1,81 @@
+"""Steps of a ranking's trackers: as few as show the way, and as many as tell effects from each other."""
+
+from dataclasses import replace
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from sledge import DRY, SLEDGE, pushed
+from vpm.discrepancy.parallel_candidates import ParallelCandidates
+from vpm.model import Model
+from vpm.ranking.ranking_search import Search
+from vpm.ranking.settings import STEPS, Settings
+from vpm.ranking.tracked_records import TrackedRecords, Tracker
+from vpm.weighing import Prior
+
+COARSE = Tracker(1.0).coarse
+#: A spring of the sledge's drive, and one with play.
+SPRING = {"stiffness": 4e3, "damping": 5.0, "inertia": 0.05}
+PLAY = {**SPRING, "gap": 1e-3, "width": 1e-5}
+
+
+@lru_cache
+def search() -> Search:
+    records = (pushed(seed=1, duration=4.0), pushed(seed=2, duration=4.0))
+    return Search(Model.from_toml(SLEDGE), records, (), Settings(), None, ParallelCandidates(1, None), lambda _: None)
+
+
+@pytest.mark.parametrize(("rate", "spring"), [(2000.0, 1), (500.0, 1), (125.0, 4)])
+def test_a_spring_asks_for_steps_by_time_and_a_contact_by_samples(rate: float, spring: int) -> None:
+    """Waves of a spring last as long however often a log was sampled; a contact opens and closes within a sample."""
+    bare = Model.from_toml(SLEDGE)
+    tracked = TrackedRecords(bare, (), Settings())
+    told: list[tuple[str, dict[str, Any]]] = [("joint_compliance", SPRING), ("backlash", PLAY)]
+    steps = [tracked.stepping(bare.with_effect(name, "way", **values), COARSE, 1.0 / rate)[1] for name, values in told]
+    assert steps == [spring, STEPS]
+
+
+def test_coarse_steps_are_corrected_to_what_fine_ones_leave() -> None:
+    """Where a fit begins they agree to rounding, and the error of a step beside grows only with the distance."""
+    own = search()
+    look = own.look(own.fitted(own.start, Tracker(1.0)))
+    fitter = look.coarse_fitter
+    assert fitter is not None
+    structure = look.fitted.structure
+
+    def left(move: float) -> float:
+        moved = structure.at(structure.standard + move)
+        coarse, fine = (
+            one.unfitted(moved, way).residual for one, way in ((fitter, COARSE), (own.fitter, Tracker(1.0)))
+        )
+        return float(np.abs(coarse - fine).max())
+
+    near, far = left(0.01), left(0.1)
+    assert left(0.0) <= 1e-15
+    assert near < 0.2 * far < 0.02 * np.abs(look.fitted.residual).max()
+
+
+def test_coarse_steps_that_change_the_error_by_an_effect_compare_nothing() -> None:
+    own = search()
+    look = own.look(own.fitted(own.start, Tracker(1.0)))
+    noise = look.view.noise
+    look.coarse = replace(look.coarse, residual=look.coarse.residual + np.array(noise.deviations) * 0.3)
+    assert look.coarse_fitter is None
+
+
+@pytest.mark.parametrize(("low", "leaves"), [(1e-7, True), (1e-3, False)])
+def test_a_fit_leaves_the_end_of_a_range_no_farther_than_an_effect_gains(low: float, leaves: bool) -> None:
+    """Friction that turns round at once: records contradict the middle of a range, and tell nothing far below it."""
+    records, name = (pushed(seed=1, duration=4.0, dry=3.4),), "way.friction.transition_velocity"
+    model = Model.from_toml(DRY).with_parameters({name: low})
+    own = Search(model, records, (), Settings(), None, ParallelCandidates(1, None), lambda _: None)
+    known = {one: prior for one, prior in own.start.priors.items() if one != name}
+    fitted = own.fitted(replace(own.start, priors=known), Tracker(1.0)).structure
+    priors = {**known, name: Prior(0.1, 1.0, low, 1.0, logarithmic=True)}
+    look = own.look(own.fitter.unfitted(replace(fitted, priors=priors), Tracker(1.0)))
+    begun, middle = own._off_its_ends(look).fitted.structure, look.fitted.structure.off_its_ends
+    costs = [own.fitter.unfitted(one, Tracker(1.0), look.view).cost - look.fitted.cost for one in (begun, middle)]
+    assert costs[0] < look.needed < costs[1]
+    assert (begun.values[name] > 2.0 * low) is leaves
