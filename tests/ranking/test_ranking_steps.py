@@ -27,7 +27,7 @@ def search() -> Search:
     return Search(Model.from_toml(SLEDGE), records, (), Settings(), None, ParallelCandidates(1, None), lambda _: None)
 
 
-@pytest.mark.parametrize(("rate", "spring"), [(2000.0, 1), (500.0, 1), (125.0, 4)])
+@pytest.mark.parametrize(("rate", "spring"), [(2000.0, 1), (500.0, 2), (125.0, 4)])
 def test_a_spring_asks_for_steps_by_time_and_a_contact_by_samples(rate: float, spring: int) -> None:
     """Waves of a spring last as long however often a log was sampled; a contact opens and closes within a sample."""
     bare = Model.from_toml(SLEDGE)

@@ -18,7 +18,7 @@ DAMPING = float(np.sqrt(0.5))
 OF_PRESSURES = (1.0, 10.0, 100.0, np.inf)
 #: Fewest steps of the integrator within a sample where a joint is split: contacts ring fast. Where derivatives are all
 #: that is asked and no contact opens, steps of a spring may be as long as this, s.
-STEPS, COARSE = 4, 2e-3
+STEPS, COARSE = 4, 1e-3
 #: Longest steps where structures are compared and errors are not controlled, of order 2 and of order 4, s.
 LONGEST, LONGEST_OF_FOURTH_ORDER = 6e-4, 2e-3
 #: Short steps that cost as much as one of controlled error.
