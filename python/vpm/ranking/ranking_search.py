@@ -84,6 +84,7 @@ class Search(Trials):
                     break
                 if present:
                     looks = self._out_of_a_dead_end(best, looks)
+            looks, rounds = self._plainer(looks, rounds, named)
         except KeyboardInterrupt:
             interrupted = True
         ranking = self._ranking(looks, named, rounds, interrupted=interrupted)
@@ -91,6 +92,37 @@ class Search(Trials):
             return replace(ranking, gaps=self._gaps(held_out.with_hold(ranking.hold), ranking))
         except KeyboardInterrupt:
             return replace(ranking, interrupted=True)
+
+    def _plainer(
+        self, looks: list[Look], rounds: list[tuple[Ranked, ...]], named: dict[_Place, Ranked]
+    ) -> tuple[list[Look], list[tuple[Ranked, ...]]]:
+        """Search with one effect in the place of several, if that is more probable by the records and the model file.
+
+        Known parameters go astray to make up for what is missing. A second effect may then lead on from there, where a
+        single one with what the file states explains all of it.
+        """
+        if len(looks[0].fitted.structure.effects) < 2:
+            return looks, rounds
+        with contextlib.suppress(*ASTRAY):
+            bare = list(self.first.values())
+            best, tried = self._best(bare, [self._as_stated(look) for look in bare])
+            if best is not None and self._is_plainer(best, looks):
+                self.say(f"{best.label} from what the file states does as well alone")
+                rounds = [*rounds, self.listed(best, tried)]
+                named[_place(rounds[-1][0])] = rounds[-1][0]
+                return self.all_looks(self.look(best.fitted)), rounds
+        return looks, rounds
+
+    def _is_plainer(self, best: Trial, looks: Sequence[Look]) -> bool:
+        """Whether one effect of a search is more probable than several under its tracker."""
+        there = [look.fitted for look in looks if look.fitted.tracker == best.fitted.tracker]
+        noise = fitted_noise(best.fitted.residual, self.fitter.tracked.parts, self.settings.order)
+        alone = evidence(best.fitted, self.fitter, noise)
+        return bool(there) and all(alone > evidence(one, self.fitter, noise) for one in there)
+
+    def _as_stated(self, look: Look) -> Look:
+        """Look of the search at what the model file states, under the tracker of another one."""
+        return self.look(self.fitter.unfitted(self.start, look.fitted.tracker))
 
     def _ranking(
         self,
@@ -185,8 +217,7 @@ class Search(Trials):
         if best is not None or found.effects or found.doubt <= self.settings.odds:
             return best, tried
         with contextlib.suppress(*ASTRAY):
-            stated = [self.look(self.fitter.unfitted(self.start, look.fitted.tracker)) for look in looks]
-            best, more = self._best(looks, stated)
+            best, more = self._best(looks, [self._as_stated(look) for look in looks])
             tried = [*more, *tried]
         return best, tried
 
