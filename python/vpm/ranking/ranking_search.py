@@ -292,7 +292,8 @@ class Search(Trials):
         """Search with an earlier effect dropped or replaced by a better one.
 
         What was found before the others came in was fitted to what they leave, too. A fast tracker hides what a slow
-        one shows: an effect that counts under any of them stays.
+        one shows: an effect that counts under any of them stays. So does one without which nearly all of the error
+        comes back: others then take its shape at absurd sizes.
         """
         bare: list[Look] = []
         key = (one.name, one.at)
@@ -304,8 +305,9 @@ class Search(Trials):
             now = Trial.of(look.fitted, bare[-1], key)
             trials = (now, *self.in_its_place(bare[-1], self.others.get(key, ())))
             told = [against_free_shapes(trial, self.fitter) for trial in trials if trial.counts]
-            if counting := [trial for trial in told if trial.counts]:
-                return self._exchanged(now, counting, looks)
+            counting = [trial for trial in told if trial.counts]
+            if counting or now.judgement.least > self.settings.clear:
+                return self._exchanged(now, counting or [now], looks)
         self.say(f"no longer needed: {' at '.join(key)}")
         return self.all_looks(bare[0]), ()
 
