@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 import vpm
+from model_texts import rod
 from second_suite import arm
 from sledge import GAIN, MASS, OIL, SLEDGE, pushed
 from vpm.catalogue import EFFECTS
@@ -55,22 +56,7 @@ gain = 1.0
 
 
 #: A rod that stands on its end, on a hinge that a motor turns.
-STANDING = """
-name = "rod"
-gravity = [0, 0, -9.81]
-[bodies.rod]
-mass = 1.0
-center_of_mass = [0, 0, 0.15]
-inertia = [0.002, 0.002, 0.001, 0, 0, 0]
-[joints.hinge]
-type = "revolute"
-parent = "world"
-child = "rod"
-axis = [0, 1, 0]
-[actuators.motor]
-joint = "hinge"
-gain = 1.0
-"""
+STANDING = rod(0.15)
 
 
 def stood() -> Experiment:

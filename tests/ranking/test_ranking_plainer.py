@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import pytest
 
-from model_texts import effect_text
+from model_texts import effect_text, rod
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -14,24 +14,9 @@ from vpm.ranking.ranking_search import Search
 from vpm.ranking.settings import Settings
 
 #: A rod that hangs on a hinge, turned by a motor; its mass is a tenth uncertain.
-ROD = """
-name = "rod"
-gravity = [0, 0, -9.81]
-[bodies.rod]
-mass = { value = 1.0, uncertainty = 0.1 }
-center_of_mass = [0, 0, -0.15]
-inertia = [0.002, 0.002, 0.001, 0, 0, 0]
-[joints.hinge]
-type = "revolute"
-parent = "world"
-child = "rod"
-axis = [0, 1, 0]
-[actuators.motor]
-joint = "hinge"
-gain = 1.0
-[sensors.encoder]
-measures = "hinge.position"
-""" + effect_text("viscous_friction", "hinge", viscous="{ value = 0.03, uncertainty = 0.006 }")
+ROD = rod(-0.15, "{ value = 1.0, uncertainty = 0.1 }")
+ROD += '[sensors.encoder]\nmeasures = "hinge.position"\n'
+ROD += effect_text("viscous_friction", "hinge", viscous="{ value = 0.03, uncertainty = 0.006 }")
 MASS, OIL, REST, STEP, FINE = 1.06, 0.032, 0.11, 2e-3, 10
 
 

@@ -91,6 +91,26 @@ axis = {along}
 """
 
 
+def rod(height: float, mass: str = "1.0") -> str:
+    """Model file of a rod on a hinge that a motor turns, with its centre of mass above or below, m."""
+    return f"""
+name = "rod"
+gravity = [0, 0, -9.81]
+[bodies.rod]
+mass = {mass}
+center_of_mass = [0, 0, {height}]
+inertia = [0.002, 0.002, 0.001, 0, 0, 0]
+[joints.hinge]
+type = "revolute"
+parent = "world"
+child = "rod"
+axis = [0, 1, 0]
+[actuators.motor]
+joint = "hinge"
+gain = 1.0
+"""
+
+
 def two_links(
     upper: str, lower: str, elbow: str, *, axis: str = "[0.0, 0.0, 1.0]", gravity: str = "[0.0, 0.0, 0.0]"
 ) -> str:

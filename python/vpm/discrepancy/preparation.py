@@ -135,15 +135,20 @@ def recalibrated_of(
     return recalibrated
 
 
-def _as_stated(model: Model, ranked: Model, names: Collection[str]) -> dict[str, float]:
-    """Prepared values of a ranking's observer, of parameters that it finds as the model file states them.
+def is_as_stated(model: Model, ranked: Model | None, name: str) -> bool:
+    """Whether an observer, in a ranking, finds a parameter where the prepared model's file has it.
 
     Noise of an encoder that a controller answers to moves efforts along with rates: damping to the residual, but not to
     the observer.
     """
-    values = {name: ranked.parameters[name].value for name in names if name in ranked.parameters}
-    file = model.parameters
-    return {name: value for name, value in values.items() if abs(value - file[name].value) <= FAR * stated(file[name])}
+    found = None if ranked is None else ranked.parameters.get(name)
+    file = model.parameters[name]
+    return found is not None and abs(found.value - file.value) <= FAR * stated(file)
+
+
+def _as_stated(model: Model, ranked: Model, names: Collection[str]) -> dict[str, float]:
+    """Prepared values of a ranking's observer, of parameters that it finds as the model file states them."""
+    return {name: ranked.parameters[name].value for name in names if is_as_stated(model, ranked, name)}
 
 
 def begun_anywhere(model: Model, data: Data, recalibrated: Judged, notes: list[str]) -> tuple[Data, Judged]:

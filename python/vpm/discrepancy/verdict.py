@@ -11,7 +11,7 @@ from scipy.special import ndtri
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
 from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RefusedEffect
 from vpm.discrepancy.noise.noise_floor import Structure
-from vpm.discrepancy.preparation import ruled_out, ruled_out_together, stated
+from vpm.discrepancy.preparation import is_as_stated, ruled_out, ruled_out_together, stated
 from vpm.discrepancy.remainder.remainder import Remainder
 from vpm.discrepancy.screening.candidates import joint_at
 from vpm.discrepancy.search.candidate_choice import Accepted
@@ -284,7 +284,7 @@ def _doubt(nominal: Model, ranked: Model | None, recalibrated: Judged, *final: J
     """
     for far, where in ((ruled_out, ""), (ruled_out_together, " at the most probable values that explain the records")):
         before, *after = (far(nominal, one) for one in (recalibrated, *final))
-        shown = {name: times for name, times in before.items() if not _is_as_stated(nominal, ranked, name)}
+        shown = {name: times for name, times in before.items() if not is_as_stated(nominal, ranked, name)}
         if away := {name: times for name, times in shown.items() if all(name in one for one in after)}:
             name = max(away, key=lambda one: away[one])
             return (
@@ -410,15 +410,8 @@ def driven_away(nominal: Model, recalibrated: Judged, final: Judged, ranked: Mod
         after = final.model.parameters[name].value
         away = abs(after - parameter.value) - NORMAL_95 * float(std)
         moved = abs(after - recalibrated.model.parameters[name].value)
-        if _is_as_stated(nominal, ranked, name):
+        if is_as_stated(nominal, ranked, name):
             continue
         if min(away, moved) > FAR * spread:
             found[name] = abs(after - parameter.value) / spread
     return dict(sorted(found.items(), key=lambda item: -item[1]))
-
-
-def _is_as_stated(nominal: Model, ranked: Model | None, name: str) -> bool:
-    """Whether an observer finds a parameter of the verdict where the model file has it."""
-    stands = None if ranked is None else ranked.parameters.get(name)
-    file = nominal.parameters[name]
-    return stands is not None and abs(stands.value - file.value) <= FAR * stated(file)

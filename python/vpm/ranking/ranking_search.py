@@ -115,10 +115,8 @@ class Search(Trials):
 
     def _is_plainer(self, best: Trial, looks: Sequence[Look]) -> bool:
         """Whether one effect of a search is more probable than several under its tracker."""
-        there = [look.fitted for look in looks if look.fitted.tracker == best.fitted.tracker]
-        noise = fitted_noise(best.fitted.residual, self.fitter.tracked.parts, self.settings.order)
-        alone = evidence(best.fitted, self.fitter, noise)
-        return bool(there) and all(alone > evidence(one, self.fitter, noise) for one in there)
+        there = (look.fitted for look in looks if look.fitted.tracker == best.fitted.tracker)
+        return any(self.advantage(best.fitted, one) > 0.0 for one in there)
 
     def _as_stated(self, look: Look) -> Look:
         """Look of the search at what the model file states, under the tracker of another one."""

@@ -61,7 +61,9 @@ def _does_better(trials: Trials, trial: Trial, best: Trial) -> bool:
 
     Where all sensors are late, so is the drive: with more numbers they always leave a little less.
     """
-    return not as_good(best, trial, trials.settings) and trials.is_likelier(trial, best)
+    if as_good(best, trial, trials.settings):
+        return False
+    return trials.advantage(trial.fitted, best.fitted) > trials.settings.odds
 
 
 def _alike(trials: Trials, tried: Sequence[Trial], most: int) -> list[Trial]:

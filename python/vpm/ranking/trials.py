@@ -212,11 +212,10 @@ class Trials:
         """Effect of a searched structure with its evidence, judged against the structure without it."""
         return weighed([Trial.of(look.fitted, self.without(key, look), key)], self.fitter)[0]
 
-    def is_likelier(self, trial: Trial, other: Trial) -> bool:
-        """Whether a fit of the search is clearly more probable than another one under the same tracker."""
-        noise = fitted_noise(trial.fitted.residual, self.fitter.tracked.parts, self.settings.order)
-        told = [evidence(one.fitted, self.fitter, noise) for one in (trial, other)]
-        return told[0] - told[1] > self.settings.odds
+    def advantage(self, fitted: Fitted, other: Fitted) -> float:
+        """Evidence of a fit of the search over another one under the same tracker, nats, under its own noise model."""
+        noise = fitted_noise(fitted.residual, self.fitter.tracked.parts, self.settings.order)
+        return evidence(fitted, self.fitter, noise) - evidence(other, self.fitter, noise)
 
     def stands(self, trial: Trial) -> bool:
         """Whether a weighed effect of the search counts and is more probable than chance."""
