@@ -17,7 +17,7 @@ from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.model_structure import Structure, approximate
 from vpm.ranking.noise_model import white_noise
-from vpm.ranking.settings import PARTS, SURE
+from vpm.ranking.settings import NEXT_START, PARTS, SURE
 
 
 class Look:
@@ -77,12 +77,14 @@ class Look:
 
         None where it does most in a channel in which no effect could count any more.
         """
-        return self._gain(self._after_a_step(other.structure, *self.view.errors(other, self._fitter.tracked.parts)))
+        left = self._after_a_step(other.structure, *self.view.errors(other, self._fitter.tracked.parts))
+        return self._gain(left, self._alone)
 
     def gain_along(self, residual: Array) -> tuple[float, float]:
         """Gain that a look predicts for another structure if its change is scaled, nats, and the best scale.
 
-        All that is unknown without it gives way, and stays within what is known of it.
+        All that is unknown without it gives way, and stays within what is known of it. A change that is far too large
+        is scaled no farther than to the next start value: nobody knows its shape from there on.
         """
         noise, (before, slopes) = self.view.noise, self._errors
         after = noise.whitened(residual, self._fitter.tracked.parts)
@@ -90,12 +92,19 @@ class Look:
         columns = np.column_stack([slopes, along])
         size = max(float(along @ along), 1e-300)
         normal = columns.T @ columns + np.diag([*np.ones(len(z)), 1e-9 * size])
-        move = -np.linalg.solve(normal, columns.T @ before + np.append(z, 0.0))
-        moved = before + columns @ move if move[-1] > 0.0 else after
-        return self._gain(min(after, moved, key=noise.cost)), float(move[-1])
+        share = float(-np.linalg.solve(normal, columns.T @ before + np.append(z, 0.0))[-1])
+        moved = self._giving_way(before + max(share, NEXT_START) * along) if share > 0.0 else after
+        alone = min(self._alone, self._giving_way(before), key=noise.cost)
+        return self._gain(min(after, moved, key=noise.cost), alone), share
 
-    def _gain(self, left: Array) -> float:
-        noise, alone = self.view.noise, self._alone
+    def _giving_way(self, errors: Array) -> Array:
+        """Errors of a look from which all that is unknown takes what it can, within what is known of it."""
+        _, slopes = self._errors
+        normal = slopes.T @ slopes + np.eye(slopes.shape[1])
+        return np.asarray(errors - slopes @ np.linalg.solve(normal, slopes.T @ errors + self.coarse.structure.standard))
+
+    def _gain(self, left: Array, alone: Array) -> float:
+        noise = self.view.noise
         powers = (np.sum(noise.by_channel(errors) ** 2, axis=1) for errors in (left, alone))
         place = int(np.argmin(np.divide(*powers)))
         return noise.cost(alone) - noise.cost(left) if self._rooms()[place] else 0.0

@@ -55,6 +55,8 @@ NEARER, RETREAT = 0.7 ** np.arange(1, 10), 0.08
 TRIALS, TRIALS_BY_SECANTS = 4, 2
 #: Weight of the prior of a place in a step beside a size, see `Structure.leaning`: it leads elsewhere than it points.
 FAINT = 1e-6
+#: Share of the change by one start value that the next smaller one makes, about: the catalogue's are four times apart.
+NEXT_START = 0.25
 #: Share of its force by which a stop is stronger against the fastest impact, to begin with.
 LOSS = 0.1
 #: Where a place that may lie anywhere begins, as multiples of half of the way that is seen, from its middle: within the
