@@ -7,6 +7,7 @@ from collections import defaultdict
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import takewhile
 from typing import TypeAlias
 
 import numpy as np
@@ -49,8 +50,8 @@ def _at_several_places(trials: Trials, looks: list[Look], best: Trial | None, tr
                 continue
             look = trials.look(trial.fitted)
             new = [key for key in trial.fitted.structure.effects if key not in trial.look.fitted.structure.effects]
-            found = [trials.weighed_beside_others(key, look) for key in new]
-            if all(map(trials.stands, found)):
+            found = list(takewhile(trials.stands, (trials.weighed_beside_others(key, look) for key in new)))
+            if len(found) == len(new):
                 trials.say(f"{trial.key[0]} at {' and '.join(site for _, site in new)} together {trial.removing}")
                 return trials.all_looks(look), [trials.listed(one, [one]) for one in found]
     return looks, []
