@@ -417,7 +417,7 @@ def test_more_or_less_of_an_effect_promises_what_it_would_gain() -> None:
     left = {}
     for share in (-0.5, 0.5, 1.0):
         pulls = replace(structure_of(model.with_effect("bias_force", "way", force=share * 0.5 * GAIN)), priors={})
-        left[share] = fitter.followed(pulls, Tracker(1.0).coarse, ()).residual
+        left[share] = fitter.followed(pulls, Tracker(1.0).coarse, ())
     whole, _ = look.gain_along(left[1.0])
     assert whole > 100.0 * look.promising
     half, share = look.gain_along(left[0.5])

@@ -55,6 +55,7 @@ class Look:
         self.added = np.zeros(len(noise.tails)) if first is None else self._added(first.fitted.residual)
         self.explained = np.maximum(self._explained(approximate(fitted.structure.model)), self.added)
         self._curves: dict[tuple[str, ...], Array] = {}
+        self._offsets: dict[int, Array] = {}
 
     def _followed(self, fitted: Fitted) -> Followed:
         """Residual of a look with all derivatives, by few integration steps where contacts allow it."""
@@ -77,17 +78,17 @@ class Look:
 
         None where it does most in a channel in which no effect could count any more.
         """
-        left = self._after_a_step(other.structure, *self.view.errors(other, self._fitter.tracked.parts))
-        return self._gain(left, self._alone)
+        errors = self.view.errors(self._compared(other), self._fitter.tracked.parts)
+        return self._gain(self._after_a_step(other.structure, *errors), self._alone)
 
-    def gain_along(self, residual: Array) -> tuple[float, float]:
+    def gain_along(self, other: Followed) -> tuple[float, float]:
         """Gain that a look predicts for another structure if its change is scaled, nats, and the best scale.
 
         All that is unknown without it gives way, and stays within what is known of it. A change that is far too large
         is scaled no farther than to the next start value: nobody knows its shape from there on.
         """
         noise, (before, slopes) = self.view.noise, self._errors
-        after = noise.whitened(residual, self._fitter.tracked.parts)
+        after = noise.whitened(self._compared(other).residual, self._fitter.tracked.parts)
         along, z = after - before, self.coarse.structure.standard
         columns = np.column_stack([slopes, along])
         size = max(float(along @ along), 1e-300)
@@ -96,6 +97,23 @@ class Look:
         moved = self._giving_way(before + max(share, NEXT_START) * along) if share > 0.0 else after
         alone = min(self._alone, self._giving_way(before), key=noise.cost)
         return self._gain(min(after, moved, key=noise.cost), alone), share
+
+    def _compared(self, other: Followed) -> Followed:
+        """Another structure beside a look as by fine steps: what steps of the same length change is that of the look.
+
+        Else what coarse steps do wrong would pass for something that an effect explains.
+        """
+        tracked, coarse = self._fitter.tracked, self.coarse.tracker
+        steps = max(tracked.stepping(other.structure.model, coarse, one.dt)[1] for one in tracked.records)
+        return replace(other, residual=other.residual + self._by_steps(steps))
+
+    def _by_steps(self, steps: int) -> Array:
+        """What a look leaves more by fine steps than by so many coarse ones within a sample."""
+        if steps not in self._offsets:
+            tracker = replace(self.coarse.tracker, fewest=steps)
+            left = self._fitter.followed(self.coarse.structure, tracker, ()).residual
+            self._offsets[steps] = self.fitted.residual - left
+        return self._offsets[steps]
 
     def _giving_way(self, errors: Array) -> Array:
         """Errors of a look from which all that is unknown takes what it can, within what is known of it."""
@@ -111,12 +129,12 @@ class Look:
 
     @cached_property
     def _errors(self) -> tuple[Array, Array]:
-        """Errors and derivatives of the look's structure alone, by coarse steps, for all trials."""
-        return self.view.errors(self.coarse, self._fitter.tracked.parts)
+        """Errors of the look's structure alone, with derivatives by coarse steps, for all trials."""
+        return self.view.errors(replace(self.coarse, residual=self.fitted.residual), self._fitter.tracked.parts)
 
     @cached_property
     def _alone(self) -> Array:
-        """Errors of the look's structure alone after a step of a fit, by coarse steps."""
+        """Errors of the look's structure alone after a step of a fit."""
         return self._after_a_step(self.coarse.structure, *self._errors)
 
     def _after_a_step(self, structure: Structure, errors: Array, slopes: Array) -> Array:

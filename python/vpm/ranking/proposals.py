@@ -132,7 +132,7 @@ def _hopeful(
     """
 
     def promised(one: _Extended) -> list[tuple[float, _Extended]]:
-        gain, share = look.gain_along(fitter.followed(one.structure, look.coarse.tracker, ()).residual)
+        gain, share = look.gain_along(fitter.followed(one.structure, look.coarse.tracker, ()))
         found = [(gain, one)]
         effect = one.candidate.effect  # within a gap the load tells no way
         if effect.splits and not effect.has_play and "stiffness" in one.start and 0.0 < share < 1.0:
@@ -140,8 +140,7 @@ def _hopeful(
             with contextlib.suppress(*ASTRAY):
                 other = extensions.extended(look.fitted.structure, one.candidate, start, one.side)
                 stiffer = replace(one, structure=other, start=start)
-                left = fitter.followed(other, look.coarse.tracker, ()).residual
-                found.append((look.gain_along(left)[0], stiffer))
+                found.append((look.gain_along(fitter.followed(other, look.coarse.tracker, ()))[0], stiffer))
         return found
 
     gains = each("trying", promised, several, lambda one: f"{one.candidate.label}, {look.fitted.tracker.label}")

@@ -52,6 +52,7 @@ class Tracker:
     band: float  #: Bandwidth, Hz.
     #: Whether its steps are exact enough to compare structures by what they leave, or cost as little as they can.
     fine: bool = True
+    fewest: int = 1  #: Fewest steps within a sample.
 
     @property
     def coarse(self) -> Tracker:
@@ -354,7 +355,7 @@ class TrackedRecords:
         Structures are compared by short steps, or by steps of controlled error where that takes fewer. These need the
         exact Jacobian, which flexible links make large. Derivatives and proposals only show the way.
         """
-        own, fewest = self.setup.method(model, drawn=True), STEPS if model.added_joints else 1
+        own, fewest = self.setup.method(model, drawn=True), STEPS if model.added_joints else tracker.fewest
         automatic, linear = self.setup.integrator == AUTOMATIC, own == "additive"
         if not tracker.fine:
             if not any(effect.type.has_play for effect in model.effects):
