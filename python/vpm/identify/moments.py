@@ -18,6 +18,9 @@ AXES, PAIRS = ("xx", "yy", "zz"), ("xy", "xz", "yz")
 #: Share of a sum of moments that a moment may lack and still be as large: a fit that stops for want of gain ends just
 #: before the border, and nobody measures a moment to a thousandth.
 TOUCHING = 1e-3
+#: Halvings by which the border of what bodies can have is found: to a millionth of the way.
+HALVINGS = 20
+ROUNDED = 1e-12  #: Share of an inertia by which rounding may lead beyond that.
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,6 +135,35 @@ def to_the_border(before: Array, after: Array) -> Array:
     room, left = (np.sum(moments) - 2.0 * moments for moments in (before, after))
     shares = [r / (r - gone) for r, gone in zip(np.maximum(room, 0.0), left, strict=True) if gone < 0.0]
     return np.asarray(before + min(shares, default=1.0) * (after - before))
+
+
+def free_tensors(model: Model, free: Collection[str]) -> list[str]:
+    """Bodies with free moments or products of inertia whose principal axes may turn."""
+    along = {names[0].rpartition(".inertia.")[0] for names in free_moments(model, free)}
+    bodies = dict.fromkeys(name.rpartition(".inertia.")[0] for name in free if ".inertia." in name)
+    return [body for body in bodies if body not in along]
+
+
+def tensor_to_the_border(before: Array, after: Array) -> Array:
+    """Inertia (6,), xx yy zz xy xz yz, on the way from that of a real body to another, as far as a body can have it.
+
+    Second moments of mass, the half trace less the inertia, are linear in it, and no eigenvalue of theirs is negative
+    (Wensing, Kim, Slotine 2018). The least one is concave along the way: bisection finds where it ends.
+    """
+    if _is_real(after):
+        return after
+    near, far = 0.0, 1.0
+    for _ in range(HALVINGS):
+        middle = (near + far) / 2.0
+        near, far = (middle, far) if _is_real(before + middle * (after - before)) else (near, middle)
+    return np.asarray(before + near * (after - before))
+
+
+def _is_real(inertia: Array) -> bool:
+    """Whether a body can have an inertia (6,), given by its moments and products."""
+    xx, yy, zz, xy, xz, yz = inertia.tolist()
+    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    return bool(np.linalg.eigvalsh(np.trace(tensor) / 2.0 * np.eye(3) - tensor)[0] >= -ROUNDED * np.max(np.abs(tensor)))
 
 
 def rods(model: Model, free: Collection[str]) -> list[tuple[str, str]]:

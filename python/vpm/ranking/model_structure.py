@@ -11,7 +11,16 @@ import numpy as np
 
 from vpm.catalogue.kinds import Side
 from vpm.discrepancy.screening.candidates import Key
-from vpm.identify.moments import free_moments, moments_of, rods, to_the_border
+from vpm.identify.moments import (
+    AXES,
+    PAIRS,
+    free_moments,
+    free_tensors,
+    moments_of,
+    rods,
+    tensor_to_the_border,
+    to_the_border,
+)
 from vpm.model import Effect, Model
 from vpm.numbers import Array
 from vpm.ranking.settings import MOVE
@@ -173,12 +182,20 @@ class Structure:
             theta[pair] = float(np.mean(theta[pair]))
         for moments in self._moments:
             theta[moments] = to_the_border(self.theta[moments], theta[moments])
+        for inertia in self._tensors:
+            theta[inertia] = tensor_to_the_border(self.theta[inertia], theta[inertia])
         return replace(self, theta=theta)
 
     @cached_property
     def _moments(self) -> list[list[int]]:
         """Places of all three moments of inertia in a structure, of each body of which some are unknown."""
         return [[self.place(one) for one in moments_of(names[0])] for names in free_moments(self.model, self.priors)]
+
+    @cached_property
+    def _tensors(self) -> list[list[int]]:
+        """Places of moments and products of inertia in a structure, of each body whose principal axes may turn."""
+        bodies, entries = free_tensors(self.model, self.priors), (*AXES, *PAIRS)
+        return [[self.place(f"{body}.inertia.{axes}") for axes in entries] for body in bodies]
 
     @cached_property
     def room(self) -> tuple[Array, Array]:
