@@ -624,9 +624,8 @@ def tries(*logs: vpm.Experiment) -> int:
 
 
 def test_what_explains_no_record_is_not_tried_again_for_the_next_one() -> None:
-    """All records have one channel table."""
-    once = tries(gusty_slide(1))
-    assert tries(gusty_slide(1), gusty_slide(2)) == once > 0
+    """All records have one channel table. The one of which most is left is tried."""
+    assert tries(gusty_slide(1), gusty_slide(2)) in {tries(gusty_slide(1)), tries(gusty_slide(2))} - {0}
 
 
 @pytest.mark.nightly

@@ -77,7 +77,7 @@ class Explainer:
 
     def _at_once(self, part: Experiment, used: Sequence[str], left: Shares) -> list[Explanation]:
         """Two corrections of a joint of which each alone explains nothing, for the other one hides what it does."""
-        if not (doubtful := self._doubtful(left)):
+        if not (doubtful := self.judge.doubtful(left)):
             return []
         pairs = [
             pair
@@ -108,7 +108,7 @@ class Explainer:
 
     def _ended(self, part: Experiment, used: Sequence[str], left: Shares) -> list[_Trial]:
         """Fitted explanations with the errors before and after each correction, the least first."""
-        if not left.above(self.settings.negligible) and left.far <= self.settings.far:
+        if self.judge.falls(left) or (not left.above(self.settings.negligible) and left.far <= self.settings.far):
             return []
         tangent = self.judge.freed(part, left)
         freed = left if tangent is None else tangent.shares
@@ -126,7 +126,7 @@ class Explainer:
             return min(_Trial(correction, left, plain), found, key=lambda one: one.after.cost - one.before.cost)
 
         found = self.each("fitting", ended, self._finalists(part, used, left), self._words)
-        if part.duration * self.settings.band >= self.settings.periods:
+        if part.duration * self.judge.band >= self.settings.periods:
             found = [*found, *self._late(part, used, tangent, freed, self._known(found))]
         ended_well = sorted((one for one in found if not isinstance(one, Failure)), key=lambda one: one.after.order)
         different: list[_Trial] = []
@@ -170,9 +170,9 @@ class Explainer:
 
     def _finalists(self, part: Experiment, used: Sequence[str], left: Shares) -> list[Correction]:
         """Explanations that are worth a fit of the model; see `_late` for delays."""
-        some = left.above(self.settings.negligible)
+        some = {one for one in left.above(self.settings.negligible) if left.told(one) > self.settings.harmless}
         everything = list(scales(self.model, used, self.units, self.settings))
-        tried = self._about(everything, self._doubtful(left), left)
+        tried = self._about(everything, self.judge.doubtful(left), left)
         if not left.above(self.settings.lost):  # with a wrong clock the model explains nothing
             tried = [one for one in tried if not one.is_clock]
         # The mirror image of a machine explains most of a log as well as the machine does.
@@ -194,23 +194,15 @@ class Explainer:
             affected = {name for one in correction.each for name in self._affected(one, left)} & set(left.efforts)
             if not affected:
                 return True
-            efforts = self.judge.efforts_left(correction.applied(part))
-            return bool(efforts) and all(
-                mean_logarithm(efforts, names) <= mean_logarithm(left.efforts, names) for names in (affected, efforts)
+            efforts = self.judge.efforts_left(correction.applied(part), affected)
+            # A position and its velocity may both be wrong, and are put right one after the other.
+            told = affected | {name for name in left.efforts if not name.endswith(".velocity")}
+            return told <= set(efforts) and all(
+                mean_logarithm(efforts, names) <= mean_logarithm(left.efforts, names) for names in (affected, told)
             )
 
         told = self.each("comparing efforts", better, corrections, self._words)
         return [one for one, kept in zip(corrections, told, strict=True) if kept is True]
-
-    def _doubtful(self, left: Shares) -> set[str]:
-        """Channels that the model does not explain; all where its file rules out the values by which it does.
-
-        But for those without an inverse-dynamics residual: a wrong unit or sign shows there. What shows in the motion
-        alone is a small force of which a slow tracker makes a large error, such as one at which a joint sticks.
-        """
-        share = self.settings.doubtful
-        found = set(left.by_channel) if left.far > self.settings.far else left.above(share)
-        return {name for name in found if left.efforts.get(name, 1.0) > share}
 
     def _about(self, corrections: Iterable[Correction], channels: set[str], left: Shares) -> list[Correction]:
         """Explanations that may have affected one of these channels."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -72,17 +72,35 @@ def _references(model: Model, record: Experiment) -> Iterator[Related]:
 def _accelerations(model: Model, record: Experiment) -> Iterator[Related]:
     """Related accelerations: measured, and of the filtered positions, without the ends."""
     for joint in model.joints:
-        position, acceleration = f"{joint}.position", f"{joint}.acceleration"
-        if acceleration not in record or not _moves(record, position):
-            continue
-        read, retained = [record.read_rate(position)], [record.retained.get(position, np.inf)]
-        cutoff = choose_cutoff(record[position][:, None], record.rate, read, retained).cutoff
-        inside = slice((edge := settling_samples(record.rate, cutoff)), len(record) - edge)
-        if len(record) <= 4 * edge:
-            continue
-        rate = differentiate(lowpass(record[position], record.rate, cutoff), record.dt)
-        expected, values = differentiate(rate, record.dt), lowpass(record[acceleration], record.rate, cutoff)
-        yield Related(acceleration, f"the second derivative of {position}", values[inside], expected[inside])
+        yield from _derivative(record, f"{joint}.position", f"{joint}.acceleration", 2)
+
+
+def left_of_velocities(record: Experiment, channels: Collection[str]) -> dict[str, float]:
+    """Share of the variance of each velocity among channels that the derivative of its position does not explain.
+
+    That is a relation of two sensors, which no force and no mass enters.
+    """
+    found = {}
+    for joint, _, kind in (name.rpartition(".") for name in channels):
+        for one in _derivative(record, f"{joint}.position", f"{joint}.velocity", 1) if kind == "velocity" else ():
+            found[one.channel] = min(one.error(), 1.0)
+    return found
+
+
+def _derivative(record: Experiment, position: str, channel: str, order: int) -> Iterator[Related]:
+    """Related derivative of a position, if a record holds both: measured, and of the filtered position."""
+    if channel not in record or not _moves(record, position):
+        return
+    read, retained = [record.read_rate(position)], [record.retained.get(position, np.inf)]
+    cutoff = choose_cutoff(record[position][:, None], record.rate, read, retained).cutoff
+    inside = slice((edge := settling_samples(record.rate, cutoff)), len(record) - edge)
+    if len(record) <= 4 * edge:
+        return
+    expected, values = lowpass(record[position], record.rate, cutoff), lowpass(record[channel], record.rate, cutoff)
+    for _ in range(order):
+        expected = differentiate(expected, record.dt)
+    which = {1: "derivative", 2: "second derivative"}[order]
+    yield Related(channel, f"the {which} of {position}", values[inside], expected[inside])
 
 
 def _moves(record: Experiment, channel: str) -> bool:

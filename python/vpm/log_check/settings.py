@@ -10,6 +10,9 @@ class Settings:
     """Thresholds of the log check: bandwidth, stretch, shares and sizes."""
 
     band: float = 1.0  #: Bandwidth of the tracker that keeps the model on the log, Hz.
+    #: Least ratio of that to the rate at which the machine falls over where it stands on its joints: drawn back four
+    #: times as hard as it falls, it is off by a third more than a machine that does not fall.
+    firm: float = 2.0
     #: Largest product of bandwidth and sample time: in a log whose time is wrong the tracker is slower.
     turn: float = 0.02
     still: float = 0.003  #: Share of the motion of a record, as squares of its steps, that has gone by where it begins.

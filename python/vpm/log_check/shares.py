@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -18,6 +18,8 @@ from vpm.identify.response_along_motion import bends, has_own_drives
 from vpm.initial import initial_state
 from vpm.log_check.correction import Correction
 from vpm.log_check.delay import Delayed, with_delay, without_delay
+from vpm.log_check.falling import fall_rate
+from vpm.log_check.related import left_of_velocities
 from vpm.log_check.settings import Settings
 from vpm.model import Model
 from vpm.numbers import Array
@@ -66,13 +68,22 @@ class Shares:
     chance: float = 1.0  #: Of deviations as large as these.
     floor: float = 0.0  #: Shares below this are as good as nothing.
     #: Inverse-dynamics residual of the effort at each position, and of strains along the motion; none where drives have
-    #: states of their own.
+    #: states of their own. Of a velocity what the derivative of its position leaves.
     efforts: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def cost(self) -> float:
         """Sum of the logarithms of the shares, but for what is negligible: each channel has a scale of its own."""
         return sum(math.log(max(share, self.floor)) for share in self.by_channel.values())
+
+    def told(self, channel: str) -> float:
+        """What is left of the efforts that tell of a channel; 1 where none do.
+
+        A velocity is as good as the position of which it is the derivative.
+        """
+        joint, _, kind = channel.rpartition(".")
+        names = (channel, f"{joint}.position") if kind == "velocity" else (channel,)
+        return max(self.efforts.get(name, 1.0) for name in names)
 
     def logarithm(self, channels: Iterable[str]) -> float:
         """Mean of the logarithms of the shares of some channels."""
@@ -116,8 +127,10 @@ class Judge:
     A tracker of stated bandwidth keeps the model on the record, see `vpm.ranking.tracked_records.TrackedRecords`.
     """
 
-    def __init__(self, model: Model, settings: Settings, setup: Setup) -> None:
+    def __init__(self, model: Model, settings: Settings, setup: Setup, records: Sequence[Experiment] = ()) -> None:
         self.settings, self.setup = settings, setup
+        #: Bandwidth of the tracker, Hz: faster than the machine falls over anywhere in its records.
+        self.band = max([settings.band, *(settings.firm * fall_rate(model, record) for record in records)])
         present = {(effect.name, effect.at) for effect in model.effects}
         joints = [name for name in model.joints if name not in model.added_joints]
         self.added = tuple((name, at) for at in joints for name in FORCES if (name, at) not in present)
@@ -135,10 +148,13 @@ class Judge:
             return self._lost(record, values)
         return self._shares(tracked, residual, tracker, values)
 
-    def efforts_left(self, record: Experiment) -> Mapping[str, float]:
-        """Inverse-dynamics residual of the effort at each position as a share; see `Shares.efforts`."""
-        near = self._regressed(record, self._structure(record))
-        return {} if near is None else near.efforts
+    def efforts_left(self, record: Experiment, channels: Collection[str]) -> Mapping[str, float]:
+        """What is left of the effort at each position, and of velocities among channels; see `Shares.efforts`."""
+        return self._told(record, self._regressed(record, self._structure(record)), channels)
+
+    def _told(self, record: Experiment, near: _Regressed | None, channels: Collection[str]) -> dict[str, float]:
+        """What is left of efforts, and of velocities beside the derivative of their positions; see `Shares.efforts`."""
+        return {**left_of_velocities(record, channels), **({} if near is None else near.efforts)}
 
     def efforts_read(self, record: Experiment) -> Mapping[str, float]:
         """Such a residual also where drives have states, if the pressures of both chambers tell what they give."""
@@ -178,10 +194,14 @@ class Judge:
         structure, plain = self._structure(record), self.measured(record)
         starts, near = [(structure, plain)], self._regressed(record, structure)
         if near is not None and self._is_lost(plain):
-            starts.append((replace(structure, theta=near.values), self.measured(record, near.values)))
+            there = self.measured(record, near.values)
+            there = replace(there, efforts=self._told(record, near, there.by_channel))
+            if self.falls(there):
+                return there
+            starts.append((replace(structure, theta=near.values), there))
         found = [self._fitted(record, *start) or plain for start in starts]
         best = min(found, key=lambda shares: shares.order)
-        return best if near is None else replace(best, efforts=near.efforts)
+        return replace(best, efforts=self._told(record, near, best.by_channel))
 
     def fitted_from(self, record: Experiment, known: Array, efforts: Mapping[str, float]) -> Shares:
         """Shares at values that are ``known`` from another record, or when a fit from there has ended.
@@ -208,6 +228,24 @@ class Judge:
             return None
         shares = self._shares(tracked, found.residual, tracker, found.structure.theta)
         return self._with_departure(shares, found.structure)
+
+    def doubtful(self, left: Shares) -> set[str]:
+        """Channels that the model does not explain; all where its file rules out the values by which it does.
+
+        But for those without an inverse-dynamics residual: a wrong unit or sign shows there. What shows in the motion
+        alone is a small force of which a slow tracker makes a large error, such as one at which a joint sticks.
+        """
+        share = self.settings.doubtful
+        found = set(left.by_channel) if left.far > self.settings.far else left.above(share)
+        return {name for name in found if left.told(name) > share}
+
+    def falls(self, left: Shares) -> bool:
+        """Whether the model leaves its record although all efforts are as they should be: then nothing follows from it.
+
+        An arm that stands on its joints falls over faster than a slow tracker draws it back.
+        """
+        told = all(left.told(name) <= self.settings.harmless for name in left.by_channel)
+        return told and bool(left.above(self.settings.doubtful))
 
     def _is_lost(self, plain: Shares) -> bool:
         """Whether the model as it is does not follow a record, by its ``plain`` shares."""
@@ -295,7 +333,7 @@ class Judge:
         refined = replace(correction, delay=delay)
         shares = self.measured(refined.applied(record), np.array(values))
         shares = self._with_departure(shares, without_delay(found.structure))
-        return refined, replace(shares, efforts=self.efforts_left(refined.applied(record)))
+        return refined, replace(shares, efforts=self.efforts_left(refined.applied(record), shares.by_channel))
 
     def _with_departure(self, shares: Shares, structure: Structure) -> Shares:
         """Shares with how far the parameters of the model are from what its file states."""
@@ -380,7 +418,7 @@ class Judge:
         return frozenset(name for key in self.added for name in self.model.effect(*key).parameter_names.values())
 
     def _tracker(self, record: Experiment) -> Tracker:
-        return Tracker(min(self.settings.band, self.settings.turn / record.dt), fine=False)
+        return Tracker(min(self.band, self.settings.turn / record.dt), fine=False)
 
     def _ranking(self, record: Experiment) -> RankingSettings:
         return RankingSettings(bands=(self._tracker(record).band,), iterations=self.settings.steps)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -42,10 +43,10 @@ def _of_sensor(record: Experiment, name: str, others: Sequence[str], settings: S
     if np.unique(values).size < settings.levels:
         return
     if frozen := _frozen(record, name, others, settings):
-        first, last = record.time[frozen.start], record.time[frozen.stop - 1]
+        first, last = (_stamp(record, at) for at in (frozen.start, frozen.stop - 1))
         yield finding(
             "frozen",
-            f"{name} stands still from {first:.4g} s to {last:.4g} s and then jumps",
+            f"{name} stands still from {first} s to {last} s and then jumps",
             "cut that stretch out of the record",
         )
     spikes = _spikes(values, settings)
@@ -53,7 +54,7 @@ def _of_sensor(record: Experiment, name: str, others: Sequence[str], settings: S
         yield finding(
             "spikes",
             f"{name} has {spikes.size} {'spike' if spikes.size == 1 else 'spikes'}, the first at "
-            f"{record.time[spikes[0]]:.4g} s",
+            f"{_stamp(record, int(spikes[0]))} s",
             "replace these samples by their neighbours",
         )
     step, reach = quantisation_step(values), float(np.ptp(values))
@@ -105,12 +106,19 @@ def _is_flat(levels: Array, settings: Settings) -> bool:
     return float(levels.max()) < settings.level * float(levels.min())
 
 
+def _stamp(record: Experiment, sample: int) -> str:
+    """Time at which a stretch begins or ends, s, with the digits that tell one sample from the next."""
+    return f"{round(float(record.time[sample]), max(-math.floor(math.log10(record.dt)), 0)):.15g}"
+
+
 def _frozen(record: Experiment, name: str, others: Sequence[str], settings: Settings) -> slice | None:
     """The longest stretch of one value, if it ends by a jump, or if the channel has noise elsewhere.
 
-    A reading that does not jump may repeat one value while the machine rests: then all other sensors rest, too.
+    A reading that does not jump may repeat one value while its joint rests: then the other sensors of that rest, too,
+    or all others where it has none. A velocity may repeat one while its position goes on at that speed.
     """
-    values = record[name]
+    values, (owner, _, kind) = record[name], name.rpartition(".")
+    others = [other for other in others if other.rpartition(".")[0] == owner] or list(others)
     steps = np.diff(values)
     run = _longest(steps == 0.0)
     if (
@@ -122,7 +130,10 @@ def _frozen(record: Experiment, name: str, others: Sequence[str], settings: Sett
     stretch = slice(run.start, run.stop + 1)
     if abs(steps[run.stop]) > settings.jump * float(np.abs(np.delete(steps, run.stop)).max()):
         return stretch
-    at_rest = bool(others) and all(_rests(record[other], stretch) for other in others)
+    gone = values[run.start] * record.time if kind == "velocity" else 0.0
+    at_rest = bool(others) and all(
+        _rests(record[other] - (gone if other == f"{owner}.position" else 0.0), stretch) for other in others
+    )
     return stretch if not at_rest and _is_noisy(np.delete(values, run), settings) else None
 
 
