@@ -132,7 +132,8 @@ def refuse_mistakes(
 class _Begun:
     """A record to check, the beginning of its motion, and what is left of that as it is."""
 
-    record: Experiment
+    logged: Experiment
+    record: Experiment  #: With the positions of joints that it holds as angles of shafts.
     part: Experiment
     left: Shares
     sides: list[Finding]  #: Joints that are on the other side of a dead centre, which the record has put right.
@@ -145,12 +146,12 @@ class _Check:
         self.judge, self.each, self.settings = judge, each, judge.settings
         self._in_vain: list[Shares] = []  # what is left of records that no correction explains
 
-    def begun(self, record: Experiment) -> _Begun:
+    def begun(self, logged: Experiment) -> _Begun:
         """Beginning of a check: what is left of a record as it is."""
-        record = joints_from_shafts(record, self.judge.model)
+        record = joints_from_shafts(logged, self.judge.model)
         record, sides = beyond_dead_centres(self.judge, record, self.settings)
         part = _beginning(record, measured_outputs(self.judge.model, record), self.settings)
-        return _Begun(record, part, self.judge.fitted(part), sides)
+        return _Begun(logged, record, part, self.judge.fitted(part), sides)
 
     def order(self, begun: Sequence[_Begun]) -> list[int]:
         """Places of records in the order of a check: where most is left a mistake shows best.
@@ -179,7 +180,9 @@ class _Check:
             left = min(left, self.judge.fitted_from(part, known, left.efforts), key=lambda one: one.order)
         outputs = measured_outputs(model, record)
         inputs = tuple(name for name in model.input_channels if name in record)
-        stretches = list(odd_stretches(record, outputs, inputs, self.settings))
+        # A joint may rest while the shafts turn from which its angle is worked out, step by step of their encoders.
+        sensed = measured_outputs(model, begun.logged)
+        stretches = list(odd_stretches(begun.logged, sensed, inputs, self.settings))
         found, affected, whole = list[Finding](), set[str](), record
         says = len(part) >= self.settings.judged and not self._is_as_before(left)
         for _ in range(self.settings.rounds if says else 0):
