@@ -38,6 +38,8 @@ class Judgement(Storable):
         Whether it repeats along a whole fraction of the period of another effect at its place.
     reshaped : str
         An effect of the same curve that was found before and does as well by another shape of its law; "" if none does.
+    timed : str
+        A shift of all commands within one sample that does as well; "" if none does.
     """
 
     removed: float
@@ -49,6 +51,7 @@ class Judgement(Storable):
     alone: float = 0.0
     overtone: bool = False
     reshaped: str = ""
+    timed: str = ""
 
     @property
     def words(self) -> str:
@@ -105,4 +108,6 @@ class Judgement(Storable):
             return "it repeats along a whole fraction of the period of another effect there, and is an overtone of that"
         if self.reshaped:
             return f"{self.reshaped} does as well by another shape of its law"
+        if self.timed:
+            return f"{self.timed}, do as well"
         return ""

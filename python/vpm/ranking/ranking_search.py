@@ -13,6 +13,7 @@ from vpm.catalogue.kinds import Side
 from vpm.model import Effect
 from vpm.numbers import rough_percent
 from vpm.ranking.choice_by_evidence import evidence, weighed
+from vpm.ranking.command_timing import against_timing
 from vpm.ranking.disturbed_records import disturbed
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
 from vpm.ranking.free_shape import against_free_shapes
@@ -253,10 +254,11 @@ class Search(Trials):
         counting += self._counting_elsewhere(counting)
         while counting:
             best, *others = weighed(counting, self.fitter)
-            if best.evidence > self.settings.odds:
+            best = against_timing(best, self.fitter)
+            if best.counts and best.evidence > self.settings.odds:
                 self.others[best.key] = [trial.fitted.structure for trial in others]
                 return best, [best, *others, *told, *tried]
-            # It leaves less error because it answers to noise otherwise; no sample is more probable by it.
+            # It leaves less error because it answers to noise otherwise, or comes in time; no sample is more probable.
             told.append(best)
             counting = [trial for trial in counting if trial.fitted is not best.fitted]
         return None, told + tried

@@ -124,6 +124,15 @@ class TrackedRecords:
         other = TrackedRecords(self.model, self.experiments, self.settings, replace(self.setup, hold=hold))
         return other.with_pressures(self.of_pressures)
 
+    def with_commands_later(self, samples: int) -> TrackedRecords:
+        """Tracked records whose commands come by whole samples later, or earlier where there are fewer than none."""
+        other, rows = copy.copy(self), [np.arange(len(record.time)) - samples for record in self.records]
+        other.records = tuple(
+            replace(record, inputs=record.inputs[np.clip(places, 0, len(places) - 1)])
+            for record, places in zip(self.records, rows, strict=True)
+        )
+        return other
+
     def with_pressures(self, band: float) -> TrackedRecords:
         """Tracked records with pressures that are drawn with another bandwidth, Hz."""
         other = copy.copy(self)
