@@ -24,8 +24,8 @@ from vpm.discrepancy.screening.probe import (
     screening_effort,
 )
 from vpm.discrepancy.search.candidate_choice import Accepted, choose
-from vpm.discrepancy.settings import CLEAR_GAIN, FEW, FLOOR_FACTOR, RINGING, SHORT_LIST
-from vpm.identify import gain, segments
+from vpm.discrepancy.settings import CLEAR_GAIN, FEW, FLOOR_FACTOR, RINGING, SHORT_LIST, SLIGHT
+from vpm.identify import gain, gaps, segments
 from vpm.identify.response_along_motion import answers_at_once, bends
 from vpm.identify.tangent import drives_on_tangent
 from vpm.numbers import power
@@ -73,11 +73,19 @@ class Round:
         model = self.current.model
         left = structure(model, self.data.training, self.data.validation, self.timed.fitted, self.timed.validation)
         quiet = not left.present and left.above_white <= FLOOR_FACTOR
-        if quiet or self.done():
+        if quiet or self._leaves_slight() or self.done():
             return None
         self.screen(without, heavy=True)
         self.confirm()
         return self.best()
+
+    def _leaves_slight(self) -> bool:
+        """Whether what the round has to explain is less of any channel than laws are wrong by.
+
+        No candidate does more than all of it: each would be refused as slight, for a hidden motion is no exact law.
+        """
+        left = gaps(self.data.validation, self.current.validation).values()
+        return max((share for _, share, _ in left), default=0.0) <= SLIGHT
 
     def weak(self, best: Accepted) -> bool:
         """Whether the best candidate of the round leaves most of the error, so that a hidden motion is tried too.
