@@ -457,8 +457,7 @@ class Tangent:
     @property
     def deviations(self) -> Array:
         """Standard deviations of the parameters, as shares of those that the model file states (k,)."""
-        slopes, _ = self._weighed(self.shares.seen)
-        normal = slopes.T @ slopes + np.eye(slopes.shape[1])
+        normal = self._normal + np.eye(len(self._normal))
         sizes = 1.0 / np.sqrt(np.diag(normal))
         spread = np.diag(np.linalg.pinv(normal * np.outer(sizes, sizes), hermitian=True))
         return np.asarray(sizes * np.sqrt(np.maximum(spread, 0.0)))
@@ -470,17 +469,34 @@ class Tangent:
         """
         rows = rows_of(corrected, record)
         kept = np.flatnonzero(np.isin(rows, self.shares.seen))
-        slopes, sizes = self._weighed(rows[kept])
+        whole, sizes = self._all
+        there = np.isin(self.shares.seen, rows[kept])
+        slopes = (whole if np.all(there) else whole[there]).reshape(-1, whole.shape[2])
+        lost = whole[~there].reshape(-1, whole.shape[2])  # a delay cuts off some samples at the ends
         before, after = (part / sizes for part in (self.residual[rows[kept]], residual[kept]))
-        along = (after - before).reshape(-1, 1)
-        columns = np.hstack([slopes, along])
-        normal = columns.T @ columns + np.diag([*np.ones(slopes.shape[1]), 1e-12 * float(np.sum(along**2)) + 1e-300])
-        pull = columns.T @ before.ravel() + np.append(self.structure.standard, 0.0)
+        along = (after - before).ravel()
+        square = float(along @ along)
+        beside = slopes.T @ along
+        own = self._normal - lost.T @ lost + np.eye(len(beside))
+        normal = np.block([[own, beside[:, None]], [beside[None, :], np.array([[(1.0 + 1e-12) * square + 1e-300]])]])
+        pull = np.append(slopes.T @ before.ravel() + self.structure.standard, along @ before.ravel())
         move = -np.linalg.solve(normal, pull)
-        left = (before.ravel() + columns @ move).reshape(before.shape) * sizes
+        left = (before.ravel() + slopes @ move[:-1] + move[-1] * along).reshape(before.shape) * sizes
         scale = self.shares.free * len(kept) / len(self.shares.seen)
         errors = map(_share, np.sum(left**2, axis=0).tolist(), scale.tolist())
         return replace(self.shares, by_channel=dict(zip(self.shares.by_channel, errors, strict=True))), float(move[-1])
+
+    @cached_property
+    def _all(self) -> tuple[Array, Array]:
+        """Weighed slopes of the error share at all samples that count (n, m, k), and sizes."""
+        slopes, sizes = self._weighed(self.shares.seen)
+        return slopes.reshape(-1, len(sizes), slopes.shape[1]), sizes
+
+    @cached_property
+    def _normal(self) -> Array:
+        """Squares of the weighed slopes of the error share (k, k)."""
+        slopes = self._all[0].reshape(-1, self._all[0].shape[2])
+        return np.asarray(slopes.T @ slopes)
 
     def _weighed(self, rows: NDArray[np.intp]) -> tuple[Array, Array]:
         """Slopes of the error share, weighed sample by sample and channel by channel, and sizes."""
