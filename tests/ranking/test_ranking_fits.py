@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from scipy.signal import lfilter
 
 import vpm
-from model_texts import rod
+from model_texts import effect_text, rod
 from second_suite import arm
 from sledge import GAIN, MASS, OIL, SLEDGE, pushed
 from vpm.catalogue import EFFECTS
@@ -415,7 +415,7 @@ def test_more_or_less_of_an_effect_promises_what_it_would_gain() -> None:
     fixed = replace(structure_of(model), priors={})
     look = Look(fitter.fitted(fixed, Tracker(1.0), View(fitter.noise_of(fixed, Tracker(1.0)))), fitter)
     left = {}
-    for share in (-0.5, 0.5, 1.0):
+    for share in (-0.5, 0.5, 1.0, 10.0):
         pulls = replace(structure_of(model.with_effect("bias_force", "way", force=share * 0.5 * GAIN)), priors={})
         left[share] = fitter.followed(pulls, Tracker(1.0).coarse, ())
     whole, _ = look.gain_along(left[1.0])
@@ -424,6 +424,41 @@ def test_more_or_less_of_an_effect_promises_what_it_would_gain() -> None:
     assert half == pytest.approx(whole, rel=0.05)
     assert share == pytest.approx(2.0, rel=0.05)
     assert look.gain_along(left[-0.5])[0] < 0.0
+    far, share = look.gain_along(left[10.0])
+    assert share == pytest.approx(0.1, rel=0.05)
+    assert far < 0.0  # a quarter of it, where the next start is, pulls too much
+
+
+def test_what_all_else_explains_is_promised_by_no_effect() -> None:
+    """A change of a hair is worth nothing, however much the fit of what is known still has to gain."""
+    model = Model.from_toml(SLEDGE).with_parameters({"sledge.mass": 1.5 * MASS})
+    known = {"sledge.mass": Prior(1.5 * MASS, 0.01 * MASS, 0.0, np.inf)}
+    fitter = fitter_of(model)
+    look = Look(fitter.unfitted(Structure(model, model.theta.copy(), known), Tracker(1.0)), fitter)
+    hair = replace(structure_of(model.with_effect("bias_force", "way", force=1e-9)), priors={})
+    assert look.gain_along(fitter.followed(hair, Tracker(1.0).coarse, ()))[0] < look.promising
+
+
+def test_what_coarse_steps_do_wrong_is_promised_by_no_effect() -> None:
+    """Another mass would explain what long steps make of a spring, and explains nothing of its oil."""
+    model = Model.from_toml(SLEDGE + effect_text("spring", "way", stiffness="1875.0", rest="0.0"))
+    time = 0.02 * np.arange(400)
+    sweep = {"motor.command": 10.0 * np.sin(2.0 * time * (1.0 + time))}
+    scene = Experiment.from_arrays(time, sweep | {"way.position": 0.0 * time}, model=model, name="sweep")
+    dry = model.with_parameters({"way.friction.viscous": 0.8 * OIL})
+    ran = vpm.simulate(dry, scene, substeps=50, initial_state=np.zeros(2))
+    way = {"way.position": ran.values[:, ran.channels.index("way.position")]}
+    fitter = Fitter(
+        TrackedRecords(model, [Experiment.from_arrays(time, sweep | way, model=model, name="sweep")], Settings()),
+        Settings(),
+    )
+    look = Look(fitter.unfitted(replace(structure_of(model), priors={}), Tracker(1.0)), fitter)
+    heavier = Structure(model, model.theta.copy(), {"sledge.mass": Prior(MASS, 0.1 * MASS, 0.0, np.inf)})
+    followed = fitter.followed(heavier, Tracker(1.0).coarse, ("sledge.mass",))
+    errors, slopes = look.view.errors(followed, fitter.tracked.parts)
+    move = bounded_step(heavier, errors, slopes, look.settings.reach)
+    assert look.view.noise.cost(errors) - look.view.noise.cost(errors + slopes @ move) > 50.0 * look.promising
+    assert look.predicted_gain(followed) < look.promising
 
 
 #: Two sledges that have nothing to do with each other.
