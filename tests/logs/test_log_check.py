@@ -378,6 +378,16 @@ def test_says_of_which_parameters_a_log_says_nothing() -> None:
     assert "spring" in one.sentence
 
 
+def test_what_one_log_shows_is_not_called_unseen_for_another() -> None:
+    """The first instants of a motion say nothing of a mass, and the whole one does."""
+    moving = record(textbook_arm.log(PLAIN, 5), "moving")
+    model = vpm.Model.from_toml(textbook_arm.FILE)
+    short = record({name: values[: len(values) // 50] for name, values in textbook_arm.log(PLAIN, 5).items()}, "short")
+    (alone,) = vpm.check_log(model, short, workers=1).findings
+    assert (alone.kind, alone.records) == ("unseen", ("short",))
+    assert vpm.check_log(model, [short, moving], workers=1).findings == ()
+
+
 def test_refuses_to_conclude_anything_from_such_a_log(logs: dict[str, Columns]) -> None:
     log = record(scaled("i1", 1e3)(logs["friction"]))
     with pytest.raises(ExperimentError, match=r"m1\.command is in mA, not in A.*leave out its check"):

@@ -98,7 +98,7 @@ def check_log(
                 shares[name] = max(share, shares.get(name, 0.0))
     except KeyboardInterrupt:
         raise KeyboardInterrupt(UNCHECKED.format(record=checked)) from None
-    findings = [finding for place in sorted(found) for finding in found[place]]
+    findings = [finding for place in sorted(found) for finding in found[place]] + check.unseen(begun)
     return LogCheck(tuple(sorted(_together(findings), key=lambda one: not one.mistake)), shares)
 
 
@@ -145,6 +145,7 @@ class _Check:
     def __init__(self, judge: Judge, each: ParallelCandidates) -> None:
         self.judge, self.each, self.settings = judge, each, judge.settings
         self._in_vain: list[Shares] = []  # what is left of records that no correction explains
+        self._undetermined: dict[str, list[str]] = {}  # parameters of which each record says next to nothing
 
     def begun(self, logged: Experiment) -> _Begun:
         """Beginning of a check: what is left of a record as it is."""
@@ -204,9 +205,16 @@ class _Check:
         for correction, related in wrong_scales(model, whole, units, self.settings):
             found.append(_of_related(correction, related, units, correction.entries(table), record.name))
         tangent = None if self.judge.falls(left) else self.judge.tangent(part, left)
-        if tangent is not None and (undetermined := self.judge.undetermined(tangent)):
-            stretches.append(_of_parameters(undetermined, record.name))
+        if tangent is not None:
+            self._undetermined[record.name] = self.judge.undetermined(tangent)
         return [*begun.sides, *found, *stretches], left
+
+    def unseen(self, begun: Sequence[_Begun]) -> list[Finding]:
+        """Finding of a check on parameters of which no record says anything; none if there are no such."""
+        records = tuple(one.record.name for one in begun if one.record.name in self._undetermined)
+        told = [self._undetermined[name] for name in records]
+        names = [name for name in (told[0] if told else ()) if all(name in other for other in told)]
+        return [_of_parameters(names, records)] if names else []
 
     def _is_as_before(self, left: Shares) -> bool:
         """Whether a checked record leaves what another one left that no correction explains.
@@ -323,10 +331,11 @@ def _evidence(found: Explanation, place: str) -> str:
     return f"of {place} the model leaves {left} unexplained as it is, and {then} with {corrected}"
 
 
-def _of_parameters(undetermined: Sequence[str], record: str) -> Finding:
-    sentence = f"the beginning of its motion says next to nothing of {', '.join(undetermined)}"
+def _of_parameters(undetermined: Sequence[str], records: tuple[str, ...]) -> Finding:
+    motion = "its motion" if len(records) == 1 else "their motions"
+    sentence = f"the beginning of {motion} says next to nothing of {', '.join(undetermined)}"
     repair = "see by vpm identify whether the rest says more; else fit others, or move the machine so that they matter"
-    return Finding("unseen", (), (record,), sentence, repair)
+    return Finding("unseen", (), records, sentence, repair)
 
 
 def _together(findings: Sequence[Finding]) -> list[Finding]:
