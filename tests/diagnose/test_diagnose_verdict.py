@@ -80,7 +80,10 @@ def test_an_effect_that_leaves_the_deflection_behind_its_joint_explains_nothing(
         "knee_deflection.position (observed)": ChannelGap(2e-3, 1.449e-3, after, 1.969e-4, "rad", 9.24e-3, "observed"),
     }
     left: Any = SimpleNamespace(present=True)
-    assert verdict(data, final, final, found, gap, left, None)[0] == word
+    told, sentence, *_ = verdict(data, final, final, found, gap, left, None)
+    assert told == word
+    # The sentence tells what is left there, not the little that is left elsewhere.
+    assert ("leave 94 % of what was left of knee_deflection.position" in sentence) == (word == "unexplained")
 
 
 @pytest.mark.parametrize(

@@ -163,34 +163,40 @@ def _of_named(
     mostly_open = (open_anywhere and errors.share_left > MOSTLY_OPEN) or described_better
     joints = Joints.of(gap, left, found.left)
     apart = joints.differ and not any(joints.has(entry, found.final.model) for entry in found.accepted)
-    if _is_spoiled(found, gap, tracked) or (not apart and not _is_explanation(found, tracked, mostly_open)):
-        leave = f"leave {100.0 * (tracked if tracked >= 1.0 else errors.share_left):.0f} % of its mean square"
+    spoiled = _spoiled(found, gap, tracked)
+    if spoiled or (not apart and not _is_explanation(found, tracked, mostly_open)):
+        share = f"{100.0 * (tracked if tracked >= 1.0 else errors.share_left):.0f} % of its mean square"
         return (
             "unexplained",
             f"The residual is structured and {errors.above:.2g} times the noise floor. The effects of the catalogue "
-            f"that come closest, {names}, {leave}: they are not the explanation. {numbers}",
+            f"that come closest, {names}, leave {spoiled or share}: they are not the explanation. {numbers}",
             True,
         )
     more = _OPEN.format(joints=", ".join(joints.open)) if apart else _REST if errors.remaining else ""
     return "effect_found", f"Missing: {names}. {numbers}{more}", errors.remaining
 
 
-def _is_spoiled(found: Search, gap: Mapping[str, ChannelGap], tracked: float) -> bool:
-    """Whether the verdict on named effects is spoiled: they leave most of an effort where they act, or of a deflection.
+def _spoiled(found: Search, gap: Mapping[str, ChannelGap], tracked: float) -> str:
+    """What spoils the verdict on named effects: most of an effort where they act, or of a deflection, is left; or "".
 
     No noise excuses that of an effort: the floor of a drive that gives next to nothing is as large. A backlash is hard
     to balance: where little is left of what a tracker sees, that says more. A deflection behind their joint is told by
     a tracker alone, and what it leaves of that as it was is no law on either side.
     """
     if tracked <= _most_left(found) and joints_with_play(found.final.model):
-        return False
-    efforts = [gap[channel] for joint in _joints(found) if (channel := f"{joint}.effort") in gap]
-    most = any(g.after**2 > CLEAR_GAIN * g.signal**2 for g in efforts)
-    behind = {found.final.model.joint_behind(joint) for joint in _joints(found) if joint}
-    bent = [g for channel, g in gap.items() if g.mode == OBSERVED and channel.rpartition(".")[0] in behind]
-    most = most or any(g.after**2 > CLEAR_GAIN * g.recalibrated**2 and _is_clear(g.after, g) for g in bent)
-    # A model without any force would leave less.
-    return most or any(g.recalibrated < g.signal < g.after for g in main_gaps(gap))
+        return ""
+    joints = _joints(found)
+    behind = {found.final.model.joint_behind(joint) for joint in joints if joint}
+    for channel, g in gap.items():
+        joint, _, quantity = channel.rpartition(".")
+        if joint in joints and quantity == "effort" and g.after**2 > CLEAR_GAIN * g.signal**2:
+            return f"{100.0 * (g.after / g.signal) ** 2:.0f} % of the mean square of {channel}"
+        bent = g.mode == OBSERVED and joint in behind
+        if bent and g.after**2 > CLEAR_GAIN * g.recalibrated**2 and _is_clear(g.after, g):
+            return f"{100.0 * (g.after / g.recalibrated) ** 2:.0f} % of what was left of {channel}"
+        if g.mode == "inverse_dynamics" and g.recalibrated < g.signal < g.after:
+            return f"more of {channel} than a model without any force"
+    return ""
 
 
 def _rests_on_tracker(found: Search, data: Data | None) -> bool:
