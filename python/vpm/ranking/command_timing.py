@@ -11,7 +11,7 @@ from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.refusal import has_peers
 from vpm.discrepancy.settings import CLEAR_GAIN
 from vpm.numbers import Array
-from vpm.ranking.fit import ASTRAY, Fitter
+from vpm.ranking.fit import ASTRAY, Fitter, free_step
 from vpm.ranking.look import Look
 from vpm.ranking.tried_effect import Trial
 
@@ -58,7 +58,7 @@ def _shifted(look: Look, fitter: Fitter) -> tuple[float, float]:
     samples = 0.0
     for _ in range(STEPS):
         now, along = errors + samples * straight + samples**2 * bent, straight + 2.0 * samples * bent
-        move = float(_step(now, np.column_stack([slopes, along]), np.append(z, 0.0), len(z))[-1])
+        move = float(free_step(now, np.column_stack([slopes, along]), z)[-1])
         samples = float(np.clip(samples + move, -1.0, 1.0))
     now = errors + samples * straight + samples**2 * bent
     return _cost(look, errors, slopes, z) - _cost(look, now, slopes, z), samples
@@ -66,11 +66,5 @@ def _shifted(look: Look, fitter: Fitter) -> tuple[float, float]:
 
 def _cost(look: Look, errors: Array, slopes: Array, z: Array) -> float:
     """Cost after a step of all that is unknown beside a shift of commands."""
-    move = _step(errors, slopes, z, len(z))
+    move = free_step(errors, slopes, z)
     return look.view.noise.cost(errors + slopes @ move) + 0.5 * float((z + move) @ (z + move))
-
-
-def _step(errors: Array, slopes: Array, z: Array, stated: int) -> Array:
-    """Most probable step by deviations of priors (k,); nothing is known of a shift behind ``stated`` ones."""
-    known = np.where(np.arange(len(z)) < stated, 1.0, 1e-12 * np.sum(slopes**2, axis=0) + 1e-300)
-    return -np.linalg.solve(slopes.T @ slopes + np.diag(known), slopes.T @ errors + known * z)

@@ -366,6 +366,17 @@ def by_secant(slopes: Array, change: Array, move: Array) -> Array:
     return np.asarray(slopes + np.outer(missed, move))
 
 
+def free_step(errors: Array, slopes: Array, standard: Array) -> Array:
+    """Most probable step of a fit without bounds (k,), in deviations of the priors from their ``standard`` values.
+
+    Nothing is known of what further columns of the ``slopes`` stand for.
+    """
+    known, unknown = len(standard), slopes.shape[1] - len(standard)
+    z = np.append(standard, np.zeros(unknown))
+    weights = np.where(np.arange(len(z)) < known, 1.0, 1e-9 * np.sum(slopes**2, axis=0) + 1e-300)
+    return -np.linalg.solve(slopes.T @ slopes + np.diag(weights), slopes.T @ errors + weights * z)
+
+
 def bounded_step(
     structure: Structure, errors: Array, slopes: Array, reach: float, variance: float | None = None
 ) -> Array:

@@ -13,7 +13,7 @@ from vpm.catalogue import EFFECTS
 from vpm.discrepancy.screening.candidates import Key
 from vpm.model import Effect
 from vpm.numbers import Array
-from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step
+from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step, free_step
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.model_structure import Structure, approximate
 from vpm.ranking.noise_model import white_noise
@@ -88,38 +88,44 @@ class Look:
         is scaled no farther than to the next start value: nobody knows its shape from there on.
         """
         noise, (before, slopes) = self.view.noise, self._errors
-        after = noise.whitened(self._compared(other).residual, self._fitter.tracked.parts)
-        along, z = after - before, self.coarse.structure.standard
-        columns = np.column_stack([slopes, along])
-        size = max(float(along @ along), 1e-300)
-        normal = columns.T @ columns + np.diag([*np.ones(len(z)), 1e-9 * size])
-        share = float(-np.linalg.solve(normal, columns.T @ before + np.append(z, 0.0))[-1])
-        moved = self._giving_way(before + max(share, NEXT_START) * along) if share > 0.0 else after
-        alone = min(self._alone, self._giving_way(before), key=noise.cost)
-        return self._gain(min(after, moved, key=noise.cost), alone), share
+        along = noise.whitened(self._compared(other).residual, self._fitter.tracked.parts) - before
+        share = float(free_step(before, np.column_stack([slopes, along]), self.coarse.structure.standard)[-1])
+        ends = [before + along]
+        if share > 0.0:
+            ends.append(self._giving_way(before + max(share, NEXT_START) * along))
+        return self._gain(min(ends, key=noise.cost), self._given_way), share
 
     def _compared(self, other: Followed) -> Followed:
         """Another structure beside a look as by fine steps: what steps of the same length change is that of the look.
 
         Else what coarse steps do wrong would pass for something that an effect explains.
         """
-        tracked, coarse = self._fitter.tracked, self.coarse.tracker
-        steps = max(tracked.stepping(other.structure.model, coarse, one.dt)[1] for one in tracked.records)
-        return replace(other, residual=other.residual + self._by_steps(steps))
+        return replace(other, residual=other.residual + self._by_steps(self._steps_of(other.structure)))
+
+    def _steps_of(self, structure: Structure) -> int:
+        """Coarse steps within a sample that a structure takes beside a look."""
+        tracked = self._fitter.tracked
+        return max(tracked.stepping(structure.model, self.coarse.tracker, one.dt)[1] for one in tracked.records)
 
     def _by_steps(self, steps: int) -> Array:
         """What a look leaves more by fine steps than by so many coarse ones within a sample."""
         if steps not in self._offsets:
-            tracker = replace(self.coarse.tracker, fewest=steps)
-            left = self._fitter.followed(self.coarse.structure, tracker, ()).residual
+            left = self.coarse.residual
+            if steps != self._steps_of(self.coarse.structure):
+                tracker = replace(self.coarse.tracker, fewest=steps)
+                left = self._fitter.followed(self.coarse.structure, tracker, ()).residual
             self._offsets[steps] = self.fitted.residual - left
         return self._offsets[steps]
 
     def _giving_way(self, errors: Array) -> Array:
         """Errors of a look from which all that is unknown takes what it can, within what is known of it."""
         _, slopes = self._errors
-        normal = slopes.T @ slopes + np.eye(slopes.shape[1])
-        return np.asarray(errors - slopes @ np.linalg.solve(normal, slopes.T @ errors + self.coarse.structure.standard))
+        return np.asarray(errors + slopes @ free_step(errors, slopes, self.coarse.structure.standard))
+
+    @cached_property
+    def _given_way(self) -> Array:
+        """Errors of the look's structure alone, from which what is unknown has taken most."""
+        return min(self._alone, self._giving_way(self._errors[0]), key=self.view.noise.cost)
 
     def _gain(self, left: Array, alone: Array) -> float:
         noise = self.view.noise
