@@ -37,6 +37,12 @@ def test_a_spring_asks_for_steps_by_time_and_a_contact_by_samples(rate: float, s
     assert steps == [spring, STEPS]
 
 
+def test_a_structure_takes_as_many_steps_as_the_one_that_it_is_compared_with() -> None:
+    """Else what coarse steps do wrong would pass for what an effect with a contact explains."""
+    tracked = TrackedRecords(Model.from_toml(SLEDGE), (), Settings())
+    assert tracked.stepping(Model.from_toml(SLEDGE), replace(COARSE, fewest=STEPS), 1e-3)[1] == STEPS
+
+
 def test_coarse_steps_are_corrected_to_what_fine_ones_leave() -> None:
     """Where a fit begins they agree to rounding, and the error of a step beside grows only with the distance."""
     own = search()

@@ -364,12 +364,12 @@ class TrackedRecords:
         Structures are compared by short steps, or by steps of controlled error where that takes fewer. These need the
         exact Jacobian, which flexible links make large. Derivatives and proposals only show the way.
         """
-        own, fewest = self.setup.method(model, drawn=True), STEPS if model.added_joints else tracker.fewest
+        own, fewest = self.setup.method(model, drawn=True), STEPS if model.added_joints else 1
         automatic, linear = self.setup.integrator == AUTOMATIC, own == "additive"
         if not tracker.fine:
             if not any(effect.type.has_play for effect in model.effects):
                 fewest = min(fewest, int(np.ceil(dt / COARSE)))
-            return ("crank_nicolson" if automatic and linear else own), fewest
+            return ("crank_nicolson" if automatic and linear else own), max(fewest, tracker.fewest)
         short = int(np.ceil(dt / (LONGEST_OF_FOURTH_ORDER if linear else LONGEST)))
         if automatic and short > CONTROLLED * fewest and not model.levels:
             return f"adaptive({self.settings.exact:g})", 1
