@@ -178,7 +178,7 @@ class Trials:
             ends = [fitted, *self._detours(fitted, view)] if trial.splits else [fitted]
             return Trial.of(min(ends, key=lambda one: one.cost), trial.look)
 
-        ends = self.each("finishing", one_finished, hopeful, lambda trial: trial.label)
+        ends = self.each("finishing", one_finished, _foremost(hopeful), lambda trial: trial.label)
         return [end for end in ends if isinstance(end, Trial)]
 
     def _detours(self, fitted: Fitted, view: View) -> list[Fitted]:
@@ -251,3 +251,14 @@ class Trials:
             trial.rivals,
             class_probability,
         )
+
+
+def _foremost(trials: Sequence[Trial]) -> list[Trial]:
+    """Fits of a search round without those that began elsewhere and have come less far than another of the same effect.
+
+    Impacts let fits end in many places, so that all are kept where a joint is split.
+    """
+    best: dict[tuple[Key, Side], Trial] = {}
+    for trial in sorted(trials, key=lambda one: one.fitted.cost):
+        best.setdefault((trial.key, trial.fitted.structure.side(trial.key)), trial)
+    return [trial for trial in trials if trial.splits or trial in best.values()]
