@@ -104,7 +104,7 @@ def test_what_was_tried_in_vain_is_refused_with_its_numbers(named: vpm.Diagnosis
         ("score", 2.0, "2 standard deviations, 3 are needed"),
         ("size", 0.001, "0.1 % of what all effects of the model do"),
         ("beside", 0.04, "4 % of what the effects that were found do"),
-        ("shape", 0.01, "1 % of what effects over the same states do there"),
+        ("shape", 0.01, "1 % of what the same states do there"),
         ("alone", 1.02, "102 % of the error power of a mass on which nothing acts"),
         ("least", 0.5, "its shape ends where the records do"),
     ],

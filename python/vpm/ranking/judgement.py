@@ -29,7 +29,8 @@ class Judgement(Storable):
     beside : float
         The same of those that were added before.
     shape : float
-        The same of those that show over the same states at the same place: one curve with two shapes.
+        The same of those that show over the same states at the same place, one curve with two shapes, and of the
+        bending of links where that is what a gauge reads.
     alone : float
         Of an effect that adds inertia, the share of the error power that is left, in the channel in which it removes
         most, of what the tracker leaves of a mass on which nothing acts: too heavy a machine is drawn along by the
@@ -96,8 +97,7 @@ class Judgement(Storable):
             )
         if self.shape <= settings.inexact:
             return (
-                f"it does {rough_percent(self.shape)} of what effects over the same states do there, "
-                "and no law is as exact as that"
+                f"it does {rough_percent(self.shape)} of what the same states do there, and no law is as exact as that"
             )
         if self.alone >= 1.0 - settings.worth:
             return (

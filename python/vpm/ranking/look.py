@@ -36,6 +36,8 @@ class Look:
         left. Here and below error power is what stands out of noise: what a sensor adds no model can remove.
     added : ndarray, shape (m,)
         The same of those that were added.
+    bent : ndarray, shape (m,)
+        The same of the bending of links: all that a strain gauge reads.
     """
 
     def __init__(self, fitted: Fitted, fitter: Fitter, first: Look | None = None) -> None:
@@ -54,6 +56,9 @@ class Look:
         self._clear = power > SURE * chance
         self.added = np.zeros(len(noise.tails)) if first is None else self._added(first.fitted.residual)
         self.explained = np.maximum(self._explained(approximate(fitted.structure.model)), self.added)
+        gauges = {f"{name}.strain" for name in own.model.gauges}
+        reads = [channel in gauges for channel in tracked.records[0].channels]
+        self.bent = np.where(reads, self._beside(tracked.motion), 0.0)
         self._curves: dict[tuple[str, ...], Array] = {}
         self._offsets: dict[int, Array] = {}
 
@@ -130,8 +135,13 @@ class Look:
     def _gain(self, left: Array, alone: Array) -> float:
         noise = self.view.noise
         powers = (np.sum(noise.by_channel(errors) ** 2, axis=1) for errors in (left, alone))
-        place = int(np.argmin(np.divide(*powers)))
+        place = self._place(np.divide(*powers), self._rooms())
         return noise.cost(alone) - noise.cost(left) if self._rooms()[place] else 0.0
+
+    def _place(self, ratio: Array, rooms: Collection[bool]) -> int:
+        """Channel of a look in which most is removed, of those with room for an effect if enough is removed there."""
+        seen = np.where(list(rooms), ratio, 1.0)
+        return int(np.argmin(seen if np.min(seen) < 1.0 - self.settings.worth else ratio))
 
     @cached_property
     def _errors(self) -> tuple[Array, Array]:
@@ -180,9 +190,9 @@ class Look:
 
     def _rooms(self, left: Array | float = 1.0) -> list[bool]:
         """Channels in which a look has room for an effect that counts."""
-        size, beside = (np.sqrt(left / (power + 1.0)) for power in (self.explained, self.added))
-        told = zip(self._clear.astype(float).tolist(), size.tolist(), beside.tolist(), strict=True)
-        return [Judgement(c, c, np.inf, a, b, 1.0).counts(self.settings) for c, a, b in told]
+        told = (np.sqrt(left / (power + 1.0)).tolist() for power in (self.explained, self.added, self.bent))
+        clear = self._clear.astype(float).tolist()
+        return [Judgement(c, c, np.inf, *few).counts(self.settings) for c, *few in zip(clear, *told, strict=True)]
 
     def _above_noise(self, squares: Sequence[Array]) -> tuple[Array, Array]:
         """Error power of a look above white noise by channel (m,), and its deviation by chance."""
@@ -205,11 +215,12 @@ class Look:
         """
         left = self._squares(fitted.residual)
         ratio = self._ratio(self.left, left)
-        removed, place = max(1.0 - float(np.prod(ratio)), 1e-12), int(np.argmin(ratio))
+        removed, gone = max(1.0 - float(np.prod(ratio)), 1e-12), np.maximum(1.0 - ratio, 1e-12)
+        place = self._place(ratio, np.sqrt(gone / (self.bent + gone)) > self.settings.inexact)
         apart = [self._ratio([b], [a]) for b, a in zip(self.left, left, strict=True)]
         shares = [1.0 - max(float(np.prod(one)), float(one[place])) for one in apart]
-        there = max(1.0 - float(ratio[place]), 1e-12)
-        curve = np.zeros(len(ratio)) if key is None else self._curve(key)
+        there = float(gone[place])
+        curve = self.bent if key is None else np.maximum(self._curve(key), self.bent)
         powers = (self.explained, self.added, curve)
         size, beside, shape = (float(np.sqrt(there / (power[place] + there))) for power in powers)
         score = _repeated([(self.left[1], left[1])], self.settings.pieces)
