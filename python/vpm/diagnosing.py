@@ -102,13 +102,13 @@ def diagnose(
     """Name the physics that ``model`` is missing, with evidence on data that were not fitted.
 
     Logs with a wrong unit, sign, name or clock are refused, see `vpm.check_log`. The parameters that the model file
-    calls uncertain are fitted first, for a wrong parameter is not a missing effect. Where links are rigid and up to
-    three joints move, a ranking of the training records names what is missing, see `vpm.rank`, and validation records
-    decide no name. Elsewhere every effect is screened at every site by its regressor; those with the largest predicted
-    gain are refitted together with the model. They have to predict validation records, by the inverse-dynamics residual
-    and in simulation. One is accepted at a time, the one with the largest validation gain per number. Where no efforts
-    follow from a motion, with closed loops or drives that go by their own samples, a ranking names, and what its
-    observer leaves of validation records is told.
+    calls uncertain are fitted first, for a wrong parameter is not a missing effect. Where up to three joints move, a
+    ranking of the training records names what is missing, see `vpm.rank`, and validation records decide no name.
+    Elsewhere every effect is screened at every site by its regressor; those with the largest predicted gain are
+    refitted together with the model. They have to predict validation records, by the inverse-dynamics residual and in
+    simulation. One is accepted at a time, the one with the largest validation gain per number. Where no efforts follow
+    from a motion, with closed loops or drives that go by their own samples, a ranking names, and what its observer
+    leaves of validation records is told.
 
     Parameters
     ----------
@@ -128,9 +128,8 @@ def diagnose(
     limit : int, optional
         Most effects to accept; two for each joint, but at least six, if not given.
     names : {"ranking", "search"}
-        Where names come from: from `vpm.rank` where that covers the machine and from rounds of screening on
-        inverse-dynamics residuals
-         elsewhere, or from these in any case.
+        Where names come from: from `vpm.rank` where that covers the machine and elsewhere from rounds of screening on
+        inverse-dynamics residuals, or from these in any case.
     check : bool
         Refuse logs with a mistake that no machine makes by itself.
     workers : int, optional

@@ -228,7 +228,10 @@ def test_machines_that_a_ranking_does_not_cover_say_why() -> None:
     assert why_not_ranked(two_link_arm.nominal(), ()) == ""
     assert why_not_ranked(Model.from_toml(HOPPER), ()) == ""
     assert why_not_ranked(Model.load(EXAMPLES / "servo_cylinder" / "rig.toml"), ()) == ""
-    assert why_not_ranked(Model.load(EXAMPLES / "flexible_pendulum" / "flexible_pendulum.toml"), ()) == "links bend"
+    assert why_not_ranked(Model.load(EXAMPLES / "flexible_pendulum" / "flexible_pendulum.toml"), ()) == ""
+    assert why_not_ranked(Model.load(EXAMPLES / "hyl" / "fcm.toml"), ()) == "there are 7 joints, more than 3"
+    oil = "the actuators hip_drive and knee_drive have type hydraulic"
+    assert why_not_ranked(Model.load(EXAMPLES / "hyl" / "hydraulic.toml"), ()) == oil
 
 
 def test_a_refit_that_simulates_worse_is_not_kept(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:

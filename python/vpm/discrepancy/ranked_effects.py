@@ -28,7 +28,7 @@ from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import gain, segments
 from vpm.identify.identifiability import Span
-from vpm.identify.response_along_motion import bends, joints_with_play
+from vpm.identify.response_along_motion import joints_with_play
 from vpm.model import Effect, Model
 from vpm.model.splitting import name_of_bending
 from vpm.numbers import Array, power
@@ -42,15 +42,13 @@ BEHIND = ".link."
 
 
 def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
-    """Why names do not come from a ranking, or "": it covers up to three joints, rigid links, and one drive with oil.
+    """Why names do not come from a ranking, or "": it covers up to three joints and one drive with oil.
 
     Several of these take it many times as long as a search, and it names no better there; a joint without a drive no
     search sees. A bending that a log holds is compared by a ranking, but on a log of a real arm a search names its
     friction more plausibly. Where a second encoder shows how far a load stays behind its drive, friction bends what is
     between, if it acts on the load: only a ranking tries that.
     """
-    if bends(model):
-        return "links bend"
     oil = [name for name in model.actuators if model.actuator_type(name) == "hydraulic"]
     if len(oil) > 1 and not free_joints(model):
         return f"the actuators {' and '.join(oil)} have type hydraulic"
