@@ -641,3 +641,21 @@ def test_what_explains_no_record_is_not_tried_again_for_the_next_one() -> None:
 @pytest.mark.nightly
 def test_a_record_that_counts_the_other_way_is_tried_beside_one_that_nothing_explains() -> None:
     assert tries(gusty_slide(1), gusty_slide(1, sign=-1.0)) > tries(gusty_slide(1))
+
+
+def test_commands_beyond_the_limit_of_a_drive_are_no_wrong_unit() -> None:
+    """A slide whose drive gives 4 N where its controller asks for 36 N: smaller commands leave little, a limit less."""
+    random, step, place, speed = np.random.default_rng(4), 2e-3, 0.0, 0.0
+    rows = []
+    for target in np.repeat(random.uniform(-0.4, 0.4, 8), 400):
+        asked = np.clip(400.0 * (target - place) - 20.0 * speed, -36.0, 36.0)
+        rows.append((place, asked))
+        for _ in range(4):
+            speed += step / 4 * (np.clip(asked, -4.0, 4.0) / 2.0 + 0.1)
+            place += step / 4 * speed
+    places, forces = np.array(rows).T
+    read = {"slide.position": places + 1e-6 * random.standard_normal(places.size), "drive.command": forces}
+    log = vpm.Experiment.from_arrays(step * np.arange(places.size), read, {}, name="jumps", model=SLIDE)
+    found = vpm.check_log(SLIDE, log, workers=1).findings
+    assert not any(one.mistake for one in found)
+    assert "or the drive gives no more than a limit" in found[0].sentence

@@ -25,6 +25,9 @@ from vpm.observer import measured_outputs
 from vpm.one_thread import in_one_thread
 from vpm.simulate import Setup
 
+#: What else it may be that looks like a mistake.
+DELAY = "a clock of the log, or a delay of the machine or of its sensors"
+LIMIT = "or the drive gives no more than a limit, which the model does not know"
 #: Said after Ctrl-C.
 UNCHECKED = "nothing is known yet: {record} was still being checked for wrong units, signs, names and clocks"
 
@@ -268,7 +271,7 @@ def _finding(
     correction, before, after = found.correction, found.before.by_channel, found.after.by_channel
     said = ", or ".join(one.sentence(units) for one in (correction, *found.rivals))
     if found.is_possible:
-        said += " (a clock of the log, or a delay of the machine or of its sensors)"
+        said += f" ({LIMIT if found.is_limit else DELAY})"
     harms = not correction.delay or max(before[name] for name in found.affected) > settings.harmless
     place = min(found.affected, key=lambda name: after[name] / max(before[name], 1e-300))
     lines, repair = _written(correction, changed)

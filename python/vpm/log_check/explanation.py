@@ -9,6 +9,7 @@ from functools import partial
 from typing import NamedTuple, TypeVar
 
 import numpy as np
+from scipy.optimize import minimize_scalar
 
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.experiment import Experiment
@@ -34,11 +35,12 @@ class Explanation:
     #: The model explains the record without it as well, but with values that its file rules out.
     is_of_values: bool = False
     at_once: bool = False  #: Another correction has to be made with it; alone it explains nothing.
+    is_limit: bool = False  #: Drives that give no more than some limit explain the record as well as smaller commands.
 
     @property
     def is_possible(self) -> bool:
         """Whether an explanation could also be what the machine does by itself."""
-        return any(one.is_possible for one in (self.correction, *self.rivals))
+        return self.is_limit or any(one.is_possible for one in (self.correction, *self.rivals))
 
 
 class _Trial(NamedTuple):
@@ -70,7 +72,7 @@ class Explainer:
         """
         ended = self._ended(part, used, left)
         if (best := self._best(ended, used)) is not None:
-            return [best]
+            return [replace(best, is_limit=self._is_limit(best, part))]
         if not left.above(self.settings.harmless):
             return []
         return self._at_once(part, used, left) or self._one_by_one(ended, part, used)
@@ -156,6 +158,25 @@ class Explainer:
         affected, of_values = self._affected(correction, after), self._is_of_values(correction, before, after)
         found = Explanation(correction, before, after, affected, rivals, of_values)
         return self._mirrored(found, used)
+
+    def _is_limit(self, found: Explanation, part: Experiment) -> bool:
+        """Whether drives that give no more than some limit explain a record as well as commands that are too large."""
+        scaled = (one for one in (found.correction, *found.rivals) if 0.0 < one.factor < 1.0)
+        asked = [one for one in scaled if all(name.endswith(".command") for name in one.channels)]
+        if not asked:
+            return False
+        places = [part.channels.index(name) for name in asked[0].channels]
+        most = np.max(np.abs(part.data[:, places]), axis=0)
+
+        def limited(level: float) -> Shares:
+            data, ends = np.array(part.data), math.exp(level) * most
+            data[:, places] = np.clip(data[:, places], -ends, ends)
+            return self.judge.fitted(replace(part, data=data))
+
+        levels = (math.log(0.5 * asked[0].factor), 0.0)
+        best = minimize_scalar(lambda level: limited(level).cost, bounds=levels, options={"xatol": 0.02})
+        there = limited(best.x)
+        return there.far <= self.settings.far and there.cost <= found.after.cost - math.log(self.settings.alike)
 
     def _mirrored(self, found: Explanation, used: Sequence[str]) -> Explanation:
         """The explanation with the other side of a delay: some channels late is the same as all others early."""
