@@ -18,7 +18,7 @@ def compare(
         str | None,
         typer.Option(
             help="free_run, inverse_dynamics, restarts, closed_loop or prescribed_motion; by default inverse_dynamics, "
-            "or restarts where drives have states of their own or loops are closed.",
+            "or restarts where drives have states of their own, links bend or loops are closed.",
             metavar="MODE",
         ),
     ] = None,

@@ -22,6 +22,7 @@ from vpm.simulate import simulate
 
 RIG = EXAMPLES / "servo_cylinder" / "rig.toml"
 STEP = EXAMPLES / "emps" / "step.toml"
+TUDOR = EXAMPLES / "tudor" / "tudor.toml"
 COMMANDS = (
     *("info", "simulate", "compare", "identify", "diagnose", "rank", "report"),
     *("climb", "simplify", "budget", "compile", "demo"),
@@ -107,17 +108,25 @@ def test_compare_says_where_the_residual_lives() -> None:
     assert "of the residual's energy" in done.stdout
 
 
-def test_compare_takes_a_machine_whose_efforts_do_not_follow_from_commands(tmp_path: Path) -> None:
-    """Oil has states of its own: such a machine is compared by short predictions unless a mode is asked for."""
-    rig = Model.load(RIG)
-    time = 1e-3 * np.arange(600)
-    log = Experiment.from_arrays(time, {"servo.command": 2e-3 * np.sin(20.0 * time)}, model=rig)
-    run = simulate(rig, log)
-    for channel in ("axis.position", "servo.pressure_a"):
-        log = log.with_channel(channel, run[channel], rig.channel_unit(channel))
+@pytest.mark.parametrize(
+    ("machine", "drive", "size", "channels"),
+    [
+        (RIG, "servo", 2e-3, ("axis.position", "servo.pressure_a")),
+        (TUDOR, "motor_3", 0.2, ("joint_1.position", "joint_2.position", "joint_3.position", "gauge_1.strain")),
+    ],
+)
+def test_compare_takes_a_machine_whose_efforts_do_not_follow_from_commands(
+    tmp_path: Path, machine: Path, drive: str, size: float, channels: tuple[str, ...]
+) -> None:
+    """Oil and links that bend have states that no log holds: short predictions compare them unless a mode is given."""
+    model, time = Model.load(machine), 1e-3 * np.arange(600)
+    sent = {f"{name}.command": 0.0 * time for name in model.actuators}
+    log = Experiment.from_arrays(time, sent | {f"{drive}.command": size * np.sin(20.0 * time)}, model=model)
+    run = simulate(model, log)
+    for channel in channels:
+        log = log.with_channel(channel, run[channel], model.channel_unit(channel))
     log.save(tmp_path / "log.npz")
-    done = ran("compare", RIG, tmp_path / "log.npz")
-    assert "servo.pressure_a" in done.stdout
+    assert channels[-1] in ran("compare", machine, tmp_path / "log.npz").stdout
 
 
 def test_machines_with_closed_loops_are_compared_by_short_predictions(tmp_path: Path) -> None:

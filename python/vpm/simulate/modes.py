@@ -146,8 +146,11 @@ def judging_mode(model: Model, records: Sequence[Experiment]) -> str:
 
 
 def comparing_mode(model: Model) -> str:
-    """Mode in which a model is compared with a log: inverse dynamics, or restarts if loops or drives forbid that."""
-    follow = not model.loops and all(model.follows_command(name) for name in model.actuators)
+    """Mode in which a model is compared with a log: inverse dynamics, or restarts if that is no way.
+
+    It is none with loops, links that bend, and drives that do not follow their commands.
+    """
+    follow = not (model.loops or model.core.n_elastic) and all(map(model.follows_command, model.actuators))
     return "inverse_dynamics" if follow else "restarts"
 
 
