@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from vpm.identify.feasibility import pseudo_inertia
 from vpm.model import Model
 from vpm.numbers import Array
 
@@ -161,9 +162,8 @@ def tensor_to_the_border(before: Array, after: Array) -> Array:
 
 def _is_real(inertia: Array) -> bool:
     """Whether a body can have an inertia (6,), given by its moments and products."""
-    xx, yy, zz, xy, xz, yz = inertia.tolist()
-    tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
-    return bool(np.linalg.eigvalsh(np.trace(tensor) / 2.0 * np.eye(3) - tensor)[0] >= -ROUNDED * np.max(np.abs(tensor)))
+    second = pseudo_inertia(np.append(np.zeros(4), inertia))[:3, :3]
+    return bool(np.linalg.eigvalsh(second)[0] >= -ROUNDED * np.max(np.abs(inertia)))
 
 
 def rods(model: Model, free: Collection[str]) -> list[tuple[str, str]]:
