@@ -168,14 +168,16 @@ class Explainer:
         places = [part.channels.index(name) for name in asked[0].channels]
         most = np.max(np.abs(part.data[:, places]), axis=0)
 
-        def limited(level: float) -> Shares:
+        fitted: list[Shares] = []
+
+        def cost(level: float) -> float:
             data, ends = np.array(part.data), math.exp(level) * most
             data[:, places] = np.clip(data[:, places], -ends, ends)
-            return self.judge.fitted(replace(part, data=data))
+            fitted.append(self.judge.fitted(replace(part, data=data)))
+            return fitted[-1].cost
 
-        levels = (math.log(0.5 * asked[0].factor), 0.0)
-        best = minimize_scalar(lambda level: limited(level).cost, bounds=levels, options={"xatol": 0.02})
-        there = limited(best.x)
+        minimize_scalar(cost, bounds=(math.log(0.5 * asked[0].factor), 0.0), options={"xatol": 0.02})
+        there = min(fitted, key=lambda one: one.cost)
         return there.far <= self.settings.far and there.cost <= found.after.cost - math.log(self.settings.alike)
 
     def _mirrored(self, found: Explanation, used: Sequence[str]) -> Explanation:

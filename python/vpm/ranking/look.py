@@ -133,10 +133,10 @@ class Look:
         return min(self._alone, self._giving_way(self._errors[0]), key=self.view.noise.cost)
 
     def _gain(self, left: Array, alone: Array) -> float:
-        noise = self.view.noise
+        noise, rooms = self.view.noise, self._rooms()
         powers = (np.sum(noise.by_channel(errors) ** 2, axis=1) for errors in (left, alone))
-        place = self._place(np.divide(*powers), self._rooms())
-        return noise.cost(alone) - noise.cost(left) if self._rooms()[place] else 0.0
+        place = self._place(np.divide(*powers), rooms)
+        return noise.cost(alone) - noise.cost(left) if rooms[place] else 0.0
 
     def _place(self, ratio: Array, rooms: Collection[bool]) -> int:
         """Channel of a look in which most is removed, of those with room for an effect if enough is removed there."""

@@ -254,9 +254,9 @@ class Trials:
 
 
 def _foremost(trials: Sequence[Trial]) -> list[Trial]:
-    """Fits of a search round without those that began elsewhere and have come less far than another of the same effect.
+    """Fits of a search round, of each effect the one that has come farthest: most others end there, too.
 
-    Impacts let fits end in many places, so that all are kept where a joint is split.
+    Where a joint is split all are kept, for impacts let fits end in many places.
     """
     best: dict[tuple[Key, Side], Trial] = {}
     for trial in sorted(trials, key=lambda one: one.fitted.cost):
