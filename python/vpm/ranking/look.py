@@ -188,6 +188,13 @@ class Look:
             return any(self._rooms())
         return any(self._rooms(self._ratio(self.left, self._squares(beside.residual))))
 
+    def leaves_little(self, beside: Fitted) -> bool:
+        """Whether another structure leaves less in a look than a second effect has to do, where that has room."""
+        left = self._squares(beside.residual)
+        (power, chance), ratio = self._above_noise(left), self._ratio(self.left, left)
+        much = (power > SURE * chance) & (ratio > self.settings.second**2)
+        return not np.any(much & self._rooms(ratio))
+
     def _rooms(self, left: Array | float = 1.0) -> list[bool]:
         """Channels in which a look has room for an effect that counts."""
         told = (np.sqrt(left / (power + 1.0)).tolist() for power in (self.explained, self.added, self.bent))

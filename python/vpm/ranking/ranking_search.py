@@ -248,8 +248,8 @@ class Search(Trials):
             ends = [against_free_shapes(trial, self.fitter) for trial in self.finished(seen) if trial.counts]
             tried += [*(trial for trial in ends if not trial.counts), *seen]
             counting += [trial for trial in ends if trial.counts]
-            if any(not trial.look.has_room(trial.fitted) for trial in counting):
-                break  # nothing could be missing beside it
+            if any(trial.look.leaves_little(trial.fitted) for trial in counting):
+                break  # what another tracker shows beside it the next round asks for
         told: list[Trial] = []
         counting += self._counting_elsewhere(counting)
         while counting:

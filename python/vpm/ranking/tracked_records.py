@@ -366,9 +366,9 @@ class TrackedRecords:
         """
         own, fewest = self.setup.method(model, drawn=True), STEPS if model.added_joints else 1
         automatic, linear = self.setup.integrator == AUTOMATIC, own == "additive"
+        if (linear or not tracker.fine) and not any(effect.type.has_play for effect in model.effects):
+            fewest = min(fewest, int(np.ceil(dt / COARSE)))
         if not tracker.fine:
-            if not any(effect.type.has_play for effect in model.effects):
-                fewest = min(fewest, int(np.ceil(dt / COARSE)))
             return ("crank_nicolson" if automatic and linear else own), max(fewest, tracker.fewest)
         short = int(np.ceil(dt / (LONGEST_OF_FOURTH_ORDER if linear else LONGEST)))
         if automatic and short > CONTROLLED * fewest and not model.levels:
