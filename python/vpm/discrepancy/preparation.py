@@ -16,7 +16,7 @@ import numpy as np
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import shares_at, slow_share, slow_speeds
-from vpm.discrepancy.settings import FAR, HELD_OUT, QUICKER, REACH
+from vpm.discrepancy.settings import FAR, HELD_OUT, QUICKER, REACH, WIDER
 from vpm.discrepancy.stuck_channels import check_moving, check_stuck
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, Motion, choose_cutoff, joints_from_sensors
@@ -50,10 +50,32 @@ def records_of(model: Model, experiments: Sequence[Experiment], validate: Sequen
     validation = tuple(joints_from_sensors(record, model) for record in validate)
     if validation:
         check_stuck(model, validation)
-        return training, validation, []
+        return training, validation, beyond_training(model, training, validation)
     pairs = [e.split(1.0 - HELD_OUT) for e in training]
     note = f"no validation record was given: the last {100 * HELD_OUT:.0f} % of each record was kept out of the fit"
     return tuple(p[0] for p in pairs), tuple(p[1] for p in pairs), [note]
+
+
+def beyond_training(model: Model, training: Sequence[Experiment], validation: Sequence[Experiment]) -> list[str]:
+    """Notes on commands and positions that validation records take far beyond those of the training records.
+
+    After a whole turn of a joint nothing is new.
+    """
+    notes, ends = [], {}
+    for channel in (*model.input_channels, *(f"{joint}.position" for joint in model.coordinates)):
+        if all(channel in record for record in (*training, *validation)):
+            ends[channel] = [f([f(record[channel]) for record in training]) for f in (np.min, np.max)]
+    for record in validation:
+        for channel, (low, high) in ends.items():
+            least, most = float(np.min(record[channel])), float(np.max(record[channel]))
+            turned = record.unit(channel) == "rad" and high - low > 2.0 * np.pi
+            if max(most, high) - min(least, low) > WIDER * (high - low) > 0.0 and not turned:
+                reached = f"{short(least)} to {short(most)} {record.unit(channel)}"
+                notes.append(
+                    f"{record.name}: {channel} runs from {reached}, but in training records from {short(low)} to "
+                    f"{short(high)}; train on a record that goes as far, for what acts out there has no name yet"
+                )
+    return notes
 
 
 def data_of(

@@ -67,6 +67,8 @@ SLOW_GAIN, SLOW_EVALUATIONS = 0.01, 10
 HOPELESS = 10.0
 #: Share of each record that is kept out of the fit when no validation record is given.
 HELD_OUT = 0.3
+#: Validation records that make the range of a command or a joint so many times as wide show what training ones cannot.
+WIDER = 2.0
 #: Stated uncertainties, on a logarithmic scale, that a recalibration may move what the model is not linear in.
 REACH = 4.0
 #: The motion is filtered at most so many times as high as the least error of its acceleration asks for.

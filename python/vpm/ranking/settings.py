@@ -16,8 +16,8 @@ DAMPING = float(np.sqrt(0.5))
 #: Bandwidths with which pressures of chambers may be drawn, Hz; with the last one they are those that were read. Noise
 #: of a drive moves pressures as fast as its valve does, noise of gauges does not: records tell which is the larger.
 OF_PRESSURES = (1.0, 10.0, 100.0, np.inf)
-#: Fewest steps of the integrator within a sample where a joint is split: contacts ring fast. Where no contact opens, and
-#: derivatives are all that is asked or springs are taken with order 4, steps may be as long as this, s.
+#: Fewest steps of the integrator within a sample where a joint is split: contacts ring fast. Where no contact opens,
+#: and derivatives are all that is asked or springs are taken with order 4, steps may be as long as this, s.
 STEPS, COARSE = 4, 1e-3
 #: Longest steps where structures are compared and errors are not controlled, of order 2 and of order 4, s.
 LONGEST, LONGEST_OF_FOURTH_ORDER = 6e-4, 2e-3
