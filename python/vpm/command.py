@@ -76,6 +76,9 @@ Check = Annotated[
     bool, typer.Option("--check/--no-check", help="Refuse logs with a wrong unit, sign, name or clock, see vpm check.")
 ]
 Share = Annotated[float, typer.Option(help="Share of the period that a step may take at its 99.9 % quantile.")]
+Words = list[str] | None
+Effect = Annotated[Words, typer.Option(help="Try only these effects; repeat.")]
+Without = Annotated[Words, typer.Option(help="Try all effects but these; repeat.")]
 Workers = Annotated[int, typer.Option(min=0, help="Candidates at a time; 0 for one per core. The result is the same.")]
 
 
@@ -179,6 +182,23 @@ class _Lines:
     def __exit__(self, *_: object) -> None:
         self._over.set()
         self._thread.join()
+
+
+def to_try(only: list[str] | None, without: list[str] | None) -> list[str] | None:
+    """Names of the effects to try; None for all."""
+    from vpm.discrepancy.screening.candidates import asked_for
+    from vpm.errors import DiagnosisError, near_match
+
+    if not without:
+        return only or None
+    given = only or asked_for(None)
+    for name in without:
+        if name not in given:
+            raise DiagnosisError(f'--without: "{name}" is not among the effects to try; {near_match(name, given)}')
+    left = [name for name in given if name not in without]
+    if not left:
+        raise DiagnosisError("--without leaves no effect to try; leave fewer out")
+    return left
 
 
 @contextmanager

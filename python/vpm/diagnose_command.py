@@ -12,17 +12,20 @@ from vpm.command import (
     Channels,
     Check,
     Cutoff,
+    Effect,
     FoundHold,
     Integrator,
     Interpolate,
     Logs,
     ModelPath,
     ReportFolder,
+    Without,
     Workers,
     console,
     load_all,
     load_record,
     searching,
+    to_try,
 )
 from vpm.command_output import give, wrote
 
@@ -32,20 +35,15 @@ EXAMPLES = (
     "Example:  vpm diagnose model.toml train.csv --without sensor_delay --limit 2 --workers 1"
 )
 
-Words = list[str] | None
 Validate = Annotated[
     list[Path] | None, typer.Option(help="Record that is never fitted; repeat. Default: 30 % of each log.")
 ]
-Effect = Annotated[Words, typer.Option(help="Try only these effects; repeat.")]
-Without = Annotated[Words, typer.Option(help="Try all effects but these; repeat.")]
 Limit = Annotated[
     int | None, typer.Option(min=0, help="Most effects to accept. Default: two for each joint, but at least six.")
 ]
 Names = Annotated[
     Literal["ranking", "search"],
-    typer.Option(
-        help="Where names come from; a ranking covers rigid machines of up to three joints and loops, a search others."
-    ),
+    typer.Option(help="Where names come from; a ranking covers machines of up to three joints, a search others."),
 ]
 Substeps = Annotated[
     int, typer.Option(min=1, help="Integration steps per sample, in simulations of validation records.")
@@ -80,7 +78,7 @@ def diagnose(
     from vpm.report import print_story, write_report
     from vpm.simulate import Setup
 
-    tried = _tried(effect, without)
+    tried = to_try(effect, without)
     machine, records = load_all(model, logs, channels, interpolate)
     validation = [load_record(path, machine, channels, interpolate) for path in validate or []]
     with searching() as (tell, each):
@@ -104,20 +102,3 @@ def diagnose(
     give(diagnosis=diagnosis)
     print_story(diagnosis, console)
     wrote(*write_report(diagnosis, out))
-
-
-def _tried(only: list[str] | None, without: list[str] | None) -> list[str] | None:
-    """Names of the effects to try; None for all."""
-    from vpm.discrepancy.screening.candidates import asked_for
-    from vpm.errors import DiagnosisError, near_match
-
-    if not without:
-        return only or None
-    given = only or asked_for(None)
-    for name in without:
-        if name not in given:
-            raise DiagnosisError(f'--without: "{name}" is not among the effects to try; {near_match(name, given)}')
-    left = [name for name in given if name not in without]
-    if not left:
-        raise DiagnosisError("--without leaves no effect to try; leave fewer out")
-    return left

@@ -10,16 +10,19 @@ import typer
 
 from vpm.command import (
     Channels,
+    Effect,
     FoundHold,
     Integrator,
     Interpolate,
     Logs,
     ModelPath,
+    Without,
     Workers,
     console,
     load_all,
     load_record,
     searching,
+    to_try,
     writable,
 )
 from vpm.command_output import give, wrote
@@ -31,7 +34,7 @@ from vpm.ranking import Ranked, Ranking
 
 EXAMPLES = (
     "Example:  vpm rank model.toml train.csv --validate test.csv --out better.toml\n\n"
-    "Example:  vpm rank model.toml a.csv b.csv --most 1 --workers 1"
+    "Example:  vpm rank model.toml a.csv b.csv --without sensor_delay --most 1 --workers 1"
 )
 #: Effects that were tried and not taken, that are shown.
 SHOWN = 5
@@ -50,6 +53,8 @@ def rank(
     logs: Logs,
     validate: Validate = None,
     out: Out = None,
+    effect: Effect = None,
+    without: Without = None,
     most: Most = 4,
     channels: Channels = None,
     interpolate: Interpolate = False,
@@ -59,12 +64,13 @@ def rank(
 ) -> None:
     """Order what a model could be missing by what it removes of the error, and add the best for as long as it counts.
 
-    For rigid machines. A third of each log is held back; neither a controller nor a start at rest is asked for.
+    A third of each log is held back; neither a controller nor a start at rest is asked for.
     """
     from vpm.ranking import Settings
     from vpm.ranking import rank as ranked
     from vpm.simulate import Setup
 
+    tried = to_try(effect, without)
     machine, records = load_all(model, logs, channels, interpolate)
     held_out = [load_record(path, machine, channels, interpolate) for path in validate or []]
     with searching() as (tell, each):
@@ -72,6 +78,7 @@ def rank(
             machine,
             records,
             held_out,
+            effects=tried,
             settings=Settings(effects=most),
             setup=Setup(integrator, hold=hold),
             workers=workers or None,

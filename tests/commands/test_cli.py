@@ -256,6 +256,9 @@ def test_rank_names_what_is_missing_and_writes_the_model(tmp_path: Path) -> None
     assert "way.position, validation" in done.stdout
     better = Model.load(tmp_path / "better.toml")
     assert better.parameters["motor.lag.time_constant"].value == pytest.approx(0.008, rel=0.05)
+    others = ran("rank", *words[:6], "--without", "actuator_lag", cwd=tmp_path).stdout
+    assert "actuator_lag" not in others
+    assert others.startswith("1. input_delay at motor removes ")
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of another kind")
@@ -312,6 +315,7 @@ def test_demo_tells_the_story(tmp_path: Path) -> None:
         (("diagnose", MODEL, TRAIN, "--effect", "coulomb"), "coulomb_friction"),
         (("diagnose", MODEL, TRAIN, "--without", "coulomb"), '--without: "coulomb" is not among'),
         (("diagnose", MODEL, TRAIN, "--effect", "spring", "--without", "spring"), "leaves no effect to try"),
+        (("rank", MODEL, TRAIN, "--without", "coulomb"), '--without: "coulomb" is not among'),
         (("identify", MODEL, TRAIN, "--free", "shoulder.viscous"), "shoulder.friction.viscous"),
         (("identify", MODEL, TRAIN, "--fix", "shoulder.viscous"), '--fix: "shoulder.viscous" is not among the free'),
         (("identify", MODEL, TRAIN, "--tie", "a"), "FOLLOWER=LEADER"),
