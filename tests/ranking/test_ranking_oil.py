@@ -15,6 +15,7 @@ from vpm.numbers import Array
 from vpm.ranking.fit import Fitter
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.model_structure import Structure
+from vpm.ranking.parameter_priors import stated
 from vpm.ranking.ranking_search import Search
 from vpm.ranking.settings import Settings
 from vpm.ranking.tracked_records import TrackedRecords, Tracker, tracker_gains
@@ -117,6 +118,25 @@ def test_a_value_at_the_end_of_its_range_begins_anew_in_the_middle() -> None:
     freed = structure.at(np.array([-1e3, -1e3, 1.0])).off_its_ends
     assert freed.values == {turning: pytest.approx(1e-3), oil: pytest.approx(1.2e9), dry: pytest.approx(25.0)}
     assert freed.off_its_ends is freed
+
+
+def test_oil_does_not_become_air_where_a_leak_is_missing() -> None:
+    """Pressures that are drawn to their gauges leave no error of soft oil, whatever leaks: nothing was named then."""
+    model, oil = rig(), "pump.oil.bulk_modulus"
+    leaky = model.with_effect("internal_leakage", "servo", coefficient=2e-12)
+    tried = ["internal_leakage", "valve_dynamics", "spring"]
+    ranking = vpm.rank(model, logged(leaky, currents(), 2, drive=5e-6), effects=tried)
+    (leak,) = ranking.effects
+    assert leak.effect == "internal_leakage"
+    assert next(iter(leak.values.values())) == pytest.approx(2e-12, rel=0.05)
+    assert ranking.model.parameters[oil].value == pytest.approx(model.parameters[oil].value, rel=0.1)
+
+
+def test_what_no_force_is_linear_in_is_off_by_a_factor() -> None:
+    """A deviation up is what the file states, and as many down stay above zero; four are as far as a fit goes."""
+    prior = stated(rig())["pump.oil.bulk_modulus"]
+    assert (prior.value(1.0), prior.value(-1.0)) == (pytest.approx(1.6e9), pytest.approx(0.9e9))
+    assert prior.ends == (pytest.approx(-4.0), pytest.approx(4.0))
 
 
 def test_what_takes_nearly_all_of_the_error_counts_though_few_pieces_show_it() -> None:

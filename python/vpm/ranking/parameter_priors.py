@@ -16,11 +16,11 @@ from vpm.discrepancy.screening.candidates import (
     springs_shown,
     way_of_spring,
 )
-from vpm.discrepancy.settings import LEAST
+from vpm.discrepancy.settings import LEAST, REACH
 from vpm.discrepancy.stuck_channels import is_moving
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.moments import beside_known, free_moments
-from vpm.model import Model
+from vpm.model import Model, Parameter
 from vpm.numbers import Array
 from vpm.ranking.settings import DELAY
 from vpm.ranking.tracked_records import TrackedRecords
@@ -115,7 +115,7 @@ def _strength(values: Array) -> float:
 def stated(model: Model) -> dict[str, Prior]:
     """Priors of a model's parameters as its file states them, and within what bodies can have."""
     found = {
-        p.name: Prior(p.value, p.uncertainty, p.minimum, p.maximum)
+        p.name: _stated(p)
         for p in model.parameters.values()
         if p.adjustable and p.uncertainty and np.isfinite(p.uncertainty)
     }
@@ -124,6 +124,20 @@ def stated(model: Model) -> dict[str, Prior]:
             one = found[names[0]]
             found[names[0]] = replace(one, low=max(one.low, ends[0]), high=min(one.high, ends[1]))
     return found
+
+
+def _stated(parameter: Parameter) -> Prior:
+    """Prior of a parameter as its file states it; a positive one that no force is linear in is off by a factor.
+
+    Of these nothing leads back from afar: oil as soft as air hides all that oil could show, and a tracker that draws
+    pressures leaves no error then.
+    """
+    value, uncertainty, low, high = parameter.value, parameter.uncertainty, parameter.minimum, parameter.maximum
+    if parameter.kind == "linear" or not 0.0 <= low < value:
+        return Prior(value, uncertainty or np.inf, low, high)
+    share = float(np.log1p((uncertainty or np.inf) / value))
+    far = float(np.exp(REACH * share))
+    return Prior(value, share, max(low, value / far), min(high, value * far), logarithmic=True)
 
 
 def known(model: Model, data: InverseDynamicsProblem, tracked: TrackedRecords) -> dict[str, Prior]:
