@@ -149,8 +149,9 @@ def _closed_motion(
     readings[1][:, places] = m.velocity / gain[places]
     whole = np.zeros((2, len(m.time), len(model.joints)))
     remembers = any(name.endswith(".memory") for name in model.internal_names)
+    position = None
     for row in range(len(m.time)) if remembers else rows:
-        position, velocity = measured(model, readings[0][row], readings[1][row], m.joints)
+        position, velocity = measured(model, readings[0][row], readings[1][row], m.joints, position)
         whole[:, row] = gain * position[: len(gain)] + offset, gain * velocity[: len(gain)]
     return replace(m, joints=model.joints, position=whole[0], velocity=whole[1], acceleration=np.zeros_like(whole[0]))
 

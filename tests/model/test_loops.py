@@ -715,3 +715,57 @@ def test_restarts_begin_at_what_the_driven_joints_tell(palletiser: Model) -> Non
     for name in driven:
         error = run[name] - np.interp(run.time, time, log[name])
         assert np.abs(error).max() < 0.01 * np.ptp(log[name])
+
+
+CRANK, COUPLER, ROCKER, GROUND = 0.08, 0.30, 0.22, 0.28
+
+
+@pytest.fixture(scope="module")
+def crank_rocker() -> Model:
+    """A four-bar linkage after Grashof whose crank goes round, driven there."""
+    body = {"mass": 1.0, "inertia": [0.01, 0.01, 0.01, 0.0, 0.0, 0.0]}
+    turns = {"type": "revolute", "axis": [0.0, 0.0, 1.0]}
+    joints = {
+        "crank": {**turns, "parent": "world", "child": "wheel"},
+        "pin": {**turns, "parent": "wheel", "child": "coupler", "translation": [CRANK, 0.0, 0.0]},
+        "rocker": {**turns, "parent": "world", "child": "lever", "translation": [GROUND, 0.0, 0.0]},
+    }
+    ends = {
+        "a": {"parent": "coupler", "point": [COUPLER, 0.0, 0.0]},
+        "b": {"parent": "lever", "point": [ROCKER, 0.0, 0.0]},
+    }
+    loop = {"type": "revolute", "axis": [0.0, 0.0, 1.0], **ends, "start": {"pin": 0.8, "rocker": 1.6}}
+    return Model.from_dict(
+        {
+            "name": "crank-rocker",
+            "gravity": [0.0, 0.0, 0.0],
+            "bodies": {name: dict(body) for name in ("wheel", "coupler", "lever")},
+            "joints": joints,
+            "loops": {"end": loop},
+            "actuators": {"motor": {"joint": "crank", "gain": 1.0, "command_unit": "N m"}},
+        }
+    )
+
+
+def rocker_angle(crank: Array) -> Array:
+    """Angle of the rocker by the law of cosines, the coupler's end above the ground link."""
+    x, y = CRANK * np.cos(crank) - GROUND, CRANK * np.sin(crank)
+    away = np.hypot(x, y)
+    return np.asarray(np.arctan2(y, x) - np.arccos((ROCKER**2 + away**2 - COUPLER**2) / (2.0 * ROCKER * away)))
+
+
+@pytest.mark.parametrize("crank", [0.5, 3.7, 6.0, 8.89, -17.3, 4000.0])
+def test_a_crank_that_goes_round_keeps_its_assembly(crank_rocker: Model, crank: float) -> None:
+    q = crank_rocker.loops.assembled({"crank": crank})
+    assert q[0] == crank
+    assert math.remainder(q[2] - float(rocker_angle(np.array(crank))), 2.0 * math.pi) == pytest.approx(0.0, abs=1e-9)
+    np.testing.assert_allclose(q[2], crank_rocker.loops.near({"crank": crank})[2], atol=1e-9)
+
+
+def test_restarts_of_a_crank_that_goes_round_begin_on_its_side(crank_rocker: Model) -> None:
+    """The log holds the crank alone, begins after half a turn and has several turns."""
+    time = 0.004 * np.arange(500)
+    log = Experiment.from_arrays(time, {"crank.position": 3.7 + 9.0 * time, "motor.command": 0.0 * time})
+    run = simulate(crank_rocker, log, "restarts", horizon=0.1)
+    away = run["rocker.position"] - rocker_angle(run["crank.position"])
+    np.testing.assert_allclose(np.remainder(away + np.pi, 2.0 * np.pi), np.pi, atol=1e-9)

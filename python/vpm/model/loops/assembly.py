@@ -26,7 +26,7 @@ _STEPS, _HALVINGS = 200, 12
 _TURN = 0.3
 #: Share by which an assembly may be farther from a start than another one and count as near.
 _AS_NEAR = 0.05
-#: Pieces of the way of an assembly from its start.
+#: Fewest pieces of the way of an assembly from its start; no angle turns farther than `_TURN` in one of them.
 _PIECES = 20
 
 
@@ -42,8 +42,9 @@ def assembled(loops: Loops, start: Array, fixed: Mapping[int, float], joints: in
         Number of joints, which come first. Flexible links bend only where joints cannot close the loops.
     """
     free = [place for place in range(joints) if place not in fixed]
-    ways = [_moved(loops, _closed(loops, start, range(joints)), fixed, free), _put(loops, start, fixed, free)]
-    closed = min(ways, key=lambda q: _open(loops, q))
+    closed = _moved(loops, _closed(loops, start, range(joints)), fixed, free)
+    if _open(loops, closed) > CLOSED:
+        closed = min(closed, _put(loops, start, fixed, free), key=lambda q: _open(loops, q))
     if _open(loops, closed) > CLOSED:
         closed = _closed(loops, closed, [place for place in range(start.size) if place not in fixed])
     return closed
@@ -75,13 +76,40 @@ def mirrored(loops: Loops, start: Array, fixed: Mapping[int, float], joints: int
 
 def _moved(loops: Loops, q: Array, fixed: Mapping[int, float], free: Sequence[int]) -> Array:
     """Closed on the whole way to where some have to be: the assembly stays the same."""
-    start = {place: float(q[place]) for place in fixed}
-    for share in np.linspace(0.0, 1.0, _PIECES)[1:]:
-        ahead = {place: start[place] + float(share) * (end - start[place]) for place, end in fixed.items()}
-        q = _put(loops, q, ahead, free)
+    way, turns = _way(loops, q, fixed)
+    for piece in way:
+        q = _put(loops, q, piece, free)
         if _open(loops, q) > CLOSED:
             break
-    return q
+    return q + turns
+
+
+def followed(loops: Loops, q: Array, readings: Mapping[int, float], joints: int) -> Array:
+    """The assembly next to readings of some joints, on the way there from the assembly ``q``.
+
+    Readings may be more than the degrees of freedom and disagree a little: all joints close the loops.
+    """
+    way, turns = _way(loops, q, readings)
+    for piece in way:
+        q = _put(loops, _put(loops, q, piece, [place for place in range(joints) if place not in piece]), {}, range(joints))
+    return q + turns
+
+
+def _way(loops: Loops, q: Array, ends: Mapping[int, float]) -> tuple[list[dict[int, float]], Array]:
+    """Pieces of the way from an assembly to the ends of some coordinates, and the whole turns that it leaves out.
+
+    A whole turn of an angle changes no assembly.
+    """
+    turns, ways = np.zeros_like(q), {}
+    for place, end in ends.items():
+        ways[place] = end - float(q[place])
+        if place in loops.angles:
+            turns[place] = 2.0 * np.pi * np.trunc(ways[place] / (2.0 * np.pi))
+            ways[place] -= float(turns[place])
+    farthest = max((abs(way) for place, way in ways.items() if place in loops.angles), default=0.0)
+    shares = np.linspace(0.0, 1.0, max(_PIECES, int(np.ceil(farthest / _TURN)) + 1))[1:].tolist()
+    start = q.copy()
+    return [{place: float(start[place]) + share * way for place, way in ways.items()} for share in shares], turns
 
 
 def _put(loops: Loops, q: Array, fixed: Mapping[int, float], free: Sequence[int]) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import ModelError, near_match
-from vpm.model.loops.assembly import CLOSED, NOTHING, assembled, least, mirrored, null_space, pivots
+from vpm.model.loops.assembly import CLOSED, NOTHING, assembled, followed, least, mirrored, null_space, pivots
 from vpm.model.loops.path import Path, Singularity
 from vpm.model.loops.states import rest
 from vpm.numbers import Array, array_of, number_of
@@ -110,9 +110,19 @@ class Loops:
             self._refuse_two(closed, q, fixed)
         return closed
 
-    def near(self, guess: Mapping[str, float]) -> Array:
-        """Coordinates next to a guess (m, rad) at which all loop closures hold; of two as near, one of them."""
-        closed = assembled(self, self._begun({}, guess)[0], {}, len(self._model.joints))
+    def near(self, readings: Mapping[str, float], before: Array | None = None) -> Array:
+        """Coordinates next to readings of joints (m, rad) at which all loop closures hold.
+
+        They are reached by a motion from the assembly ``before``, by default that of the model file, so that loops
+        stay on their side. Where the file does not decide between two, the readings do.
+        """
+        q, ends = self._begun(readings, {})
+        begin = self._decided if before is None else before
+        if begin is None:
+            q[list(ends)] = list(ends.values())
+            closed = assembled(self, q, {}, len(self._model.joints))
+        else:
+            closed = followed(self, begin, ends, len(self._model.joints))
         self._complain(closed, {})
         return closed
 
@@ -326,6 +336,14 @@ class Loops:
     def _starts(self) -> dict[str, float]:
         entries = self._model.loop_entries.values()
         return {name: value for entry in entries for name, value in entry.start.items()}
+
+    @cached_property
+    def _decided(self) -> Array | None:
+        """Closure that the model file begins with, if it tells one."""
+        try:
+            return self.assembled()
+        except ModelError:
+            return None
 
     @cached_property
     def _driven(self) -> tuple[str, ...]:

@@ -122,15 +122,19 @@ def kept(model: Evaluations, state: Array) -> None:
     state[n : 2 * n] -= least(jacobian, jacobian @ state[n : 2 * n])
 
 
-def measured(model: Evaluations, position: Array, velocity: Array, seen: Sequence[str]) -> tuple[Array, Array]:
+def measured(
+    model: Evaluations, position: Array, velocity: Array, seen: Sequence[str], before: Array | None = None
+) -> tuple[Array, Array]:
     """State next to a measured one that leaves the loops closed: coordinates and rates.
 
-    Of the joints that were ``seen``, as many keep their readings as there are degrees of freedom.
+    Of the joints that were ``seen``, as many keep their readings as there are degrees of freedom. The others are where
+    a motion from the assembly ``before`` takes them, by default from that of the model file.
     """
     names, loops = model.coordinates, model.loops
-    start = {name: value for name, value in zip(names, position.tolist(), strict=True) if name in seen}
-    kept = [name for name in loops.independent(loops.near(start), seen) if name in seen]
-    q = loops.assembled({name: start[name] for name in kept}, start)
+    readings = {name: value for name, value in zip(names, position.tolist(), strict=True) if name in seen}
+    near = loops.near(readings, before)
+    kept = [name for name in loops.independent(near, seen) if name in seen]
+    q = loops.assembled({name: readings[name] for name in kept}, dict(zip(names, near.tolist(), strict=True)))
     return q, loops.velocities(q, {name: float(velocity[names.index(name)]) for name in kept})
 
 
