@@ -236,3 +236,25 @@ def test_noise_between_two_readings_is_not_taken_for_none(tmp_path: Path) -> Non
     kept = log.trim(5.0, 40.0).select(["swing.position"])
     assert kept.read_rate("swing.position") == log.read_rate("swing.position")
     assert log.with_channel("swing.position", truth[: len(log)], "rad").read_rate("swing.position") == log.rate
+
+
+def test_a_grid_stays_on_its_samples_where_stamps_are_rounded(tmp_path: Path) -> None:
+    """Stamps in whole milliseconds every 2.5 ms, and a clock of the epoch whose numbers hold no more than 0.24 us."""
+    count, step = 4000, 0.0025
+    force = np.random.default_rng(0).normal(size=count)
+    for start, clock in (
+        (0.0, np.round(1e3 * step * np.arange(count))),
+        (1.7e9, 1.7e12 + 1e3 * step * np.arange(count)),
+    ):
+        rows = [
+            f"{stamp!r},{value!r},{'' if k % 2 else k}"
+            for k, (stamp, value) in enumerate(zip(clock.tolist(), force.tolist(), strict=True))
+        ]
+        path = tmp_path / "log.csv"
+        path.write_text("\n".join(["t,F,x", *rows]), encoding="utf-8")
+        entries = {"time": ChannelEntry(column="t", unit="ms"), "drive.command": ChannelEntry(column="F", unit="N")}
+        entries["axis.position"] = ChannelEntry(column="x", unit="m")
+        log = Experiment.load(path, entries, irregular="interpolate")
+        assert log.dt == pytest.approx(step, rel=2e-4 if start == 0.0 else 1e-7)
+        if start:
+            np.testing.assert_allclose(log["drive.command"], force[: len(log)], atol=1e-3)

@@ -69,6 +69,16 @@ def check_finite(values: Array, time: Array, what: str, source: Source, *, chann
         )
 
 
+def usual_step(time: Array) -> float:
+    """Mean step of a clock, s, without its gaps: that of its grid.
+
+    The median is one of the steps, each of which is rounded to what the clock counts or its numbers hold. A grid of
+    rounded steps drifts away from the samples.
+    """
+    steps = np.diff(time)
+    return float(np.mean(steps[steps <= GAP * np.median(steps)]))
+
+
 def check_increasing(time: Array, source: Source) -> None:
     """Refuse a grid that is too short, or whose time stands still or goes back."""
     if time.size < FEWEST_SAMPLES:
@@ -144,25 +154,25 @@ def make_uniform(
     - ``data``: shape (N, C)
     - ``channels``: positions, velocities and accelerations are interpolated by cubic splines, all others by straight
       lines
-    - ``rate``: Hz; None takes the median step
+    - ``rate``: Hz; None takes the usual step
 
     - result ``time``: shape (M,)
     - result ``data``: shape (M, C)
     - result ``sentence``: for the history
     """
     steps = np.diff(time)
-    median = float(np.median(steps))
-    step = median if rate is None else 1.0 / rate
+    usual = usual_step(time)
+    step = usual if rate is None else 1.0 / rate
     check_grid(time, step, MOST_GROWTH if rate is None else MOST_FINER, source)
     grid = time[0] + step * np.arange(int((time[-1] - time[0]) / step * (1.0 + 1e-12) + 1e-6) + 1)
     grid = grid[grid <= time[-1] + 1e-6 * step]
     inside = np.minimum(grid, time[-1])
     columns = [interpolate(time, data[:, i], inside, smooth=is_smooth(channel)) for i, channel in enumerate(channels)]
-    gaps = steps[steps > GAP * median]
-    missing = int(np.sum(np.round(gaps / median) - 1))
+    gaps = steps[steps > GAP * usual]
+    missing = int(np.sum(np.round(gaps / usual) - 1))
     text = f"The record was interpolated onto a uniform grid of {grid.size} samples, {step:.9g} s apart"
     if missing:
-        longest = round(float(gaps.max()) / median) - 1
+        longest = round(float(gaps.max()) / usual) - 1
         text += (
             f"; {missing} {_samples(missing)} missing before, the longest gap being {longest} long "
             f"after t = {time[int(np.argmax(steps))]:.6g} s"

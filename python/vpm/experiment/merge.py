@@ -15,6 +15,7 @@ from vpm.experiment.grid import (
     check_increasing,
     is_smooth,
     make_uniform,
+    usual_step,
 )
 from vpm.experiment.signal import anti_alias, interpolate
 from vpm.numbers import Array
@@ -30,7 +31,7 @@ def merge_clocks(
     - ``clocks``: own clocks of some channels, s, counted from the same instant; equal ones change nothing
     - ``irregular``: one of "error", "interpolate", whether interpolation is allowed
 
-    - result ``time``: shape (M,), with interpolation, uniform at the median step of the clock, over the time that all
+    - result ``time``: shape (M,), with interpolation, uniform at the mean step of the clock, over the time that all
       columns share
     - result ``columns``: each of shape (M,)
     - result ``sentences``: for the history
@@ -61,7 +62,7 @@ def merge_clocks(
         check_finite(columns[channel], own, f'the channel "{channel}"', source, channel=channel)
     start = max(own[0] for own in every.values())
     stop = min(own[-1] for own in every.values())
-    step = float(np.median(np.diff(time)))
+    step = usual_step(time)
     if stop - start < FEWEST_SAMPLES * step:
         late = max(every, key=lambda channel: float(every[channel][0]))
         early = min(every, key=lambda channel: float(every[channel][-1]))
