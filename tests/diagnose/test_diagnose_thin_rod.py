@@ -2,7 +2,7 @@
 
 import pytest
 
-from vpm.discrepancy.preparation import with_unseen
+from vpm.discrepancy.preparation import with_ranked
 from vpm.model import Model
 
 ROD = """
@@ -37,6 +37,16 @@ def test_a_thin_rod_takes_both_moments_from_where_both_are_seen() -> None:
     stated = Model.from_toml(ROD)
     recalibrated = stated.with_parameters({**dict.fromkeys(across, 1.7e-3), "rod.mass": 0.16})
     ranked = stated.with_parameters({**dict.fromkeys(across, 1.5e-3), "rod.mass": 0.14})
-    start = with_unseen(recalibrated, ranked, ["rod.inertia.xx"]).parameters
+    start = with_ranked(recalibrated, ranked, ["rod.inertia.xx"]).parameters
     assert [start[name].value for name in across] == pytest.approx([1.5e-3, 1.5e-3])
     assert start["rod.mass"].value == pytest.approx(0.16)
+
+
+def test_moments_of_a_body_come_from_one_fit() -> None:
+    """A recalibration of a wrong model may end near no body at all; one moment of another fit is too large for it."""
+    moments = [f"arm.inertia.{axes}" for axes in ("xx", "yy", "zz")]
+    stated = Model.from_toml(ROD)
+    recalibrated = stated.with_parameters(dict.fromkeys(moments, 1e-9))
+    ranked = stated.with_parameters(dict(zip(moments, (0.009, 0.012, 0.011), strict=True)))
+    start = with_ranked(recalibrated, ranked, ["arm.inertia.zz"]).parameters
+    assert [start[name].value for name in moments] == pytest.approx([0.009, 0.012, 0.011])

@@ -142,10 +142,10 @@ def recalibrated_of(
     recalibrated, stopped = judged_anyhow(model, (*free, *transitions), alone, bounds)
     unseen = {name for one in recalibrated.fit.unseen for name in one.names}
     if ranked is not None and unseen:
-        start = with_unseen(recalibrated.model, ranked, unseen)
+        start = with_ranked(recalibrated.model, ranked, unseen)
         recalibrated, stopped = judged_anyhow(start, (*free, *transitions), alone, bounds)
     if ranked is not None and (held := _as_stated(model, ranked, ruled_out(model, recalibrated))):
-        start, rest = recalibrated.model.with_parameters(held), tuple(name for name in free if name not in held)
+        start, rest = with_ranked(recalibrated.model, ranked, held), tuple(name for name in free if name not in held)
         recalibrated, stopped = judged_anyhow(start, (*rest, *transitions), alone, bounds)
     if stopped:
         notes.append(f"the recalibrated model could not simulate the validation records: {stopped}")
@@ -199,14 +199,15 @@ def begun_anywhere(model: Model, data: Data, recalibrated: Judged, notes: list[s
     return data, recalibrated
 
 
-def with_unseen(recalibrated: Model, ranked: Model, unseen: Collection[str]) -> Model:
-    """Prepared model with what the residual does not show as in the ranked one, and other moments of the same bodies.
+def with_ranked(recalibrated: Model, ranked: Model, names: Collection[str]) -> Model:
+    """Prepared model with some values as in the ranked one, and other moments of the same bodies.
 
-    A residual that shows one moment of a thin rod says nothing of the other, which has to be as large.
+    Moments of two fits may be those of no body: of a thin rod both have to be as large, and none exceeds the sum of the
+    others.
     """
-    bodies = {f"{name.rpartition('.inertia.')[0]}.inertia." for name in unseen if ".inertia." in name}
+    bodies = {f"{name.rpartition('.inertia.')[0]}.inertia." for name in names if ".inertia." in name}
     moments = {name for name in recalibrated.parameters if name.startswith(tuple(bodies))}
-    return recalibrated.with_parameters({name: ranked.parameters[name].value for name in {*unseen, *moments}})
+    return recalibrated.with_parameters({name: ranked.parameters[name].value for name in {*names, *moments}})
 
 
 def _transitions(model: Model, data: InverseDynamicsProblem) -> dict[str, tuple[float, float]]:
