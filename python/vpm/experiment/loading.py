@@ -110,6 +110,7 @@ def _finish(make: type[R], draft: Draft, name: str, irregular: str, resample: fl
     check_finite(draft.time, draft.time, "the time", draft.source, channel="time")
     check_increasing(draft.time, draft.source)
     slower = _take_fresh(draft, irregular)
+    read_at = {channel: own for channel, own in draft.clocks.items() if not is_smooth(channel)}
     if draft.clocks:
         slower |= {channel: 1.0 / float(np.median(np.diff(own))) for channel, own in draft.clocks.items()}
         draft.time, draft.columns, merged = merge_clocks(
@@ -130,7 +131,9 @@ def _finish(make: type[R], draft: Draft, name: str, irregular: str, resample: fl
     units = tuple(draft.units[channel] for channel in channels)
     step = float(np.median(np.diff(time)))
     slower = {channel: rate for channel, rate in slower.items() if rate * step * GAP < 1.0}
-    record = make(name, time, data, channels, units, (*draft.history, sentence), draft.unused, slower)
+    read_at = {channel: own for channel, own in read_at.items() if channel in slower}
+    told = (*draft.history, sentence)
+    record = make(name, time, data, channels, units, told, draft.unused, slower, read_at=read_at)
     if draft.delays:
         record = record.align(draft.delays)
     if draft.moved:

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
 
 _Record = TypeVar("_Record", bound="Experiment")
+_Known = TypeVar("_Known")
 _NEXT = {"position": "velocity", "velocity": "acceleration"}
 
 
@@ -61,6 +62,9 @@ class Experiment(Result):
         readings are interpolated.
     retained : mapping of str to float
         Frequency above which a filter of this library took a channel away, Hz, and its noise with it.
+    read_at : mapping of str to ndarray
+        Times, s, at which a channel that may jump was read, where that was less often than the record: straight lines
+        run from reading to reading.
     """
 
     name: str
@@ -72,6 +76,7 @@ class Experiment(Result):
     unused_columns: tuple[str, ...] = field(default=())
     slower: Mapping[str, float] = field(default_factory=dict)
     retained: Mapping[str, float] = field(default_factory=dict)
+    read_at: Mapping[str, Array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Take read-only copies of a record's arrays and check that the parts fit together."""
@@ -346,7 +351,7 @@ class Experiment(Result):
             read = {channel: self.read_rate(channel) for channel in self.channels} if factor < 1.0 else self.slower
             return self._changed(told, time=time, data=data, slower=read)
         retained = {channel: min(kept, self.retained.get(channel, kept)) for channel in self.channels}
-        return self._changed(told, time=time, data=data, retained=retained)
+        return self._changed(told, time=time, data=data, retained=retained, read_at={})
 
     def filter(self, channel: str, cutoff: float, order: int = 4) -> Self:
         """Record with one channel behind a zero-phase Butterworth filter (see `vpm.experiment.signal.lowpass`)."""
@@ -354,7 +359,7 @@ class Experiment(Result):
         sentence = f"{channel} was filtered at {cutoff:.6g} Hz (Butterworth of order {order}, forward and backward)."
         filtered = self._with_column(channel, values, self.unit(channel), sentence)
         retained = min(cutoff, self.retained.get(channel, cutoff))
-        return replace(filtered, retained={**self.retained, channel: retained})
+        return replace(filtered, retained={**self.retained, channel: retained}, read_at=_without(self.read_at, channel))
 
     def differentiate(self, channel: str, name: str | None = None) -> Self:
         """Record with the derivative of a channel as a further one.
@@ -400,10 +405,8 @@ class Experiment(Result):
         verb = "replaced by" if name in self else "added from"
         sentence = f"{name} was {verb} values in {unit}."
         changed = self._with_column(name, parsed.to_si(column), parsed.si, sentence)
-        slower, retained = (
-            {other: known for other, known in one.items() if other != name} for one in (self.slower, self.retained)
-        )
-        return replace(changed, slower=slower, retained=retained)
+        slower, retained = (_without(one, name) for one in (self.slower, self.retained))
+        return replace(changed, slower=slower, retained=retained, read_at=_without(self.read_at, name))
 
     def align(self, delays: Mapping[str, float]) -> Self:
         """Record with some channels moved back by the times by which they lag the others.
@@ -430,7 +433,8 @@ class Experiment(Result):
             moved.append(f"{channel} by {delay:.6g} s")
         lost = len(self) - int(inside.sum())
         sentence = f"Moved back {', '.join(moved)}; {lost} samples at the ends, which have no value there, were cut."
-        return self._changed(sentence, time=self.time[inside], data=data)
+        read_at = {channel: time - delays.get(channel, 0.0) for channel, time in self.read_at.items()}
+        return self._changed(sentence, time=self.time[inside], data=data, read_at=read_at)
 
     def to_csv(self, path: str | PathLike[str]) -> Path:
         """Write a record as a table, ``time [s]`` and each channel with its unit in brackets, for `load`."""
@@ -489,6 +493,11 @@ class Experiment(Result):
 
     def _frame_columns(self) -> Mapping[str, object]:
         return {"time_s": self.time, **dict(zip(self.channels, self.data.T, strict=True))}
+
+
+def _without(known: Mapping[str, _Known], channel: str) -> dict[str, _Known]:
+    """What is known of a record's other channels."""
+    return {other: value for other, value in known.items() if other != channel}
 
 
 def _read_from(path: str | PathLike[str], record: _Record, how: Mapping[str, Any]) -> _Record:

@@ -21,6 +21,7 @@ from vpm.initial import initial_state, joints_by_velocity
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.observer import Record
+from vpm.ranking.between_readings import between_readings
 from vpm.ranking.hidden_first_states import STEP, HiddenFirstStates, hidden_states
 from vpm.ranking.noise_model import NoiseModel, Parts, Structured, frequencies
 from vpm.ranking.settings import (
@@ -349,6 +350,11 @@ class TrackedRecords:
                     moved = firsts.added(model, start, STEP * size * (np.arange(len(firsts.sizes)) == number))
                     others, _, _ = self._run(model, theta[:own], tracker, NOTHING, record, moved)
                     whole[:, :, columns.index(before + number)] = (outputs - others) / (STEP * size)
+            log = self.experiments[len(residuals)]
+            for place, channel in enumerate(record.channels):
+                if channel in log.read_at and channel not in self.drawn_to:
+                    outputs[:, place] = between_readings(log, channel, outputs[:, place])
+                    whole[:, place] = between_readings(log, channel, whole[:, place])
             residuals.append(record.readings - outputs)
             slopes.append(whole)
         return np.concatenate(residuals), np.concatenate(slopes)
