@@ -27,7 +27,7 @@ from vpm.discrepancy.screening.candidates import asked_for
 from vpm.discrepancy.search.search import Search
 from vpm.discrepancy.search.search_round import Request, Tell
 from vpm.discrepancy.settings import FLOOR_FACTOR, WORTH_A_NAME
-from vpm.discrepancy.verdict import is_negligible, only_where_closed, verdict
+from vpm.discrepancy.verdict import is_negligible, only_if_open, only_where_closed, verdict, without_effects
 from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment, as_records
 from vpm.experiment.signal import check_cutoff
@@ -384,8 +384,10 @@ def _told(known: _Known, found: Search) -> Diagnosis | list[Drift]:
     floor, gap, left = measure(found.final)
     if (kept := only_where_closed(found, data, gap, left)) is not found:
         found, (floor, gap, left) = kept, measure(kept.final)
-    rest, stopped = until_stopped(lambda: _rest(known, found, gap), None)
     beyond = tracker_gaps(known.ranking, data.training.joints) if known.ranking is not None else {}
+    if (kept := only_if_open(found, known.recalibrated, gap | beyond)) is not found:
+        found, (floor, gap, left), beyond = kept, measure(kept.final), without_effects(beyond)
+    rest, stopped = until_stopped(lambda: _rest(known, found, gap), None)
     said = verdict(data, known.nominal, known.recalibrated, found, gap | beyond, left, rest)
     if said[0] == "unexplained" and not found.accepted and job.may_drift:
         pairs = ((data.training, found.final.fit.residual), (data.validation, found.final.validation))

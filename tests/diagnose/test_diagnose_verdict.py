@@ -8,7 +8,8 @@ import pytest
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.diagnosis import ChannelGap
-from vpm.discrepancy.verdict import _nothing_missing, _unheard, verdict
+from vpm.discrepancy.search.search import Search
+from vpm.discrepancy.verdict import _nothing_missing, _unheard, only_if_open, verdict, without_effects
 
 SIGNAL, NOISE = 1.0, 1e-3
 
@@ -134,3 +135,22 @@ def test_an_error_that_grew_is_not_told_as_a_gap_that_closed() -> None:
     )
     _, plain = _nothing_missing(data, nominal, recalibrated, ([closed, grew], []), closed, "")
     assert plain.endswith("Error on validation data: 50.00 % before, 10.00 % recalibrated.")
+
+
+@pytest.mark.parametrize(
+    ("before", "left", "kept"), [(5.7e-4, 1.11, False), (5.7e-4, 0.01, True), (5.7e-2, 1.11, True)]
+)
+def test_an_effect_that_explains_nothing_is_withdrawn_where_nothing_was_open(
+    before: float, left: float, kept: bool
+) -> None:
+    """A linkage without a missing effect, of which an observer leaves less than noise: no effect is worth a name."""
+    entry: Any = SimpleNamespace(key=("rotor_inertia", "crank"))
+    judged: Any = SimpleNamespace()
+    found = Search((), (entry,), (), (), left={"crank": left})
+    gap = {"crank.position": ChannelGap(8e-4, before, before * left**0.5, 6.6e-4, "rad", 5.2, "observed")}
+    told = only_if_open(found, judged, gap)
+    assert (told is found) is kept
+    if not kept:
+        assert [one.name for one in told.refused] == ["rotor_inertia"]
+        assert told.final is judged
+        assert without_effects(gap)["crank.position"].after == before

@@ -388,6 +388,30 @@ def only_where_closed(found: Search, data: Data, gap: Mapping[str, ChannelGap], 
     )
 
 
+def only_if_open(found: Search, recalibrated: Judged, gap: Mapping[str, ChannelGap]) -> Search:
+    """Search without effects that explain nothing where nothing was open.
+
+    An observer finds as much left with them as without, and that is noise or next to nothing.
+    """
+    counted = [*main_gaps(gap), *(g for g in gap.values() if g.mode == OBSERVED)]
+    left = min(found.left.values(), default=0.0)
+    tried = found.accepted and not found.interrupted and not found.within_laws
+    if not tried or left < 1.0 or any(_is_clear(g.recalibrated, g) for g in counted):
+        return found
+    reason = "as much is left with it as without, and that is noise or next to nothing"
+    return replace(
+        found,
+        stages=(*found.stages, *(Stage("removed", *entry.key, recalibrated) for entry in reversed(found.accepted))),
+        accepted=(),
+        refused=(*(RefusedEffect(*entry.key, reason) for entry in found.accepted), *found.refused),
+    )
+
+
+def without_effects(gap: Mapping[str, ChannelGap]) -> dict[str, ChannelGap]:
+    """Gaps of a verdict that has withdrawn all effects: after them as before."""
+    return {channel: replace(g, after=g.recalibrated) for channel, g in gap.items()}
+
+
 def _refused(entry: Accepted, joints: Joints, model: Model) -> RefusedEffect:
     joint = joint_at(model, entry.key[1]) or joints.worst
     share = 100.0 * joints.open[joint]

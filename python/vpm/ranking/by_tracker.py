@@ -15,7 +15,7 @@ from vpm.discrepancy.preparation import Records, moved_far
 from vpm.discrepancy.ranked_effects import fitted_in, staged, tracker_gaps
 from vpm.discrepancy.screening.candidates import Candidate, asked_for, candidates
 from vpm.discrepancy.screening.probe import Probe
-from vpm.discrepancy.verdict import verdict
+from vpm.discrepancy.verdict import only_if_open, verdict, without_effects
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import Estimate, InverseDynamicsProblem, estimate, gain, gaps, segments
@@ -86,10 +86,12 @@ def diagnosed_by_tracker(
         settings,
     )
     notes.extend([BY_TRACKER.format(reason=reason, band=band), *moved_far(model, recalibrated)])
-    told = of_search(model, records, nominal, found, (data.training, data.validation))
-    if not ranking.gaps:
-        return told
     gap = tracker_gaps(ranking, None)
+    if gap and (kept := only_if_open(found, recalibrated, gap)) is not found:
+        found, gap = kept, without_effects(gap)
+    told = of_search(model, records, nominal, found, (data.training, data.validation))
+    if not gap:
+        return told
     word, summary, _ = verdict(None, nominal, recalibrated, found, gap, None, None)
     traced = _traces(data.validation, nominal, found.final)
     return replace(told, verdict=word, summary=so_far(found, summary), gap=gap, traces=traced)
