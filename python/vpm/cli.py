@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from importlib import import_module
 from io import TextIOWrapper
 from pathlib import Path
 from threading import Event
@@ -14,35 +15,18 @@ from typing import Annotated, TextIO
 import typer
 from typer.core import TyperGroup
 
-from vpm import (
-    __version__,
-    budget_command,
-    check_command,
-    climb_command,
-    compare_command,
-    compile_command,
-    demo_command,
-    diagnose_command,
-    export_command,
-    identify_command,
-    import_command,
-    info_command,
-    linkage_command,
-    optimise_command,
-    prove_command,
-    rank_command,
-    reduce_command,
-    report_command,
-    simplify_command,
-    simulate_command,
-    study_command,
-    view_command,
-)
+from vpm import __version__
 from vpm.command import BESIDE, PICTURES, console, errors
 from vpm.command_output import STOPPED, add_flags, asked, give, notes, speak, unexpected
 from vpm.errors import INTERRUPTED, VpmError
 from vpm.excite_command import app as excite_app
 from vpm.files import exists
+
+#: Commands in the order of the help, one ``*_command.py`` each, behind those of `excite`.
+COMMANDS = (
+    *("info", "check", "identify", "diagnose", "rank", "optimise", "prove", "study", "view", "import", "export"),
+    *("reduce", "climb", "simplify", "budget", "compile", "simulate", "compare", "report", "linkage", "demo"),
+)
 
 
 class _Commands(TyperGroup):
@@ -98,27 +82,10 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
 )
 app.add_typer(excite_app, name="excite")
-app.command(epilog=info_command.EXAMPLES)(info_command.info)
-app.command(epilog=check_command.EXAMPLES)(check_command.check)
-app.command(epilog=identify_command.EXAMPLES)(identify_command.identify)
-app.command(epilog=diagnose_command.EXAMPLES)(diagnose_command.diagnose)
-app.command(epilog=rank_command.EXAMPLES)(rank_command.rank)
-app.command(epilog=optimise_command.EXAMPLES)(optimise_command.optimise)
-app.command(epilog=prove_command.EXAMPLES)(prove_command.prove)
-app.command(epilog=study_command.EXAMPLES)(study_command.study)
-app.command(epilog=view_command.EXAMPLES)(view_command.view)
-app.command("import", epilog=import_command.EXAMPLES)(import_command.import_)
-app.command(epilog=export_command.EXAMPLES)(export_command.export)
-app.command(epilog=reduce_command.EXAMPLES)(reduce_command.reduce)
-app.command(epilog=climb_command.EXAMPLES)(climb_command.climb)
-app.command(epilog=simplify_command.EXAMPLES)(simplify_command.simplify)
-app.command(epilog=budget_command.EXAMPLES)(budget_command.budget)
-app.command("compile", epilog=compile_command.EXAMPLES)(compile_command.compile_)
-app.command(epilog=simulate_command.EXAMPLES)(simulate_command.simulate)
-app.command(epilog=compare_command.EXAMPLES)(compare_command.compare)
-app.command(epilog=report_command.EXAMPLES)(report_command.report)
-app.command(epilog=linkage_command.EXAMPLES)(linkage_command.linkage)
-app.command(epilog=demo_command.EXAMPLES)(demo_command.demo)
+for name in COMMANDS:
+    module = import_module(f"vpm.{name}_command")
+    run = getattr(module, name, None) or getattr(module, f"{name}_")  # import and compile are words of Python
+    app.command(name, epilog=module.EXAMPLES)(run)
 
 
 def _version(asked: bool) -> None:
