@@ -31,9 +31,9 @@ class ArrayLog(Log):
         path: str | PathLike[str],
         shapes: Mapping[str, tuple[int, ...]],
         refused: Mapping[str, str],
-        units: Mapping[str, str],
+        units: dict[str, str],
     ) -> None:
-        self.path = path
+        super().__init__(path)
         self.shapes = shapes
         self.header = tuple(name for array in shapes for name in _names(array, shapes[array]))
         matrices = {array: _which(array, shape) for array, shape in shapes.items() if len(shape) > 1}

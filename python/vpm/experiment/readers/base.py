@@ -1,7 +1,7 @@
 """What every reader of logs offers: names of columns, and their numbers."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from os import PathLike
 
@@ -41,19 +41,21 @@ class Log(ABC):
     ----------
     header : tuple of str
         Names of all columns of numbers.
-    refused : mapping of str to str
+    refused : dict of str to str
         What else is in the file, and why it is no column of numbers, as the end of a sentence with the repair.
-    units : mapping of str to str
+    units : dict of str to str
         Units that the file itself states.
     bracketed_units : bool
         Whether brackets behind a name hold a unit, ``q [deg]``; in the other formats they hold an index.
     """
 
-    path: str | PathLike[str]
     header: tuple[str, ...]
-    refused: Mapping[str, str]
-    units: Mapping[str, str]
     bracketed_units = False
+
+    def __init__(self, path: str | PathLike[str]) -> None:
+        self.path = path
+        self.refused: dict[str, str] = {}
+        self.units: dict[str, str] = {}
 
     def find(self, column: str) -> str | None:
         """Name in `header` of what a channel table calls ``column``; None where the file does not have it.

@@ -2,8 +2,9 @@
 
 import logging
 from abc import abstractmethod
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager, nullcontext
+from os import PathLike
 from typing import ClassVar
 
 from vpm.experiment.readers.base import Log
@@ -24,10 +25,13 @@ class ClockedLog(Log):
     package: ClassVar[str]
     extra: ClassVar[str]
     kind: ClassVar[str]
-    groups: Mapping[str, str]  #: Group of each column.
-    sizes: Mapping[str, int]  #: Number of samples of each group that has a clock.
-    clocks: Mapping[str, str]  #: Names of clocks, and the group of each; they are no channels.
     remarks: tuple[str, ...] = ()  #: Sentences about the whole file, for the history of the record.
+
+    def __init__(self, path: str | PathLike[str]) -> None:
+        super().__init__(path)
+        self.groups: dict[str, str] = {}  #: Group of each column.
+        self.sizes: dict[str, int] = {}  #: Number of samples of each group that has a clock.
+        self.clocks: dict[str, str] = {}  #: Names of clocks, and the group of each; they are no channels.
 
     def find(self, column: str) -> str | None:
         """Name of a column or clock; see `Log.find`."""

@@ -1,6 +1,6 @@
 """Data frames that a program holds already: of pandas, polars, or anything with columns that NumPy takes."""
 
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Hashable, Iterable, Sequence
 from contextlib import suppress
 from typing import Any, Protocol
 
@@ -37,12 +37,11 @@ class FrameLog(Log):
     bracketed_units = True
 
     def __init__(self, frame: Frame, name: str) -> None:
-        self.path = name
+        super().__init__(name)
         columns, index = list(getattr(frame, "columns", ())), getattr(frame, "index", None)
         if not columns:
             raise self.error(f"{name} is a {type(frame).__name__} without columns; give a data frame with named ones")
         self._columns: dict[str, NDArray[Any]] = {}
-        self.refused: dict[str, str] = {}
         own = getattr(index, "name", None)
         given = [] if own is None else [(_name(own), _array(index))]
         # A frame gives all columns of a name that it has twice; those are refused before they are used.
@@ -55,7 +54,6 @@ class FrameLog(Log):
             else:
                 self.refused[column] = f"holds {array.dtype}, which is no number; name a column of numbers"
         self.header = tuple(self._columns)
-        self.units: Mapping[str, str] = {}
 
     def _read(self, columns: Sequence[str], clock: str) -> Table:  # noqa: ARG002
         """Columns of a data frame by name; see `Log.read`."""

@@ -10,7 +10,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from os import PathLike
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -52,7 +52,7 @@ class GuardedLog(Log):
     def __init__(self, path: str | PathLike[str], reader: type[ClockedLog]) -> None:
         if importlib.util.find_spec(reader.package) is None:
             raise MissingExtraError(reader.package, reader.extra)
-        self.path = path
+        super().__init__(path)
         self._kind = reader.kind
         size = Path(path).stat().st_size
         self._seconds = START + PER_BYTE * size
@@ -62,8 +62,7 @@ class GuardedLog(Log):
         finalize(self, _stop, self._child, folder)
         told, _ = self._ask({})
         self.header: tuple[str, ...] = tuple(told["header"])
-        self.refused: Mapping[str, str] = told["refused"]
-        self.units: Mapping[str, str] = told["units"]
+        self.refused, self.units = told["refused"], told["units"]
 
     def find(self, column: str) -> str | None:
         """Name of a column as the guarded reader knows it; see `Log.find`."""

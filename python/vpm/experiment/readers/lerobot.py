@@ -44,9 +44,7 @@ class EpisodeLog(Log):
     """
 
     def __init__(self, path: str | PathLike[str]) -> None:
-        self.path = path
-        self.units: dict[str, str] = {}
-        self.refused: dict[str, str] = {}
+        super().__init__(path)
         place = Path(path)
         if not is_episode(place):
             episodes = episodes_of(place)

@@ -41,10 +41,7 @@ class JsonLog(ClockedLog):
     package, extra, kind = "mcap", "mcap", "an MCAP file of JSON"
 
     def __init__(self, path: str | PathLike[str]) -> None:
-        self.path = path
-        self.units: dict[str, str] = {}
-        self.refused: dict[str, str] = {}
-        self.groups: dict[str, str] = {}
+        super().__init__(path)
         self._stamps: dict[str, list[int]] = {}
         self._columns: dict[str, list[float]] = {}
         self._fields: dict[str, dict[str, list[float]]] = {}

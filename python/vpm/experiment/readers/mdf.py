@@ -59,14 +59,9 @@ class MdfLog(ClockedLog):
     _file: MDF
 
     def __init__(self, path: str | PathLike[str]) -> None:
-        self.path = path
+        super().__init__(path)
         self._places: dict[str, _Place] = {}
         self._numbers: dict[str, int] = {}
-        self.refused: dict[str, str] = {}
-        self.groups: dict[str, str] = {}
-        self.sizes: dict[str, int] = {}
-        self.clocks: dict[str, str] = {}
-        self.units: dict[str, str] = {}
         self._formulas: dict[_Place, Any] = {}
         with self._opened() as file:
             labels = _labels(file)

@@ -23,12 +23,11 @@ class ParquetLog(Log):
         with needs("pyarrow", "parquet"):
             import pyarrow as pa
             import pyarrow.parquet as pq
-        self.path = path
+        super().__init__(path)
         with reading(path, "a Parquet file"):
             table = pq.read_table(path)
         while any(pa.types.is_struct(field.type) for field in table.schema):
             table = table.flatten()
-        self.refused: dict[str, str] = {}
         self._stamps: list[str] = []
         names = []
         for field in table.schema:
@@ -44,7 +43,6 @@ class ParquetLog(Log):
         if repeated:
             raise self.error(f'{path} has two columns named "{repeated[0]}"; rename one of them')
         self.header = tuple(names)
-        self.units: dict[str, str] = {}
         self._table = table
 
     def _read(self, columns: Sequence[str], clock: str) -> Table:  # noqa: ARG002

@@ -52,9 +52,7 @@ class BagLog(Log):
     """
 
     def __init__(self, path: str | PathLike[str]) -> None:
-        self.path = path
-        self.refused: dict[str, str] = {}
-        self.units: dict[str, str] = {}
+        super().__init__(path)
         self._topics: dict[str, _Topic] = {}
         with self._opened() as bag:
             for connection in bag.connections:

@@ -38,14 +38,10 @@ class TdmsLog(ClockedLog):
     _file: TdmsFile
 
     def __init__(self, path: str | PathLike[str]) -> None:
-        self.path = path
-        self.refused: dict[str, str] = {}
-        self.units: dict[str, str] = {}
-        self.clocks: dict[str, str] = {}
+        super().__init__(path)
         self._places: dict[str, tuple[str, str]] = {}
         self._stamps: set[str] = set()
         self._waves: dict[str, tuple[float, float]] = {}
-        self.sizes: dict[str, int] = {}
         starts: dict[str, int] = {}
         with self._opened() as file:
             for group in file.groups():

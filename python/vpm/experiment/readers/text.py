@@ -13,10 +13,9 @@ class TextLog(Log):
     bracketed_units = True
 
     def __init__(self, path: str | PathLike[str]) -> None:
-        self.path = path
+        super().__init__(path)
         self.dialect = read_header(path)
         self.header = self.dialect.header
-        self.refused: dict[str, str] = {}
         self.units = dict(zip(self.header, self.dialect.units, strict=False))
 
     def _read(self, columns: Sequence[str], clock: str) -> Table:

@@ -34,12 +34,9 @@ class UlogLog(ClockedLog):
     package, extra, kind = "pyulog", "ulog", "a ULog file"
 
     def __init__(self, path: str | PathLike[str]) -> None:
-        self.path = path
-        self.units: dict[str, str] = {}
+        super().__init__(path)
         log = _parsed(path)
         self.refused = dict.fromkeys(log.message_formats, "has no messages; log this topic, or do not map it")
-        self.groups: dict[str, str] = {}
-        self.clocks: dict[str, str] = {}
         self._values: dict[str, NDArray[np.generic]] = {}
         self._stamps: dict[str, NDArray[np.int64]] = {}
         for topic in log.data_list:
