@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import partial
 from itertools import chain
+from operator import call
 from typing import TypeVar
 
 from numpy.typing import ArrayLike
@@ -122,7 +123,7 @@ def side_by_side(
     if workers < 1:
         raise SimulationError(f"{workers} workers can do nothing; give at least 1")
     with _shown(progress, len(jobs)) as told:
-        return _run_all([partial(_chunk, _called, [job]) for job in jobs], [1] * len(jobs), workers, told)
+        return _run_all([partial(_chunk, call, [job]) for job in jobs], [1] * len(jobs), workers, told)
 
 
 def _run_all(
@@ -166,10 +167,6 @@ def _chunk(one: Callable[[Item], Run], items: Sequence[Item]) -> list[Run | VpmE
         except VpmError as error:
             found.append(error)
     return found
-
-
-def _called(job: Callable[[], Run]) -> Run:
-    return job()
 
 
 def _one(model: Model, mode: str, setup: Setup, cutoff: float | None, trial: Trial) -> Run:

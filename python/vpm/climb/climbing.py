@@ -253,7 +253,8 @@ def families(model: Model) -> list[Family]:
     for family in LINKS:
         made = [(level, each) for level in family if (each := _made(model, beams, level)) is not None]
         found += [made] if made else []
-    return [*found, [(_own(beams), model)]]
+    own = ", ".join(dict.fromkeys(str(beam["level"]) for beam in beams.values()))
+    return [*found, [(own, model)]]
 
 
 def _made(model: Model, beams: Mapping[str, Any], level: str) -> Model | None:
@@ -267,7 +268,3 @@ def _made(model: Model, beams: Mapping[str, Any], level: str) -> Model | None:
     except VpmError:
         return None
     return made
-
-
-def _own(beams: Mapping[str, Any]) -> str:
-    return ", ".join(dict.fromkeys(str(beam["level"]) for beam in beams.values()))

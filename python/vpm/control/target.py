@@ -57,7 +57,8 @@ class TargetMotion:
         first, last = (np.atleast_1d(array_of(given, "the target", SimulationError)) for given in (start, end))
         if first.shape != last.shape or first.ndim != 1:
             raise SimulationError(f"a target from {first.shape} to {last.shape} numbers is none; give as many for both")
-        _check_duration(duration)
+        if not (np.isfinite(duration) and duration > 0.0):
+            raise SimulationError(f"a motion of {duration} s is not possible; give a positive time")
         _check_finite(np.stack([first, last]))
         still = [np.zeros_like(first)] * FLAT
         shape = BPoly.from_derivatives([0.0, duration], [[first, *still], [last, *still]])
@@ -140,11 +141,6 @@ class TargetMotion:
 
     def __repr__(self) -> str:
         return f"TargetMotion({self.width} outputs, {self.duration:.4g} s)"
-
-
-def _check_duration(duration: float) -> None:
-    if not (np.isfinite(duration) and duration > 0.0):
-        raise SimulationError(f"a motion of {duration} s is not possible; give a positive time")
 
 
 def _check_finite(values: Array) -> None:

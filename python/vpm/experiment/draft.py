@@ -133,7 +133,8 @@ def _map_channel(
     read = {name: content.columns[column] for name, column in columns.items()}
     for name, part in entry.columns.items():
         if part.delay:
-            read[name] = _moved_back(clock, read[name], part.delay, smooth=is_smooth(channel))
+            back = np.clip(clock + part.delay, clock[0], clock[-1])  # where it ends it keeps its last value
+            read[name] = interpolate(clock, read[name], back, smooth=is_smooth(channel))
             draft.moved.append(part.delay)
             draft.history.append(f'For {channel} column "{part.column}" was moved back by {part.delay:.6g} s.')
     raw = _built(draft.source, read, channel, entry) if entry.value else read[""]
@@ -149,11 +150,6 @@ def _map_channel(
     draft.history.append(", ".join(words) + ".")
     if entry.delay != 0.0:
         draft.delays[channel] = entry.delay
-
-
-def _moved_back(clock: Array, values: Array, delay: float, *, smooth: bool) -> Array:
-    """Column of a draft moved back by its delay; where it ends it keeps its last value."""
-    return interpolate(clock, values, np.clip(clock + delay, clock[0], clock[-1]), smooth=smooth)
 
 
 def _clock(draft: Draft, content: Table, channel: str, columns: Mapping[str, str]) -> Array | None:

@@ -31,7 +31,9 @@ def beyond_dead_centres(judge: Judge, record: Experiment, settings: Settings) ->
     leaves more than a doubtful share of them, and beyond the dead centre at most a tenth of that.
     """
     tellers = {
-        joint: line for joint, line in lines_that_tell(record, judge.model).items() if _turns(judge.model, joint)
+        joint: line
+        for joint, line in lines_that_tell(record, judge.model).items()
+        if judge.model.channel_unit(f"{joint}.position") == "rad"
     }
     findings: list[Finding] = []
     try:
@@ -52,10 +54,6 @@ def beyond_dead_centres(judge: Judge, record: Experiment, settings: Settings) ->
         findings.append(_finding(judge.model, record, turned, (joint, line), centre, (left[position], after[position])))
         told, left = turned, after
     return (told, findings) if findings else (record, [])
-
-
-def _turns(model: Model, joint: str) -> bool:
-    return model.channel_unit(f"{joint}.position") == "rad"
 
 
 def _finding(

@@ -11,7 +11,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
-from vpm.model.entry import Quantity
 from vpm.model.messages import Problem
 from vpm.model.parameters import Parameter, Slot
 from vpm.model.schema import Document
@@ -114,12 +113,8 @@ class Checked:
             target: Any = content
             for key in way:
                 target = target[key]
-            target[last] = plain(_moved(slot.si_quantity(), self.parameters[name].value))
+            target[last] = plain(slot.si_quantity().model_copy(update={"value": self.parameters[name].value}))
         return content
-
-
-def _moved(quantity: Quantity, value: float) -> Quantity:
-    return quantity.model_copy(update={"value": value})
 
 
 def _reshapes(slot: Slot, value: float) -> bool:

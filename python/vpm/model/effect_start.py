@@ -50,7 +50,8 @@ def starting_values(
 
 def _motor_side(model: Model, effect: EffectType, joint: str) -> float:
     """Start value of the inertia before a spring or backlash: a share of what the joint moves at zero."""
-    driving = [name for name in model.actuators if _drives(model, name, joint)]
+    turning = (name for name in model.actuators if model.line_of_actuator(name) is None)
+    driving = [name for name in turning if joint in model.joints_of_actuator(name)]
     if joint not in model.joints or (effect.has_play and not driving):
         return 0.0
     known = [f"{joint}.rotor_inertia", f"{joint}.rotor.inertia", *(f"{name}.rotor_inertia" for name in driving)]
@@ -58,7 +59,3 @@ def _motor_side(model: Model, effect: EffectType, joint: str) -> float:
     if any(name in model.parameters for name in known):
         return 0.0
     return MOTOR_SHARE * float(model.masses_at_zero[model.joints.index(joint)])
-
-
-def _drives(model: Model, actuator: str, joint: str) -> bool:
-    return model.line_of_actuator(actuator) is None and joint in model.joints_of_actuator(actuator)

@@ -1,6 +1,7 @@
 """Terms and coefficients of a NARX model from records."""
 
 from collections.abc import Mapping, Sequence
+from math import comb
 from typing import Literal
 
 import numpy as np
@@ -123,19 +124,13 @@ def _pool(
     lags = [(at, _delays(one, signals[at], least=0 if at else 1)) for at, one in enumerate([output_lags, *per_input])]
     if degree < 1:
         raise IdentificationError(f"degree must be 1 or more, got {degree}; 1 gives a linear model")
-    count = _count(sum(len(delays) for _, delays in lags), degree)
+    count = comb(sum(len(delays) for _, delays in lags) + degree, degree)
     if count > MOST_CANDIDATES:
         raise IdentificationError(
             f"these lags and degree {degree} give {count} candidates, and at most {MOST_CANDIDATES} are formed; take "
             "fewer lags or a lower degree"
         )
     return narx_candidates(lags, degree, constant)
-
-
-def _count(factors: int, degree: int) -> int:
-    from math import comb
-
-    return comb(factors + degree, degree)
 
 
 def _delays(lags: Lags, name: str, *, least: int) -> list[int]:

@@ -53,7 +53,7 @@ class Program:
         cost = (1 - p) * ca.mtimes(own, z) + p * ca.mtimes(slack, z)
         jacobian = _Entries(*_triplets(csc_array(self.A)), self.A.shape)
         gradient = ca.densify((1 - p) * own + p * slack)
-        hessian = _Entries(*_empty(), (nz, nz))
+        hessian = _Entries(*_triplets(csc_array((nz, nz))), (nz, nz))
         for group in self.groups:
             nv, nr = group.variables.numel(), group.results.numel()
             v = ca.reshape(ca.mtimes(_dm(group.V), z), nv, group.count)
@@ -155,10 +155,6 @@ def _nonzeros(matrix: Expression) -> Expression:
 def _pattern(matrix: Expression) -> tuple[Indices, Indices]:
     rows, columns = matrix.sparsity().get_triplet()
     return np.asarray(rows, dtype=np.int64), np.asarray(columns, dtype=np.int64)
-
-
-def _empty() -> tuple[Indices, Indices, Array]:
-    return np.empty(0, np.int64), np.empty(0, np.int64), np.empty(0)
 
 
 def _triplets(matrix: csc_array) -> tuple[Indices, Indices, Array]:

@@ -123,7 +123,9 @@ def _bounds(names: Sequence[str], limits: Sequence[Limit], size: int) -> tuple[A
 
 def scales(task: Fitted, channels: Channels, points: Sequence[tuple[Array, Array]]) -> Scales:
     """Sizes of the variables at the start: limits, else what the ends and the commands make of them."""
-    own, durations = channels.own, np.array([_duration(phase.shortest, phase.longest) for phase in task.phases])
+    # The middle of a range of durations, as a factor of both ends.
+    durations = np.array([math.sqrt(phase.shortest * phase.longest) for phase in task.phases])
+    own = channels.own
     limits = [one for phase in task.phases for one in phase.limits]
 
     def limit_of(name: str) -> float:
@@ -191,8 +193,3 @@ def simulated(model: Model, task: Fitted, channels: Channels, motion: MeshMotion
     found = np.stack([np.interp(motion.times, time, column) for column in np.array(states).T], axis=1)
     commands = tuple(np.tile(row, (mesh.size, 1)) for row, mesh in zip(held, motion.meshes, strict=True))
     return replace(motion, states=found, commands=commands)
-
-
-def _duration(shortest: float, longest: float) -> float:
-    """Start duration: the middle of a range, as a factor of both."""
-    return math.sqrt(shortest * longest)

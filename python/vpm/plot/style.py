@@ -9,6 +9,7 @@ from functools import wraps
 from html import escape
 from io import StringIO
 from typing import TYPE_CHECKING, Any, ParamSpec, TypeVar
+from zlib import crc32
 
 import numpy as np
 from numpy.typing import NDArray
@@ -177,7 +178,7 @@ def figure_to_svg(figure: Figure, words: str = "") -> str:
     svg = text[text.index("<svg") :].strip()
     # A hundredth of a point is a hundredth of what anybody sees.
     svg = re.sub(r'(?<= )(d|x|y)="[^"]*"', lambda place: re.sub(r"\d+\.\d{3,}", _hundredths, place[0]), svg)
-    mark = f"f{_checksum(svg):08x}-"
+    mark = f"f{crc32(svg.encode()):08x}-"
     svg = re.sub(r'\bid="', f'id="{mark}', svg)
     svg = re.sub(r'(url\(#|href="#)', lambda match: match.group(1) + mark, svg)
     return svg.replace("<svg", f'<svg role="img" aria-label="{escape(words)}"', 1) if words else svg
@@ -227,9 +228,3 @@ def label(quantity: str, unit: str) -> str:
 
 def _hundredths(number: re.Match[str]) -> str:
     return f"{float(number[0]):.2f}".rstrip("0").rstrip(".")
-
-
-def _checksum(text: str) -> int:
-    from zlib import crc32
-
-    return crc32(text.encode())

@@ -48,7 +48,7 @@ def _gaps(d: Diagnosis) -> list[str]:
     head = f"  {'channel':34s} {'before':>11s} {'recalibrated':>13s} {'after':>11s} {'noise floor':>12s}"
     lines = ["gap on validation data (root mean square):", head]
     for channel, gap in d.gap.items():
-        numbers = f"{_cell(gap.before)} {_cell(gap.recalibrated, 13)} {_cell(gap.after)} {_floor(gap)}"
+        numbers = f"{_cell(gap.before)} {_cell(gap.recalibrated, 13)} {_cell(gap.after)} {_cell(gap.noise_floor, 12)}"
         shares = f"{_share(gap.before, gap)} {_share(gap.recalibrated, gap, 13)} {_share(gap.after, gap)}"
         lines += [f"  {channel:34s} {numbers} {gap.unit}", f"  {'':34s} {shares}"]
     return lines
@@ -90,7 +90,3 @@ def _cell(value: float, width: int = 11) -> str:
 
 def _share(value: float, gap: ChannelGap, width: int = 11) -> str:
     return f"{percent(gap.share(value)):>{width}s}"
-
-
-def _floor(gap: ChannelGap) -> str:
-    return _cell(gap.noise_floor, 12)

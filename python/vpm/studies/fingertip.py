@@ -91,20 +91,17 @@ class Curve:
 
     def balance(self) -> float:
         """Work of the plate on the fingertip less elastic energy, share of the energy."""
+        from scipy.interpolate import PchipInterpolator
+
         way = np.array([0.0, *(step.indentation for step in self.steps)])
-        work = _integral(way, np.array([0.0, *(step.force for step in self.steps)]))
+        force = PchipInterpolator(way, [0.0, *(step.force for step in self.steps)])
+        work = float(force.integrate(way[0], way[-1]))
         return work / self.steps[-1].energy - 1.0
 
     def _at(self, depth: Array, what: Callable[[Pressed], float]) -> Array:
         from scipy.interpolate import PchipInterpolator
 
         return np.asarray(PchipInterpolator(self.way, [what(step) for step in self.steps])(depth))
-
-
-def _integral(x: Array, y: Array) -> float:
-    from scipy.interpolate import PchipInterpolator
-
-    return float(PchipInterpolator(x, y).integrate(x[0], x[-1]))
 
 
 def indent(finger: Finger, fineness: int, depths: Array = STEPS) -> Curve:

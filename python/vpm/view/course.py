@@ -122,7 +122,8 @@ def _measured(model: Model, run: Run, coordinates: Array, notes: list[str]) -> A
     if run.mode == "prescribed_motion":
         notes.append("The joints move as they were measured; only what they carry is simulated.")
         return None
-    columns = {name: run.channels.index(f"{name}.position") for name in model.joints if _has(run, name)}
+    joints = (name for name in model.joints if f"{name}.position" in run.channels)
+    columns = {name: run.channels.index(f"{name}.position") for name in joints}
     found = {name: run.measured[:, column] for name, column in columns.items()}
     seen = [name for name, values in found.items() if np.all(np.isfinite(values))]
     if not seen:
@@ -132,10 +133,6 @@ def _measured(model: Model, run: Run, coordinates: Array, notes: list[str]) -> A
         measured[:, model.joints.index(name)] = found[name]
     notes += _told(model, seen)
     return measured
-
-
-def _has(run: Run, joint: str) -> bool:
-    return f"{joint}.position" in run.channels
 
 
 def _told(model: Model, seen: list[str]) -> Iterator[str]:

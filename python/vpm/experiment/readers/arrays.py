@@ -84,7 +84,7 @@ class ArrayLog(Log):
             match = pattern.match(column)
             if match is None:
                 continue
-            name = self._array_name(match["name"])
+            name = match["name"]
             shape = self.shapes.get(name, ())
             index = int(match["index"] or match.groupdict().get("short") or 0)
             if len(shape) == 1 and index == 0 and not row:
@@ -92,10 +92,6 @@ class ArrayLog(Log):
             if len(shape) == 2 and index < shape[0 if row else 1]:
                 return name, row, index
         return None
-
-    def _array_name(self, name: str) -> str:
-        """An array's name in `shapes`, from what a channel table calls it."""
-        return name
 
 
 def shape_of_vector(shape: tuple[int, ...]) -> tuple[int, ...]:

@@ -49,10 +49,6 @@ def _answer(log: Log, request: dict[str, Any]) -> Answer:
     return {"header": log.header, "refused": dict(log.refused), "units": dict(log.units)}, []
 
 
-def _refusal(error: VpmError) -> Answer:
-    return {"error": str(error), "channel": getattr(error, "channel", None)}, []
-
-
 def _send(out: BinaryIO, answer: Answer) -> None:
     told, arrays = answer
     out.write(json.dumps({**told, "sizes": [array.size for array in arrays]}).encode() + b"\n")
@@ -80,7 +76,7 @@ def serve(module: str, name: str, path: str, seconds: int, space: int) -> None:
                     log = getattr(importlib.import_module(module), name)(path)
                 answer = _answer(log, json.loads(line))
         except VpmError as error:
-            answer = _refusal(error)
+            answer = {"error": str(error), "channel": getattr(error, "channel", None)}, []
         _send(out, answer)
 
 

@@ -118,7 +118,8 @@ def static_windows(
         raise IdentificationError(f"the time to settle is {settle:g} s; give a time of zero or more")
     tests = element_samples(records, signals, step)
     # What is small is judged beside all tests, because the force of one pose may be zero.
-    scales = tuple(_small(np.concatenate(columns)) for columns in _both(tests))
+    both = ([one.force for one in tests], [one.length for one in tests])
+    scales = tuple(_small(np.concatenate(columns)) for columns in both)
     poses = [_pose(one, signals, settle, scales) for one in tests]
     found = []
     lone = []
@@ -134,10 +135,6 @@ def static_windows(
     names, drive, length, values, covariance, samples = zip(*found, strict=True)
     columns = np.array(drive), np.array(length), np.array(values), np.array(covariance), np.array(samples)
     return MaxwellWindows(("k0", "s0"), "tangent", signals.drive or "", names, *columns, notes)
-
-
-def _both(tests: list[Samples]) -> tuple[list[Array], list[Array]]:
-    return [one.force for one in tests], [one.length for one in tests]
 
 
 def _small(values: Array) -> float:
