@@ -111,13 +111,8 @@ def side_by_side(
 
     ``jobs``: each gives a run; ``workers``, ``progress``: as in `simulate_batch`.
     Result: in the order of the jobs; one that fails is an error in the list.
-
-    Raises
-    ------
-    SimulationError
-        The number of workers is impossible.
-    BatchInterruptedError
-        Ctrl-C, a `KeyboardInterrupt` with what was finished; all other jobs stop.
+    Raises `SimulationError`: the number of workers is impossible.
+    Raises `BatchInterruptedError`: Ctrl-C, a `KeyboardInterrupt` with what was finished; all other jobs stop.
     """
     workers = (os.cpu_count() or 1) if workers is None else workers
     if workers < 1:

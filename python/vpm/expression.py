@@ -42,10 +42,7 @@ def zeroed(count: Array, index: Array) -> Array:
     ``count``, ``index``: shape (N,), the pulse is high above half of its range. One that is high at the first sample
     began before.
 
-    Raises
-    ------
-    VpmError
-        There is no pulse.
+    Raises `VpmError`: there is no pulse.
     """
     high = index > 0.5 * (index.min() + index.max())
     rises = np.flatnonzero(high[1:] & ~high[:-1])
@@ -112,10 +109,7 @@ class Expression:
     def __call__(self, parts: Mapping[str, Quantity]) -> Quantity:
         """Value of an expression over columns.
 
-        Parameters
-        ----------
-        parts : mapping of str to Quantity
-            One for each of `names`.
+        ``parts``: one for each of `names`.
         """
         try:
             with np.errstate(all="ignore"):

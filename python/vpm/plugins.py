@@ -40,10 +40,7 @@ class Plugin:
     def load(self) -> object:
         """Load what a plugin's entry point names.
 
-        Raises
-        ------
-        PluginError
-            Its package cannot be imported, or the name was refused.
+        Raises `PluginError`: its package cannot be imported, or the name was refused.
         """
         if self.refused:
             raise self.error(self.refused)

@@ -87,10 +87,7 @@ class Parcel:
     def of(cls, thing: object) -> Parcel:
         """Parcel to send: something pickled; records go by the path of their file.
 
-        Raises
-        ------
-        ExecutorError
-            A part of it cannot be pickled.
+        Raises `ExecutorError`: a part of it cannot be pickled.
         """
         return cls(_sendable(thing))
 

@@ -96,10 +96,8 @@ class Tasks(Generic[K]):
       new processes take its place, or what the function makes. An executor that a function made ends with the block.
     - ``say``: called with a sentence where a task died or a pool broke; a `RuntimeWarning` says it if not given
 
-    Raises
-    ------
-    ExecutorError
-        By `answered`: the executor takes no task from the beginning, or a worker cannot work for this program.
+    Raises `ExecutorError`: by `answered`: the executor takes no task from the beginning, or a worker cannot work for
+    this program.
     """
 
     def __init__(self, where: Where, say: Say | None = None, folders: Sequence[str] = ()) -> None:

@@ -95,13 +95,9 @@ def start_state(model: Model, experiment: Experiment | None) -> Array | None:
 def commands(model: Model, rate: float, experiment: Experiment | None = None) -> Array:
     """Inputs (N, inputs) that drive timed steps of a model.
 
-    Parameters
-    ----------
-    rate : float
-        Hz.
-    experiment : Experiment, optional
-        Its commands, or what the model's controllers make of its references, each held until the record's next sample;
-        without it a sum of sines.
+    - ``rate``: Hz
+    - ``experiment``: its commands, or what the model's controllers make of its references, each held until the record's
+      next sample; without it a sum of sines
     """
     if experiment is not None:
         # The machine moves as fast as it was measured, whatever the rate of the log.

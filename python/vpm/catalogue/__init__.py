@@ -46,10 +46,7 @@ EFFECTS: Mapping[str, EffectType] = _CATALOGUE
 def effect_type(name: str) -> EffectType:
     """Entry of the catalogue for the name of an effect.
 
-    Parameters
-    ----------
-    name : str
-        For example ``"coulomb_friction"``.
+    ``name``: for example ``"coulomb_friction"``.
     """
     try:
         return EFFECTS[name]

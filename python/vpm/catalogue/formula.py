@@ -41,12 +41,8 @@ class Formula:
     def __call__(self, q: float, v: float, parameters: Sequence[float]) -> float:
         """Effort of a formula, as the core computes it.
 
-        Parameters
-        ----------
-        q, v : float
-            Coordinate and velocity of the joint (SI).
-        parameters : sequence of float
-            In the order in which they were declared.
+        - ``q``, ``v``: coordinate and velocity of the joint (SI)
+        - ``parameters``: in the order in which they were declared
         """
         stack: list[float] = []
         numbers = {"parameter": parameters, "constant": self.constants}

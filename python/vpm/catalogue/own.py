@@ -31,10 +31,7 @@ def entry_of(
 ) -> EffectType:
     """Catalogue entry of a user's own law; see `vpm.catalogue.register`.
 
-    Raises
-    ------
-    ModelError
-        A name, a unit, the law or the sentence cannot be used.
+    Raises `ModelError`: a name, a unit, the law or the sentence cannot be used.
     """
     shapes = shapes or {}
     names = (*sizes, *shapes)

@@ -48,10 +48,8 @@ class Schedule(Storable):
     def over(cls, model: Model, joints: Mapping[str, ArrayLike]) -> Schedule:
         """Schedule points: poses of rest at all combinations of some joints' positions.
 
-        Raises
-        ------
-        SimulationError
-            A name is unknown, positions do not ascend, or something else than an ideal drive holds a joint.
+        Raises `SimulationError`: a name is unknown, positions do not ascend, or something else than an ideal drive
+        holds a joint.
         """
         grid = tuple(
             np.atleast_1d(array_of(values, f"{name}: positions", SimulationError)) for name, values in joints.items()

@@ -56,10 +56,8 @@ def solve(rates: Rates, times: Array, guess: Array, ends: tuple[Array, Array]) -
     - ``guess``: shape (N, nx), from rest to rest; its ends are the states of rest
     - ``ends``: derivatives of the rates at both states of rest
 
-    Raises
-    ------
-    SimulationError
-        Newton's method does not end, or the machine has another number of unstable directions at its end.
+    Raises `SimulationError`: Newton's method does not end, or the machine has another number of unstable directions at
+    its end.
     """
     first, last = split(ends[0]).forward, split(ends[1]).backward
     nx = guess.shape[1]

@@ -38,15 +38,10 @@ class BaseParameters(Storable):
 def regressor(model: Model, position: Array, velocity: Array, acceleration: Array, names: Sequence[str]) -> Array:
     """Derivative of the effort that a motion needs by parameters, exact to rounding.
 
-    Parameters
-    ----------
-    position, velocity, acceleration : ndarray, shape (N, n)
-    names : sequence of str
-        k dotted names.
+    - ``position``, ``velocity``, ``acceleration``: shape (N, n)
+    - ``names``: k dotted names
 
-    Returns
-    -------
-    ndarray, shape (N, n, k)
+    Result: shape (N, n, k).
     """
     inputs = np.zeros((len(position), len(model.inputs)))
     columns = [model.index(name) for name in names]

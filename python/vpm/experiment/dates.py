@@ -28,11 +28,8 @@ def seconds_of_dates(cells: Sequence[str]) -> Array:
 
     Nanoseconds are counted in whole numbers. A zone is taken off, so that an hour of summer time does not show.
 
-    Raises
-    ------
-    ValueError
-        A cell is no date; its index is the first argument, and why the second. Dates with slashes may stay within one
-        day only, because their day and month may stand in either order.
+    Raises `ValueError`: a cell is no date; its index is the first argument, and why the second. Dates with slashes may
+    stay within one day only, because their day and month may stand in either order.
     """
     ticks, days = np.empty(len(cells), dtype=np.int64), set()
     for place, cell in enumerate(cells):

@@ -110,12 +110,8 @@ def check_uniform(time: Array, source: Source) -> str:
     """Refuse gaps and uneven steps of a grid.
 
     Result: sentence on the grid for the history.
-
-    Raises
-    ------
-    ExperimentError
-        Samples are missing, one step is off by more than 0.5 % of the median step, or a sample lies further than a
-        twentieth of a step from the uniform grid.
+    Raises `ExperimentError`: samples are missing, one step is off by more than 0.5 % of the median step, or a sample
+    lies further than a twentieth of a step from the uniform grid.
     """
     steps = np.diff(time)
     median = float(np.median(steps))

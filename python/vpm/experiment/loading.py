@@ -89,10 +89,7 @@ def channel_table(
 ) -> Mapping[str, ChannelEntry] | None:
     """Loaded channel-table entries by name, the clock under "time"; None where nobody gave a table.
 
-    Parameters
-    ----------
-    model : Model, optional
-        Its own table counts where none is given.
+    ``model``: its own table counts where none is given.
     """
     if channels is None:
         return None if model is None or not model.channel_table else model.channel_table
@@ -148,10 +145,7 @@ def _take_fresh(draft: Draft, irregular: str) -> dict[str, float]:
     Without interpolation they stay as they are if that costs no more than the noise of the sensor. The rates of their
     readings come back, Hz.
 
-    Raises
-    ------
-    ExperimentError
-        Repeated values cost more.
+    Raises `ExperimentError`: repeated values cost more.
     """
     slower: dict[str, float] = {}
     for channel, column in draft.columns.items():

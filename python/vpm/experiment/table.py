@@ -52,11 +52,8 @@ def read_table(path: str | PathLike[str], dialect: Dialect, wanted: Sequence[str
     - ``wanted``: columns to read; others may hold anything
     - ``clock``: column of the time among them: numbers, or dates
 
-    Raises
-    ------
-    ExperimentError
-        A column is missing, or a cell is no number (with its line, column and text). A cell may be empty beside a
-        clock: a column with such cells was sampled more slowly, or lost samples.
+    Raises `ExperimentError`: a column is missing, or a cell is no number (with its line, column and text). A cell may
+    be empty beside a clock: a column with such cells was sampled more slowly, or lost samples.
     """
     header = dialect.header
     for name in wanted:

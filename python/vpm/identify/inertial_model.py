@@ -20,15 +20,8 @@ AGREE = 1e-8
 def repaired(model: Model, values: Mapping[str, float]) -> Model:
     """A model with standard inertial parameters, and others, in place of its own.
 
-    Parameters
-    ----------
-    values : mapping of str to float
-        As `inertial_regression` names them, all ten of a body.
-
-    Raises
-    ------
-    IdentificationError
-        A name is none of the model's, or no body can have the values.
+    ``values``: as `inertial_regression` names them, all ten of a body.
+    Raises `IdentificationError`: a name is none of the model's, or no body can have the values.
     """
     changed = dict(values)
     for body in model.bodies:

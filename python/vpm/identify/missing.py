@@ -50,10 +50,8 @@ def whiteness(
 ) -> tuple[Whiteness, ...]:
     """Judge whether effects are missing by what is left of each channel of each record.
 
-    Parameters
-    ----------
-    residual : ndarray, shape (n,)
-    jacobian : ndarray, shape (n, p)
+    - ``residual``: shape (n,)
+    - ``jacobian``: shape (n, p)
     """
     plain = untied(data)
     unseen = _of_unseen(model, plain) if isinstance(plain, InverseDynamicsProblem) else []

@@ -154,10 +154,7 @@ def losses_and_weights(residual: Array, loss: str, scale: float) -> tuple[Array,
 def noise_levels(blocks: Sequence[Block], residual: Array, *, robust: bool) -> Mapping[str, float]:
     """Noise deviation of each channel in the objective, in its unit; ``robust`` by the median.
 
-    Parameters
-    ----------
-    residual : ndarray
-        Weighted as the blocks say.
+    ``residual``: weighted as the blocks say.
     """
     levels = {}
     for channel in dict.fromkeys(block.channel for block in blocks):

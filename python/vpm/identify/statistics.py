@@ -195,12 +195,8 @@ def freedom(jacobian: Array, blocks: Sequence[Block], unknowns: int) -> Array:
     ``n`` equal samples there are ``3/2 n / (lags + 1)`` (M. Priestley, *Spectral Analysis and Time Series*, 1981, table
     6.1, halved at frequency zero). Samples that do not count and the unknowns take theirs.
 
-    Parameters
-    ----------
-    jacobian : ndarray, shape (n, p)
-        Columns of similar length.
-    unknowns : int
-        Parameters and first states.
+    - ``jacobian``: shape (n, p); columns of similar length
+    - ``unknowns``: parameters and first states
     """
     bread = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
     decided, shares = (jacobian @ bread) ** 2, []

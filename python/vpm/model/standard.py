@@ -26,11 +26,8 @@ PLAIN = np.array([1.0, 0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
 def standard_parameters(mass: float, center: Array, inertia: Array) -> Array:
     """Standard parameters (10,): mass, first moment, moments of inertia about the frame's origin.
 
-    Parameters
-    ----------
-    center : ndarray, shape (3,)
-    inertia : ndarray, shape (6,)
-        About the centre of mass: xx yy zz xy xz yz, entries of the matrix.
+    - ``center``: shape (3,)
+    - ``inertia``: shape (6,); about the centre of mass: xx yy zz xy xz yz, entries of the matrix
     """
     shift = mass * (float(center @ center) * np.eye(3) - np.outer(center, center))
     x, y, z = 0, 1, 2

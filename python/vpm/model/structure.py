@@ -206,10 +206,7 @@ class Structure:
     def unit(self, channel: str) -> str:
         """SI unit of a channel of the structure.
 
-        Raises
-        ------
-        ModelError
-            The model has no such channel; the message names near ones.
+        Raises `ModelError`: the model has no such channel; the message names near ones.
         """
         if channel not in self._units:
             self._units[channel] = unit_of(channel, self)

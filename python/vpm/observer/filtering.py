@@ -109,10 +109,7 @@ def whitened(covariances: Array, values: Array) -> Array:
 def filtered(model: Model, record: Record, noise: Noise, *, setup: Setup | None = None) -> Pass:
     """Pass of the Kalman filter of ``model`` over a ``record``.
 
-    Raises
-    ------
-    DivergedError, SimulationError
-        The model runs away from the log, or cannot be filtered.
+    Raises `DivergedError`, `SimulationError`: the model runs away from the log, or cannot be filtered.
     """
     from vpm._core import Diverged
 

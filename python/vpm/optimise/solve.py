@@ -60,12 +60,8 @@ class SearchInterruptedError(KeyboardInterrupt):
 def search(model: Model, given: Fitted, progress: Progress, start: MeshMotion | None = None) -> Search:
     """Solve for the best motion on a mesh that is fine enough, from another motion if there is one.
 
-    Raises
-    ------
-    OptimisationError
-        No motion fulfils the task; the sentence says by how much the nearest one fails.
-    SearchInterruptedError
-        Ctrl-C.
+    Raises `OptimisationError`: no motion fulfils the task; the sentence says by how much the nearest one fails.
+    Raises `SearchInterruptedError`: Ctrl-C.
     """
     task = complete(model, given)
     channels = Channels(equations(model))

@@ -31,12 +31,9 @@ class Names:
     def of(self, what: str, name: str, suffixes: Sequence[str] = ("",)) -> str:
         """Model-file name for a robot's name.
 
-        Parameters
-        ----------
-        what : str
-            ``"joint"``, ``"link"``: what is put before or behind a name that will not do, and stands in the note.
-        suffixes : sequence of str
-            Of the names that it brings with it, such as the coordinates of a joint.
+        - ``what``: ``"joint"``, ``"link"``: what is put before or behind a name that will not do, and stands in the
+          note
+        - ``suffixes``: of the names that it brings with it, such as the coordinates of a joint
         """
         safe = re.sub(r"[^A-Za-z0-9_-]", "_", name)
         if not safe[:1].isalpha():

@@ -43,10 +43,7 @@ class Tree:
 def gather(robot: Robot) -> Tree:
     """Lumps of moving links, with what is fixed to them.
 
-    Raises
-    ------
-    ModelError
-        The links are no tree, or nothing moves.
+    Raises `ModelError`: the links are no tree, or nothing moves.
     """
     root, order = _ordered(robot)
     places: dict[str, tuple[str, Pose]] = {root: (WORLD, Pose())}

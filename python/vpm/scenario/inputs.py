@@ -49,17 +49,11 @@ def _check_known(name: str, known: tuple[str, ...], what: str, owner: str, keys:
 def sampled(signal: Signal, keys: Keys, unit: str, clock: Clock) -> Array:
     """Input samples of a signal, shape (steps + 1,), SI.
 
-    Parameters
-    ----------
-    keys : tuple
-        Its place in the file.
-    unit : str
-        SI unit of the channel that it drives.
+    - ``keys``: its place in the file
+    - ``unit``: SI unit of the channel that it drives
 
-    Raises
-    ------
-    ScenarioError
-        A number has a unit of another kind, a frequency cannot be sampled, or points are not in order.
+    Raises `ScenarioError`: a number has a unit of another kind, a frequency cannot be sampled, or points are not in
+    order.
     """
 
     def size(given: Given, key: str) -> float:

@@ -18,13 +18,9 @@ def machines(entries: tuple[RunEntry, ...], folder: Path) -> Mapping[str, Model]
     """Model of each run, by the name of the run; a file that several runs name is read once.
 
     ``folder``: folder of the scenario file, from where the paths of model files lead.
-
-    Raises
-    ------
-    ScenarioError
-        Two runs have one name; a model file is not there; an effect, a level or a parameter does not fit the model.
-    ModelError
-        A model file is wrong; the message names it.
+    Raises `ScenarioError`: two runs have one name; a model file is not there; an effect, a level or a parameter does
+    not fit the model.
+    Raises `ModelError`: a model file is wrong; the message names it.
     """
     found: dict[str, Model] = {}
     load = cache(_built)

@@ -30,20 +30,12 @@ def sine(time: Array, mean: float, amplitude: float, frequency: float, phase: fl
 def chirp(time: Array, mean: float, amplitude: float, first: float, last: float, duration: float) -> Array:
     """Chirp signal ``mean + amplitude sin(2 pi (f0 t + (f1 - f0) t^2 / (2 T)))`` from f0 to f1 over T.
 
-    Parameters
-    ----------
-    time : ndarray, shape (N,)
-        s.
-    mean, amplitude : float
-        In the unit of the channel.
-    first, last : float
-        Frequency at time zero and after ``duration``, Hz.
-    duration : float
-        s.
+    - ``time``: shape (N,); s
+    - ``mean``, ``amplitude``: in the unit of the channel
+    - ``first``, ``last``: frequency at time zero and after ``duration``, Hz
+    - ``duration``: s
 
-    Returns
-    -------
-    ndarray, shape (N,)
+    Result: shape (N,).
     """
     turns = first * time + 0.5 * (last - first) * time**2 / duration
     return np.asarray(mean + amplitude * np.sin(2.0 * np.pi * turns))

@@ -75,15 +75,8 @@ class Judge:
     def errors(self, model: Model, setup: Setup) -> dict[str, float]:
         """Relative error of each channel on the records to judge on.
 
-        Parameters
-        ----------
-        setup : Setup
-            Its substeps are those of one step of the controller.
-
-        Raises
-        ------
-        SimulationError
-            The simulation fails in these steps.
+        ``setup``: its substeps are those of one step of the controller.
+        Raises `SimulationError`: the simulation fails in these steps.
         """
         stepped = replace(setup, substeps=setup.substeps * self.per_sample)
         data = self._outputs(model, self.validation, stepped)

@@ -120,11 +120,7 @@ def reduced(model: Model, changes: Sequence[Reduction]) -> Model:
     """Model with several reductions done.
 
     ``changes``: at most one of each site.
-
-    Raises
-    ------
-    ModelError
-        They contradict each other.
+    Raises `ModelError`: they contradict each other.
     """
     # A rigid link has no components, and a spool that follows at once no effect that slows it: those come last.
     for change in sorted(changes, key=lambda each: each.kind in ("level", "drive")):

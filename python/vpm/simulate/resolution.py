@@ -169,14 +169,9 @@ def outermost(places: Array) -> list[int]:
 def resolution(model: Model, states: Array, commands: Array, dt: float, setup: Setup, duration: float) -> Resolution:
     """What steps do not resolve in a run of ``duration`` (s) that begins in the first of ``states``.
 
-    Parameters
-    ----------
-    states : ndarray, shape (N, nx)
-        Those of the run.
-    commands : ndarray, shape (N, nu)
-        What is held from each of them on.
-    dt : float
-        Time between samples, s.
+    - ``states``: shape (N, nx); those of the run
+    - ``commands``: shape (N, nu); what is held from each of them on
+    - ``dt``: time between samples, s
     """
     method, internal = setup.method(model), states[:, 2 * model.core.n_coordinates :]
     passed = states[[0, *outermost(states[:, : len(model.joints)])]]

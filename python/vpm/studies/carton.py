@@ -111,10 +111,7 @@ def fold(model: Model) -> Fold:
 def fold_carton(fineness: int = 4) -> Study:
     """Run the study of folding a carton.
 
-    Parameters
-    ----------
-    fineness : int
-        Elements of the flexible panel; fewer ones show how its force converges.
+    ``fineness``: elements of the flexible panel; fewer ones show how its force converges.
     """
     if not 1 <= fineness <= 16:
         raise VpmError(f"a panel of {fineness} elements cannot be made; take a whole number from 1 to 16")

@@ -129,10 +129,7 @@ def classes(step: Pressed) -> Array:
 def fingertip(fineness: int = 3) -> Study:
     """Run the study of a soft fingertip.
 
-    Parameters
-    ----------
-    fineness : int
-        Of the finest mesh; coarser ones show how figures converge.
+    ``fineness``: of the finest mesh; coarser ones show how figures converge.
     """
     check_fineness(fineness)
     levels = {rim: [indent(FINGER.with_(held=held), n) for n in range(1, fineness + 1)] for rim, held in RIMS.items()}

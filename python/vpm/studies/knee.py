@@ -114,10 +114,7 @@ def _stressed(solid: Solid, held: Array, moved: Array, clear: NDArray[np.bool_])
 def knee(fineness: int = 4) -> Study:
     """Run the study of a knee.
 
-    Parameters
-    ----------
-    fineness : int
-        Bricks through the thickness of the finest mesh; coarser ones show how stresses converge.
+    ``fineness``: bricks through the thickness of the finest mesh; coarser ones show how stresses converge.
     """
     yoke, young = Yoke(), 1e9 * MATERIALS["AISI 304"][1]
     if not 1 <= fineness <= 6:

@@ -54,18 +54,11 @@ def press(
 ) -> list[Pressed]:
     """Raise an obstacle against a body, one load step after the other.
 
-    Parameters
-    ----------
-    ways : iterable of float
-        Indentations in growing order, m.
-    start : float
-        Height of the obstacle where it touches, m.
-    curvature : float
-        Of the obstacle, see `Obstacle`.
-    augmented : bool
-        False for the penalty alone, which lets the body overlap.
-    after : Pressed, optional
-        Where to go on.
+    - ``ways``: indentations in growing order, m
+    - ``start``: height of the obstacle where it touches, m
+    - ``curvature``: of the obstacle, see `Obstacle`
+    - ``augmented``: False for the penalty alone, which lets the body overlap
+    - ``after``: where to go on
     """
     state, reached = (after.state, after.indentation) if after else (body.rest(), 0.0)
     results = []

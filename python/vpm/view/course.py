@@ -41,12 +41,8 @@ def course_of(model: Model, source: Run | ScenarioRun | Experiment | None, mode:
     - ``mode``: how a log is simulated: by default ``free_run`` on its commands, ``closed_loop`` on references, or
       ``prescribed_motion`` with neither
 
-    Raises
-    ------
-    SimulationError
-        The run is of another model, or does not tell where its joints are.
-    ExperimentError
-        The log does not.
+    Raises `SimulationError`: the run is of another model, or does not tell where its joints are.
+    Raises `ExperimentError`: the log does not.
     """
     if source is None:
         return Course("at rest with all joints at zero", np.zeros(1), resting(model, np.zeros(len(model.joints))))

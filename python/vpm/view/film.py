@@ -42,11 +42,7 @@ def draw(scene: Scene, sample: int, *, dark: bool = False, size: tuple[int, int]
     """Draw one picture of a film.
 
     ``size``: pixels across and up.
-
-    Raises
-    ------
-    MissingExtraError
-        matplotlib is not installed.
+    Raises `MissingExtraError`: matplotlib is not installed.
     """
     with needs("matplotlib", "film"):
         from matplotlib.collections import PolyCollection

@@ -38,14 +38,11 @@ OWN = frozenset(ending[1:] for ending in ENDINGS)
 def open_log(path: str | PathLike[str]) -> Log:
     """Reader for a file of a log: its columns by name, and their numbers.
 
-    Parameters
-    ----------
-    path : path-like
-        ``.csv`` and every ending that is not named here is text; ``.parquet`` and ``.pq`` need the extra ``parquet``;
-        ``.mat`` of MATLAB up to 7.2 needs none, of 7.3 the extra ``hdf5``, as do ``.h5``, ``.hdf5``, ``.hdf`` and
-        ``.he5``; ``.bag`` (ROS 1), ``.db3`` and ``.mcap`` and folders with a ``metadata.yaml`` (ROS 2) need the extra
-        ``ros``; ``.mf4`` and ``.mdf`` the extra ``mdf``, ``.tdms`` of LabVIEW ``tdms``, ``.ulg`` of PX4 ``ulog``;
-        folders of LeRobot, and ``FOLDER/episode_000003`` in them, ``parquet``. Other packages may bring more.
+    ``path``: ``.csv`` and every ending that is not named here is text; ``.parquet`` and ``.pq`` need the extra
+    ``parquet``; ``.mat`` of MATLAB up to 7.2 needs none, of 7.3 the extra ``hdf5``, as do ``.h5``, ``.hdf5``, ``.hdf``
+    and ``.he5``; ``.bag`` (ROS 1), ``.db3`` and ``.mcap`` and folders with a ``metadata.yaml`` (ROS 2) need the extra
+    ``ros``; ``.mf4`` and ``.mdf`` the extra ``mdf``, ``.tdms`` of LabVIEW ``tdms``, ``.ulg`` of PX4 ``ulog``; folders
+    of LeRobot, and ``FOLDER/episode_000003`` in them, ``parquet``. Other packages may bring more.
     """
     if reason := unreadable(path):
         raise ExperimentError(reason, path=str(path))

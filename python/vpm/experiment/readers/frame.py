@@ -28,10 +28,7 @@ class FrameLog(Log):
 
     Times of day and spans are told in seconds from the first of their column. Missing values are NaN.
 
-    Raises
-    ------
-    ExperimentError
-        It has no columns, or one of its names twice.
+    Raises `ExperimentError`: it has no columns, or one of its names twice.
     """
 
     bracketed_units = True

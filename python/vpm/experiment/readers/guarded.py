@@ -40,13 +40,8 @@ class GuardedLog(Log):
     """A log whose reader works in another process.
 
     ``reader``: the class that reads the file.
-
-    Raises
-    ------
-    MissingExtraError
-        The library of the reader is not installed.
-    ExperimentError
-        The file is broken, its library crashed, or took too much time or memory.
+    Raises `MissingExtraError`: the library of the reader is not installed.
+    Raises `ExperimentError`: the file is broken, its library crashed, or took too much time or memory.
     """
 
     def __init__(self, path: str | PathLike[str], reader: type[ClockedLog]) -> None:
@@ -86,10 +81,7 @@ class GuardedLog(Log):
     def _ask(self, request: Answer) -> tuple[Answer, list[Array]]:
         """Answer of the guarded reader: a line of JSON, then the numbers of its arrays.
 
-        Raises
-        ------
-        ExperimentError
-            It says so, or it is no longer there.
+        Raises `ExperimentError`: it says so, or it is no longer there.
         """
         child = self._child
         watch = Timer(PATIENCE * self._seconds, child.kill)

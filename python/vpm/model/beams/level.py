@@ -59,10 +59,7 @@ class Level:
         Deflections start from a clamp: a Bezier curve has two control points less for bending, which is clamped in
         value and slope, and one less for the others; the elements of a deflection that does not bend are linear.
 
-        Parameters
-        ----------
-        component : str
-            For example ``"bending_x"``.
+        ``component``: for example ``"bending_x"``.
         """
         bends = component.startswith("bending")
         match self.name:
@@ -82,10 +79,7 @@ class Level:
         One component after the other, except for springs between rigid segments: there one segment after the other.
         Modes of a reduced solid are of no component: ``mode.0``.
 
-        Parameters
-        ----------
-        deforms : sequence of str
-            Components, in the order of the file.
+        ``deforms``: components, in the order of the file.
         """
         if self.name == "reduced":
             return tuple(f"mode.{i}" for i in range(self.number))

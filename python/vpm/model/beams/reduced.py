@@ -130,10 +130,7 @@ class ReducedLink:
     def load(cls, path: str | PathLike[str]) -> Self:
         """Read a reduced solid from a file that `save` wrote.
 
-        Raises
-        ------
-        ModelError
-            It is not there, or something else.
+        Raises `ModelError`: it is not there, or something else.
         """
         return cls.from_bytes(read_bytes(path))
 

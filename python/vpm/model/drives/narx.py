@@ -174,10 +174,7 @@ def factors_of(text: str, names: Sequence[str]) -> tuple[Factor, ...]:
 def poles(terms: Sequence[Sequence[Factor]], coefficients: Sequence[float]) -> np.ndarray | None:
     """Poles of a NARX model linear in its past: roots of ``z^n - a_1 z^(n-1) - ... - a_n``.
 
-    Returns
-    -------
-    ndarray or None
-        None where a product contains the output, so that no fixed poles decide whether it stays bounded.
+    Result: None where a product contains the output, so that no fixed poles decide whether it stays bounded.
     """
     past = [(term, value) for term, value in zip(terms, coefficients, strict=True) if any(s == 0 for s, _ in term)]
     if any(len(term) > 1 for term, _ in past):

@@ -24,16 +24,11 @@ Value = Callable[[str, float], float]
 def rest(model: Evaluations, theta: Array, coordinates: Array) -> Array:
     """States of drives and supplies after a long rest without commands at ``coordinates``.
 
-    Parameters
-    ----------
-    theta : ndarray, shape (P,)
-    coordinates : ndarray, shape (n,)
+    - ``theta``: shape (P,)
+    - ``coordinates``: shape (n,)
 
-    Returns
-    -------
-    ndarray
-        In the order of ``model.internal_names``: lags, currents and spools 0, visco-elastic elements settled, chambers
-        without net force, supplies at their pressure.
+    Result: in the order of ``model.internal_names``: lags, currents and spools 0, visco-elastic elements settled,
+    chambers without net force, supplies at their pressure.
     """
     if all(name.endswith(".lag") for name in model.internal_names):
         return np.zeros(len(model.internal_names))

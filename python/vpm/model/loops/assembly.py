@@ -33,13 +33,9 @@ _PIECES = 20
 def assembled(loops: Loops, start: Array, fixed: Mapping[int, float], joints: int) -> Array:
     """The assembly next to a start, or what comes nearest to one.
 
-    Parameters
-    ----------
-    start : ndarray, shape (n,)
-    fixed : mapping of int to float
-        Places of coordinates that are held, and where.
-    joints : int
-        Number of joints, which come first. Flexible links bend only where joints cannot close the loops.
+    - ``start``: shape (n,)
+    - ``fixed``: places of coordinates that are held, and where
+    - ``joints``: number of joints, which come first. Flexible links bend only where joints cannot close the loops.
     """
     free = [place for place in range(joints) if place not in fixed]
     closed = _moved(loops, _closed(loops, start, range(joints)), fixed, free)

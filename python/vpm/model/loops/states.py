@@ -43,8 +43,6 @@ def rest(
 ) -> tuple[Array, dict[str, float]]:
     """State of closed loops at rest under gravity, and efforts on the held joints; see `Loops.rest`.
 
-    Notes
-    -----
     ``h(q) - J^T l = 0`` on all coordinates that are not held, with closed loops, by Newton's method in q and l.
     """
     loops = model.loops
@@ -100,10 +98,7 @@ def _turned(loops: Loops, q: Array, chosen: NDArray[np.bool_], forces: Array) ->
 def close(model: Evaluations, state: Array, named: Mapping[str, float]) -> None:
     """Put coordinates and rates into a state that close the loops, with those that are named as they are.
 
-    Raises
-    ------
-    ModelError
-        They do not close so.
+    Raises `ModelError`: they do not close so.
     """
     n = len(model.coordinates)
 
@@ -146,10 +141,7 @@ def reduced(
     ``dq = T dq_i`` with T from `Loops.transmission`, and the same of the rates at rest: motions with closed loops are
     invariant.
 
-    Raises
-    ------
-    ModelError
-        The state moves, or the loops are singular there.
+    Raises `ModelError`: the state moves, or the loops are singular there.
     """
     names, n = model.coordinates, len(model.coordinates)
     if np.abs(state[n : 2 * n]).max(initial=0.0) > 0.0:

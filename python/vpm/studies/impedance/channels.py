@@ -28,12 +28,8 @@ class Columns:
 def columns(record: RecordLike, names: tuple[str, ...], fewest: int) -> Columns:
     """Clock and channels of a record by name.
 
-    Parameters
-    ----------
-    record : Experiment or mapping of str to array-like, shape (N,)
-        A mapping has its clock under ``"time"``, s.
-    fewest : int
-        Samples that the question needs at least.
+    - ``record``: shape (N,); a mapping has its clock under ``"time"``, s
+    - ``fewest``: samples that the question needs at least
     """
     is_log = isinstance(record, Experiment)
     title = record.name if isinstance(record, Experiment) else "record"

@@ -73,13 +73,8 @@ def leg_regressor(leg: Leg, angles: ArrayLike, rates: ArrayLike, accelerations: 
     Torques are linear in masses and inertias while dimensions and centres of mass are known, so that the difference of
     the torques of two legs that differ by one unit of one parameter is the derivative.
 
-    Parameters
-    ----------
-    angles, rates, accelerations : array_like, shape (2,) or (N, 2)
-
-    Returns
-    -------
-    ndarray, shape (2, 11) or (N, 2, 11)
+    ``angles``, ``rates``, ``accelerations``: shape (2,) or (N, 2).
+    Result: shape (2, 11) or (N, 2, 11).
     """
     # The core knows no leg without mass: the two segments weigh 1 kg in all of them, and nothing else weighs anything.
     base = np.zeros(len(INERTIAL_NAMES))
