@@ -44,14 +44,6 @@ Channels = Annotated[
 Cutoff = Annotated[
     float | None, typer.Option(help="Cut-off frequency of the motion filter, Hz; by default chosen from the record.")
 ]
-Mode = Annotated[
-    str,
-    typer.Option(
-        help="free_run, inverse_dynamics, restarts, closed_loop or prescribed_motion.",
-        metavar="MODE",
-        show_default=True,
-    ),
-]
 Integrator = Annotated[
     str,
     typer.Option(

@@ -41,7 +41,6 @@ class Equations:
     commands: tuple[str, ...]
     channels: tuple[str, ...]
     state_units: tuple[str, ...]
-    command_units: tuple[str, ...]
     channel_units: tuple[str, ...]
     #: Symbols, shapes (nx,) and (nu,).
     x: Expression
@@ -62,7 +61,6 @@ def equations(model: Model) -> Equations:
         commands=commands,
         channels=tuple(model.output_channels),
         state_units=tuple(model.state_units),
-        command_units=tuple(model.channel_unit(name) for name in commands),
         channel_units=tuple(model.channel_unit(name) for name in model.output_channels),
         x=x,
         u=u,
