@@ -15,11 +15,6 @@ from vpm.optimise.task import Fitted, Limit
 LOOKS, HAIR = 1001, 1e-3
 
 
-def binding(channels: Channels, task: Fitted, motion: MeshMotion) -> tuple[str, ...]:
-    """Kept limits that hold the motion back, with the share of their phase."""
-    return tuple(_held(channels, task, motion))
-
-
 def passed(channels: Channels, task: Fitted, motion: MeshMotion) -> tuple[str, ...]:
     """Limits that the motion has not kept between points, with by how much."""
     found = []
@@ -36,7 +31,8 @@ def passed(channels: Channels, task: Fitted, motion: MeshMotion) -> tuple[str, .
     return tuple(found)
 
 
-def _held(channels: Channels, task: Fitted, motion: MeshMotion) -> Iterator[str]:
+def binding(channels: Channels, task: Fitted, motion: MeshMotion) -> Iterator[str]:
+    """Kept limits that hold the motion back, with the share of their phase."""
     for phase, limit, course in _courses(channels, task, motion):
         for word, end in (("least", limit.least), ("most", limit.most)):
             if not math.isfinite(end) or limit.least == limit.most:

@@ -115,7 +115,7 @@ def _optimum(models: tuple[Model, Model], name: str, found: Search) -> Optimum:
         intervals=sum(mesh.size - 1 for mesh in motion.meshes),
         rounds=found.rounds,
         iterations=found.iterations,
-        binding=binding(channels, found.task, motion),
+        binding=tuple(binding(channels, found.task, motion)),
         played={},
         played_in_full={},
         notes=(*found.notes, *passed(channels, found.task, motion)),

@@ -260,7 +260,7 @@ def _why(found: Search, run: _Run) -> str:
     if not missed:
         return f"the search ended with {run.status}, though motions exist; give more intervals or other limits of time"
     what, unit, there, wanted = missed[0]
-    held = binding(found.channels, found.task, soft.motion)
+    held = tuple(binding(found.channels, found.task, soft.motion))
     limits = f", and {' and '.join(held)}" if held else ""
     unit = "" if unit == "1" else f" {unit}"
     return (

@@ -104,10 +104,8 @@ def _learnt(model: Model, drive: str, taught: Sequence[Record], step: float) -> 
 
 
 def tables(
-    model: Model,
-    taught: Sequence[Mapping[str, Array]],
-    runs: Callable[[Model], Sequence[Run]],
-) -> tuple[Replacement, ...]:
+    model: Model, taught: Sequence[Mapping[str, Array]], runs: Callable[[Model], Sequence[Run]]
+) -> Iterator[Replacement]:
     """A table for each servo-cylinder that one can be read of.
 
     Where its valve has no clearance, that one is taken with which the quasi-static drive moves most like the full one.
@@ -115,12 +113,6 @@ def tables(
     - ``taught``: each of shape (N,), what it does on the records to learn from
     - ``runs``: what another model does on these
     """
-    return tuple(_read(model, taught, runs))
-
-
-def _read(
-    model: Model, taught: Sequence[Mapping[str, Array]], runs: Callable[[Model], Sequence[Run]]
-) -> Iterator[Replacement]:
     for drive in hydraulic_drives(model):
         channel = model.rate_channel(drive)
         fastest = SPARE * max(float(np.max(np.abs(each[channel]))) for each in taught)

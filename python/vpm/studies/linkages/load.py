@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from os import PathLike
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TypeVar
 
 from vpm.errors import ModelError, UnitError, near_match
 from vpm.model.reading import read_toml
@@ -14,6 +14,7 @@ from vpm.studies.linkages.leg_parameters import Attachment, Cylinder, LegParamet
 from vpm.units import convert
 
 TYPES = ("karl", "leg")
+Found = TypeVar("Found")
 
 
 class _Table:
@@ -52,19 +53,19 @@ class _Table:
             self._refuse(key, "has to be text in quotes")
         return value
 
-    def finish(self) -> None:
-        """Refuse keys that loading did not ask for."""
+    def whole(self, found: Found) -> Found:
+        """Give what was loaded of a table; keys that nothing asked for are refused."""
         for key in self.content:
             if key not in self.asked:
                 self._refuse(key, f"is not a known key; {near_match(key, self.asked)}")
+        return found
 
     def _value(self, key: str, unit: str) -> object:
         value = self._get(key)
         if isinstance(value, Mapping):
             inner = _Table(value, self.path, self._place(key))
             given, self._unit = inner._get("value"), inner.text("unit", unit)
-            inner.finish()
-            return given
+            return inner.whole(given)
         self._unit = unit
         return value
 
@@ -134,8 +135,7 @@ def _karl(table: _Table, name: str) -> Karl:
         distal_anchor=table.pair("distal_anchor", "m"),
         rods=table.pair("rods", "m"),
     )
-    table.finish()
-    return Karl(geometry, name)
+    return Karl(table.whole(geometry), name)
 
 
 def _leg(table: _Table, name: str) -> Leg:
@@ -147,34 +147,20 @@ def _leg(table: _Table, name: str) -> Leg:
         knee=_cylinder(table.table("knee")),
         gravity=table.number("gravity", "m/s^2"),
     )
-    table.finish()
-    return Leg(parameters, name)
+    return Leg(table.whole(parameters), name)
 
 
 def _segment(table: _Table) -> Segment:
-    segment = Segment(
-        table.number("length", "m"),
-        table.number("mass", "kg"),
-        table.number("inertia", "kg m^2"),
-        table.pair("center", "m"),
-    )
-    table.finish()
-    return segment
+    length, mass, inertia = table.number("length", "m"), table.number("mass", "kg"), table.number("inertia", "kg m^2")
+    return table.whole(Segment(length, mass, inertia, table.pair("center", "m")))
 
 
 def _cylinder(table: _Table) -> Cylinder:
-    attachment = Attachment(
-        table.number("base", "m"),
-        table.number("base_angle", "rad"),
-        table.number("tip", "m"),
-        table.number("tip_angle", "rad"),
-    )
-    cylinder = Cylinder(attachment, _part(table.table("barrel")), _part(table.table("rod")))
-    table.finish()
-    return cylinder
+    units = {"base": "m", "base_angle": "rad", "tip": "m", "tip_angle": "rad"}
+    attachment = Attachment(*(table.number(key, unit) for key, unit in units.items()))
+    return table.whole(Cylinder(attachment, _part(table.table("barrel")), _part(table.table("rod"))))
 
 
 def _part(table: _Table) -> LegPart:
-    part = LegPart(table.number("mass", "kg"), table.number("center", "m"), table.number("inertia", "kg m^2"))
-    table.finish()
-    return part
+    units = {"mass": "kg", "center": "m", "inertia": "kg m^2"}
+    return table.whole(LegPart(*(table.number(key, unit) for key, unit in units.items())))
