@@ -46,7 +46,7 @@ def check(
         if channels is None and (importer := importer_of(model)) is not None:
             raise ModelError(f"{model} is read by {importer}, so no table can be put into it; name one with --channels")
         probe_file(channels or model)
-    machine, records = load_all(model, logs, channels, interpolate)
+    machine, records, _ = load_all(model, logs, channels, interpolate)
     table = _table(machine, channels, logs[0])
     with searching() as (_, each):
         found = check_log(

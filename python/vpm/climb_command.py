@@ -42,8 +42,7 @@ def climb(
     from vpm.climb import climb as find_level
     from vpm.simulate import Setup
 
-    machine, records = load_all(model, log, channels, interpolate)
-    validation = load_all(model, validate, channels, interpolate)[1]
+    machine, records, validation = load_all(model, log, channels, interpolate, validate)
     with progress() as tell:
         found = find_level(
             machine,

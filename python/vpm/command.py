@@ -130,10 +130,13 @@ def load_pair(model: Path, log: Path, channels: Path | None, interpolate: bool) 
     return machine, load_record(log, machine, channels, interpolate)
 
 
-def load_all(model: Path, logs: list[Path], channels: Path | None, interpolate: bool) -> tuple[Model, list[Experiment]]:
-    """Model and several records of the files that a command names."""
+def load_all(
+    model: Path, logs: list[Path], channels: Path | None, interpolate: bool, unseen: list[Path] | None = None
+) -> tuple[Model, list[Experiment], list[Experiment]]:
+    """Model, records of the files that a command names, and those that judge it, if it names any."""
     machine = load_model(model)
-    return machine, [load_record(log, machine, channels, interpolate) for log in logs]
+    every = [load_record(log, machine, channels, interpolate) for log in (*logs, *(unseen or ()))]
+    return machine, every[: len(logs)], every[len(logs) :]
 
 
 class _Lines:

@@ -23,7 +23,6 @@ from vpm.command import (
     Workers,
     console,
     load_all,
-    load_record,
     searching,
     to_try,
 )
@@ -79,8 +78,7 @@ def diagnose(
     from vpm.simulate import Setup
 
     tried = to_try(effect, without)
-    machine, records = load_all(model, logs, channels, interpolate)
-    validation = [load_record(path, machine, channels, interpolate) for path in validate or []]
+    machine, records, validation = load_all(model, logs, channels, interpolate, validate)
     with searching() as (tell, each):
         diagnosis = find_missing(
             machine,

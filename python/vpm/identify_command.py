@@ -22,7 +22,6 @@ from vpm.command import (
     fillable,
     fitting,
     load_all,
-    load_record,
     save_plot,
     writable,
 )
@@ -122,8 +121,7 @@ def identify(
         most_evaluations=evaluations,
     )
     asked = settings != Fitting(workers=workers, seed=seed) or noise or loss
-    machine, records = load_all(model, logs, channels, interpolate)
-    unseen = [load_record(path, machine, channels, interpolate) for path in validate or []]
+    machine, records, unseen = load_all(model, logs, channels, interpolate, validate)
     setup = Setup(integrator, substeps, horizon, settling, hold)
     if check:
         _refuse(machine, [*records, *unseen], setup, workers)

@@ -20,7 +20,6 @@ from vpm.command import (
     Workers,
     console,
     load_all,
-    load_record,
     searching,
     to_try,
     writable,
@@ -71,8 +70,7 @@ def rank(
     from vpm.simulate import Setup
 
     tried = to_try(effect, without)
-    machine, records = load_all(model, logs, channels, interpolate)
-    held_out = [load_record(path, machine, channels, interpolate) for path in validate or []]
+    machine, records, held_out = load_all(model, logs, channels, interpolate, validate)
     with searching() as (tell, each):
         ranking = ranked(
             machine,

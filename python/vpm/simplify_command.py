@@ -44,8 +44,7 @@ def simplify(
     """Find the cheapest model that still tells the truth within a tolerance; exit code 1 if it misses the period."""
     from vpm.simplify import simplify as find_cheapest
 
-    machine, records = load_all(model, logs, channels, interpolate)
-    validation = load_all(model, validate, channels, interpolate)[1] if validate else None
+    machine, records, validation = load_all(model, logs, channels, interpolate, validate)
     machine = machine if level is None else machine.at(level)
     with progress() as tell:
         ladder = find_cheapest(
@@ -54,7 +53,7 @@ def simplify(
             rate=rate,
             tolerance=tolerance,
             share=share,
-            validate=validation,
+            validate=validation or None,
             against=against,
             mode=mode,
             channels=compare,
