@@ -4,7 +4,7 @@ Each place of a model where something can be simpler is a *site* with a list of 
 reduced model takes one change, or none, at each site.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -103,7 +103,7 @@ class Reduction(Storable):
 VELOCITY_TERMS, COUPLING_TERMS = (Reduction("terms", name, MACHINE) for name in ("velocity", "coupling"))
 
 
-def reductions(model: Model, learnt: Sequence[Reduction] = ()) -> dict[tuple[str, str], tuple[Reduction, ...]]:
+def reductions(model: Model, learnt: Iterable[Reduction] = ()) -> dict[tuple[str, str], tuple[Reduction, ...]]:
     """Reductions of a model that are possible, by site.
 
     ``learnt``: more of them, which records tell: `vpm.simplify.surrogates`.
