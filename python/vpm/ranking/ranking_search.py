@@ -62,28 +62,29 @@ class Search(Trials):
                     looks = smooth
                     continue
                 before.append(places)
+                was = looks
                 looks, together = several_at_once(self, looks, best, tried)
                 rounds.append(self.listed(None if together else best, tried))
-                if together:
-                    rounds += together
-                    named |= {_place(ranked): ranked for ranked, *_ in together}
-                    continue
-                if best is None:
+                rounds += together
+                if best is None and not together:
                     break
-                named[_place(rounds[-1][0])] = rounds[-1][0]
-                was, looks = looks, [self.look(best.fitted)]  # known, should the next fits be interrupted
-                self.say(f"{best.label} {best.removing}")
-                looks = self.all_looks(looks[0])
+                added = together or rounds[-1:]
+                named |= {_place(ranked): ranked for ranked, *_ in added}
+                if best is not None and not together:
+                    looks = [self.look(best.fitted)]  # known, should the next fits be interrupted
+                    self.say(f"{best.label} {best.removing}")
+                    looks = self.all_looks(looks[0])
                 for one in there:
                     looks, several = self._reconsidered(one, looks)
                     if several:
                         rounds.append(several)
                         named[_place(several[0])] = several[0]
                 if _is_worse(looks, was):
-                    self.say(f"{best.label} does not do the work of what it makes needless")
+                    names = " and ".join(ranked.effect for ranked, *_ in added)
+                    self.say(f"{names} does not do the work of what it makes needless")
                     looks = was
                     break
-                if present:
+                if best is not None and not together and present:
                     looks = self._out_of_a_dead_end(best, looks)
             looks, rounds = self._plainer(looks, rounds, named)
         except KeyboardInterrupt:
@@ -136,7 +137,7 @@ class Search(Trials):
         found = best.fitted.structure
         recalibrated = next(iter(self.first.values())).fitted.structure.repaired
         hold = self.fitter.tracked.setup.course
-        effects = tuple(_named(named, one) for one in found.added)
+        effects = tuple(_named(named, one, found.values) for one in found.added)
         return Ranking(effects, tuple(rounds), found.repaired, recalibrated, {}, interrupted, hold, self._notes(best))
 
     def _foresight(self, structure: Structure, looks: Sequence[Look]) -> float:
@@ -326,11 +327,12 @@ def _place(ranked: Ranked) -> _Place:
     return *ranked.key, ranked.side
 
 
-def _named(named: Mapping[_Place, Ranked], effect: Effect) -> Ranked:
-    """Ranked effect of a searched structure; what split its joint may have taken it to another side since."""
-    own = named.get((effect.name, effect.at, effect.side))
+def _named(named: Mapping[_Place, Ranked], effect: Effect, values: Mapping[str, float]) -> Ranked:
+    """Ranked effect of a searched structure at its ``values``; what split its joint may have changed its side since."""
     same = [one for one in named.values() if one.key == (effect.name, effect.at)]
-    return replace(own or same[-1], side=effect.side)
+    own = named.get((effect.name, effect.at, effect.side)) or same[-1]
+    now = {name: values.get(name, value) for name, value in own.values.items()}
+    return replace(own, side=effect.side, values=now)
 
 
 def _is_worse(now: Sequence[Look], before: Sequence[Look]) -> bool:

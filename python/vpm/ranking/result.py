@@ -110,7 +110,7 @@ class Ranking(Result):
     Attributes
     ----------
     effects : tuple of Ranked
-        What was added.
+        What was added, at the values of the model.
     rounds : tuple of tuple of Ranked
         All that was fitted beside what had been found before, the best first.
     model : Model
