@@ -43,6 +43,7 @@ def test_what_noise_hides_is_no_evidence_that_nothing_is_missing(floor: float, s
         "arm_bending.position": ChannelGap(1.0, 1.0, 1.0, 1.0, "rad", SIGNAL, "inverse_dynamics"),
     }
     assert ("Nothing is said of servo.pressure_a: noise" in _unheard(gap, model)) is said
+    assert ("More is left of servo.pressure_a than noise" in _unheard(gap, model)) is not said
 
 
 @pytest.mark.parametrize(("after", "word"), [(0.1, "effect_found"), (0.9, "unexplained")])

@@ -41,6 +41,11 @@ _NOISE = (
     " Nothing is said of {channels}: noise of the records would leave as much with the right model. A finer sensor of "
     "the motion would show more."
 )
+#: The same of channels with more than noise leaves.
+_PATTERNLESS = (
+    " More is left of {channels} than noise of the records leaves, but with no pattern that repeats: something outside "
+    "the machine acted that no log holds, or a sensor is noisier than it looks."
+)
 
 
 def main_gaps(gap: Mapping[str, ChannelGap]) -> list[ChannelGap]:
@@ -266,20 +271,18 @@ def _nothing_missing(
 
 
 def _unheard(gap: Mapping[str, ChannelGap], model: Model) -> str:
-    """Sentence of the verdict that nothing is missing on channels of which noise hides most, or "".
+    """Sentences of the verdict that nothing is missing on channels of which most is left, or "".
 
     Chambers integrate the noise of the motion, which may leave more of a pressure than the machine makes it change. A
     deflection of what the model takes for rigid is no such channel: noise alone is what it then should show.
     """
-    lost = [
-        name
+    left = {
+        name: g.after <= FLOOR_FACTOR * g.noise_floor
         for name, g in gap.items()
-        if g.mode == "inverse_dynamics"
-        and name not in model.deflections
-        and g.after**2 > MOSTLY_OPEN * g.signal**2
-        and g.after <= FLOOR_FACTOR * g.noise_floor
-    ]
-    return _NOISE.format(channels=", ".join(lost)) if lost else ""
+        if g.mode == "inverse_dynamics" and name not in model.deflections and g.after**2 > MOSTLY_OPEN * g.signal**2
+    }
+    pairs = ((_NOISE, [name for name in left if left[name]]), (_PATTERNLESS, [name for name in left if not left[name]]))
+    return "".join(sentence.format(channels=", ".join(names)) for sentence, names in pairs if names)
 
 
 def _doubt(nominal: Model, ranked: Model | None, recalibrated: Judged, *final: Judged) -> str:
