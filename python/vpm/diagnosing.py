@@ -16,7 +16,15 @@ from vpm.discrepancy.diagnosis_fields import examined, gaps_of, of_search, pictu
 from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.noise.sensor_drift import Drift, sensor_drifts, without_drifts
 from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
-from vpm.discrepancy.preparation import Records, begun_anywhere, data_of, nominal_of, recalibrated_of, records_of
+from vpm.discrepancy.preparation import (
+    Records,
+    begun_anywhere,
+    beyond_training,
+    data_of,
+    nominal_of,
+    recalibrated_of,
+    records_of,
+)
 from vpm.discrepancy.provenance import own_settings, provenance
 from vpm.discrepancy.ranked_effects import NoResidualError, tracker_gaps
 from vpm.discrepancy.remainder.empirical_formula import beside
@@ -237,7 +245,8 @@ def diagnosed(
     bare = _without_sensor(model, records[0])
     blind = [NO_SENSOR.format(channels=", ".join(bare))] if bare and diagnosis.verdict == "unexplained" else []
     summary = diagnosis.summary + _or_late_readings(model, diagnosis, bare)
-    return replace(diagnosis, summary=summary, notes=(*odd, *diagnosis.notes, *blind))
+    far = beyond_training(model, *records[:2]) if validate else []
+    return replace(diagnosis, summary=summary, notes=(*odd, *far, *diagnosis.notes, *blind))
 
 
 def _without_sensor(model: Model, records: Sequence[Experiment]) -> list[str]:

@@ -50,7 +50,7 @@ def records_of(model: Model, experiments: Sequence[Experiment], validate: Sequen
     validation = tuple(joints_from_sensors(record, model) for record in validate)
     if validation:
         check_stuck(model, validation)
-        return training, validation, beyond_training(model, training, validation)
+        return training, validation, []
     pairs = [e.split(1.0 - HELD_OUT) for e in training]
     note = f"no validation record was given: the last {100 * HELD_OUT:.0f} % of each record was kept out of the fit"
     return tuple(p[0] for p in pairs), tuple(p[1] for p in pairs), [note]
