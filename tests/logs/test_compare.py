@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from command_line import ran
 from vpm import demo
 from vpm.compare import Comparison, autocorrelation, compare, cross_correlation, effective_samples, write_mcap
+from vpm.compare.regions import time_region
 from vpm.errors import ExperimentError, MissingExtraError
 from vpm.experiment import Experiment
 from vpm.experiment.readers import open_log
@@ -225,6 +226,8 @@ def test_a_burst_is_found_in_its_slice_of_time() -> None:
     assert (region.worst.low, region.worst.high) == pytest.approx((8.0, 9.0), abs=0.01)
     assert region.worst.share > 0.99
     assert region.sentence == "100 % of the residual's energy lies between 8 and 9 s, 5 % of the time."
+    later = time_region(residual, 1.7e9 + np.arange(residual.size) / RATE)  # the clock of a computer
+    assert "lies between 8 and 9 s from the first sample, 5 %" in later.sentence
 
 
 def test_a_tone_is_found_in_its_octave() -> None:

@@ -93,9 +93,11 @@ class Where(Storable):
 
 
 def time_region(residual: Array, time: Array) -> Region:
-    """Region by time: shares of 20 equal slices."""
-    bins = _bins(residual, time, np.linspace(time.min(), time.max(), TIME_SLICES + 1))
-    return Region("time", "s", bins, _concentration(bins, "s", "of the time"))
+    """Region by time: shares of 20 equal slices, counted from the first sample, whatever the clock shows there."""
+    since = time - time.min()
+    bins = _bins(residual, since, np.linspace(0.0, since.max(), TIME_SLICES + 1))
+    unit = "s" if time.min() == 0.0 else "s from the first sample"
+    return Region("time", "s", bins, _concentration(bins, unit, "of the time"))
 
 
 def restart_region(residual: Array, since: Array) -> Region:

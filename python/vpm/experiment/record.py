@@ -288,8 +288,8 @@ class Experiment(Result):
         kept = (self.time >= first - slack) & (self.time <= last + slack)
         if kept.sum() < FEWEST_SAMPLES:
             raise ExperimentError(
-                f"{self.name}: {kept.sum()} samples lie between {first:g} s and {last:g} s, and at least "
-                f"{FEWEST_SAMPLES} are needed; the record goes from {self.time[0]:g} s to {self.time[-1]:g} s"
+                f"{self.name}: {kept.sum()} samples lie between {first:.12g} s and {last:.12g} s, and at least "
+                f"{FEWEST_SAMPLES} are needed; the record goes from {self.time[0]:.12g} s to {self.time[-1]:.12g} s"
             )
         time = self.time[kept]
         return self._changed(

@@ -147,9 +147,9 @@ def _joint(p: Picture, number: int, last: str) -> Iterator[Drawn]:
         f"{name}: over time",
         f"First validation record: effort as measured and as the model needs it, {' and '.join(stages)}; below, the "
         f"residual.{masked}",
-        f"Effort and residual of {p.channel} over {short(float(p.time[0]))} to {short(float(p.time[-1]))} s. Residual, "
+        f"Effort and residual of {p.channel} over {short(float(p.time[-1] - p.time[0]))} s. Residual, "
         f"root mean square: {sizes}; largest at the end {short(float(p.after[worst]))} {p.unit} at "
-        f"{short(float(p.time[worst]))} s.{masked}",
+        f"{short(float(p.time[worst] - p.time[0]))} s.{masked}",
         plot_joint_over_time(p, stages),
         joint=True,
     )
