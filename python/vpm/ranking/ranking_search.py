@@ -64,13 +64,13 @@ class Search(Trials):
                 before.append(places)
                 was = looks
                 looks, together = several_at_once(self, looks, best, tried)
-                rounds.append(self.listed(None if together else best, tried))
-                rounds += together
+                best = None if together else best
+                rounds += [self.listed(best, tried), *together]
                 if best is None and not together:
                     break
                 added = together or rounds[-1:]
                 named |= {_place(ranked): ranked for ranked, *_ in added}
-                if best is not None and not together:
+                if best is not None:
                     looks = [self.look(best.fitted)]  # known, should the next fits be interrupted
                     self.say(f"{best.label} {best.removing}")
                     looks = self.all_looks(looks[0])
@@ -84,7 +84,7 @@ class Search(Trials):
                     self.say(f"{names} does not do the work of what it makes needless")
                     looks = was
                     break
-                if best is not None and not together and present:
+                if best is not None and present:
                     looks = self._out_of_a_dead_end(best, looks)
             looks, rounds = self._plainer(looks, rounds, named)
         except KeyboardInterrupt:
@@ -250,7 +250,7 @@ class Search(Trials):
             tried += [*(trial for trial in ends if not trial.counts), *seen]
             counting += [trial for trial in ends if trial.counts]
             if any(trial.look.leaves_little(trial.fitted) for trial in counting):
-                break  # what another tracker shows beside it the next round asks for
+                break  # the next round looks under all trackers again
         told: list[Trial] = []
         counting += self._counting_elsewhere(counting)
         while counting:
