@@ -135,7 +135,7 @@ def main() -> None:
     except BrokenPipeError:
         _let_go(sys.stdout)
         code = 1
-    except Exception as error:  # noqa: BLE001  # a library that was being loaded may make one of Ctrl-C
+    except BaseException as error:  # noqa: BLE001  # also a panic, and what libraries that load make of Ctrl-C
         code = 1
         if not pressed.is_set():
             _tell_unexpected(error)
@@ -144,13 +144,14 @@ def main() -> None:
     if pressed.is_set():
         errors.print(STOPPED)
         code = INTERRUPTED
+        exec("")  # noqa: S102  # clears a flag: `python -m` kills itself where Ctrl-C came in such a call
     if console.trouble or errors.trouble or notes.trouble:
         _tell_unwritten()
         code = code or 1
     sys.exit(code)
 
 
-def _tell_unexpected(error: Exception) -> None:
+def _tell_unexpected(error: BaseException) -> None:
     if asked(sys.argv[1:]).verbose:
         errors.print("".join(format_exception(error)), markup=False)
     errors.print(f"error: {unexpected(error)}", markup=False)

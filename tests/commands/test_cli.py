@@ -368,3 +368,45 @@ def test_interrupting_a_long_command_ends_it_at_once() -> None:
     assert sum(os.times()[2:4]) - others - before < 10.0
     assert process.returncode == 130
     assert "Traceback" not in err
+
+
+#: A command that does something else than a command of vpm.
+ANOTHER = """
+import os
+from vpm import cli
+
+class Panic(BaseException): ...
+
+def pressed():
+    try:
+        os.kill(os.getpid(), 2)
+    except KeyboardInterrupt as reason:
+        raise Panic from reason
+
+def panic():
+    raise Panic("index out of bounds")
+
+cli.app = lambda: {command}
+cli.main()
+"""
+
+
+def another(command: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    (folder / "another.py").write_text(ANOTHER.format(command=command))
+    return subprocess.run(
+        [sys.executable, "-m", "another"], cwd=folder, capture_output=True, text=True, check=False, timeout=60
+    )
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals of another kind")
+@pytest.mark.parametrize("command", ["exec('raise KeyboardInterrupt')", "pressed()"])
+def test_what_libraries_make_of_ctrl_c_ends_with_its_exit_code(command: str, tmp_path: Path) -> None:
+    """Python kills itself where Ctrl-C comes in `exec`, as libraries call it; a panic is no `Exception`."""
+    done = another(command, tmp_path)
+    assert (done.returncode, done.stderr) == (130, "stopped by Ctrl-C\n")
+
+
+def test_a_panic_of_the_core_is_one_sentence(tmp_path: Path) -> None:
+    done = another("panic()", tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.startswith("error: vpm met an unexpected Panic (index out of bounds)")

@@ -19,6 +19,9 @@ mod system;
 /// The compiled core of vpm: a machine as one object, arrays in and out.
 #[pymodule]
 mod _core {
+    use numpy::PyArray1;
+    use pyo3::prelude::*;
+
     #[pymodule_export]
     use crate::dynamics::Dynamics;
     #[pymodule_export]
@@ -39,4 +42,12 @@ mod _core {
     use crate::stepping::{Simulation, Snapshot, check_integrator, step_all};
     #[pymodule_export]
     use crate::system::System;
+
+    /// Look up what arrays need of NumPy at once: the look-up panics where Ctrl-C comes in the midst of it.
+    #[pymodule_init]
+    fn ready(module: &Bound<'_, PyModule>) -> PyResult<()> {
+        module.py().import("numpy")?;
+        PyArray1::<f64>::zeros(module.py(), 0, false);
+        Ok(())
+    }
 }
