@@ -144,3 +144,33 @@ def test_what_takes_nearly_all_of_the_error_counts_though_few_pieces_show_it() -
     met_twice = Judgement(removed=0.999, least=0.99, score=1.4, size=0.9, beside=1.0, shape=1.0)
     assert met_twice.counts(Settings())
     assert not replace(met_twice, least=0.5).counts(Settings())
+
+
+def stopped(**end: float) -> Model:
+    """The rig with a stop ahead of the end of its moves."""
+    return rig(transition_velocity=2e-4).with_effect("end_stop", "axis", **{"damping": 2.0, "high": 0.032, **end})
+
+
+def test_derivatives_of_few_steps_are_those_of_the_machine() -> None:
+    """Where sharp dry friction meets oil, few steps within a sample are stable, and their derivatives grow to 1e80."""
+    model, dry = stopped(stiffness=2e5), "axis.friction.coulomb"
+    fitter = Fitter(TrackedRecords(model, [logged(model, currents(), 1, drive=3e-5)], Settings()), Settings())
+    structure = Structure(model, model.theta, {dry: Prior(20.0, 5.0, 0.0, np.inf)})
+    followed = fitter.followed(structure, Tracker(1.0), [dry])
+    more = structure.at(structure.standard + 0.01)
+    change = fitter.followed(more, Tracker(1.0), []).residual - followed.residual
+    np.testing.assert_allclose(
+        np.std(followed.jacobian[:, :, 0] * (more.theta - model.theta)[model.index(dry)], axis=0),
+        np.std(change, axis=0),
+        rtol=0.2,
+    )
+
+
+def test_oil_that_noise_of_a_drive_moves_hides_no_stop() -> None:
+    """Drawn too slowly it gives way to what is missing: the stop had a third of its damping."""
+    machine = rig().with_effect("end_stop", "axis", stiffness=2e5, damping=2.0, high=0.032)
+    record = logged(machine, currents(), 2, drive=3e-5, gauge=1e4)
+    ranking = vpm.rank(rig(), record, effects=["end_stop", "bias_force", "quadratic_drag"])
+    (stop,) = ranking.effects
+    assert stop.effect == "end_stop"
+    assert stop.values["axis.end_stop.damping"] == pytest.approx(2.0, rel=0.1)

@@ -185,8 +185,15 @@ class Fitter:
                 residual, _ = self._pass(structure, tracker)
             with contextlib.suppress(*ASTRAY):  # contacts may be too stiff for few steps
                 _, jacobian = self._pass(structure, tracker.coarse, by)
-                return Followed(structure, tracker, tuple(names), residual, jacobian)
+                if not self._is_unstable(structure, tracker, by, residual - self.offset, jacobian):
+                    return Followed(structure, tracker, tuple(names), residual, jacobian)
         return Followed(structure, tracker, tuple(names), *self._pass(structure, tracker, by))
+
+    def is_wild(self, coarse: Followed, fitted: Fitted) -> bool:
+        """Whether derivatives by few steps move a fit farther than its records move, and a move by fine ones less."""
+        structure = fitted.structure
+        by = [structure.place(name) for name in coarse.names], structure.moves(coarse.names)
+        return self._is_unstable(structure, fitted.tracker, by, fitted.residual - self.offset, coarse.jacobian)
 
     def unfitted(self, structure: Structure, tracker: Tracker, view: View | None = None) -> Fitted:
         """Structure as it is in the place of a fit, with its cost under a view or under white noise of its own.
@@ -310,10 +317,10 @@ class Fitter:
         return residual + self.offset, jacobian
 
     def _is_unstable(self, structure: Structure, tracker: Tracker, by: By, residual: Array, jacobian: Array) -> bool:
-        """Whether approximate derivatives of a fit move the model farther than the records move, and a move does not.
+        """Whether derivatives of a fit move the model farther than the records move, and a tracker moves it less.
 
         Steps that pass a sharp bend of dry friction are stable. Derivatives that take their matrices as constant are
-        not, and grow there from step to step without end.
+        not, and grow there from step to step without end. So do exact ones of few steps where a stop meets oil.
         """
         columns, moves = by
         if moves is None or not columns:

@@ -63,10 +63,12 @@ class Look:
         self._offsets: dict[int, Array] = {}
 
     def _followed(self, fitted: Fitted) -> Followed:
-        """Residual of a look with all derivatives, by few integration steps where contacts allow it."""
+        """Residual of a look with all derivatives, by few integration steps where contacts and friction allow it."""
         names = tuple(fitted.structure.priors)
         with contextlib.suppress(*ASTRAY):
-            return self._fitter.followed(fitted.structure, fitted.tracker.coarse, names)
+            coarse = self._fitter.followed(fitted.structure, fitted.tracker.coarse, names)
+            if not self._fitter.is_wild(coarse, fitted):
+                return coarse
         return self._fitter.followed(fitted.structure, fitted.tracker, names, fitted.residual)
 
     @cached_property
