@@ -348,12 +348,14 @@ class System:
         hold: str = ...,
         alone: bool = ...,
         moves: ArrayLike | None = ...,
+        innovations: bool = ...,
     ) -> tuple[Array, Array, Array]:
         """Follow ``readings`` (N, m) with given ``gains`` (N, nx * m); as `simulate`, before each correction.
 
         Derivatives (N, m, k) are those of the measured outputs alone; outputs are, too, where ``alone``. They are those
         of the steps. Where ``moves`` (k,) tell by how much each parameter may be moved for a difference, approximate
-        ones do where they take less time: differences, or derivatives of the equations to the order of the steps.
+        ones do where they take less time: differences, or derivatives of the equations to the order of the steps. Where
+        readings are ``innovations``, outputs and these are what sensors show.
         """
     def answers(
         self,

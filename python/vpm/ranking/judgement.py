@@ -37,6 +37,8 @@ class Judgement(Storable):
         tracker alone.
     overtone : bool
         Whether it repeats along a whole fraction of the period of another effect at its place.
+    explained : float
+        Share of the error power that it explains: of the error and not of its mirror image.
     reshaped : str
         An effect of the same curve that was found before and does as well by another shape of its law; "" if none does.
     timed : str
@@ -51,6 +53,7 @@ class Judgement(Storable):
     shape: float
     alone: float = 0.0
     overtone: bool = False
+    explained: float = 1.0
     reshaped: str = ""
     timed: str = ""
 
@@ -106,6 +109,11 @@ class Judgement(Storable):
             )
         if self.overtone:
             return "it repeats along a whole fraction of the period of another effect there, and is an overtone of that"
+        if self.explained <= settings.worth:
+            return (
+                f"it {self.words}, and as much of that of its mirror image: it answers otherwise to noise, "
+                "and explains nothing"
+            )
         if self.reshaped:
             return f"{self.reshaped} does as well by another shape of its law"
         if self.timed:

@@ -18,6 +18,7 @@ from vpm.ranking.judgement import Judgement
 from vpm.ranking.model_structure import Structure, approximate
 from vpm.ranking.noise_model import white_noise
 from vpm.ranking.settings import NEXT_START, PARTS, SURE
+from vpm.ranking.tracked_records import TrackedRecords
 
 
 class Look:
@@ -241,6 +242,26 @@ class Look:
         if key is None or not ended or not judgement.is_faint(self.settings, PARTS):
             return judgement
         return replace(judgement, score=max(score, self._score_of_all(fitted, left[1])))
+
+    def explained_by(self, trial: Fitted, judgement: Judgement) -> Judgement:
+        """Judgement in a look of what another structure explains of the error, and not of its mirror image.
+
+        What removes the error adds to its mirror image: where ``s`` is removed of ``e``, ``|e + s|^2 - |e - s|^2`` is
+        four times their product. A structure that answers to noise otherwise leaves as much of both.
+        """
+        own = trial.structure
+        with contextlib.suppress(*ASTRAY):
+            mirrored, _ = self._mirrored.follow(own.model, own.theta, trial.tracker)
+            real, other = (self._ratio(self.left, self._squares(one)) for one in (trial.residual, mirrored))
+            told = np.minimum((other - real) / 4.0, 1.0)
+            return replace(judgement, explained=1.0 - float(np.prod(1.0 - told)))
+        return judgement
+
+    @cached_property
+    def _mirrored(self) -> TrackedRecords:
+        """Records of which a look's structure leaves the mirror image of its error."""
+        own = self.fitted.structure
+        return self._fitter.tracked.mirrored(own.model, own.theta, self.fitted.tracker, self.fitted.residual)
 
     def _score_of_all(self, fitted: Fitted, left: Array) -> float:
         """Score in a look by cross-validation over all parts of the record.

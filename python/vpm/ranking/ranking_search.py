@@ -16,7 +16,6 @@ from vpm.ranking.choice_by_evidence import evidence, weighed
 from vpm.ranking.command_timing import against_timing
 from vpm.ranking.disturbed_records import disturbed
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
-from vpm.ranking.free_shape import against_free_shapes
 from vpm.ranking.judgement import Judgement
 from vpm.ranking.look import Look
 from vpm.ranking.model_structure import Structure
@@ -246,7 +245,7 @@ class Search(Trials):
             if not look.has_room():
                 continue
             seen = self.tried(look, start)
-            ends = [against_free_shapes(trial, self.fitter) for trial in self.finished(seen) if trial.counts]
+            ends = [self.examined(trial) for trial in self.finished(seen) if trial.counts]
             tried += [*(trial for trial in ends if not trial.counts), *seen]
             counting += [trial for trial in ends if trial.counts]
             if any(trial.look.leaves_little(trial.fitted) for trial in counting):
@@ -275,7 +274,7 @@ class Search(Trials):
         there = {trial.key for trial in counting if trial.look is first.look}
         missing = {trial.key: trial.fitted.structure for trial in counting if trial.key not in there}
         ends = self.in_its_place(first.look, list(missing.values()))
-        return [trial for trial in (against_free_shapes(end, self.fitter) for end in ends) if trial.counts]
+        return [trial for trial in (self.examined(end) for end in ends) if trial.counts]
 
     def _out_of_a_dead_end(self, last: Trial, looks: list[Look]) -> list[Look]:
         """Search without its last effect, if that only led the fit of others out of a dead end."""
@@ -305,7 +304,7 @@ class Search(Trials):
                 return looks, ()
             now = Trial.of(look.fitted, bare[-1], key)
             trials = (now, *self.in_its_place(bare[-1], self.others.get(key, ())))
-            told = [against_free_shapes(trial, self.fitter) for trial in trials if trial.counts]
+            told = [self.examined(trial) for trial in trials if trial.counts]
             counting = [trial for trial in told if trial.counts]
             if counting or now.judgement.least > self.settings.clear:
                 return self._exchanged(now, counting or [now], looks)

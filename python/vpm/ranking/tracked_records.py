@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import contextlib
 import copy
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import TypeAlias
 from weakref import WeakKeyDictionary
@@ -334,13 +334,11 @@ class TrackedRecords:
         (len(columns),) tell by how much each of these numbers may be moved for a difference.
         """
         own = len(model.theta)
-        firsts = self.firsts if len(theta) > own else HiddenFirstStates()
-        shifts = theta[own:].reshape(len(self.records), len(firsts.states))
+        firsts = self._firsts_of(model, theta)
         places, by = among_parameters(own, columns, moves)
         residuals: list[Array] = []
         slopes: list[Array] = []
-        for record, begun, shift in zip(self.records, self._begun(model), shifts, strict=True):
-            start = firsts.added(model, begun, shift)
+        for record, start in zip(self.records, self._starts_of(model, theta), strict=True):
             outputs, _, slope = self._run(model, theta[:own], tracker, by, record, start)
             whole = np.zeros((*outputs.shape, len(columns)))
             whole[:, :, places] = -slope
@@ -350,14 +348,40 @@ class TrackedRecords:
                     moved = firsts.added(model, start, STEP * size * (np.arange(len(firsts.sizes)) == number))
                     others, _, _ = self._run(model, theta[:own], tracker, NOTHING, record, moved)
                     whole[:, :, columns.index(before + number)] = (outputs - others) / (STEP * size)
-            log = self.experiments[len(residuals)]
-            for place, channel in enumerate(record.channels):
-                if channel in log.read_at and channel not in self.drawn_to:
-                    outputs[:, place] = between_readings(log, channel, outputs[:, place])
-                    whole[:, place] = between_readings(log, channel, whole[:, place])
+            for place, told in self._told_slowly(self.experiments[len(residuals)], record):
+                outputs[:, place], whole[:, place] = told(outputs[:, place]), told(whole[:, place])
             residuals.append(record.readings - outputs)
             slopes.append(whole)
         return np.concatenate(residuals), np.concatenate(slopes)
+
+    def mirrored(self, model: Model, theta: Array, tracker: Tracker, residual: Array) -> TrackedRecords:
+        """Tracked records of which a model leaves the mirror image of the ``residual`` (N, m) that it leaves of these.
+
+        Law: a model in innovations form (T. Kailath, *IEEE Transactions on Automatic Control* 13, 1968), driven by its
+        innovations with the other sign (wild bootstrap; C. F. J. Wu, *The Annals of Statistics* 14, 1986).
+
+        Raises
+        ------
+        Diverged
+            The model runs away with these.
+        """
+        ends, own, records = np.cumsum([len(record.time) for record in self.records]), len(model.theta), []
+        logs = zip(ends, self.experiments, self.records, self._starts_of(model, theta), strict=True)
+        for end, log, record, start in logs:
+            other = replace(record, readings=-residual[end - len(record.time) : end])
+            outputs, _, _ = self._run(model, theta[:own], tracker, NOTHING, other, start, innovations=True)
+            for place, told in self._told_slowly(log, record):
+                outputs[:, place] = told(outputs[:, place])
+            records.append(replace(other, readings=other.readings + outputs))
+        mirrored = copy.copy(self)
+        mirrored.records = tuple(records)
+        return mirrored
+
+    def _told_slowly(self, log: Experiment, record: Record) -> Iterator[tuple[int, Callable[[Array], Array]]]:
+        """Channels of a tracked record that were read more slowly, with how their outputs are read."""
+        for place, channel in enumerate(record.channels):
+            if channel in log.read_at and channel not in self.drawn_to:
+                yield place, partial(between_readings, log, channel)
 
     def squares(self, residual: Array, noise: NoiseModel) -> tuple[Array, Array]:
         """Squares of a tracked residual (N, m) under a noise model: of fitted (n, m) and held-back samples."""
@@ -380,6 +404,16 @@ class TrackedRecords:
         if automatic and short > CONTROLLED * fewest and not model.levels:
             return f"adaptive({self.settings.exact:g})", 1
         return own, max(fewest, short)
+
+    def _firsts_of(self, model: Model, theta: Array) -> HiddenFirstStates:
+        """Unmeasured first states of tracked records that follow the parameters, if any do."""
+        return self.firsts if len(theta) > len(model.theta) else HiddenFirstStates()
+
+    def _starts_of(self, model: Model, theta: Array) -> Iterator[Array]:
+        """First states of tracked records with what ``theta`` tells of them."""
+        firsts = self._firsts_of(model, theta)
+        shifts = theta[len(model.theta) :].reshape(len(self.records), len(firsts.states))
+        return (firsts.added(model, *pair) for pair in zip(self._begun(model), shifts, strict=True))
 
     def _begun(self, model: Model) -> list[Array]:
         """First states of tracked records by the model's own values; a tracker soon forgets them.
@@ -407,10 +441,11 @@ class TrackedRecords:
         start: Array,
         *,
         alone: bool = True,
+        innovations: bool = False,
     ) -> tuple[Array, Array, Array]:
         """Outputs of a tracked record (N, m), states (N, nx) and derivatives ``by`` some numbers (N, m, k).
 
-        Outputs are those of its channels ``alone``, or all of the model.
+        Outputs are those of its channels ``alone``, or all of the model. Its readings may be ``innovations``.
         """
         known = [column for column, name in enumerate(record.channels) if name in model.output_channels]
         channels = [record.channels[column] for column in known]
@@ -432,6 +467,7 @@ class TrackedRecords:
             self.setup.course,
             alone=alone,
             moves=by[1],
+            innovations=innovations,
         )
         if alone and len(known) < len(record.channels):
             outputs, slopes = (_among(known, len(record.channels), one) for one in (outputs, slopes))

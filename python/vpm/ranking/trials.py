@@ -15,6 +15,7 @@ from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.ranking.choice_by_evidence import as_good, evidence, weighed
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
+from vpm.ranking.free_shape import against_free_shapes
 from vpm.ranking.look import Look
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.noise_model import fitted_noise
@@ -181,6 +182,10 @@ class Trials:
         ends = self.each("finishing", one_finished, _foremost(hopeful), lambda trial: trial.label)
         return [end for end in ends if isinstance(end, Trial)]
 
+    def examined(self, trial: Trial) -> Trial:
+        """Trial of the search that counts, asked what it explains of noise, and what other shapes would do."""
+        return against_free_shapes(trial.beside_mirror_image, self.fitter)
+
     def _detours(self, fitted: Fitted, view: View) -> list[Fitted]:
         """Fits of a splitting effect in the search, continued from where a faster tracker leads.
 
@@ -210,7 +215,7 @@ class Trials:
 
     def weighed_beside_others(self, key: Key, look: Look) -> Trial:
         """Effect of a searched structure with its evidence, judged against the structure without it."""
-        return weighed([Trial.of(look.fitted, self.without(key, look), key)], self.fitter)[0]
+        return weighed([Trial.of(look.fitted, self.without(key, look), key).beside_mirror_image], self.fitter)[0]
 
     def advantage(self, fitted: Fitted, other: Fitted) -> float:
         """Evidence of a fit of the search over another one under the same tracker, nats, under its own noise model."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.screening.candidates import Key
@@ -34,6 +34,11 @@ class Trial:
     def counts(self) -> bool:
         """Whether a tried effect counts: beyond chance and beyond errors of laws."""
         return self.fitted.structure.shows(self.key) and self.judgement.counts(self.look.settings)
+
+    @property
+    def beside_mirror_image(self) -> Trial:
+        """Trial judged by what it explains of the error, and not of its mirror image."""
+        return replace(self, judgement=self.look.explained_by(self.fitted, self.judgement))
 
     @property
     def splits(self) -> bool:

@@ -50,6 +50,8 @@ pub struct Gains<'a> {
     pub readings: Readings<'a>,
     /// Row k: states x channels, at sample k.
     pub gains: Table<'a>,
+    /// Whether the readings are innovations, as of a machine in innovations form: outputs and these are what its sensors show.
+    pub innovations: bool,
     /// Whether no other output than those that were measured is asked for.
     pub alone: bool,
     /// By how much each parameter by which there are derivatives may be moved. Then these may be approximate, where that takes less time than

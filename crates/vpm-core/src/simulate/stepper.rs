@@ -277,12 +277,15 @@ impl<'a, S: Scalar> Stepper<'a, S> {
 
     /// Corrects the stepper's state by gains on readings of sample `row` less its outputs, if there are any.
     fn correct(&mut self, row: usize) {
-        let Some(Gains { readings, gains, .. }) = self.plan.gains else { return };
+        let Some(Gains { readings, gains, innovations, .. }) = self.plan.gains else { return };
         let outputs = &self.shown;
         let measured = readings.channels.iter().zip(readings.table.row(row));
         let mut missed = take(&mut self.missed);
         missed.clear();
-        missed.extend(measured.map(|(&channel, &reading)| S::from_f64(reading) - outputs[channel]));
+        missed.extend(measured.map(|(&channel, &reading)| {
+            let predicted = if innovations { S::zero() } else { outputs[channel] };
+            S::from_f64(reading) - predicted
+        }));
         let moved = |place: usize| {
             let gains = &gains.row(row)[place * missed.len()..];
             missed.iter().zip(gains).fold(S::zero(), |sum, (&missed, &gain)| sum + missed * gain)

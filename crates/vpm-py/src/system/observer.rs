@@ -66,7 +66,7 @@ impl System {
     /// Outputs (N, ny) that an observer with given gains (N, nx * m) predicts from the samples before, or the measured ones (N, m) alone, its
     /// states before they are corrected (N, nx), and the derivatives of the measured outputs (N, m, k): of the steps, or approximate ones where
     /// these take less time and `moves` (k,) tell by how much parameters may be moved for them.
-    #[pyo3(signature = (theta, initial_state, inputs, channels, readings, gains, time_step, substeps, integrator, sensitivities=vec![], hold="zero_order", alone=false, moves=None))]
+    #[pyo3(signature = (theta, initial_state, inputs, channels, readings, gains, time_step, substeps, integrator, sensitivities=vec![], hold="zero_order", alone=false, moves=None, innovations=false))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn observe<'py>(
         &self,
@@ -84,6 +84,7 @@ impl System {
         hold: &str,
         alone: bool,
         moves: Option<Any<'py>>,
+        innovations: bool,
     ) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
         let request = Request::new(self, theta, (time_step, substeps, integrator), &sensitivities)?;
         let hold = self.checked(py, Hold::from_name(hold))?;
@@ -95,12 +96,9 @@ impl System {
             let setting = request.setting(&self.description, interrupt);
             let inputs = Inputs { table: inputs.as_table()?, hold };
             let readings = Readings { channels: &channels, table: readings.as_table()? };
-            observe(
-                setting,
-                initial.values(),
-                inputs,
-                Gains { readings, gains: gains.as_table()?, alone, moves: moves.as_ref().map(Numbers::values) },
-            )
+            let (gains, moves) = (gains.as_table()?, moves.as_ref().map(Numbers::values));
+            let gains = Gains { readings, gains, innovations, alone, moves };
+            observe(setting, initial.values(), inputs, gains)
         })?;
         self.run(py, run, [channels.len(), sensitivities.len()])
     }

@@ -309,7 +309,13 @@ fn drawn(rows: usize, times: f64) -> Vec<f64> {
 fn observed(bench: &Bench, inputs: &[f64], readings: &[f64], gains: &[f64]) -> Run {
     let rows = readings.len();
     let readings = Readings { channels: &[0], table: Table::new("readings", readings, rows, 1).unwrap() };
-    let gains = Gains { readings, gains: Table::new("gains", gains, rows, 5).unwrap(), alone: false, moves: None };
+    let gains = Gains {
+        readings,
+        gains: Table::new("gains", gains, rows, 5).unwrap(),
+        innovations: false,
+        alone: false,
+        moves: None,
+    };
     observe(bench.setting(), &START, Table::new("inputs", inputs, rows, 2).unwrap(), gains).unwrap()
 }
 

@@ -57,7 +57,13 @@ fn observed_at(
 ) -> Run {
     let rows = inputs.len() / 2;
     let readings = Readings { channels, table: Table::new("readings", readings, rows, 2).unwrap() };
-    let gains = Gains { readings, gains: Table::new("gains", gains, rows, 10).unwrap(), alone, moves: None };
+    let gains = Gains {
+        readings,
+        gains: Table::new("gains", gains, rows, 10).unwrap(),
+        innovations: false,
+        alone,
+        moves: None,
+    };
     observe(bench.setting(), &FIRST, Table::new("inputs", inputs, rows, 2).unwrap(), gains).unwrap()
 }
 
@@ -156,7 +162,13 @@ fn differences_are_near_the_derivatives() {
     bench.sensitivities = vec![0, 2, 5, 7];
     let run = |moves: Option<&[f64]>| {
         let readings = Readings { channels: &[0, 4], table: Table::new("readings", &readings, 12, 2).unwrap() };
-        let gains = Gains { readings, gains: Table::new("gains", &gains, 12, 10).unwrap(), alone: true, moves };
+        let gains = Gains {
+            readings,
+            gains: Table::new("gains", &gains, 12, 10).unwrap(),
+            innovations: false,
+            alone: true,
+            moves,
+        };
         observe(bench.setting(), &FIRST, Table::new("inputs", &inputs, 12, 2).unwrap(), gains)
     };
     let (exact, differences) = (run(None).unwrap(), run(Some(&[1e-6; 4])).unwrap());
@@ -261,6 +273,7 @@ fn a_late_sensor_is_observed_as_a_late_command() {
         let gains = Gains {
             readings: Readings { channels: &[0], table },
             gains: Table::new("gains", &gains, rows, 2).unwrap(),
+            innovations: false,
             alone: false,
             moves: None,
         };
@@ -277,6 +290,31 @@ fn a_late_sensor_is_observed_as_a_late_command() {
     // A position that is drawn alone is drawn at once.
     assert!(gap(&left([0.2, 0.0], &delay, &[]), &left([0.2, 0.0], &[], &delay)) < 1e-3);
     assert!(gap(&left([0.05, 1.4], &delay, &[]), &left([0.05, 1.4], &[], &delay)) < 0.06);
+}
+
+/// A machine in innovations form gives the record that its observer leaves these innovations of (T. Kailath, *IEEE Transactions on Automatic
+/// Control* 13, 1968).
+#[test]
+fn innovations_give_their_record_again() {
+    let bench = Bench::new(&arm(), STEP, 2, Method::Rk4);
+    let (inputs, readings) = record(&bench, 300);
+    let gains = filtered(&bench, (&inputs, &readings)).gains;
+    let run = observed(&bench, (&inputs, &readings), &gains);
+    let left: Vec<f64> =
+        measured(&bench, &run).iter().zip(&readings).map(|(output, reading)| reading - output).collect();
+    let table = |name, values, width| Table::new(name, values, 300, width).unwrap();
+    let gains = Gains {
+        readings: Readings { channels: &[0, 4], table: table("readings", &left, 2) },
+        gains: table("gains", &gains, 10),
+        innovations: true,
+        alone: false,
+        moves: None,
+    };
+    let again = observe(bench.setting(), &FIRST, table("inputs", &inputs, 2), gains).unwrap();
+    assert!(left.iter().any(|e| e.abs() > 1e-3));
+    for ((output, e), reading) in measured(&bench, &again).iter().zip(&left).zip(&readings) {
+        assert!((output + e - reading).abs() < 1e-11, "{output} + {e} is not {reading}");
+    }
 }
 
 /// A closed loop: a point of one body on a point of another.
@@ -296,7 +334,7 @@ fn drawn(bench: &Bench, initial: &[f64], (inputs, readings): (&[f64], &[f64]), g
     let readings = Readings { channels: &[0], table: Table::new("readings", readings, rows, 1).unwrap() };
     let gains = gains.repeat(rows);
     let gains = Table::new("gains", &gains, rows, 2 * n).unwrap();
-    let gains = Gains { readings, gains, alone: false, moves: None };
+    let gains = Gains { readings, gains, innovations: false, alone: false, moves: None };
     observe(bench.setting(), initial, Table::new("inputs", inputs, rows, 1).unwrap(), gains).unwrap()
 }
 
