@@ -717,6 +717,43 @@ def test_restarts_begin_at_what_the_driven_joints_tell(palletiser: Model) -> Non
         assert np.abs(error).max() < 0.01 * np.ptp(log[name])
 
 
+@pytest.mark.parametrize("angle", [0.02, 0.1])
+def test_a_link_bends_where_joints_cannot_hold_the_loop_closed(angle: float) -> None:
+    """A strip turned at its clamp, its end pinned to a slide: 3 E I angle / L for small angles."""
+    E, width, height, L = 206e9, 0.002, 0.02, 0.5
+    small = {"mass": 0.5, "inertia": [1e-3, 1e-3, 1e-3, 0.0, 0.0, 0.0]}
+    strip = {
+        "parent": "hub",
+        "length": L,
+        "level": "strain(4)",
+        "deforms": ["bending_y"],
+        "material": {"young": E, "density": 7850.0},
+        "section": {"shape": "rectangle", "width": width, "height": height},
+    }
+    slide = {"parent": "world", "child": "slide", "translation": [0.0, 0.0, L]}
+    model = Model.from_dict(
+        {
+            "name": "pinned strip",
+            "gravity": [0.0, 0.0, 0.0],
+            "bodies": {"hub": small, "slide": small},
+            "joints": {
+                "clamp": {"type": "revolute", "parent": "world", "child": "hub", "axis": [0.0, 1.0, 0.0]},
+                "guide": {"type": "prismatic", "axis": [0.0, 0.0, 1.0], **slide},
+            },
+            "beams": {"strip": strip},
+            "loops": {
+                "pin": {"type": "revolute", "a": {"parent": "strip"}, "b": {"parent": "slide"}, "axis": [0.0, 1.0, 0.0]}
+            },
+            "actuators": {"motor": {"joint": "clamp", "gain": 1.0}},
+        }
+    )
+    q, efforts = model.loops.rest({"clamp": angle})
+    assert q[0] == angle
+    # The bent strip reaches less far, by the mean of half its squared slope, and is stiffer by as small a share.
+    assert efforts["clamp"] == pytest.approx(3.0 * E * width**3 * height / 12.0 * angle / L, rel=0.1 * angle**2)
+    assert q[1] == pytest.approx(-L * angle**2 / 10.0, rel=1e-2)
+
+
 CRANK, COUPLER, ROCKER, GROUND = 0.08, 0.30, 0.22, 0.28
 
 
@@ -760,6 +797,19 @@ def test_a_crank_that_goes_round_keeps_its_assembly(crank_rocker: Model, crank: 
     assert q[0] == crank
     assert math.remainder(q[2] - float(rocker_angle(np.array(crank))), 2.0 * math.pi) == pytest.approx(0.0, abs=1e-9)
     np.testing.assert_allclose(q[2], crank_rocker.loops.near({"crank": crank})[2], atol=1e-9)
+
+
+@pytest.mark.parametrize("rocker", [0.3, 1.0, 2.9])
+def test_what_a_rocker_cannot_reach_says_how_far_it_is_open_there(crank_rocker: Model, rocker: float) -> None:
+    """Between the rocker's end where it is held and the ring that crank and coupler reach."""
+    away = math.hypot(GROUND + ROCKER * math.cos(rocker), ROCKER * math.sin(rocker))
+    missing = max(away - COUPLER - CRANK, COUPLER - CRANK - away)
+    assert missing > 1e-3
+    with pytest.raises(ModelError, match=rf"rocker = {rocker:g} held: loop end stays open by") as caught:
+        crank_rocker.loops.assembled({"rocker": rocker})
+    told = float(str(caught.value).split("stays open by ")[1].split(" m")[0])
+    # Newton's method ends beside the least gap, where the linkage is stretched.
+    assert missing * (1.0 - 1e-3) <= told <= 1.2 * missing
 
 
 def test_restarts_of_a_crank_that_goes_round_begin_on_its_side(crank_rocker: Model) -> None:

@@ -38,11 +38,10 @@ def assembled(loops: Loops, start: Array, fixed: Mapping[int, float], joints: in
     - ``joints``: number of joints, which come first. Flexible links bend only where joints cannot close the loops.
     """
     free = [place for place in range(joints) if place not in fixed]
-    closed = _moved(loops, _closed(loops, start, range(joints)), fixed, free)
+    everything = [place for place in range(start.size) if place not in fixed]
+    closed = _moved(loops, _closed(loops, start, range(joints)), fixed, (free, everything))
     if _open(loops, closed) > CLOSED:
-        closed = min(closed, _put(loops, start, fixed, free), key=lambda q: _open(loops, q))
-    if _open(loops, closed) > CLOSED:
-        closed = _closed(loops, closed, [place for place in range(start.size) if place not in fixed])
+        closed = min(closed, _put(loops, start, fixed, (free, everything)), key=lambda q: _open(loops, q))
     return closed
 
 
@@ -70,13 +69,16 @@ def mirrored(loops: Loops, start: Array, fixed: Mapping[int, float], joints: int
     return None
 
 
-def _moved(loops: Loops, q: Array, fixed: Mapping[int, float], free: Sequence[int]) -> Array:
-    """Closed on the whole way to where some have to be: the assembly stays the same."""
+def _moved(loops: Loops, q: Array, fixed: Mapping[int, float], ways: Sequence[Sequence[int]]) -> Array:
+    """Closed on the whole way to where some have to be: the assembly stays the same.
+
+    Where the way ends before, what is held is put there all the same, and the loops are left as little open as can be.
+    """
     way, turns = _way(loops, q, fixed)
     for piece in way:
-        q = _put(loops, q, piece, free)
+        q = _put(loops, q, piece, ways)
         if _open(loops, q) > CLOSED:
-            break
+            return _put(loops, q, fixed, ways)
     return q + turns
 
 
@@ -88,7 +90,7 @@ def followed(loops: Loops, q: Array, readings: Mapping[int, float], joints: int)
     way, turns = _way(loops, q, readings)
     for piece in way:
         q = _put(
-            loops, _put(loops, q, piece, [place for place in range(joints) if place not in piece]), {}, range(joints)
+            loops, _put(loops, q, piece, [[place for place in range(joints) if place not in piece]]), {}, [range(joints)]
         )
     return q + turns
 
@@ -110,12 +112,16 @@ def _way(loops: Loops, q: Array, ends: Mapping[int, float]) -> tuple[list[dict[i
     return [{place: float(start[place]) + share * way for place, way in ways.items()} for share in shares], turns
 
 
-def _put(loops: Loops, q: Array, fixed: Mapping[int, float], free: Sequence[int]) -> Array:
-    """Assembly start: some coordinates put where they have to be, the loops closed by the other joints."""
+def _put(loops: Loops, q: Array, fixed: Mapping[int, float], ways: Sequence[Sequence[int]]) -> Array:
+    """Assembly start: some coordinates put where they have to be, the loops closed by the first others that can."""
     q = q.copy()
     for place, value in fixed.items():
         q[place] = value
-    return _closed(loops, q, free)
+    for free in ways:
+        q = _closed(loops, q, free)
+        if _open(loops, q) <= CLOSED:
+            break
+    return q
 
 
 def _closed(loops: Loops, q: Array, free: Sequence[int]) -> Array:
