@@ -309,6 +309,21 @@ def test_a_controller_holds_a_machine_that_is_not_its_model() -> None:
     np.testing.assert_allclose(again["tip.y"], held["tip.y"], atol=1e-3 * SMALL)
 
 
+def test_an_observer_whose_steps_miss_what_the_feedback_acts_on_is_refused() -> None:
+    """The spring vibrates at 481 Hz: twice a sample, which a step of a sample takes for something else."""
+    stiff = Model.from_toml(RODS.replace(f"stiffness = {STIFFNESS}", "stiffness = 5e4"))
+    plan = vpm.flexible_feedforward(stiff, turn(), ["tip.y"], method="quasi_static")
+    allowed = {"tip.y": 1e-3, "bend.velocity": 1e-2}
+    feedback = vpm.state_feedback(stiff, plan, deviations=allowed, efforts={"motor": 5.0}, points=3)
+    parts = (stiff, plan, feedback, NOISE)
+    with pytest.raises(SimulationError, match=r"grow by a factor of 1\.\d+ .* steps \(linearly_implicit, 1 ms\)"):
+        vpm.FlexibleController(*parts, channels=list(NOISE.readings))
+    controller = vpm.FlexibleController(*parts, channels=list(NOISE.readings), substeps=8)
+    pushed = vpm.Simulation(stiff, 1e-3, state={"hub.position": 1e-3, "bend.position": 1e-6}, integrator="adaptive")
+    run = pushed.run(controller, duration=1.5)
+    assert np.abs(run["tip.y"][-100:] - SMALL).max() < 0.02 * SMALL
+
+
 def test_a_feed_forward_is_a_log_for_the_servos_of_a_model() -> None:
     servo = """
 [controllers.servo]

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
+from vpm.control.closed_loops import check_loops
 from vpm.control.feedback import StateFeedback, at_axes
 from vpm.control.plan import FlexibleFeedforward
-from vpm.errors import SimulationError, check_known
+from vpm.errors import DivergedError, SimulationError, check_known
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.observer import Noise, Observer
-from vpm.simulate import AUTOMATIC
+from vpm.simulate import AUTOMATIC, Setup
 
 if TYPE_CHECKING:
     from vpm.stepping import Simulation
@@ -39,8 +40,8 @@ class FlexibleController:
         What is measured; by default positions of all joints and all strains.
     limits : mapping of str to float, optional
         Largest absolute commands; where one is reached errors are not summed on.
-    integrator : str
-        Of the observer, see :class:`vpm.simulate.Setup`.
+    integrator, substeps
+        Of the observer, see :class:`vpm.simulate.Setup`: it has to resolve what the feedback acts on.
 
     Attributes
     ----------
@@ -50,7 +51,8 @@ class FlexibleController:
     Raises
     ------
     SimulationError
-        A name is wrong, parts are of different machines or time steps, or a flexible machine has no gauge.
+        A name is wrong, parts are of different machines or time steps, a flexible machine has no gauge, or the steps
+        of the observer are so far from the machine that the loop is unstable.
 
     Examples
     --------
@@ -68,6 +70,7 @@ class FlexibleController:
         channels: Sequence[str] | None = None,
         limits: Mapping[str, float] | None = None,
         integrator: str = AUTOMATIC,
+        substeps: int = 1,
     ) -> None:
         self.model, self.feedforward, self.feedback = model, feedforward, feedback
         _match(model, feedforward, feedback)
@@ -81,16 +84,22 @@ class FlexibleController:
                 raise SimulationError(
                     "a feedback needs an observer; give noise, the deviations of readings and of unknown forces"
                 )
-            self._schedule(feedback, noise, integrator)
+            self._schedule(feedback, noise, Setup(integrator, substeps))
         self.reset()
 
-    def _schedule(self, feedback: StateFeedback, noise: Noise, integrator: str) -> None:
+    def _schedule(self, feedback: StateFeedback, noise: Noise, setup: Setup) -> None:
         """Gains of the controller at every sample, computed once: a step then takes a row of a table."""
         step, places = self.feedforward.time_step, feedback.schedule
-        observer = Observer(self.model, step, self.channels, noise, state=self._states[0], integrator=integrator)
+
+        def made(steps: Setup) -> Observer:
+            settings = (self.model, step, self.channels, noise)
+            return Observer(*settings, state=self._states[0], integrator=steps.integrator, substeps=steps.substeps)
+
+        observer = made(setup)
         self._steady = [
             observer.settled(state, command) for state, command in zip(places.states, places.commands, strict=True)
         ]
+        check_loops(made, feedback, self._steady, setup)
         values = at_axes(places, self.model, self.feedforward.time, self.feedforward.position)
         around = [places.weights(row) for row in values]
         self._nearest = [int(points[np.argmax(shares)]) for points, shares in around]
@@ -143,6 +152,13 @@ class FlexibleController:
         reference = self._states[at]
         wanted = self._commands[at] - self._gains[at] @ (observer.predicted - reference)
         wanted -= self._integral_gains[at] @ self._sums
+        if not np.isfinite(wanted).all():
+            raise DivergedError(
+                f"{self.model.name}: the observer of the controller expects no finite state at t = {self.time:g} s; "
+                "reset it, and check that its model is that of the machine",
+                run=None,
+                time=None,
+            )
         command = self._within(wanted)
         estimate = observer.step(measurements, command)
         if (command == wanted).all():

@@ -22,6 +22,9 @@ class SteadyGain(NamedTuple):
     #: Covariance of the corrected state (nx, nx), and of the innovations (m, m).
     covariance: Array
     spread: Array
+    #: What the observer's step makes of the corrected state (nx, nx), and the measured outputs by the state (m, nx).
+    transition: Array
+    output: Array
 
 
 class Observer:
@@ -208,11 +211,11 @@ class Observer:
                 "noise to what nothing moves, or leave steady out"
             ) from error
         left_over: Array = (before - gain @ spread @ gain.T).astype(np.float64)
-        return SteadyGain(gain, left_over, spread.astype(np.float64))
+        return SteadyGain(gain, left_over, spread.astype(np.float64), transition, output)
 
     def keep(self, steady: SteadyGain) -> None:
         """Keep a gain of the online observer from now on, until another is kept."""
-        self._core.hold_gain(*steady)
+        self._core.hold_gain(steady.gain, steady.covariance, steady.spread)
 
     def __repr__(self) -> str:
         return f"Observer({self.model.name!r}, channels={', '.join(self.channels)})"
