@@ -166,7 +166,6 @@ def _chunk(one: Callable[[Item], Run], items: Sequence[Item]) -> list[Run | VpmE
 
 def _one(model: Model, mode: str, setup: Setup, cutoff: float | None, trial: Trial) -> Run:
     machine = model.with_parameters(trial.parameters) if trial.parameters else model
-    state = None if trial.initial_state is None else machine.state(trial.initial_state)
     return simulate(
         machine,
         trial.experiment,
@@ -175,7 +174,7 @@ def _one(model: Model, mode: str, setup: Setup, cutoff: float | None, trial: Tri
         substeps=setup.substeps,
         horizon=setup.horizon,
         cutoff=cutoff,
-        initial_state=state,
+        initial_state=trial.initial_state,
         hold=setup.course,
     )
 

@@ -8,10 +8,11 @@ import pytest
 import vpm
 from synthetic import Truth, nominal, simulate_axis
 from vpm.compare import compare
-from vpm.errors import DivergedError, ExperimentError, SimulationError
+from vpm.errors import DivergedError, ExperimentError, ModelError, SimulationError
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem, identify
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.simulate import HOLDS, INTEGRATORS, MODES, Run, Setup, simulate
 
 TRUTH = Truth(mass=20.0, viscous=60.0, noise=0.0)
@@ -58,6 +59,24 @@ def test_free_run_reaches_terminal_speed_as_the_closed_form_says(integrator: str
     expected = force / viscous * (1.0 - np.exp(-viscous * run.time / mass))
     tolerance = 1e-3 if integrator == "semi_implicit" else 1e-6
     np.testing.assert_allclose(run["axis.velocity"], expected, atol=tolerance)
+
+
+def test_a_run_begins_in_states_given_by_name() -> None:
+    """m dv/dt = -c v: v = v0 exp(-c t/m), and q approaches q0 + v0 m/c."""
+    start = {"axis.position": 0.3, "axis.velocity": 0.4}
+    run = simulate(nominal(), constant_push(0.0, 1.0), integrator="rk4", initial_state=start)
+    mass, viscous = 20.0, 60.0
+    gone = np.exp(-viscous * run.time / mass)
+    np.testing.assert_allclose(run["axis.velocity"], 0.4 * gone, atol=1e-9)
+    np.testing.assert_allclose(run["axis.position"], 0.3 + 0.4 * mass / viscous * (1.0 - gone), atol=1e-9)
+
+
+@pytest.mark.parametrize(("mode", "start"), [("restarts", {"axis.position": 0.1}), ("inverse_dynamics", np.zeros(2))])
+def test_a_first_state_where_the_log_tells_the_states_is_refused(mode: str, start: dict[str, float] | Array) -> None:
+    with pytest.raises(SimulationError, match=f"mode '{mode}' takes no initial_state"):
+        simulate(nominal(), constant_push(0.0, 1.0), mode, initial_state=start)
+    with pytest.raises(ModelError, match=r"did you mean .axis\.position"):
+        simulate(nominal(), constant_push(0.0, 1.0), initial_state={"axis.positoin": 0.1})
 
 
 def swept(dt: float, seconds: float = 4.0) -> Experiment:

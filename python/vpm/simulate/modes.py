@@ -13,11 +13,11 @@ prescribed_motion    Given the measured motion of the joints, how do the flexibl
 ===================  =====================================================================================
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import CoreError, DivergedError, SimulationError
 from vpm.experiment import Experiment, Motion
@@ -33,6 +33,8 @@ from vpm.simulate.setup import AUTOMATIC, HOLDS, Setup
 MODES = ("free_run", "inverse_dynamics", "restarts", "closed_loop", "prescribed_motion")
 #: Those whose commands come from the log.
 LOGGED = ("free_run", "restarts")
+#: Those that begin once, in any state.
+BEGUN = ("free_run", "closed_loop")
 
 
 def simulate(
@@ -44,7 +46,7 @@ def simulate(
     substeps: int = 1,
     horizon: float = 0.25,
     cutoff: float | None = None,
-    initial_state: Array | None = None,
+    initial_state: Mapping[str, float] | ArrayLike | None = None,
     hold: str = HOLDS[0],
 ) -> Run:
     """Simulate ``model`` on the inputs of ``experiment``, in one of the modes.
@@ -59,14 +61,15 @@ def simulate(
         See :class:`Setup`.
     cutoff : float, optional
         Cut-off frequency of the motion filter, Hz (inverse dynamics, prescribed motion, initial velocities).
-    initial_state : ndarray, shape (states,), optional
-        By default estimated from the first samples of the measured positions; at rest at zero without them. Flexible
-        links start from the deflection of their equilibrium there.
+    initial_state : mapping of str to float, or array_like of shape (nx,), optional
+        Of a free run or a closed loop, as ``model.state`` takes it. By default estimated from the first samples of the
+        measured positions; at rest at zero without them. Flexible links start from the deflection of their equilibrium
+        there.
 
     Raises
     ------
-    SimulationError, ExperimentError
-        A setting is wrong or a channel that the mode needs is missing.
+    SimulationError, ModelError, ExperimentError
+        A setting or a name is wrong, or a channel that the mode needs is missing.
     DivergedError
         The state left the finite numbers, or no step of ``adaptive`` can follow it; carries the run up to there.
 
@@ -81,9 +84,15 @@ def simulate(
             f"hold '{hold}' is for commands of a log, and mode '{mode}' takes none; leave it out, or use the mode "
             f"{' or '.join(LOGGED)}"
         )
+    if initial_state is not None and mode not in BEGUN:
+        raise SimulationError(
+            f"mode '{mode}' takes no initial_state, since its states follow from the log; leave it out, or use the mode "
+            f"{' or '.join(BEGUN)}"
+        )
     if mode == "inverse_dynamics":
         return _inverse_dynamics_run(model, experiment, cutoff)
-    arrays = simulate_arrays(model, experiment, mode, setup=setup, cutoff=cutoff, initial_state=initial_state)
+    state = None if initial_state is None else model.state(initial_state)
+    arrays = simulate_arrays(model, experiment, mode, setup=setup, cutoff=cutoff, initial_state=state)
     run = run_of(model, experiment, mode, arrays, setup)
     if arrays.states is None:
         return run
