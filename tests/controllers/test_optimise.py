@@ -93,6 +93,17 @@ def test_least_time_of_a_mass_is_a_push_and_a_brake() -> None:
     assert found.status == "optimal"
     assert found.strayed < 1e-5
     assert "motor.command is at its most of 4 N" in str(found)
+    assert "lasts" not in str(found)
+
+
+@pytest.mark.parametrize(
+    ("task", "word"), [({}, "least of 3 s"), ({"minimise": "energy", "duration": [2.6, 3.0]}, "most of 3 s")]
+)
+def test_a_duration_at_an_end_of_its_range_is_told(task: dict[str, object], word: str) -> None:
+    """A push and a brake take 2.45 s; the energy 12 m^2 d^2 / T^3 falls with every duration."""
+    found = vpm.optimise(vpm.Model.from_toml(CART), dash(3.0, 4.0, duration=[3.0, 10.0]) | task)
+    assert found.duration == pytest.approx(3.0, rel=1e-4)
+    assert f"the motion lasts its {word}" in found.binding
 
 
 def test_least_energy_of_a_mass_is_a_cubic() -> None:
@@ -277,7 +288,8 @@ def test_what_cannot_be_held_is_told_with_the_limit() -> None:
 
 
 def test_what_takes_longer_is_told_with_the_limit() -> None:
-    with pytest.raises(OptimisationError, match=r"rail.position .* in place of .*, and motor.command is at its"):
+    held = "and the motion lasts its most of 1 s and motor.command is at its"
+    with pytest.raises(OptimisationError, match=rf"rail.position .* in place of .*, {held}"):
         vpm.optimise(vpm.Model.from_toml(CART), dash(3.0, 4.0, duration=[0.1, 1.0]))
 
 

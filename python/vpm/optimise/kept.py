@@ -32,7 +32,11 @@ def passed(channels: Channels, task: Fitted, motion: MeshMotion) -> tuple[str, .
 
 
 def binding(channels: Channels, task: Fitted, motion: MeshMotion) -> Iterator[str]:
-    """Kept limits that hold the motion back, with the share of their phase."""
+    """Kept limits that hold the motion back, with the share of their phase; durations at an end of their range."""
+    for part, duration in zip(task.phases, motion.durations.tolist(), strict=True):
+        for word, end in (("least", part.shortest), ("most", part.longest)):
+            if part.shortest < part.longest and abs(duration - end) <= HAIR * end:
+                yield f"the {part.name} lasts its {word} of {end:.4g} s"
     for phase, limit, course in _courses(channels, task, motion):
         for word, end in (("least", limit.least), ("most", limit.most)):
             if not math.isfinite(end) or limit.least == limit.most:

@@ -108,7 +108,8 @@ def _refine(found: Search, progress: Progress) -> None:
                 found.notes.append("The mesh has as many intervals as it may have.")
             return
         start = found.motion.on(meshes)
-    found.notes.append(f"After {task.refinements} refinements the mesh is still coarser than the tolerance asks for.")
+    refinements = f"{task.refinements} refinement{'' if task.refinements == 1 else 's'}"
+    found.notes.append(f"After {refinements} the mesh is still coarser than the tolerance asks for.")
 
 
 def _prefixed(progress: Progress, what: str) -> Progress:
