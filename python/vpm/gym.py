@@ -30,7 +30,8 @@ class VectorEnvironment(VectorEnv[Array, Array, Any]):
     Parameters
     ----------
     commands : mapping of str to (float, float)
-        Least and largest command of each actuator, in command units.
+        Least and largest command of each actuator, in command units. Springs of lines and logged supplies need none:
+        those that are not named keep their lengths and pressures, and are no actions.
     reward : callable
         Takes observations (E, m) and the actions (E, nu) that led there, gives rewards (E,).
     time_step : float
@@ -44,7 +45,8 @@ class VectorEnvironment(VectorEnv[Array, Array, Any]):
     channels : sequence of str, optional
         What is observed; by default positions and velocities of all joints.
     spread : mapping of str to float
-        By how much states are off the initial one at most where an episode begins, at random.
+        By how much states are off the initial one at most where an episode begins, at random. Of a machine with
+        closed loops what `state` and this name closes them.
     state : mapping of str to float, optional
         The initial state, as ``model.state`` takes it.
     integrator, compiled
@@ -84,11 +86,11 @@ class VectorEnvironment(VectorEnv[Array, Array, Any]):
         check_known(self.channels, model.output_channels, SimulationError, "channels:", "is not there")
         check_known(bounds or {}, self.channels, SimulationError, "bounds:", "is not there")
         check_known(spread or {}, model.state_names, SimulationError, "spread:", "is not there")
-        check_known(commands, model.inputs, SimulationError, "commands:", "is not there")
-        check_known(model.inputs, tuple(commands), SimulationError, "commands lack:", "is not there")
+        self._driven = _driven(model, commands)
         limits = np.array([(bounds or {}).get(name, (-np.inf, np.inf)) for name in self.channels])
-        ranges = np.array([commands[name] for name in model.inputs], dtype=np.float64)
-        for name, (low, high) in zip((*self.channels, *model.inputs), (*limits, *ranges), strict=True):
+        named = [model.inputs[place] for place in self._driven]
+        ranges = np.array([commands[name] for name in named], dtype=np.float64).reshape(-1, 2)
+        for name, (low, high) in zip((*self.channels, *named), (*limits, *ranges), strict=True):
             if not low < high:
                 raise SimulationError(f"{name} has no range from {low:g} to {high:g}; put the lesser one first")
         self._bounds, self._ranges = limits, ranges
@@ -100,8 +102,9 @@ class VectorEnvironment(VectorEnv[Array, Array, Any]):
         self.action_space = batch_space(self.single_action_space, copies)
         self._reward, self._samples = reward, samples
         self._steps = max(1, round(duration / (time_step * samples)))
-        self._start = model.state(state)
+        self._start, self._standing = model.state(state), model.command()
         self._spread = np.array([(spread or {}).get(name, 0.0) for name in model.state_names])
+        self._named = [name for name in model.state_names if name in {**(state or {}), **(spread or {})}]
         self._columns = [model.output_channels.index(name) for name in self.channels]
         own = [
             Simulation(model, time_step, integrator=integrator, state=self._start, compiled=compiled)
@@ -130,10 +133,12 @@ class VectorEnvironment(VectorEnv[Array, Array, Any]):
 
         low, high = self._ranges.T
         held = np.clip(np.asarray(actions, dtype=np.float64).reshape(self.num_envs, -1), low, high)
+        commands = np.tile(self._standing, (self.num_envs, 1))
+        commands[:, self._driven] = held
         going, fresh = np.flatnonzero(~self._over), np.flatnonzero(self._over)
         lost = np.zeros(self.num_envs, dtype=bool)
         if going.size:
-            outputs, failures = step_all([self._cores[k] for k in going], held[going], self._samples)
+            outputs, failures = step_all([self._cores[k] for k in going], commands[going], self._samples)
             self._seen[going] = outputs[:, self._columns]
             lost[going] = [failure is not None for failure in failures]
         self._count += 1
@@ -149,9 +154,21 @@ class VectorEnvironment(VectorEnv[Array, Array, Any]):
 
     def _begin(self, number: int) -> None:
         state = self._start + self._spread * self._random[number].uniform(-1.0, 1.0, self._start.size)
+        if self.model.loops:
+            state = self.model.state({name: state[self.model.state_names.index(name)] for name in self._named})
         self._cores[number].reset(state)
         self._seen[number] = self._cores[number].outputs[self._columns]
         self._count[number], self._over[number] = 0, False
+
+
+def _driven(model: Model, commands: Mapping[str, object]) -> list[int]:
+    """Places of the inputs that actions of an environment command."""
+    check_known(commands, model.inputs, SimulationError, "commands:", "is not there")
+    needed = [name for name in model.actuators if f"{name}.command" not in model.optional_inputs]
+    for name in needed:
+        if name not in commands:
+            raise SimulationError(f'commands lack "{name}"; give a range to each of {", ".join(needed)}')
+    return [place for place, name in enumerate(model.inputs) if name in commands]
 
 
 class Environment(gymnasium.Env[Array, Array]):
