@@ -58,10 +58,12 @@ def compile_(
         )
         return
     if c is not None:
-        written = c_source(load_model(model), name=name, parameters=parameter or ())
+        machine = load_model(model)
+        written = c_source(machine, name=name, parameters=parameter or ())
         wrote(*written.save(c))
-        give(name=written.name, parameters=written.parameters)
-        console.print(f"free are {', '.join(written.parameters) or 'no parameters'}", markup=False)
+        parts = {"inputs": machine.inputs, "outputs": machine.output_channels, "parameters": written.parameters}
+        give(name=written.name, **parts)
+        console.print(f"parameters that can be set: {', '.join(written.parameters) or 'none'}", markup=False)
         return
     writable(out)
     compiled = compile_model(load_model(model), rate, integrator=integrator, substeps=substeps)
@@ -77,7 +79,8 @@ def _tell_fmu(written: Fmu) -> None:
     give(name=written.identifier, inputs=written.inputs, outputs=written.outputs, parameters=written.parameters)
     library = f"sources and a library for {written.platform}" if written.platform else "sources"
     console.print(f"{library}, steps of {written.step:g} s by {written.integrator}", markup=False)
-    for what, names in (("takes", written.inputs), ("shows", written.outputs), ("free are", written.parameters)):
+    for what, names in (("takes", written.inputs), ("shows", written.outputs)):
         console.print(f"  {what} {', '.join(names) or 'nothing'}", markup=False)
+    console.print(f"  parameters that can be set: {', '.join(written.parameters) or 'none'}", markup=False)
     for text in written.notes:
         note(text)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from vpm.command import FORMATS, Channels, Interpolate, console, drawable, load_pair, progress, save_plot, writable
-from vpm.command_output import give, wrote
+from vpm.command_output import give, note, wrote
 from vpm.errors import ValidityWarning, VpmError
 
 if TYPE_CHECKING:
@@ -116,7 +116,7 @@ def _tell_run(run: Run, record: Experiment, out: Path | None) -> None:
     give(run=run)
     console.print(repr(run), markup=False)
     for message in run.messages:
-        console.print(f"warning: {message}", markup=False)
+        note(f"warning: {message}")
     try:
         comparison = compare_run(run, record)
         give(comparison=comparison)

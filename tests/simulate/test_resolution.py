@@ -1,6 +1,7 @@
 """What steps damp, as every way of simulating says it: of a mass on a spring, whose runs show it."""
 
 import copy
+import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -185,9 +186,11 @@ def test_the_command_says_it_beside_its_numbers(tmp_path: Path) -> None:
     rows = "\n".join(f"{STEP * k:.3f},1.0" for k in range(200))
     (tmp_path / "log.csv").write_text(f"time,drive.command\n{rows}\n", encoding="utf-8")
     done = ran("simulate", "model.toml", "log.csv", "--integrator", "rk4", cwd=tmp_path)
-    assert "warning: rk4, 1 ms: modes above" in done.stdout
+    assert "warning: rk4, 1 ms: modes above" in done.stderr
+    told = json.loads(ran("--json", "simulate", "model.toml", "log.csv", "--integrator", "rk4", cwd=tmp_path).stdout)
+    assert told["notes"] == [done.stderr.strip()]
     done = vpm("simulate", "model.toml", "log.csv", "--integrator", "adaptive", cwd=tmp_path)
-    assert "note:" not in done.stdout
+    assert "warning:" not in done.stdout + done.stderr
 
 
 def carriage(**parts: Any) -> Model:
