@@ -531,6 +531,11 @@ def test_a_missing_library_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPa
         imported(tmp_path, "<mujoco/>", "a.xml")
 
 
+def test_a_robot_in_place_of_a_model_file_is_told_the_way() -> None:
+    with pytest.raises(ModelError, match=r"arm\.urdf: this is XML, not TOML; vpm import makes"):
+        vpm.Model.load(EXAMPLES / "robots" / "arm.urdf")
+
+
 def test_commands(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(texts.ARM, encoding="utf-8")
     done = ran("import", "arm.urdf", "-o", "arm.toml", "--uncertain", "0.1", cwd=tmp_path)
