@@ -10,6 +10,7 @@ from scipy.linalg import cho_factor, cho_solve, solve_continuous_are
 
 import vpm
 from model_texts import effect_text, on_rail, sliding
+from places import EXAMPLES
 from vpm.control.splitting import solve, split
 from vpm.errors import CoreError, SimulationError
 from vpm.experiment import Experiment
@@ -385,6 +386,7 @@ def test_results_are_stored_and_plotted(tmp_path: Path) -> None:
     [
         ({"output": ["tip.w"]}, "cannot be prescribed"),
         ({"output": ["tip.y", "tip.x"]}, "one output for each input"),
+        ({"output": ["tip.z"]}, r"nothing moves tip\.z near"),
         ({"inputs": ["engine"]}, "engine"),
         ({"method": "magic"}, "no method"),
         ({"time_step": 0.1}, "twentieth"),
@@ -420,6 +422,15 @@ def test_targets_out_of_reach_and_impossible_ones_are_refused() -> None:
         vpm.TargetMotion.through([0.0, 0.0], [[0.0], [1.0]])
     with pytest.raises(SimulationError, match="at least two"):
         vpm.TargetMotion.through([0.0], [[0.0]])
+
+
+def test_machines_with_closed_loops_are_refused() -> None:
+    model = Model.load(EXAMPLES / "loops" / "parallelogram.toml")
+    drives = dict.fromkeys(model.actuators, 1.0)
+    with pytest.raises(SimulationError, match=r"state feedback is not known .* closed loops \(wrist\)"):
+        vpm.state_feedback(model, {"left_crank": [0.3]}, deviations={"left_crank.position": 0.1}, efforts=drives)
+    with pytest.raises(SimulationError, match=r"feed-forward is not known .* closed loops \(wrist\)"):
+        vpm.flexible_feedforward(model, turn(), ["left_crank.position"])
 
 
 def test_motions_that_no_input_moves_and_deviations_that_see_nothing_are_named() -> None:

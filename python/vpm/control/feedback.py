@@ -8,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from vpm.control.plan import FlexibleFeedforward
 from vpm.control.schedule import TIME, Schedule
+from vpm.control.task import refuse_loops
 from vpm.errors import SimulationError, check_known
 from vpm.linear import LinearModel
 from vpm.model import Model
@@ -106,12 +107,14 @@ def state_feedback(
     Raises
     ------
     SimulationError
-        A name or number is wrong, or a motion that does not die out is moved by no input or seen in no deviation.
+        A name or number is wrong, a motion that does not die out is moved by no input or seen in no deviation, or the
+        machine has closed loops.
 
     Examples
     --------
     >>> feedback = state_feedback(arm, plan, deviations={"tip.x": 1e-3, "tip.z": 1e-3}, efforts={"motor_2": 5.0})
     """
+    refuse_loops(model, "a state feedback")
     if isinstance(schedule, FlexibleFeedforward):
         places = Schedule.along(schedule, points)
     else:

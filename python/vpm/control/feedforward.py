@@ -70,8 +70,8 @@ def flexible_feedforward(
     Raises
     ------
     SimulationError
-        A name is unknown, the target is out of reach, the pre-actuation is too short, a limit is not kept, or outputs
-        cannot be prescribed by these inputs.
+        A name is unknown, the target is out of reach, the pre-actuation is too short, a limit is not kept, outputs
+        cannot be prescribed by these inputs, or the machine has closed loops.
 
     Examples
     --------

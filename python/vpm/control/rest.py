@@ -57,6 +57,7 @@ def poses(
         size = float(longest.max())
         if size < CLOSE * max(1.0, float(np.abs(q).max())):
             return q, u
+    _refuse_still(task, guess)
     row = int(np.argmax(np.abs(task.values(q) - wanted).max(axis=1))) if np.isfinite(q).all() else 0
     told = ", ".join(f"{name} = {value:.4g}" for name, value in zip(task.outputs, wanted[row], strict=True))
     raise SimulationError(
@@ -115,3 +116,15 @@ def _solved(both: Array, right: Array) -> Array:
         return np.asarray(np.linalg.solve(both, right[:, :, None])[:, :, 0])
     except np.linalg.LinAlgError:
         return np.full(right.shape, np.nan)
+
+
+def _refuse_still(task: Task, q: Array) -> None:
+    """Refuse outputs at rest that no coordinate moves, as across the plane of a planar arm."""
+    slopes = np.abs(task.jacobian(q))
+    still = slopes.max(axis=(0, 2)) <= 1e-12 * slopes.max(initial=0.0)
+    if still.any():
+        names = " and ".join(name for name, none in zip(task.outputs, still, strict=True) if none)
+        raise SimulationError(
+            f"{task.model.name}: nothing moves {names} near the given pose; leave this out of the outputs, or give "
+            "another start"
+        )

@@ -36,12 +36,13 @@ class Task:
 
     def __post_init__(self) -> None:
         """Check the names of an inversion task."""
+        refuse_loops(self.model, "a feed-forward")
         known = self.model.inputs
         check_known(self.inputs, known, SimulationError, "inputs:", "is unknown")
         if len(self.inputs) != len(self.outputs):
             raise SimulationError(
-                f"{len(self.outputs)} outputs ({', '.join(self.outputs)}) cannot be prescribed with "
-                f"{len(self.inputs)} inputs ({', '.join(self.inputs)}); give one output for each input"
+                f"the outputs ({', '.join(self.outputs)}) cannot be prescribed with the inputs "
+                f"({', '.join(self.inputs)}); give one output for each input, or name the inputs at work"
             )
         possible = [f"{joint}.position" for joint in self.model.joints]
         possible += [f"{marker}.{axis}" for marker in self.model.markers for axis in AXES]
@@ -181,3 +182,12 @@ def task_of(model: Model, output: str | Sequence[str] | None, inputs: Sequence[s
     if output is not None:
         return Task(model, at_work, tuple(output))
     return Task(model, at_work, tuple(f"{joint}.position" for joint in model.joints))
+
+
+def refuse_loops(model: Model, what: str) -> None:
+    """Refuse a task of machines with closed loops, whose coordinates do not move one by one."""
+    if model.loops:
+        raise SimulationError(
+            f"{model.name}: {what} is not known for machines with closed loops ({', '.join(model.loops)}); design it "
+            "on model.linearize, which has the free coordinates alone"
+        )
