@@ -572,6 +572,8 @@ class System:
         """Memories (N, effects that remember) at every sample of a path of the joints (N, n), relaxed at the first."""
     def equilibrium(self, theta: ArrayLike, position: ArrayLike) -> tuple[Array, Array]:
         """Coordinates (n_coordinates,) at rest with the joints held at ``position``, and the holding efforts (n,)."""
+    def load_at_rest(self, theta: ArrayLike, position: ArrayLike) -> tuple[Array, Array]:
+        """Efforts (n,) that hold all coordinates at rest at ``position`` (n,), and their derivative (n, n) by these."""
     def natural_frequencies(self, theta: ArrayLike, position: ArrayLike) -> Array:
         """Natural frequencies (n_elastic,) in Hz with the joints locked at ``position`` (n,), slowest first.
 

@@ -71,9 +71,12 @@ def test_wrong_settings_are_refused(change: dict[str, Any], words: str) -> None:
 
 
 def test_springs_of_lines_and_closed_loops_need_nothing_of_actions() -> None:
-    """A parallelogram on a spring that no action lengthens: episodes begin closed, and a step is that of a simulation."""
+    """Episodes of a parallelogram on a spring begin closed, and a step is that of a simulation."""
     content = Model.load(EXAMPLES / "loops" / "parallelogram.toml").to_dict()
-    ends = {"from": {"parent": "world", "point": [0.3, 0.0, 0.6]}, "to": {"parent": "coupler", "point": [0.1, 0.0, 0.0]}}
+    ends = {
+        "from": {"parent": "world", "point": [0.3, 0.0, 0.6]},
+        "to": {"parent": "coupler", "point": [0.1, 0.0, 0.0]},
+    }
     pull = {"type": "spring_damper", "line": "coil", "stiffness": 40.0, "free_length": 0.2, "damping": 1.0}
     model = Model.from_dict({**content, "lines": {"coil": ends}, "actuators": {"pull": pull, **content["actuators"]}})
     drives = [name for name in model.actuators if name != "pull"]

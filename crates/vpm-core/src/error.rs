@@ -20,6 +20,17 @@ pub enum Error {
         /// The value found.
         value: f64,
     },
+    /// A machine is not held by any effort where it was asked for.
+    #[error(
+        "the effort that holds joint `{joint}` at rest is {value}: a spring acts along a line that has no length in this \
+         pose; name another pose"
+    )]
+    NoHold {
+        /// Name of the joint.
+        joint: String,
+        /// The value found.
+        value: f64,
+    },
     /// A machine has no derivative where it was asked for.
     #[error(
         "row {row} and column {column} of {matrix}, counted from 0, is {value}: a law has no derivative at this state, \

@@ -3,7 +3,7 @@
 use crate::ball::check_angles;
 use crate::description::Description;
 use crate::error::{Error, Result};
-use crate::statics::Statics;
+use crate::statics::{self, Statics};
 use crate::system::{Build, Dynamics, LoopState};
 use crate::table::Table;
 
@@ -42,7 +42,18 @@ pub fn equilibrium(description: &Description, theta: &[f64], position: &[f64]) -
     let mut statics = held(description, theta, position)?;
     let rest = statics.settle(position)?;
     let efforts = statics.holding_efforts(&rest);
+    if let Some((body, &value)) = description.bodies.iter().zip(&efforts).find(|(_, effort)| !effort.is_finite()) {
+        return Err(Error::NoHold { joint: body.joint.name.clone(), value });
+    }
     Ok((rest.coordinates, efforts))
+}
+
+/// Evaluates the efforts that hold all coordinates at rest at `position`, and their derivative by them, n x n row by
+/// row. Springs along lines carry their part.
+pub fn load_at_rest(description: &Description, theta: &[f64], position: &[f64]) -> Result<(Vec<f64>, Vec<f64>)> {
+    Table::vector("position", position, description.n_coordinates(), "coordinate")?;
+    description.check_values(theta)?;
+    statics::load(description, theta, position)
 }
 
 /// Evaluates states of drives and supplies of a machine that has stood at `position` without commands. `position` has
@@ -134,7 +145,7 @@ pub fn loops(description: &Description, theta: &[f64], position: &[f64], velocit
 fn held(description: &Description, theta: &[f64], position: &[f64]) -> Result<Statics> {
     Table::vector("position", position, description.n_joints(), "joint")?;
     description.check_values(theta)?;
-    Statics::new(description, theta, &[])
+    Statics::new(description, theta, &[], true)
 }
 
 fn prepare<const N: usize>(

@@ -29,6 +29,8 @@ pub(crate) struct Statics {
     /// The coordinates that find their rest themselves: passive joints, then elastic coordinates.
     free: Vec<usize>,
     passive: Vec<String>,
+    /// Share of the forces of springs along lines: all, or none where drives do nothing.
+    springs: f64,
 }
 
 /// A machine at rest.
@@ -50,19 +52,21 @@ enum Newton {
 }
 
 impl Statics {
-    /// Statics of beams and the joints `passive`, all other joints held: prepares the search for rest.
-    pub(crate) fn new(description: &Description, theta: &[f64], passive: &[usize]) -> Result<Self> {
+    /// Statics of beams and the joints `passive`, all other joints held: prepares the search for rest. Without `drives`
+    /// springs along lines do nothing.
+    pub(crate) fn new(description: &Description, theta: &[f64], passive: &[usize], drives: bool) -> Result<Self> {
         let plain: Dynamics<f64> = description.dynamics(theta)?;
         let free: Vec<usize> = passive.iter().copied().chain(plain.joints()..plain.coordinates()).collect();
-        let unbalance = if free.is_empty() { None } else { Some(unbalance(description, theta)?) };
+        let springs = f64::from(u8::from(drives));
+        let unbalance = if free.is_empty() { None } else { Some(unbalance(description, theta, springs)?) };
         let passive = passive.iter().map(|&joint| description.bodies[joint].joint.name.clone()).collect();
-        Ok(Self { plain, unbalance, free, passive })
+        Ok(Self { plain, unbalance, free, passive, springs })
     }
 
     /// Static free coordinates under gravity with the other joints held at `joints`. Passive ones are sought from
     /// there.
     ///
-    /// Law: `bias(q, 0) + K q = effects(q, 0)` on the free coordinates, by Newton's method from the straight beams with exact
+    /// Law: `bias(q, 0) + K q = effects(q, 0) + springs(q)` on the free coordinates, by Newton's method from the straight beams with exact
     /// derivatives (of the recorded load). Where that goes astray the weight is put on in stages, so that of several places at rest it is the
     /// one that the beams sag to. Passive joints are first moved to where their own load changes its sign: from the flat middle of a
     /// play Newton's first step would lead anywhere. Checked: converged to rounding.
@@ -147,7 +151,7 @@ impl Statics {
         let start = coordinates[joint];
         let mut load = |way: f64| {
             coordinates[joint] = start + way;
-            self.plain.unbalance(coordinates, 1.0)[joint]
+            self.plain.unbalance(coordinates, [1.0, self.springs])[joint]
         };
         let first = load(0.0);
         let (mut near, mut far) = (0.0, -WAYS[0] * first.signum());
@@ -166,7 +170,7 @@ impl Statics {
     }
 
     fn residual(&mut self, q: &[f64], weight: f64) -> DVector<f64> {
-        let load = self.plain.unbalance(q, weight);
+        let load = self.plain.unbalance(q, [weight, self.springs]);
         DVector::from_iterator(self.free.len(), self.free.iter().map(|&place| load[place]))
     }
 
@@ -181,11 +185,12 @@ impl Statics {
         DMatrix::from_fn(free.len(), free.len(), |row, column| matrix[free[row] * n + free[column]])
     }
 
-    /// Static efforts that hold the joints at rest, with those of the effects taken off.
+    /// Static efforts that hold the joints at rest, with those of the effects and of springs along lines taken off.
     pub(crate) fn holding_efforts(&mut self, rest: &Rest) -> Vec<f64> {
         let n = rest.coordinates.len();
         let (zero, mut efforts) = (vec![0.0; n], vec![0.0; n]);
         self.plain.inverse_dynamics(&rest.coordinates, &zero, &zero, &mut efforts);
+        self.plain.subtract_springs(&rest.coordinates, self.springs, &mut efforts);
         efforts.truncate(self.plain.joints());
         efforts
     }
@@ -207,24 +212,35 @@ impl Statics {
     }
 }
 
-/// Static residual under a share of the weight, for the checked parameters `theta`; first under all of it.
-fn unbalance<S: Scalar>(description: &Description, theta: &[S]) -> Result<Routine<S>> {
+/// Static load that holds all coordinates at `position`, n, and its derivative by them, n x n row by row.
+pub(crate) fn load(description: &Description, theta: &[f64], position: &[f64]) -> Result<(Vec<f64>, Vec<f64>)> {
+    let n = position.len();
+    let (mut matrix, mut load) = (vec![0.0; n * n], vec![0.0; n]);
+    unbalance(description, theta, 1.0)?.matrix(position, &mut matrix, n, &mut load);
+    Ok((load, matrix))
+}
+
+/// Static residual under a share of the weight, for the checked parameters `theta`; first under all of it. `springs` is
+/// the share of those along lines.
+fn unbalance<S: Scalar>(description: &Description, theta: &[S], springs: f64) -> Result<Routine<S>> {
     let values: Vec<f64> = theta.iter().map(Scalar::inspect).collect();
     let mut routine = Routine::new(description.functions().function(&Kind::Unbalance, &values)?, theta);
     routine.hold(0, S::one());
+    routine.hold(1, S::from_f64(springs));
     Ok(routine)
 }
 
-/// Static coordinates with the joints held at `joints` but for `passive` ones, with exact derivatives. One Newton step
-/// over the number type from the solution in plain numbers (the implicit function theorem).
+/// Static coordinates with the joints held at `joints` but for `passive` ones, with exact derivatives; without `drives`
+/// springs along lines do nothing. One Newton step over the number type from the solution in plain numbers (the implicit
+/// function theorem).
 pub(crate) fn settled<S: Scalar>(
     description: &Description,
     theta: &[S],
     joints: &[S],
-    passive: &[usize],
+    (passive, drives): (&[usize], bool),
 ) -> Result<Vec<S>> {
     let values = |numbers: &[S]| numbers.iter().map(Scalar::re).collect::<Vec<f64>>();
-    let mut statics = Statics::new(description, &values(theta), passive)?;
+    let mut statics = Statics::new(description, &values(theta), passive, drives)?;
     let Rest { coordinates, tangent } = statics.settle(&values(joints))?;
     let mut q: Vec<S> = joints.to_vec();
     q.extend(coordinates[joints.len()..].iter().map(|&value| S::from_f64(value)));
@@ -233,8 +249,8 @@ pub(crate) fn settled<S: Scalar>(
     }
     let Some(inverse) = tangent.try_inverse() else { return Ok(q) };
     let missing = match S::plain(&q) {
-        Some(plain) => statics.plain.unbalance(plain, 1.0).into_iter().map(S::from_f64).collect(),
-        None => unbalance(description, theta)?.at(&q).to_vec(),
+        Some(plain) => statics.plain.unbalance(plain, [1.0, statics.springs]).into_iter().map(S::from_f64).collect(),
+        None => unbalance(description, theta, statics.springs)?.at(&q).to_vec(),
     };
     for (row, &place) in inverse.row_iter().zip(&statics.free) {
         let step: S = row.iter().zip(&statics.free).map(|(&entry, &column)| missing[column] * entry).sum();

@@ -84,18 +84,21 @@ class Schedule(Storable):
 
 
 def _holding(model: Model, state: Array, effort: Array) -> Array:
-    """Commands that hold a pose of the schedule, by the levers of all inputs about it."""
-    n, joints = len(model.coordinates), len(model.joints)
+    """Commands that hold a pose of the schedule, by the levers of all inputs about it but for springs along lines."""
+    n = len(model.coordinates)
     if len(state) != model.core.n_states:
         raise SimulationError(f"{model.name}: drives with states of their own cannot be scheduled; use ideal drives")
     standing = model.command()
     _, by_inputs, _, _ = model.core.linearize(model.theta, state, standing)
-    levers = (model.mass_matrix(state[:n]) @ by_inputs[n:])[:joints]
-    found = np.linalg.lstsq(levers, effort, rcond=None)[0]
-    missing = float(np.abs(levers @ found - effort).max(initial=0.0))
+    working = np.array([channel not in model.optional_inputs for channel in model.input_channels])
+    levers = model.mass_matrix(state[:n]) @ by_inputs[n:] * working
+    # Links rest as gravity and springs bend them: a force of a drive on them would bend them otherwise.
+    wanted = np.concatenate([effort, np.zeros(n - len(effort))])
+    found = np.linalg.lstsq(levers, wanted, rcond=None)[0]
+    missing = float(np.abs(levers @ found - wanted).max(initial=0.0))
     if missing > 1e-6 * float(np.abs(effort).max(initial=0.0)):
         raise SimulationError(
-            f"{model.name}: no command holds the joints at {np.round(state[:joints], 4).tolist()}, {missing:.3g} N or "
-            "N m are missing; schedule along a feed-forward, or where passive joints rest"
+            f"{model.name}: no command holds the joints at {np.round(state[: len(effort)], 4).tolist()}, {missing:.3g} "
+            "N or N m are missing; schedule along a feed-forward, or where passive joints rest"
         )
     return np.asarray(standing + found)

@@ -53,6 +53,13 @@ class Task:
                 f"{self.model.name}: drives with states of their own ({held}) cannot be inverted; "
                 "give the model drives that deliver at once, and let theirs follow the force"
             )
+        kinds = {name: self.model.actuator_type(name) for name in self.model.actuators}
+        other = [f"{name} ({kind})" for name, kind in kinds.items() if kind != "ideal"]
+        if other:
+            raise SimulationError(
+                f"{self.model.name}: {', '.join(other)} gives an effort that is not in proportion to its command, and "
+                "a feed-forward would leave it out; take an effect in its place, such as a spring, or vpm.optimise"
+            )
 
     # ---- the machine -------------------------------------------------------------------------------------------------
 

@@ -37,7 +37,7 @@ class Evaluations(Motions):
         coordinates : ndarray, shape (n,)
             ``q``, then the elastic coordinates.
         effort : ndarray, shape (joints,)
-            N or N m; springs and loads of the joints are carried too.
+            N or N m; springs and loads of the joints are carried too, and springs of lines carry their part.
 
         Raises
         ------

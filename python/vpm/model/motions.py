@@ -186,8 +186,8 @@ class Motions(Components):
     def energy(self, q: ArrayLike, v: ArrayLike) -> tuple[Any, Any]:
         """Kinetic and potential energy at motions, J.
 
-        The potential is that of the bodies in gravity and of the effects, flexible links, contacts and bushings that
-        store energy.
+        The potential is that of the bodies in gravity and of the effects, flexible links, contacts, bushings and
+        springs of lines that store energy, these without a command.
 
         Parameters
         ----------

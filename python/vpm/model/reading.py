@@ -86,7 +86,9 @@ def parse_toml(text: str, path: str | None = None) -> dict[str, Any]:
         raise ModelError(f"{head}tables or lists are nested without end; write them flatter", path=path) from None
     except tomllib.TOMLDecodeError as error:
         if text.lstrip().startswith("<"):
-            raise ModelError(f"{head}this is XML, not TOML; vpm import makes a model file of a robot", path=path) from None
+            raise ModelError(
+                f"{head}this is XML, not TOML; vpm import makes a model file of a robot", path=path
+            ) from None
         found = re.fullmatch(
             r"(?P<what>.*) \(at (?:line (?P<line>\d+), column (?P<column>\d+)|end of document)\)", str(error)
         )

@@ -86,8 +86,8 @@ def simulate(
         )
     if initial_state is not None and mode not in BEGUN:
         raise SimulationError(
-            f"mode '{mode}' takes no initial_state, since its states follow from the log; leave it out, or use the mode "
-            f"{' or '.join(BEGUN)}"
+            f"mode '{mode}' takes no initial_state, since its states follow from the log; leave it out, or use the "
+            f"mode {' or '.join(BEGUN)}"
         )
     if mode == "inverse_dynamics":
         return _inverse_dynamics_run(model, experiment, cutoff)

@@ -51,7 +51,8 @@ pub fn files(description: &Description, theta: &[f64], free: &[usize], names: &N
     let name = names.machine.as_str();
     description
         .refuse_sampled("the machine has no rates in continuous time", "write it with an ideal drive in its place")?;
-    description.refuse_loops("a step in C, which would not close them again", "run it by a compiled model")?;
+    description
+        .refuse_loops("C source, whose steps would not close them again,", "compile the model without C source")?;
     description.check_values(theta)?;
     check(description, free, names)?;
     let machine = Machine::new(description, theta, free, name)?;

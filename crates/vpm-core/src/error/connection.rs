@@ -73,7 +73,7 @@ pub enum ConnectionError {
         rate: f64,
     },
     /// Something that is not known of machines with closed loops.
-    #[error("the machine has closed loops (`{closure}`), of which {what} is not known; {repair}")]
+    #[error("{what} is not known for machines with closed loops (`{closure}`); {repair}")]
     LoopRefused {
         /// Name of the loop.
         closure: String,

@@ -149,10 +149,10 @@ pub(crate) fn of_what<S: Scalar>(name: &str, number: S) -> String {
 /// What helps against a state that left its bounds.
 pub(crate) fn repair(method: Method) -> &'static str {
     match method {
-        Method::LinearlyImplicit | Method::Rosenbrock | Method::Guarded => {
+        Method::LinearlyImplicit | Method::Rosenbrock | Method::Guarded | Method::Additive | Method::CrankNicolson => {
             "use more substeps or the integrator adaptive, or check signs and units of parameters and commands"
         }
-        Method::Rk4 | Method::SemiImplicit | Method::Additive | Method::CrankNicolson => {
+        Method::Rk4 | Method::SemiImplicit => {
             "use more substeps or the integrator linearly_implicit, or check signs and units of parameters and commands"
         }
         Method::Adaptive { .. } => "check signs and units of parameters and commands",
@@ -164,10 +164,10 @@ pub(super) fn repair_along(method: Method, drives: bool) -> &'static str {
     match method {
         Method::Adaptive { .. } => "check units and jumps of the motion",
         _ if drives => "use the integrator adaptive, and check units and jumps of the motion",
-        Method::LinearlyImplicit | Method::Rosenbrock | Method::Guarded => {
+        Method::LinearlyImplicit | Method::Rosenbrock | Method::Guarded | Method::Additive | Method::CrankNicolson => {
             "use more substeps or the integrator adaptive, and check units and jumps of the motion"
         }
-        Method::Rk4 | Method::SemiImplicit | Method::Additive | Method::CrankNicolson => {
+        Method::Rk4 | Method::SemiImplicit => {
             "use more substeps or the integrator linearly_implicit, and check units and jumps of the motion"
         }
     }

@@ -142,7 +142,7 @@ impl<'a, S: Scalar> Way<'a, S> {
         let mut joints = vec![S::zero(); description.n_joints()];
         self.guidance.joints.iter().for_each(|&joint| joints[joint] = self.joint(joint, 0)[0]);
         if count > 0 {
-            let q = settled(description, theta, &joints, self.guide.passive)?;
+            let q = settled(description, theta, &joints, (self.guide.passive, self.guidance.drives))?;
             self.state.iter_mut().zip(self.machine.free()).for_each(|(entry, &place)| *entry = q[place]);
         }
         for (half, away) in self.guide.departure.chunks_exact(description.n_coordinates().max(1)).enumerate() {

@@ -110,8 +110,9 @@ impl<S: Scalar> Dynamics<S> {
         total
     }
 
-    /// Answers with the load that the coordinates miss at rest: `weight bias(q, 0) + K q - effects(q, 0)`.
-    pub(crate) fn unbalance(&mut self, q: &[S], weight: S) -> Vec<S> {
+    /// Answers with the load that the coordinates miss at rest: `weight bias(q, 0) + K q - effects(q, 0)`, less a share
+    /// of the forces of springs along lines.
+    pub(crate) fn unbalance(&mut self, q: &[S], [weight, springs]: [S; 2]) -> Vec<S> {
         let zero = vec![S::zero(); q.len()];
         self.terms(q, &zero);
         let mut loads = zero.clone();
@@ -123,7 +124,30 @@ impl<S: Scalar> Dynamics<S> {
             seat.push(&mut loads, -effect.law().effort_at_rest(seat.of(q)));
         }
         self.subtract_connections(&mut loads);
+        self.subtract_springs(q, springs, &mut loads);
         loads
+    }
+
+    /// Takes a share of the forces of springs along lines off `loads` in an answer at rest, without command and with
+    /// visco-elastic ones settled.
+    pub(crate) fn subtract_springs(&mut self, q: &[S], share: S, loads: &mut [S]) {
+        if !self.actuators.iter().any(|actuator| is_spring(&actuator.drive)) {
+            return;
+        }
+        let Self { model, data, loads: rates, actuators, .. } = self;
+        rates.fill(S::zero());
+        frames(model, data, q, rates);
+        poses(model, data);
+        lines(model, data);
+        for actuator in actuators.iter() {
+            let Target::Line(line) = actuator.on else { continue };
+            let length = data.composite.lines[line].length;
+            match &actuator.drive {
+                Drive::SpringDamper(law) => data.line_load(line, -law.force(length, S::zero()) * share, loads),
+                Drive::Maxwell(law) => data.line_load(line, law.force(length, law.settled(length)) * share, loads),
+                _ => {}
+            }
+        }
     }
 
     /// Takes the loads of contacts and bushings off `loads` in an answer, after [`Dynamics::terms`] in that state.
@@ -140,8 +164,7 @@ impl<S: Scalar> Dynamics<S> {
 
     /// Answers with the energy of springs in two-point elements, J.
     fn springs(&mut self, q: &[S], v: &[S]) -> S {
-        let spring = |drive: &Drive<S>| matches!(drive, Drive::SpringDamper(_) | Drive::Maxwell(_));
-        if !self.actuators.iter().any(|actuator| spring(&actuator.drive)) {
+        if !self.actuators.iter().any(|actuator| is_spring(&actuator.drive)) {
             return S::zero();
         }
         self.locate(q, v);
@@ -233,4 +256,9 @@ impl<S: Scalar> Dynamics<S> {
         frames(model, data, q, loads);
         poses(model, data);
     }
+}
+
+/// Whether a drive stores energy, so that an answer has it at rest.
+fn is_spring<S>(drive: &Drive<S>) -> bool {
+    matches!(drive, Drive::SpringDamper(_) | Drive::Maxwell(_))
 }

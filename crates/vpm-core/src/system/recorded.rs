@@ -128,7 +128,7 @@ impl Kind {
     /// Places of the inputs of such a recorded program, from those of a free machine at `places`.
     fn places(&self, places: Places) -> Places {
         match self {
-            Self::Unbalance => Places { states: places.coordinates, inputs: 1, ..places },
+            Self::Unbalance => Places { states: places.coordinates, inputs: 2, ..places },
             Self::Guided(guidance, _) => guidance.places(places),
             Self::Derived(kind, _) => kind.places(places),
             _ => places,
@@ -367,7 +367,7 @@ fn outputs(build: impl Build<Error = Error>, places: Places, parameters: &[Recor
             (numbers, None)
         }
         Kind::Unbalance => {
-            let loads = dynamics.unbalance(&x, input(places.states, 0.0));
+            let loads = dynamics.unbalance(&x, [0, 1].map(|share| input(places.states + share, 0.0)));
             (loads.clone(), Some(Matrix::by_states(loads, dim)))
         }
         Kind::Guided(guidance, part) => {

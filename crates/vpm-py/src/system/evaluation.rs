@@ -206,6 +206,20 @@ impl System {
         Ok((PyArray1::from_vec(py, coordinates), PyArray1::from_vec(py, efforts)))
     }
 
+    /// Evaluates efforts (n,) that hold all coordinates at rest at a position, and their derivative (n, n) by these.
+    fn load_at_rest<'py>(
+        &self,
+        py: Python<'py>,
+        theta: &Any<'py>,
+        position: &Any<'py>,
+    ) -> PyResult<(Row<'py>, Table<'py>)> {
+        let (theta, q) = (Numbers::vector("theta", theta)?, Numbers::vector("position", position)?);
+        let result = self.compute(py, |_| evaluate::load_at_rest(self.description(), theta.values(), q.values()))?;
+        let (load, slope) = result;
+        let n = load.len();
+        Ok((PyArray1::from_vec(py, load), matrix(py, slope, [n, n])?))
+    }
+
     /// Evaluates natural frequencies (k,) in Hz about rest with the joints locked, slowest first. Negative for growth
     /// instead of vibration.
     fn natural_frequencies<'py>(&self, py: Python<'py>, theta: &Any<'py>, position: &Any<'py>) -> PyResult<Row<'py>> {

@@ -89,9 +89,8 @@ def followed(loops: Loops, q: Array, readings: Mapping[int, float], joints: int)
     """
     way, turns = _way(loops, q, readings)
     for piece in way:
-        q = _put(
-            loops, _put(loops, q, piece, [[place for place in range(joints) if place not in piece]]), {}, [range(joints)]
-        )
+        others = [place for place in range(joints) if place not in piece]
+        q = _put(loops, _put(loops, q, piece, [others]), {}, [range(joints)])
     return q + turns
 
 

@@ -290,7 +290,7 @@ class Loops:
         -------
         coordinates : ndarray, shape (n,)
         efforts : dict of str to float
-            Efforts (N, N m) on the held joints.
+            Efforts (N, N m) on the held joints; springs of lines carry their part.
 
         Raises
         ------

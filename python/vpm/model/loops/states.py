@@ -52,7 +52,7 @@ def rest(
     chosen = loops.at(q).independent
     forces = np.zeros(int(chosen.sum()))
     for _ in range(_STEPS):
-        needed, slope = _load(model, q)
+        needed, slope = model.core.load_at_rest(model.theta, q)
         state = loops.at(q)
         J = state.jacobian[chosen]
         missing = np.concatenate([(needed - J.T @ forces)[free], state.gap[chosen]])
@@ -66,7 +66,7 @@ def rest(
         q[free] += step[: len(free)]
         forces += scale * step[len(free) :]
         if np.abs(step[: len(free)]).max(initial=0.0) < _LAST * max(1.0, float(np.abs(q).max())):
-            needed, _ = _load(model, q)
+            needed, _ = model.core.load_at_rest(model.theta, q)
             left = needed - loops.at(q).jacobian[chosen].T @ forces
             if np.abs(left[free]).max(initial=0.0) > 1e-6 * (1.0 + float(np.abs(needed).max())):
                 break  # no step leads nearer, and yet the loads do not vanish
@@ -75,13 +75,6 @@ def rest(
         f"{model.name} finds no rest with {', '.join(held) or 'nothing'} held; hold as many joints as there are "
         "degrees of freedom, or give springs to the others"
     )
-
-
-def _load(model: Evaluations, q: Array) -> tuple[Array, Array]:
-    """Efforts that hold the open machine's state at rest, and their derivative by coordinates."""
-    zero = np.zeros_like(q)
-    found = model.inverse_dynamics_derivatives(q, zero, zero)
-    return np.asarray(found.effort), np.asarray(found.by_position)
 
 
 def _turned(loops: Loops, q: Array, chosen: NDArray[np.bool_], forces: Array) -> Array:
