@@ -83,6 +83,13 @@ def test_a_run_begins_where_springs_and_links_balance(coil: str) -> None:
     assert np.ptp(run["tip.z"]) < 1e-9
 
 
+def test_a_prescribed_motion_tells_that_springs_do_nothing() -> None:
+    still = Experiment.from_arrays(1e-3 * np.arange(200), {"hinge.position": np.zeros(200)}, model=boom("maxwell"))
+    run = simulate(boom("maxwell"), still, "prescribed_motion", cutoff=40.0)
+    assert np.abs(run["tip.z"]).max() < 1e-9
+    assert "springs along lines (coil) did nothing" in run.notes[0]
+
+
 def test_gains_over_poses_hold_what_springs_of_lines_leave() -> None:
     model = boom("spring_damper")
     feedback = vpm.state_feedback(

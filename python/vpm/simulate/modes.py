@@ -97,7 +97,9 @@ def simulate(
     if arrays.states is None:
         return run
     run = judged(model, run, arrays.states)
-    if mode == "prescribed_motion" or len(arrays.states) == 0:
+    if mode == "prescribed_motion":
+        return replace(run, notes=(*run.notes, *_left_out(model)))
+    if len(arrays.states) == 0:
         return run
     duration = len(arrays.states) * experiment.dt
     commands = arrays.outputs[:, [model.output_channels.index(name) for name in model.input_channels]]
@@ -205,6 +207,17 @@ def _dispatch(
         flat = outputs.reshape(-1, outputs.shape[-1])
         return SimulatedArrays(flat, jacobian.reshape(len(flat), flat.shape[1], -1), rows, starts)
     raise SimulationError(f"unknown mode '{mode}'; choose one of {', '.join(MODES)}")
+
+
+def _left_out(model: Model) -> tuple[str, ...]:
+    """What does not act on the links and passive joints of a prescribed run, in which drives do nothing."""
+    springs = [name for name in model.actuators if f"{name}.command" in model.optional_inputs]
+    if not springs:
+        return ()
+    return (
+        f"springs along lines ({', '.join(springs)}) did nothing, as no drive does in a prescribed motion: links and "
+        "passive joints that they pull moved without them",
+    )
 
 
 def _prescribed(model: Model, m: Motion, theta: Array, columns: list[int], setup: Setup) -> SimulatedArrays:
