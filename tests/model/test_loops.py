@@ -222,6 +222,14 @@ def test_what_cannot_close_says_how_far(parallelogram: Model) -> None:
         parallelogram.state({"left_crank.position": 0.3, "elbow.position": 2.0})
 
 
+def test_axes_that_are_out_of_line_say_by_which_angle(parallelogram: Model) -> None:
+    """A frame turned about its own x axis, which lies across the joint's: no joint of the plane turns it back."""
+    content = parallelogram.to_dict()
+    content["loops"]["wrist"]["b"]["rotation"] = [0.3, 0.0, 0.0]
+    with pytest.raises(ModelError, match=r"loop wrist stays open by 0\.3 rad;"):
+        Model.from_dict(content).loops.assembled({"left_crank": 0.3})
+
+
 def test_open_states_and_torn_velocities_are_refused(parallelogram: Model) -> None:
     with pytest.raises(CoreError, match="leaves loop `wrist` open"):
         run(parallelogram, [0.5, -0.4, 0.5, 0.0, 0.0, 0.0], 3, 1e-3)

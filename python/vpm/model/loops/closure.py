@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -385,16 +386,20 @@ class Loops:
             )
 
     def _complain(self, q: Array, held: Mapping[str, float]) -> None:
-        gap, first, worst = self.at(q).gap, 0, ("", 0.0)
-        for name, entry in self._model.loop_entries.items():
-            size = float(np.abs(gap[first : first + entry.equations]).max())
-            worst = max(worst, (name, size), key=lambda pair: pair[1])
-            first += entry.equations
-        if worst[1] <= CLOSED:
+        gap = self.at(q).gap
+        if np.abs(gap).max(initial=0.0) <= CLOSED:
             return
+        gaps, first = {}, 0
+        for name, entry in self._model.loop_entries.items():
+            gaps[name] = gap[first : first + entry.equations]
+            first += entry.equations
+        worst = max(gaps, key=lambda name: float(np.abs(gaps[name]).max()))
         given = " with " + ", ".join(f"{name} = {value:g}" for name, value in held.items()) + " held" if held else ""
-        way = float(np.linalg.norm(gap[:3])) if len(self) == 1 else worst[1]
+        way, turned = float(np.linalg.norm(gaps[worst][:3])), float(np.abs(gaps[worst][3:]).max(initial=0.0))
+        open_by = [
+            f"{size:.4g} {unit}" for size, unit in ((way, "m"), (math.asin(min(turned, 1.0)), "rad")) if size > CLOSED
+        ]
         raise ModelError(
-            f"the loops of {self._model.name} do not close{given}: loop {worst[0]} stays open by {way:.4g} m; hold "
-            "other positions, or give a start nearer to an assembly"
+            f"the loops of {self._model.name} do not close{given}: loop {worst} stays open by {' and '.join(open_by)}; "
+            "hold other positions, or give a start nearer to an assembly"
         )
