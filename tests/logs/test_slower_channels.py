@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.io import savemat
 
 from vpm import Experiment
 from vpm.errors import ExperimentError
@@ -12,6 +13,7 @@ from vpm.experiment import choose_cutoff, drawn_noise, instrument_noise, lowpass
 from vpm.experiment.dates import seconds_of_dates
 from vpm.identify.closed_loop_prediction import Noise
 from vpm.model import ChannelEntry
+from vpm.model.channels import ColumnPart
 
 STEP, SLOW = 0.01, 5  # s; samples between two readings of the slow sensor
 COUNT = 1200
@@ -105,6 +107,43 @@ def test_a_slow_sensor_counts_where_it_was_read(tmp_path: Path, slow: list[str])
     assert log.rate == pytest.approx(1.0 / STEP)
     assert np.abs(error).max() < 0.06  # a reading lost: the spline's error over two steps of 0.05 s
     assert np.median(np.abs(error)) < 0.005  # the step of the sensor
+
+
+def test_rows_without_a_number_of_a_slow_sensor_are_empty_cells(tmp_path: Path) -> None:
+    """Merged frames and MATLAB write NaN where a device has nothing; of two devices no row has both."""
+    time = STEP * np.arange(COUNT)
+    every = np.sort(np.concatenate([time, time[::SLOW] + 0.3 * STEP]))
+    drive, slow = np.isin(every, time), ~np.isin(every, time)
+    columns = {
+        "t": every,
+        "Weg_mm": np.where(drive, 1000.0 * np.sin(0.7 * every), np.nan),
+        "Winkel_Grad": np.where(slow, swing(every), np.nan),
+    }
+    savemat(tmp_path / "merged.mat", columns)
+    with pytest.raises(ExperimentError, match=r'sample 1: column "Weg_mm".*is nan.*fill these cells, or.*interpolate'):
+        Experiment.load(tmp_path / "merged.mat", table("t", "s"))
+    log = Experiment.load(tmp_path / "merged.mat", table("t", "s"), irregular="interpolate")
+    assert log.rate == pytest.approx(1.0 / STEP)
+    assert log.slower["swing.position"] == pytest.approx(1.0 / (SLOW * STEP))
+    np.testing.assert_allclose(log["travel.position"], np.sin(0.7 * log.time), atol=1e-9)
+    np.testing.assert_allclose(log["swing.position"], np.radians(swing(log.time)), atol=2e-5)  # of the spline
+    arrays = {"travel.position": columns["Weg_mm"], "swing.position": columns["Winkel_Grad"]}
+    units = {"travel.position": "mm", "swing.position": "deg"}
+    np.testing.assert_array_equal(Experiment.from_arrays(every, arrays, units, irregular="interpolate").data, log.data)
+
+
+def test_a_turn_is_unwrapped_over_rows_without_a_number(tmp_path: Path) -> None:
+    """An expression takes the rows in which all of its columns have numbers."""
+    turns = 37.0 * np.arange(COUNT) % 256.0
+    turns[[5, 6, 400]] = np.nan
+    savemat(tmp_path / "counter.mat", {"t": STEP * np.arange(COUNT), "n": turns})
+    counter = ChannelEntry(value="unwrap(n, 256)", columns={"n": ColumnPart(column="n")}, unit="1")
+    entries = {"time": ChannelEntry(column="t", unit="s"), "a.position": counter}
+    log = Experiment.load(tmp_path / "counter.mat", entries, irregular="interpolate")
+    np.testing.assert_allclose(log["a.position"], 37.0 * np.arange(COUNT), atol=1e-6)
+    savemat(tmp_path / "counter.mat", {"t": STEP * np.arange(COUNT), "n": np.full(COUNT, np.nan)})
+    with pytest.raises(ExperimentError, match=r'no row has a number for the channel "a\.position"; do not map it'):
+        Experiment.load(tmp_path / "counter.mat", entries, irregular="interpolate")
 
 
 @pytest.mark.parametrize("times", [1.0, 5.0])

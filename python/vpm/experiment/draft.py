@@ -38,9 +38,45 @@ class Draft:
     #: Delays of columns that were moved back already, s: at the ends of the record they have no value.
     moved: list[float] = field(default_factory=list)
 
+    def numbers(
+        self, channel: str, own: Array | None, read: Mapping[str, Array]
+    ) -> tuple[Array | None, dict[str, Array]]:
+        """Clock and columns of a drafted channel, without the rows in which one of its columns has no number.
 
-def mapped_draft(log: Log, table: Mapping[str, ChannelEntry], model: Model | None) -> Draft:
-    """Draft of channels from columns that a channel table names."""
+        Data frames, Parquet and MATLAB write NaN where a row of one device has nothing of another, or a sample was
+        lost. ``own``, ``read``: clock (None where it is that of the record) and columns, shape (N,).
+
+        Raises `ExperimentError`: no row has a number.
+        """
+        there = ~np.any([np.isnan(column) for column in read.values()], axis=0)
+        if np.all(there):
+            return own, dict(read)
+        if not np.any(there):
+            raise self.source.error(
+                f'{self.source.name}: no row has a number for the channel "{channel}"; do not map it', channel=channel
+            )
+        clock = (self.time if own is None else own)[there]
+        self.clocks[channel] = clock
+        self.history.append(f"{channel} has numbers in {clock.size} of {there.size} rows.")
+        return clock, {name: column[there] for name, column in read.items()}
+
+    def on_fullest_clock(self) -> "Draft":
+        """Draft without the rows in which only slower channels were read, and none other: they are no grid."""
+        if len(self.clocks) < len(self.columns) or not self.clocks:
+            return self
+        time = max(self.clocks.values(), key=len)
+        lines = None if self.source.lines is None else self.source.lines[np.isin(self.time, time)]
+        clocks = {channel: own for channel, own in self.clocks.items() if not np.array_equal(own, time)}
+        return replace(self, source=replace(self.source, lines=lines), time=time, clocks=clocks)
+
+
+def mapped_draft(
+    log: Log, table: Mapping[str, ChannelEntry], model: Model | None, *, interpolated: bool = False
+) -> Draft:
+    """Draft of channels from columns that a channel table names.
+
+    ``interpolated``: rows in which a column has no number count as rows in which it was not read.
+    """
     path = log.path
     present = _present_columns(path, table, log)
     columns = list(dict.fromkeys(column for found in present.values() for column in found.values()))
@@ -72,8 +108,8 @@ def mapped_draft(log: Log, table: Mapping[str, ChannelEntry], model: Model | Non
     draft.unused = tuple(column for column in log.header if column not in columns)
     for channel, entry in table.items():
         if channel != "time":
-            _map_channel(draft, content, channel, entry, present.get(channel), model)
-    return draft
+            _map_channel(draft, content, channel, entry, present.get(channel), model, interpolated)
+    return draft.on_fullest_clock() if interpolated and not content.clocks else draft
 
 
 def _present_columns(
@@ -114,6 +150,7 @@ def _map_channel(
     entry: ChannelEntry,
     columns: Mapping[str, str] | None,
     model: Model | None,
+    interpolated: bool,
 ) -> None:
     """Draft of one channel in the unit of the entry: (column or value * scale + offset)."""
     given, draft.units[channel] = understood(entry.unit, channel, model, draft.source.name)
@@ -125,12 +162,13 @@ def _map_channel(
     own = _clock(draft, content, channel, columns)
     if own is not None:
         draft.clocks[channel] = own
+    read = {name: content.columns[column] for name, column in columns.items()}
+    if interpolated:
+        own, read = draft.numbers(channel, own, read)
     # Lines are those of the record's clock.
     clock, source = (draft.time, draft.source) if own is None else (own, replace(draft.source, lines=None))
     for name, part in entry.parts.items():
-        what = f'column "{part.column}" ({channel})'
-        check_finite(content.columns[columns[name]], clock, what, source, channel=channel)
-    read = {name: content.columns[column] for name, column in columns.items()}
+        check_finite(read[name], clock, f'column "{part.column}" ({channel})', source, channel=channel)
     for name, part in entry.columns.items():
         if part.delay:
             back = np.clip(clock + part.delay, clock[0], clock[-1])  # where it ends it keeps its last value
@@ -175,7 +213,10 @@ def _built(source: Source, read: Mapping[str, Array], channel: str, entry: Chann
         value = read_expression(entry.value)(parts)
         if value.dimension != given.dimension:
             kind = replace(given, dimension=value.dimension).kind
-            raise VpmError(f'"{entry.value}" is in {kind}, but its unit is {entry.unit}; correct one of them')
+            raise VpmError(
+                f'"{entry.value}" is in {kind}, but its unit is {entry.unit}; state the units of its columns (numbers '
+                f"have none: for 5 {entry.unit} a count write 5*count and that the unit of count is {entry.unit})"
+            )
         if value.dimension == PURE and given.factor != 1.0 and all(unit.factor == 1.0 for unit in units.values()):
             # Nobody can tell whether 360 x of turns x is meant in degrees already.
             raise VpmError(
@@ -189,8 +230,11 @@ def _built(source: Source, read: Mapping[str, Array], channel: str, entry: Chann
     return np.asarray(given.from_si(value.values), dtype=np.float64)
 
 
-def plain_draft(log: Log) -> Draft:
-    """Draft with every column as a channel of its own name; a unit may stand in brackets behind it."""
+def plain_draft(log: Log, *, interpolated: bool = False) -> Draft:
+    """Draft with every column as a channel of its own name; a unit may stand in brackets behind it.
+
+    ``interpolated``: as of `mapped_draft`.
+    """
     path, (names, clock) = log.path, _plain_columns(log)
     content = log.read(log.header, clock)
     source = Source(str(path), content.lines, str(path))
@@ -204,13 +248,15 @@ def plain_draft(log: Log) -> Draft:
             continue
         if column in content.clocks:
             draft.clocks[name] = seconds.to_si(content.clocks[column])
-        own = draft.clocks.get(name, draft.time)
-        check_finite(content.columns[column], own, f'column "{column}"', source, channel=name)
+        values = content.columns[column]
+        if interpolated:
+            values = draft.numbers(name, draft.clocks.get(name), {"": values})[1][""]
+        check_finite(values, draft.clocks.get(name, draft.time), f'column "{column}"', source, channel=name)
         given, draft.units[name] = understood(stated or "1", name, None, str(path))
-        draft.columns[name] = given.to_si(content.columns[column])
+        draft.columns[name] = given.to_si(values)
         how = f"converted from {stated} to {draft.units[name]}" if stated else "as it is, its unit is not stated"
         draft.history.append(f'{name} is column "{column}", {how}.')
-    return draft
+    return draft.on_fullest_clock() if interpolated and not content.clocks else draft
 
 
 def plain_table(path: str | PathLike[str], model: Model) -> dict[str, ChannelEntry]:

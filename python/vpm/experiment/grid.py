@@ -61,9 +61,10 @@ def check_finite(values: Array, time: Array, what: str, source: Source, *, chann
         first = int(bad[0])
         when = f" at t = {time[first]:.6g} s" if np.isfinite(time[first]) else ""
         count = "the only one" if bad.size == 1 else f"the first of {bad.size}"
+        nothing = np.all(np.isnan(values[bad])) and np.isfinite(time[first])
+        repair = f"fill these cells, or {INTERPOLATE}" if nothing else "repair these cells"
         raise source.error(
-            f"{source.at(first)}: {what} is {values[first]}{when}, {count}; repair these cells, or delete "
-            f"their rows and {INTERPOLATE}",
+            f"{source.at(first)}: {what} is {values[first]}{when}, {count}; {repair}",
             channel=channel,
             time=float(time[first]) if np.isfinite(time[first]) else None,
         )

@@ -41,7 +41,12 @@ def record_of_log(
 ) -> R:
     """Load the record in a log; see `Experiment.load`."""
     table = channel_table(channels, model)
-    draft = plain_draft(log) if table is None else mapped_draft(log, table, model)
+    interpolated = irregular == "interpolate"
+    draft = (
+        plain_draft(log, interpolated=interpolated)
+        if table is None
+        else mapped_draft(log, table, model, interpolated=interpolated)
+    )
     return _finish(make, draft, name, irregular, resample)
 
 
@@ -78,10 +83,12 @@ def record_of_arrays(
             )
         unit = units.get(channel) or (model.channel_unit(channel) if model is not None else "1")
         own, draft.units[channel] = understood(unit, channel, model, name)
+        if irregular == "interpolate":
+            column = draft.numbers(channel, None, {"": column})[1][""]
         draft.columns[channel] = own.to_si(column)
         if not own.is_si:
             draft.history.append(f"{channel} was converted from {unit} to {draft.units[channel]}.")
-    return _finish(make, draft, name, irregular, resample)
+    return _finish(make, draft.on_fullest_clock(), name, irregular, resample)
 
 
 def channel_table(
