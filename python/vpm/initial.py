@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import ExperimentError
 from vpm.experiment import Experiment, Motion, joints_from_sensors, motion
+from vpm.first_bending import first_departure
 from vpm.model import Model
 from vpm.model.drives.states import commanded_states, follow, rest
 from vpm.model.loops.states import kept, measured
@@ -46,8 +47,14 @@ def measured_states(
     states[:, :joints] = (m.position[rows] - offset) / gain
     states[:, coordinates : coordinates + joints] = m.velocity[rows] / gain
     if coordinates > joints:
-        bent = _bent(model, theta, ((m.position - offset) / gain, m.velocity / gain, m.acceleration / gain), m.dt)
-        states[:, : 2 * coordinates] = bent[rows]
+        states[:, : 2 * coordinates] = _bent(
+            model,
+            experiment,
+            theta,
+            replace(
+                m, position=(m.position - offset) / gain, velocity=m.velocity / gain, acceleration=m.acceleration / gain
+            ),
+        )[rows]
     for state, row in zip(states, rows, strict=True):
         internal = _internal(model, experiment, theta, state[:coordinates], int(row))
         follow(model, theta, internal, m.inputs[row], state[coordinates : coordinates + joints])
@@ -61,16 +68,31 @@ def measured_states(
     return states
 
 
-def _bent(model: Model, theta: Array, motion: tuple[Array, Array, Array], dt: float) -> Array:
-    """Coordinates and rates (N, 2 coordinates) of flexible links along a motion, for initial states."""
-    position, velocity, acceleration = motion
+def _bent(model: Model, experiment: Experiment, theta: Array, m: Motion) -> Array:
+    """Coordinates and rates (N, 2 coordinates) of flexible links along a motion, for initial states.
+
+    They begin as what they carry reads at first, or at rest where the log holds nothing of that.
+    """
     joints, coordinates = len(model.joints), len(model.coordinates)
-    _, states, _ = model.core.simulate_prescribed(
-        theta, position, velocity, acceleration, dt, 1, "linearly_implicit", [], []
-    )
-    bent = np.array(states[:, : 2 * coordinates])
-    bent[:, :joints] = position
-    bent[:, coordinates : coordinates + joints] = velocity
+
+    def along(departure: Array | None) -> tuple[Array, Array]:
+        outputs, states, _ = model.core.simulate_prescribed(
+            theta, m.position, m.velocity, m.acceleration, m.dt, 1, "linearly_implicit", [], [], departure=departure
+        )
+        return np.asarray(outputs), np.array(states)
+
+    outputs, states = along(None)
+    owners = {*model.gauges, *model.markers, *model.imus}
+    told = [name for name in model.output_channels if name.partition(".")[0] in owners and name in experiment]
+    if told:
+        places = [model.output_channels.index(name) for name in told]
+        readings = np.column_stack([experiment[name] for name in told])
+        start = states[0], m.inputs[0]
+        departure = first_departure(model, theta, start, (told, readings, m.dt), outputs[:, places], m.edge)
+        _, states = along(departure) if np.any(departure) else (outputs, states)
+    bent = states[:, : 2 * coordinates]
+    bent[:, :joints] = m.position
+    bent[:, coordinates : coordinates + joints] = m.velocity
     return bent
 
 

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from vpm.errors import VpmError
 from vpm.experiment import Experiment, drawn_noise, read_noise
+from vpm.first_bending import bending_gains
 from vpm.identify.shooting import state_channel
 from vpm.initial import initial_state, joints_by_velocity
 from vpm.model import Model
@@ -98,6 +99,7 @@ class TrackedRecords:
         #: Channels of those drawn that show a joint, and no pressure.
         self.drawn_joints = tuple(name for name in self.drawn_to if not _chamber(model, name))
         self._starts: WeakKeyDictionary[Model, list[Array]] = WeakKeyDictionary()
+        self._bent: WeakKeyDictionary[Model, dict[int, Array]] = WeakKeyDictionary()
         ends = np.cumsum([len(record.time) for record in self.records])
         cuts = [
             int(end) - np.linspace(len(r.time) - min(int(settings.settling / r.dt), len(r.time) // 2), 0, STRETCHES + 1)
@@ -431,6 +433,15 @@ class TrackedRecords:
             self._starts[model] = starts
         return self._starts[model]
 
+    def _bending(self, model: Model, record: Record, channels: Sequence[str], start: Array) -> Array:
+        """Gains (n, nx, m) by which the first samples of a tracked record tell how links bend; see `bending_gains`."""
+        known = self._bent.setdefault(model, {})
+        if id(record.time) not in known:  # names of records may be the same
+            readings = record.readings[:, [record.channels.index(name) for name in channels]]
+            grid = min(int(self.settings.settling / record.dt), len(readings) // 2), record.dt
+            known[id(record.time)] = bending_gains(model, channels, readings, (start, record.inputs[0]), grid)
+        return known[id(record.time)]
+
     def _run(
         self,
         model: Model,
@@ -452,6 +463,8 @@ class TrackedRecords:
         bands = tracker.band, max(tracker.band, *self.settings.bands)
         gains = tracker_gains(model, channels, bands, (len(record.time), record.dt), theta, self.of_pressures)
         gains[:, :, [name not in self.drawn_to for name in channels]] = 0.0
+        bent = self._bending(model, record, channels, start)
+        gains[: len(bent)] += bent
         method, steps = self.stepping(model, tracker, record.dt)
         outputs, states, slopes = model.core.observe(
             theta,
