@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Collection, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.following import Following
@@ -55,10 +58,14 @@ class SubstituteProblem(ProblemOfAllJoints):
     """Problem on substitute records: loops opened, all joints measured, sampled drives without effort.
 
     Motions are those of the machine, and efforts as large as its inertia needs. That is enough for natural sizes and
-    for where fits begin, and nothing is judged by it.
+    for where fits begin, and nothing is judged by it. Where loops are closed, joints that a log shows take what all
+    joints lack: forces of the loops do no work, and a ripple would be lost beside them.
     """
 
     def __init__(self, model: Model, tracked: TrackedRecords) -> None:
+        self._closed = model if model.loops else None
+        self._independent = [channel.rpartition(".")[0] for channel in tracked.drawn_joints]
+        self._rates: dict[int, Array] = {}
         super().__init__(opened(model), _completed(model, tracked))
 
     def _answer(
@@ -73,7 +80,41 @@ class SubstituteProblem(ProblemOfAllJoints):
         other = _opened_at(model, theta)
         places = [other.index(model.parameter_names[column]) for column in columns]
         tangent = None if origin is None else _opened_at(model, origin).theta
-        return super()._answer(other, other.theta, record, places, tangent, known)
+        answer = super()._answer(other, other.theta, record, places, tangent, known)
+        return answer if self._closed is None else self._of_loops(self._closed, answer, record)
+
+    def _of_loops(self, closed: Model, answer: Response, record: int) -> Response:
+        """Substitute efforts on the joints that are measured: those of all joints that move with them.
+
+        By the principle of virtual work (H. Goldstein, *Classical Mechanics*, 2nd ed., section 1-4) the effort of each
+        joint counts by its speed per speed of the measured one.
+        """
+        if record not in self._rates:
+            self._rates[record] = self._speeds(closed, record)
+        rates = self._rates[record]
+        places = [closed.joints.index(name) for name in self._independent]
+
+        def moved(efforts: Array) -> Array:
+            whole = efforts.copy()
+            whole[:, places] = np.einsum("nji,nj...->ni...", rates, efforts)
+            return whole
+
+        return replace(
+            answer, required=moved(answer.required), applied=moved(answer.applied), balance=moved(answer.balance)
+        )
+
+    def _speeds(self, closed: Model, record: int) -> Array:
+        """Speeds (n, joints, k) of substitute joints per speed of each measured one; none where loops are singular."""
+        motion = self.motions[record]
+        found = np.zeros((len(motion.retained), len(closed.joints), len(self._independent)))
+        for speeds, position in zip(found, motion.position[motion.retained], strict=True):
+            q = np.zeros(len(closed.coordinates))
+            q[: len(closed.joints)] = position
+            for column, name in enumerate(self._independent):
+                held = {other: float(other == name) for other in self._independent}
+                with contextlib.suppress(VpmError):
+                    speeds[:, column] = closed.loops.velocities(q, held)[: len(closed.joints)]
+        return found
 
 
 def opened(model: Model) -> Model:
