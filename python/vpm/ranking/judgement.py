@@ -60,9 +60,10 @@ class Judgement(Storable):
     @property
     def words(self) -> str:
         """Text of a judgement: ``removes 3 % of the error power``, or adds it where the share is negative."""
-        if self.least < 0.0:
-            return f"adds {rough_percent(-self.least)} to the error power"
-        return f"removes {rough_percent(self.least)} of the error power"
+        share = round(self.least, 4)  # beyond that is what fits end with
+        if share < 0.0:
+            return f"adds {rough_percent(-share)} to the error power"
+        return f"removes {rough_percent(abs(share))} of the error power"
 
     def counts(self, settings: Settings) -> bool:
         """Whether a judgement counts: more than chance, and more than errors of laws."""
