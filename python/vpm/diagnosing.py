@@ -35,7 +35,14 @@ from vpm.discrepancy.screening.candidates import asked_for
 from vpm.discrepancy.search.search import Search
 from vpm.discrepancy.search.search_round import Request, Tell
 from vpm.discrepancy.settings import FLOOR_FACTOR, WORTH_A_NAME
-from vpm.discrepancy.verdict import is_negligible, only_if_open, only_where_closed, verdict, without_effects
+from vpm.discrepancy.verdict import (
+    is_negligible,
+    only_if_open,
+    only_where_closed,
+    open_readings,
+    verdict,
+    without_effects,
+)
 from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment, as_records
 from vpm.experiment.signal import check_cutoff
@@ -243,7 +250,10 @@ def diagnosed(
     request = Request(effects, most, tell or (lambda _: None), each, names)
     diagnosis = _diagnosis(model, records, request, cutoff, setup)
     bare = _without_sensor(model, records[0])
-    blind = [NO_SENSOR.format(channels=", ".join(bare))] if bare and diagnosis.verdict == "unexplained" else []
+    untried = (
+        bare if diagnosis.verdict == "unexplained" else [one for one in open_readings(diagnosis.gap) if one in bare]
+    )
+    blind = [NO_SENSOR.format(channels=", ".join(untried))] if untried else []
     summary = diagnosis.summary + _or_late_readings(model, diagnosis, bare)
     far = beyond_training(model, *records[:2]) if validate else []
     return replace(diagnosis, summary=summary, notes=(*odd, *far, *diagnosis.notes, *blind))

@@ -9,7 +9,7 @@ import pytest
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.diagnosis import ChannelGap
 from vpm.discrepancy.search.search import Search
-from vpm.discrepancy.verdict import _nothing_missing, _unheard, only_if_open, verdict, without_effects
+from vpm.discrepancy.verdict import _nothing_missing, _unheard, only_if_open, open_readings, verdict, without_effects
 
 SIGNAL, NOISE = 1.0, 1e-3
 
@@ -155,3 +155,14 @@ def test_an_effect_that_explains_nothing_is_withdrawn_where_nothing_was_open(
         assert [one.name for one in told.refused] == ["rotor_inertia"]
         assert told.final is judged
         assert without_effects(gap)["crank.position"].after == before
+
+
+def test_a_reading_that_effects_elsewhere_leave_open_is_told() -> None:
+    """A gauge that reads 12 % too little, beside friction of the lift that is found: 31 % of its signal is left."""
+    gap = {
+        "lift.effort": ChannelGap(0.06, 0.034, 0.02, NOISE, "N", SIGNAL, "inverse_dynamics"),
+        "root.strain": ChannelGap(0.22, 0.08, 0.31, NOISE, "1", SIGNAL, "inverse_dynamics"),
+        "tip.ax (observed)": ChannelGap(0.2, 0.2, 0.01, NOISE, "m/s^2", SIGNAL, "observed"),
+        "root.strain (restarts)": ChannelGap(0.2, 0.2, 0.3, NOISE, "1", SIGNAL, "restarts"),
+    }
+    assert open_readings(gap) == ("root.strain",)

@@ -33,6 +33,8 @@ from vpm.numbers import NORMAL_95, percent, short
 
 #: Said of what stays after effects were found.
 _REST = " A structured residual above the noise remains."
+#: The same of readings that effects at other places leave as open as they were.
+_READINGS = " Most of what was open of {channels} still is."
 #: The same where effects explain what is missing at other joints.
 _OPEN = " What is left at {joints} is structured, and no effect of the catalogue explains it."
 
@@ -178,7 +180,21 @@ def _of_named(
             True,
         )
     more = _OPEN.format(joints=", ".join(joints.open)) if apart else _REST if errors.remaining else ""
+    if errors.remaining and (readings := open_readings(gap)):
+        more += _READINGS.format(channels=", ".join(readings))
     return "effect_found", f"Missing: {names}. {numbers}{more}", errors.remaining
+
+
+def open_readings(gap: Mapping[str, ChannelGap]) -> tuple[str, ...]:
+    """Readings beside efforts that a verdict leaves open: clear of noise, and about as far off as before effects."""
+    return tuple(
+        channel.partition(" ")[0]
+        for channel, g in gap.items()
+        if g.mode in ("inverse_dynamics", OBSERVED)
+        and not channel.endswith(".effort")
+        and _is_clear(g.after, g)
+        and g.after**2 > MOSTLY_OPEN * g.recalibrated**2
+    )
 
 
 def _spoiled(found: Search, gap: Mapping[str, ChannelGap], tracked: float) -> str:
