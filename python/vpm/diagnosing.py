@@ -45,6 +45,7 @@ from vpm.discrepancy.verdict import (
 )
 from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment, as_records
+from vpm.experiment.lengths import lines_that_tell
 from vpm.experiment.signal import check_cutoff
 from vpm.identify.fit_result import fit_of
 from vpm.identify.parallel import worker_count
@@ -79,6 +80,11 @@ STOPPED_LATE = "stopped by Ctrl-C before what is left, and what else would do, w
 UNFILTERED = "the cut-off frequency is not used, for an observer filters nothing"
 #: Said where something stays unexplained, of readings whose errors no candidate describes.
 NO_SENSOR = "no offset, gain or delay of {channels} was tried: describe a sensor of them in the model file to try these"
+#: Said of described sensors of lengths: the joints that follow from them are compared in their place.
+NO_LENGTH = (
+    "no offset, gain or delay of {sensor} was tried, for {joint}.position follows from what it reads: describe a "
+    "sensor of that position in its place"
+)
 #: Said where a drive is named late whose joint is read by no described sensor.
 LATE_READINGS = (
     " A late reading of {channels} would look alike, and was not tried: the model file describes no sensor of it."
@@ -254,6 +260,7 @@ def diagnosed(
         bare if diagnosis.verdict == "unexplained" else [one for one in open_readings(diagnosis.gap) if one in bare]
     )
     blind = [NO_SENSOR.format(channels=", ".join(untried))] if untried else []
+    blind += _of_lengths(model, experiments)
     summary = diagnosis.summary + _or_late_readings(model, diagnosis, bare)
     far = beyond_training(model, *records[:2]) if validate else []
     return replace(diagnosis, summary=summary, notes=(*odd, *far, *diagnosis.notes, *blind))
@@ -264,6 +271,13 @@ def _without_sensor(model: Model, records: Sequence[Experiment]) -> list[str]:
     return sorted(
         {name for record in records for name in measured_outputs(model, record) if model.sensor_of(name) is None}
     )
+
+
+def _of_lengths(model: Model, records: Sequence[Experiment]) -> list[str]:
+    """Notes of a diagnosis on described sensors of lengths that tell joints: their errors are no candidates."""
+    lines = {joint: line for record in records for joint, line in lines_that_tell(record, model).items()}
+    sensors = {joint: model.sensor_of(f"{line}.length") for joint, line in lines.items()}
+    return [NO_LENGTH.format(sensor=sensor, joint=joint) for joint, sensor in sensors.items() if sensor is not None]
 
 
 def _or_late_readings(model: Model, diagnosis: Diagnosis, bare: Sequence[str]) -> str:

@@ -7,6 +7,7 @@ import pytest
 
 import vpm
 from vpm import Experiment, Model
+from vpm.diagnosing import _of_lengths
 from vpm.errors import ExperimentError
 from vpm.experiment import joints_from_lengths
 from vpm.identify import judged_on
@@ -89,6 +90,15 @@ def test_gain_and_offset_of_the_sensor_are_undone() -> None:
     np.testing.assert_allclose(told["foot.position"], MOVED, atol=1e-7)
     with pytest.raises(ExperimentError, match=r"does not follow from lift\.length while wire\.offset\.value counts"):
         joints_from_lengths(record(length(MOVED), model), model, free=["wire.offset.value"])
+
+
+def test_a_diagnosis_says_that_errors_of_a_length_are_not_tried() -> None:
+    """The angle takes the place of the length, so that no candidate is an offset of the wire sensor."""
+    model = boom('[sensors.wire]\nmeasures = "lift.length"\n')
+    (note,) = _of_lengths(model, [record(length(MOVED), model)])
+    assert "gain or delay of wire was tried, for foot.position follows" in note
+    assert not _of_lengths(boom(), [record(length(MOVED), boom())])
+    assert not _of_lengths(model, [joints_from_lengths(record(length(MOVED), model), model)])
 
 
 def test_what_tells_no_joint_stays_or_is_refused() -> None:
