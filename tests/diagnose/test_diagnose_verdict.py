@@ -136,6 +136,9 @@ def test_an_error_that_grew_is_not_told_as_a_gap_that_closed() -> None:
     )
     _, plain = _nothing_missing(data, nominal, recalibrated, ([closed, grew], []), closed, "")
     assert plain.endswith("Error on validation data: 50.00 % before, 10.00 % recalibrated.")
+    noisy = ChannelGap(0.53, 0.52, 0.52, 0.47, "Pa", 1.0, "inverse_dynamics")
+    _, heard = _nothing_missing(data, nominal, recalibrated, ([closed, noisy], []), noisy, "")
+    assert heard.endswith("Error on validation data: 50.00 % before, 10.00 % recalibrated.")
 
 
 @pytest.mark.parametrize(

@@ -278,6 +278,8 @@ def _nothing_missing(
         closed = max(main + beside, key=_closed)
         if _closed(worst) < 0.0 < _closed(closed):
             numbers = f"{_stages(closed)}; in another channel it grew, {numbers}"
+        elif not _is_clear(worst.recalibrated, worst):  # noise alone, whatever the parameters are
+            numbers = _stages(closed)
         return (
             "parameters_only",
             "Nothing is missing: other values of the known parameters close the gap. "
