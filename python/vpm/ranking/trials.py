@@ -170,7 +170,14 @@ class Trials:
             return []
         best = min(worth, key=lambda trial: trial.left)
         most = self.settings.finished * best.left
-        hopeful = [t for t in worth if t.left <= most or as_good(t, best, self.settings) or best.contains(t)]
+        hopeful = [
+            t
+            for t in worth
+            if t.left <= most
+            or as_good(t, best, self.settings)
+            or best.contains(t)
+            or t.look.leaves_little(t.fitted)  # it may have been given up ahead of its end
+        ]
 
         def one_finished(trial: Trial) -> Trial:
             view = View(trial.look.view.noise)
