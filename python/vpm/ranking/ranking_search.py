@@ -248,8 +248,8 @@ class Search(Trials):
             ends = [self.examined(trial) for trial in self.finished(seen) if trial.counts]
             tried += [*(trial for trial in ends if not trial.counts), *seen]
             counting += [trial for trial in ends if trial.counts]
-            if any(trial.look.leaves_little(trial.fitted) for trial in counting):
-                break  # the next round looks under all trackers again
+            if not all(trial.look.has_room(trial.fitted) for trial in counting):
+                break  # one leaves nothing that another effect could do better
         told: list[Trial] = []
         counting += self._counting_elsewhere(counting)
         while counting:
