@@ -130,7 +130,7 @@ def _linear(
 def bending_gains(
     model: Model, channels: Sequence[str], readings: Array, start: tuple[Array, Array], grid: tuple[int, float]
 ) -> Array:
-    """Gains (samples, nx, m) by which an observer draws elastic coordinates to the first readings.
+    """Gains (samples, nx, m) by which an observer draws elastic coordinates to first readings; (0, nx, m) if none do.
 
     - ``channels``: those of the readings; others than outputs that bending moves have no gains
     - ``readings``: shape (N, m)
@@ -138,8 +138,8 @@ def bending_gains(
     - ``grid``: number of samples and their distance, s
     """
     (samples, dt), joints, count = grid, len(model.joints), len(model.coordinates)
-    gains = np.zeros((samples, len(model.state_names), len(channels)))
     vibration = FreeVibration.of(model, model.theta, start, (channels, readings, dt), held=False)
+    gains = np.zeros((0 if vibration is None else samples, len(model.state_names), len(channels)))
     if vibration is not None:
         gains[:, np.r_[joints:count, count + joints : 2 * count]] = vibration.gains(samples)
     return gains
