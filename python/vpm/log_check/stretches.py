@@ -119,12 +119,12 @@ def _frozen(record: Experiment, name: str, others: Sequence[str], settings: Sett
     """
     values, (owner, _, kind) = record[name], name.rpartition(".")
     others = [other for other in others if other.rpartition(".")[0] == owner] or list(others)
-    steps = np.diff(values)
+    steps = _steps(values, settings)
     run = _longest(steps == 0.0)
     if (
         run.stop - run.start < settings.stuck
         or run.stop >= len(steps)
-        or values[run.start] in (values.max(), values.min())
+        or min(values[run.start] - values.min(), values.max() - values[run.start]) <= _rounding(values, settings)
     ):
         return None  # what stays at an end was cut off there
     stretch = slice(run.start, run.stop + 1)
@@ -152,9 +152,19 @@ def _is_noisy(values: Array, settings: Settings) -> bool:
     """Whether noise moves a stretch from sample to sample, so that no rest repeats a value."""
     if values.size <= settings.fewest:
         return False
-    steps = np.abs(np.diff(values))
+    steps = np.abs(_steps(values, settings))
     least = float(np.min(steps, where=steps > 0.0, initial=np.inf))  # of an encoder, however many digits are written
     return noise_std(values) > max(least, settings.quiet * float(np.median(steps)))
+
+
+def _steps(values: Array, settings: Settings) -> Array:
+    """Steps (N - 1,) of a stretch; those of a computer's rounding, as interpolation leaves them, are none."""
+    steps = np.diff(values)
+    return np.where(np.abs(steps) <= _rounding(values, settings), 0.0, steps)
+
+
+def _rounding(values: Array, settings: Settings) -> float:
+    return settings.digits * float(np.finfo(np.float64).eps * np.max(np.abs(values)))
 
 
 def _longest(same: NDArray[np.bool_]) -> slice:
