@@ -18,7 +18,8 @@ def compare(
         str | None,
         typer.Option(
             help="free_run, inverse_dynamics, restarts, closed_loop or prescribed_motion; by default inverse_dynamics, "
-            "or restarts where drives have states of their own, links bend or loops are closed.",
+            "or restarts where drives have states of their own, links bend or loops are closed, or free_run where "
+            "these would need joints that the log lacks.",
             metavar="MODE",
         ),
     ] = None,
@@ -40,7 +41,8 @@ def compare(
     from vpm.simulate import simulate as simulate_log
 
     machine, record = load_pair(model, log, channels, interpolate)
-    comparison = compare_run(simulate_log(machine, record, mode or comparing_mode(machine), cutoff=cutoff), record)
+    taken = mode or comparing_mode(machine, record)
+    comparison = compare_run(simulate_log(machine, record, taken, cutoff=cutoff), record)
     give(comparison=comparison)
     console.print(str(comparison), markup=False)
     for channel in comparison.channels:

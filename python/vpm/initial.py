@@ -99,7 +99,9 @@ def _bent(model: Model, experiment: Experiment, theta: Array, m: Motion) -> Arra
 def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
     """Initial state at the first sample: lags settled, flexible links deflected as in equilibrium.
 
-    A joint is at zero where the log holds no position, and shafts tell none, with its logged velocity or at rest.
+    A joint is at zero where the log holds no position, and shafts tell none, with its logged velocity or at rest. One
+    that nobody drives or measures rests beside those that are measured, and moves as that rest does: a load hangs below
+    its rope. Where nothing draws it back it is at zero.
     Drives have stood without commands, but for what the log holds of them: pressures of chambers, current, place of the
     spool. One pressure and the load tell the other.
     """
@@ -120,6 +122,8 @@ def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
         seen = [name for name in model.joints if f"{name}.position" in experiment]
         moving = slice(coordinates, 2 * coordinates)
         state[:coordinates], state[moving] = measured(model, state[:coordinates], state[moving], seen)
+    elif unseen := _unseen(model, experiment):
+        state = _rested(model, theta, state, unseen, experiment.dt)
     if model.added_joints:
         state[:joints] = _settled(model, theta, state[:joints], experiment.dt)
     if coordinates > joints and model.loops:
@@ -135,6 +139,36 @@ def initial_state(model: Model, experiment: Experiment, theta: Array) -> Array:
             internal[place] = experiment[command][0]
     state[2 * coordinates :] = _seen(model, experiment, theta, state[:coordinates], internal, 0)
     return state
+
+
+def _unseen(model: Model, experiment: Experiment) -> list[str]:
+    """Joints without drive and reading, for an initial state; none where a log tells of no joint at all."""
+    own = [name for name in model.joints if name not in model.added_joints]
+    told = [name for name in own if any(f"{name}.{what}" in experiment for what in ("position", "velocity"))]
+    return [name for name in passive_joints(experiment, model) if name in own and name not in told] if told else []
+
+
+def _rested(model: Model, theta: Array, state: Array, unseen: Sequence[str], step: float) -> Array:
+    """Initial state with ``unseen`` joints where they rest beside the others, moving as that rest moves.
+
+    ``step``: s, over which the others go on at their speed.
+    """
+    coordinates = len(model.coordinates)
+    followed = tuple(name for name in model.joints if name not in {*unseen, *model.added_joints})
+    places = [model.joints.index(name) for name in followed]
+    gain, offset = (errors[places] for errors in sensor_errors(model, theta))
+    still, rests = np.zeros((2, len(followed))), list[Array]()
+    for passed in (0.0, step):
+        held = state[places] + passed * state[[coordinates + place for place in places]]
+        try:
+            outputs = _along(model, theta, (np.tile(gain * held + offset, (2, 1)), still, still), followed, step)
+        except ValueError:  # the core's: it finds no rest
+            return state
+        rests.append(outputs[0, [model.output_channels.index(f"{name}.position") for name in unseen]])
+    begun = state.copy()
+    begun[[model.joints.index(name) for name in unseen]] = rests[0]
+    begun[[coordinates + model.joints.index(name) for name in unseen]] = (rests[1] - rests[0]) / step
+    return begun
 
 
 def joints_by_velocity(model: Model, channels: Sequence[str]) -> tuple[str, ...]:

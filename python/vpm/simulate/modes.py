@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from vpm.errors import CoreError, DivergedError, SimulationError
-from vpm.experiment import Experiment, Motion
+from vpm.experiment import Experiment, Motion, joints_from_sensors
 from vpm.initial import initial_state as start
 from vpm.initial import joint_motion, measured_states, whole_motion
 from vpm.model import Model
@@ -156,13 +156,18 @@ def judging_mode(model: Model, records: Sequence[Experiment]) -> str:
     return "closed_loop" if held and known else "restarts"
 
 
-def comparing_mode(model: Model) -> str:
+def comparing_mode(model: Model, experiment: Experiment) -> str:
     """Mode in which a model is compared with a log: inverse dynamics, or restarts if that is no way.
 
-    It is none with loops, links that bend, and drives that do not follow their commands.
+    It is none with loops, links that bend, and drives that do not follow their commands. Restarts are none where the
+    log does not place every joint; then a free run is.
     """
     follow = not (model.loops or model.core.n_elastic) and all(map(model.follows_command, model.actuators))
-    return "inverse_dynamics" if follow else "restarts"
+    if follow:
+        return "inverse_dynamics"
+    log = joints_from_sensors(experiment, model)
+    own = () if model.loops else (name for name in model.joints if name not in model.added_joints)
+    return "restarts" if all(f"{name}.position" in log for name in own) else "free_run"
 
 
 def simulated_rows(
