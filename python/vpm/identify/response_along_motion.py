@@ -82,21 +82,32 @@ def check_along(model: Model, joints: Sequence[str]) -> None:
                 f"no effort can be balanced along a motion for the actuator {name} (type {model.actuator_type(name)}), "
                 "which goes by samples of its own; compare in the mode free_run or closed_loop"
             )
-    if not has_hidden(model, joints):
-        return
-    apart = drives_of(model, tuple(joints)) is not None
-    hidden = [name for name in model.beams if model.levels[name] != "rigid"]
-    hidden += [name for name in model.joints if name not in joints]
-    for name in model.actuators:
+    if pair := free_beside_drive(model, joints):
+        hidden, name = pair
         kind, line = model.actuator_type(name), model.line_of_actuator(name)
-        if line is not None or not (apart or model.follows_command(name)):
-            rest = f"acts on the line {line}" if line is not None else "has friction of its own"
-            what = f"has type {kind}" if kind != "ideal" else rest
-            raise SimulationError(
-                f"no effort can be balanced along a motion that leaves {', '.join(hidden)} free while the actuator "
-                f"{name} {what}; make the links rigid with model.at('rigid'), measure every joint, or identify in the "
-                "mode free_run or closed_loop"
-            )
+        rest = f"acts on the line {line}" if line is not None else "has friction of its own"
+        what = f"has type {kind}" if kind != "ideal" else rest
+        raise SimulationError(
+            f"no effort can be balanced along a motion that leaves {', '.join(hidden)} free while the actuator "
+            f"{name} {what}; make the links rigid with model.at('rigid'), measure every joint, or identify in the "
+            "mode free_run or closed_loop"
+        )
+
+
+def free_beside_drive(model: Model, joints: Sequence[str]) -> tuple[list[str], str] | None:
+    """What no measured joint tells, elastic links and other joints, and a drive whose effort needs it; None if none.
+
+    A drive that feels the measured joints alone answers to their motion. Others are states of one system with what is
+    free.
+    """
+    if not has_hidden(model, joints):
+        return None
+    apart = drives_of(model, tuple(joints)) is not None
+    for name in model.actuators:
+        if model.line_of_actuator(name) is not None or not (apart or model.follows_command(name)):
+            hidden = [beam for beam in model.beams if model.levels[beam] != "rigid"]
+            return [*hidden, *(joint for joint in model.joints if joint not in joints)], name
+    return None
 
 
 def shown_channels(model: Model, joints: Sequence[str], experiments: Sequence[Experiment]) -> tuple[str, ...]:

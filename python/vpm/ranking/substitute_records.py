@@ -9,11 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from vpm.errors import VpmError
-from vpm.experiment import Experiment
+from vpm.experiment import Experiment, joints_from_sensors
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.following import Following
-from vpm.identify.response_along_motion import SAMPLED_TYPES, Response
-from vpm.initial import joints_by_velocity
+from vpm.identify.response_along_motion import SAMPLED_TYPES, Response, free_beside_drive
+from vpm.initial import joints_by_velocity, passive_joints
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.ranking.tracked_records import TrackedRecords, Tracker
@@ -32,7 +32,22 @@ def why_unbalanced(model: Model, experiments: Sequence[Experiment] = ()) -> str:
     for experiment in experiments:
         if joints := joints_by_velocity(model, experiment.channels):
             return f"the log holds no position of {' and '.join(joints)}, only its velocity"
+        if pair := _free_beside_drive(model, experiment):
+            free, drive = pair
+            return f"the log does not tell where {' and '.join(free)} is, and the actuator {drive} answers to that"
     return ""
+
+
+def _free_beside_drive(model: Model, experiment: Experiment) -> tuple[list[str], str] | None:
+    """Joints without sensor and drive, and an actuator whose effort does not follow without them; None if none.
+
+    A machine that bends has elastic coordinates for that, which no substitute record holds.
+    """
+    if model.beams:
+        return None
+    passive = passive_joints(joints_from_sensors(experiment, model), model)
+    followed = [name for name in model.joints if name not in passive]
+    return free_beside_drive(model, followed) if followed else None
 
 
 def shown(model: Model, tracked: TrackedRecords) -> InverseDynamicsProblem:
@@ -149,7 +164,7 @@ def _idle(joint: str) -> str:
 def _completed(model: Model, tracked: TrackedRecords) -> list[Experiment]:
     """Substitute records with positions of all joints; a tracker estimates unmeasured ones."""
     lacking = {joint for one in tracked.experiments for joint in joints_by_velocity(model, one.channels)}
-    if model.loops:
+    if model.loops or any(_free_beside_drive(model, one) for one in tracked.experiments):
         lacking = set(model.joints) - set(model.added_joints)
     if not lacking:
         return list(tracked.experiments)
