@@ -20,6 +20,9 @@ from vpm.ranking.tracked_records import TrackedRecords, Tracker
 
 #: What tells where an actuator acts.
 PLACES = ("joint", "line", "transmission")
+#: Why no efforts follow where a drive answers to what a log does not tell.
+BENDING = "the actuator {drive} answers to how {links} bends"
+UNSEEN = "the log does not tell where {joints} is, and the actuator {drive} answers to that"
 
 
 def why_unbalanced(model: Model, experiments: Sequence[Experiment] = ()) -> str:
@@ -29,22 +32,18 @@ def why_unbalanced(model: Model, experiments: Sequence[Experiment] = ()) -> str:
     for name in model.actuators:
         if (kind := model.actuator_type(name)) in SAMPLED_TYPES:
             return f"the actuator {name} (type {kind}) goes by samples of its own"
+    if pair := free_beside_drive(model, model.joints):
+        return BENDING.format(links=" and ".join(pair[0]), drive=pair[1])
     for experiment in experiments:
         if joints := joints_by_velocity(model, experiment.channels):
             return f"the log holds no position of {' and '.join(joints)}, only its velocity"
-        if pair := _free_beside_drive(model, experiment):
-            free, drive = pair
-            return f"the log does not tell where {' and '.join(free)} is, and the actuator {drive} answers to that"
+        if pair := _unseen_beside_drive(model, experiment):
+            return UNSEEN.format(joints=" and ".join(pair[0]), drive=pair[1])
     return ""
 
 
-def _free_beside_drive(model: Model, experiment: Experiment) -> tuple[list[str], str] | None:
-    """Joints without sensor and drive, and an actuator whose effort does not follow without them; None if none.
-
-    A machine that bends has elastic coordinates for that, which no substitute record holds.
-    """
-    if model.beams:
-        return None
+def _unseen_beside_drive(model: Model, experiment: Experiment) -> tuple[list[str], str] | None:
+    """Joints without sensor and drive, and an actuator whose effort does not follow without them; None if none."""
     passive = passive_joints(joints_from_sensors(experiment, model), model)
     followed = [name for name in model.joints if name not in passive]
     return free_beside_drive(model, followed) if followed else None
@@ -133,9 +132,14 @@ class SubstituteProblem(ProblemOfAllJoints):
 
 
 def opened(model: Model) -> Model:
-    """Substitute machine: its loops are opened, and drives without effort act at the freed joints."""
+    """Substitute machine: its loops are opened, and drives without effort act at the freed joints.
+
+    Links that move a drive by bending are rigid there.
+    """
     if not why_unbalanced(model):
         return model
+    if free_beside_drive(model, model.joints):
+        model = model.at("rigid")
     content = model.to_dict()
     for gone in ("loops", "channels"):  # logged columns may be those of loops
         content.pop(gone, None)
@@ -164,7 +168,7 @@ def _idle(joint: str) -> str:
 def _completed(model: Model, tracked: TrackedRecords) -> list[Experiment]:
     """Substitute records with positions of all joints; a tracker estimates unmeasured ones."""
     lacking = {joint for one in tracked.experiments for joint in joints_by_velocity(model, one.channels)}
-    if model.loops or any(_free_beside_drive(model, one) for one in tracked.experiments):
+    if model.loops or any(_unseen_beside_drive(model, one) for one in tracked.experiments):
         lacking = set(model.joints) - set(model.added_joints)
     if not lacking:
         return list(tracked.experiments)
