@@ -6,6 +6,7 @@ import pytest
 import vpm
 from vpm.experiment import Experiment
 from vpm.initial import initial_state
+from vpm.simplify.judge import reference_mode
 from vpm.simulate import comparing_mode
 from winch import LOAD, MODEL, RADIUS, ROPE, G, record
 
@@ -56,7 +57,10 @@ def test_a_free_run_follows_a_log_of_the_drum_alone() -> None:
     """
     log = record(1, samples=500)
     assert comparing_mode(TRUE, log) == "free_run"
+    assert reference_mode(TRUE, [log], "data", None) == "free_run"
     run = vpm.simulate(TRUE, log, comparing_mode(TRUE, log))
     assert np.max(np.abs(run["cell.fz"] - log["cell.fz"])) < 0.05 * LOAD * G
     lift = RADIUS * log["shaft.position"] - STRETCH
-    assert comparing_mode(TRUE, log.with_channel("lift.position", lift, "m")) == "restarts"
+    whole = log.with_channel("lift.position", lift, "m")
+    assert comparing_mode(TRUE, whole) == "restarts"
+    assert reference_mode(TRUE, [whole], "data", None) == "restarts"

@@ -10,7 +10,7 @@ from vpm.identify.response_along_motion import SAMPLED_TYPES, has_own_drives
 from vpm.model import Model
 from vpm.one_thread import in_one_thread
 from vpm.simplify.replacement import commanded
-from vpm.simulate import Setup, judging_mode, simulate
+from vpm.simulate import Setup, judging_mode, places_joints, simulate
 
 #: How many steps finer the full model is simulated than the controller's period, where it is the reference.
 FINER = 2
@@ -135,9 +135,10 @@ def shown(model: Model) -> tuple[str, ...]:
 def reference_mode(model: Model, experiments: Sequence[Experiment], against: str, mode: str | None) -> str:
     """Mode to judge in: what was asked for, or the one that says most.
 
-    ``against``: one of "data", "model".
+    ``against``: one of "data", "model". Restarts need to know where every joint is.
     """
     if mode is not None:
         return mode
     best = judging_mode(model, experiments)
-    return "free_run" if against == "model" and best == "restarts" else best
+    runs = against == "model" or not all(places_joints(model, experiment) for experiment in experiments)
+    return "free_run" if runs and best == "restarts" else best

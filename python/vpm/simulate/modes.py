@@ -165,9 +165,14 @@ def comparing_mode(model: Model, experiment: Experiment) -> str:
     follow = not (model.loops or model.core.n_elastic) and all(map(model.follows_command, model.actuators))
     if follow:
         return "inverse_dynamics"
+    return "restarts" if places_joints(model, experiment) else "free_run"
+
+
+def places_joints(model: Model, experiment: Experiment) -> bool:
+    """Whether a log tells where every joint is, as restarts need; joints of loops tell each other."""
     log = joints_from_sensors(experiment, model)
     own = () if model.loops else (name for name in model.joints if name not in model.added_joints)
-    return "restarts" if all(f"{name}.position" in log for name in own) else "free_run"
+    return all(f"{name}.position" in log for name in own)
 
 
 def simulated_rows(
