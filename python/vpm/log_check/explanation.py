@@ -104,7 +104,7 @@ class Explainer:
             second = self._best(self._ended(corrected, used, after), used)
             again = second is not None and second.correction.channels == correction.channels
             if second is not None and not again and self._explains(correction, before, second.after, 2):
-                first = Explanation(correction, before, after, self._affected(correction, after), ())
+                first = Explanation(correction, before, after, self._showing(correction, before), ())
                 pairs.append([first, second])
         return min(pairs, key=lambda pair: pair[-1].after.order, default=[])
 
@@ -155,7 +155,7 @@ class Explainer:
         rivals = tuple(other.correction for other in others)
         if not self._explains(correction, before, after) or any(_is_no_scale(correction, other) for other in rivals):
             return None
-        affected, of_values = self._affected(correction, after), self._is_of_values(correction, before, after)
+        affected, of_values = self._showing(correction, before), self._is_of_values(correction, before, after)
         found = Explanation(correction, before, after, affected, rivals, of_values)
         return self._mirrored(found, used)
 
@@ -243,6 +243,15 @@ class Explainer:
                 found += [channel for channel in moved if channel in left.by_channel]
         return tuple(found or left.by_channel)
 
+    def _showing(self, correction: Correction, before: Shares) -> tuple[str, ...]:
+        """Channels in which an explained mistake shows: those that it affects, or where the model gives way.
+
+        Of a late reading that is where the machine is light, and nothing may be left of the reading itself.
+        """
+        own, some = self._affected(correction, before), before.above(self.settings.negligible)
+        hidden = correction.delay and some.isdisjoint(own)
+        return tuple(name for name in before.by_channel if name in some) if hidden and some else own
+
     def _hopeful(self, corrections: Sequence[Correction], part: Experiment, before: Shares) -> list[Correction]:
         """Few explanations of least error at the values of the model, better than without any."""
 
@@ -258,11 +267,12 @@ class Explainer:
         """Few explanations by a delay of least predicted error if parameters change too.
 
         From fitted values, else from those of the model: a long delay drives fitted ones far away. They have to be
-        predicted to leave about as little as the best correction that is ``known``.
+        predicted to leave about as little as the best correction that is ``known``. All channels are asked: the model
+        is drawn to every reading, and gives way where it is light. Of a motor and a flywheel on one shaft, a late
+        reading of the wheel shows at the motor.
         """
-        some = left.above(self.settings.negligible)
         tried = (*delays(self.model, used, self.settings), *delays_of_columns(self.table, used, self.settings))
-        corrections = self._about(tried, some, left)
+        corrections = tried if left.above(self.settings.negligible) else ()
         least, found = self.settings.held * part.dt, list[_Trial]()
         for at in (tangent, None):
             if (near := at or self.judge.tangent(part, self.judge.measured(part), FORCES)) is None:
@@ -328,7 +338,7 @@ class Explainer:
         """
         if count == 1 and self._is_of_values(correction, before, after):
             return True
-        affected = self._affected(correction, after)
+        affected = self._showing(correction, before)
         enough = count * math.log(self.settings.better)
         if after.cost > before.cost or after.logarithm(affected) - before.logarithm(affected) > enough:
             return False
