@@ -84,7 +84,7 @@ def lifted(seed: int) -> Experiment:
 
 def test_a_ram_answers_to_how_its_boom_bends() -> None:
     """Its substitute machine is rigid, with efforts as large as the weight of the boom."""
-    assert "the actuator valve answers to how jib bends" in why_unbalanced(BOOM)
+    assert "the actuator valve answers to the bending of jib" in why_unbalanced(BOOM)
     assert why_unbalanced(BOOM.at("rigid")) == ""
     record = lifted(1)
     problem = shown(BOOM, TrackedRecords(BOOM, [record], Settings(), None))
@@ -101,4 +101,4 @@ def test_friction_of_its_pin_is_named() -> None:
     why = vpm.diagnose(BOOM, lifted(1), lifted(2), effects=tried, check=False)
     assert [(one.name, one.site) for one in why.effects] == [("coulomb_friction", "luff")]
     assert why.model.parameters["luff.friction.coulomb"].value == pytest.approx(DRY, rel=0.03)
-    assert any("answers to how jib bends" in note for note in why.notes)
+    assert any("answers to the bending of jib" in note for note in why.notes)

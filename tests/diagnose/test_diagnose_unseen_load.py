@@ -15,7 +15,7 @@ def test_a_winch_without_errors_lacks_nothing() -> None:
     assert why.verdict == "parameters_only"
     assert why.model.parameters["load.mass"].value == pytest.approx(LOAD, rel=2e-3)
     assert why.model.parameters["rope.spring.stiffness"].value == pytest.approx(ROPE, rel=2e-2)
-    assert any("does not tell where lift is" in note for note in why.notes)
+    assert any("does not tell the place of lift" in note for note in why.notes)
 
 
 def test_friction_of_the_drum_is_named() -> None:
@@ -27,5 +27,5 @@ def test_friction_of_the_drum_is_named() -> None:
 
 
 def test_no_search_is_made_without_efforts() -> None:
-    with pytest.raises(DiagnosisError, match="does not tell where lift is"):
+    with pytest.raises(DiagnosisError, match="does not tell the place of lift"):
         vpm.diagnose(MODEL, record(1), record(2), names="search", check=False)

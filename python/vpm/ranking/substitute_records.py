@@ -21,8 +21,8 @@ from vpm.ranking.tracked_records import TrackedRecords, Tracker
 #: What tells where an actuator acts.
 PLACES = ("joint", "line", "transmission")
 #: Why no efforts follow where a drive answers to what a log does not tell.
-BENDING = "the actuator {drive} answers to how {links} bends"
-UNSEEN = "the log does not tell where {joints} is, and the actuator {drive} answers to that"
+BENDING = "the actuator {drive} answers to the bending of {links}"
+UNSEEN = "the log does not tell the place of {joints}, and the actuator {drive} answers to it"
 
 
 def why_unbalanced(model: Model, experiments: Sequence[Experiment] = ()) -> str:
