@@ -87,10 +87,11 @@ def check_along(model: Model, joints: Sequence[str]) -> None:
         kind, line = model.actuator_type(name), model.line_of_actuator(name)
         rest = f"acts on the line {line}" if line is not None else "has friction of its own"
         what = f"has type {kind}" if kind != "ideal" else rest
+        unseen = any(one in model.joints for one in hidden)
+        repairs = ["make the links rigid with model.at('rigid')"] * bends(model) + ["measure every joint"] * unseen
         raise SimulationError(
             f"no effort can be balanced along a motion that leaves {', '.join(hidden)} free while the actuator "
-            f"{name} {what}; make the links rigid with model.at('rigid'), measure every joint, or identify in the "
-            "mode free_run or closed_loop"
+            f"{name} {what}; {', '.join(repairs)}, or identify in the mode free_run or closed_loop"
         )
 
 
