@@ -2,6 +2,7 @@
 
 from vpm.experiment.campaign import Campaign, as_records
 from vpm.experiment.cutoff import CutoffChoice, choose_cutoff
+from vpm.experiment.derived import derived_channels, without_derived
 from vpm.experiment.draft import plain_table
 from vpm.experiment.lengths import joints_from_lengths, joints_from_sensors
 from vpm.experiment.motion import Motion, common_cutoff, motion
@@ -20,6 +21,7 @@ __all__ = [
     "choose_cutoff",
     "common_cutoff",
     "decimation_for",
+    "derived_channels",
     "differentiate",
     "drawn_noise",
     "instrument_noise",
@@ -33,4 +35,5 @@ __all__ = [
     "plain_table",
     "quantisation_step",
     "read_noise",
+    "without_derived",
 ]

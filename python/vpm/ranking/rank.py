@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
 from vpm.discrepancy.screening.candidates import asked_for
 from vpm.discrepancy.stuck_channels import check_moving
 from vpm.errors import DiagnosisError
-from vpm.experiment import Experiment, as_records, joints_from_sensors
+from vpm.experiment import Experiment, as_records, derived_channels, joints_from_sensors, without_derived
 from vpm.model import Model
 from vpm.one_thread import in_one_thread
 from vpm.ranking.ranking_search import Search
@@ -16,6 +17,9 @@ from vpm.ranking.result import Ranking
 from vpm.ranking.settings import Settings
 from vpm.ranking.tracked_records import TrackedRecords
 from vpm.simulate import Setup
+
+#: Said of channels that are not compared.
+COMPUTED = "{channel} repeats the noise of {source}, from which it was computed: it tells nothing more"
 
 
 @in_one_thread
@@ -81,8 +85,12 @@ def rank(
     if not records:
         raise DiagnosisError("no record was given; pass at least one experiment")
     check_moving(model, records)
+    derived = derived_channels(records)
+    records, unseen = without_derived(records, derived), without_derived(unseen, derived)
     each = ParallelCandidates(workers, progress)
     names = asked_for(effects)
     search = Search(model, records, names, settings or Settings(), setup, each, tell or (lambda _: None))
     # What a validation record lacks is said before the search.
-    return search.run(TrackedRecords(model, unseen, search.settings, setup))
+    ranking = search.run(TrackedRecords(model, unseen, search.settings, setup))
+    told = [COMPUTED.format(channel=channel, source=source) for channel, source in derived.items()]
+    return replace(ranking, notes=(*told, *ranking.notes))
