@@ -389,6 +389,7 @@ def test_effects_that_do_nothing_share_one_model_at_all_start_values(monkeypatch
     data, fitter = InverseDynamicsProblem(model, records()), fitter_of(model)
     structure = structure_of(model)
     look = Look(fitter.fitted(structure, Tracker(1.0), View(fitter.noise_of(structure, Tracker(1.0)))), fitter)
+    assert look.coarse.names  # its derivatives are known before proposals are asked for
     passes: list[tuple[Model, int]] = []
     follow = TrackedRecords.follow
 

@@ -10,7 +10,7 @@ import numpy as np
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Judged, Trial, is_clear
 from vpm.discrepancy.diagnosis import Diagnosis, Trace
-from vpm.discrepancy.diagnosis_fields import of_search, so_far
+from vpm.discrepancy.diagnosis_fields import of_findings, so_far
 from vpm.discrepancy.preparation import Records, moved_far
 from vpm.discrepancy.ranked_effects import fitted_in, staged, tracker_gaps
 from vpm.discrepancy.screening.candidates import Candidate, asked_for, candidates
@@ -89,7 +89,7 @@ def diagnosed_by_tracker(
     gap = tracker_gaps(ranking, None)
     if gap and (kept := only_if_open(found, recalibrated, gap)) is not found:
         found, gap = kept, without_effects(gap)
-    told = of_search(model, records, nominal, found, (data.training, data.validation))
+    told = of_findings(model, records, nominal, found, (data.training, data.validation))
     if not gap:
         return told
     word, summary, _ = verdict(None, nominal, recalibrated, found, gap, None, None)
@@ -186,7 +186,7 @@ def _beside(current: Judged, model: Model, one: Ranked, data: _Followed, *, refi
 def _offered(final: Judged, data: _Followed, effects: Sequence[str] | None) -> tuple[Candidate, ...]:
     """All candidate effects that could still be missing in a diagnosis by tracker."""
     residual, _ = data.stand_in.evaluate(final.model, final.model.theta)
-    return candidates(final.model, data.stand_in, residual, asked_for(effects), either_side=True)
+    return candidates(final.model, data.stand_in, residual, asked_for(effects))
 
 
 def _traces(problem: TrackerResidual, nominal: Judged, final: Judged) -> tuple[Trace, ...]:

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.confirmation.refusal import has_peers
 from vpm.discrepancy.settings import CLEAR_GAIN
+from vpm.model import Model
 from vpm.numbers import Array
 from vpm.ranking.fit import ASTRAY, Fitter, free_step
 from vpm.ranking.look import Look
@@ -26,7 +26,7 @@ def against_timing(trial: Trial, fitter: Fitter) -> Trial:
     Beside the best shift within one sample an effect has to gain what any effect has to, but for a delay or lag of an
     only drive or instrument that is most of what was missing.
     """
-    look, noise = trial.look, trial.look.view.noise
+    look, noise = trial.look, trial.look.noise
     alone = not has_peers(look.fitted.structure.model, trial.key[1])
     if EFFECTS[trial.key[0]].late and alone and trial.judgement.removed >= CLEAR_GAIN:
         return trial
@@ -51,7 +51,7 @@ def _shifted(look: Look, fitter: Fitter) -> tuple[float, float]:
     def shifted_by(samples: int) -> Array:
         other = Fitter(tracked.with_commands_later(samples), fitter.settings)
         moved = other.followed(look.coarse.structure, look.coarse.tracker, ()).residual
-        return look.view.noise.whitened(moved, parts)
+        return look.noise.whitened(moved, parts)
 
     later, earlier = shifted_by(1), shifted_by(-1)
     straight, bent, z = (later - earlier) / 2.0, (later + earlier) / 2.0 - errors, look.coarse.structure.standard
@@ -67,4 +67,10 @@ def _shifted(look: Look, fitter: Fitter) -> tuple[float, float]:
 def _cost(look: Look, errors: Array, slopes: Array, z: Array) -> float:
     """Cost after a step of all that is unknown beside a shift of commands."""
     move = free_step(errors, slopes, z)
-    return look.view.noise.cost(errors + slopes @ move) + 0.5 * float((z + move) @ (z + move))
+    return look.noise.cost(errors + slopes @ move) + 0.5 * float((z + move) @ (z + move))
+
+
+def has_peers(model: Model, site: str) -> bool:
+    """Whether several drives, or several position sensors, share one clock, so that a delay of one is no refusal."""
+    encoders = {model.sensor_of(f"{joint}.position") for joint in model.joints} - {None}
+    return any(site in group and len(group) > 1 for group in (set(model.actuators), encoders))

@@ -15,7 +15,7 @@ from vpm.numbers import Array
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.noise_model import NoiseModel, Parts, white_noise
 from vpm.ranking.posterior import log_volume
-from vpm.ranking.settings import FAINT, MOVE, NEARER, RETREAT, TRIALS, TRIALS_BY_SECANTS, Settings
+from vpm.ranking.settings import FAINT, LONGEST, MOVE, NEARER, RETREAT, TRIALS, TRIALS_BY_SECANTS, Settings
 from vpm.ranking.tracked_records import NOTHING, By, TrackedRecords, Tracker
 
 #: Residuals and derivatives that no record has; their squares are still numbers.
@@ -24,6 +24,9 @@ RUNAWAY = 1e100
 ROUNDED = 1e-12
 #: Weight of borders that a step has to keep beside what it wants to reach, and deviations of priors short of them.
 FIRM, HAIR = 1e6, 1e-6
+#: Deviations of its prior by which a parameter is moved to see whether derivatives tell what that does, and the share
+#: of the change that they may be wrong by.
+SEEN, WRONG = 0.01, 0.1
 #: What is raised of structures that the records contradict, that cannot be computed, or whose bodies are not real.
 ASTRAY = (ValueError, ArithmeticError)
 
@@ -179,21 +182,46 @@ class Fitter:
         VpmError
             The structure runs away from the records.
         """
+        if not tracker.fine:
+            by = [structure.place(name) for name in names], structure.moves(names)
+            return Followed(structure, tracker, tuple(names), *self._pass(structure, tracker, by))
+        if residual is None:
+            residual, _ = self._pass(structure, tracker)
+        return replace(self.by_few_steps(structure, tracker, names, residual), tracker=tracker, residual=residual)
+
+    def by_few_steps(self, structure: Structure, tracker: Tracker, names: Sequence[str], residual: Array) -> Followed:
+        """Residual for a fit with derivatives by as few integration steps as these are stable with.
+
+        - ``residual``: of the tracker itself
+
+        Raises
+        ------
+        VpmError
+            The structure runs away from the records.
+        """
         by = [structure.place(name) for name in names], structure.moves(names)
-        if tracker.fine:
-            if residual is None:
-                residual, _ = self._pass(structure, tracker)
-            with contextlib.suppress(*ASTRAY):  # contacts may be too stiff for few steps
-                _, jacobian = self._pass(structure, tracker.coarse, by)
-                if not self._is_unstable(structure, tracker, by, residual - self.offset, jacobian):
+        fewest, *more = self._few_steps(structure, tracker)
+        with contextlib.suppress(*ASTRAY):  # contacts may be too stiff for few steps
+            left, jacobian = self._pass(structure, fewest, by)
+            if not self._is_unstable(structure, tracker, by, residual - self.offset, jacobian):
+                return Followed(structure, fewest, tuple(names), left, jacobian)
+        for short in more:
+            with contextlib.suppress(*ASTRAY):
+                _, jacobian = self._pass(structure, short, by)
+                if self._tells(structure, tracker, by, residual - self.offset, jacobian):
                     return Followed(structure, tracker, tuple(names), residual, jacobian)
         return Followed(structure, tracker, tuple(names), *self._pass(structure, tracker, by))
 
-    def is_wild(self, coarse: Followed, fitted: Fitted) -> bool:
-        """Whether derivatives by few steps move a fit farther than its records move, and a move by fine ones less."""
-        structure = fitted.structure
-        by = [structure.place(name) for name in coarse.names], structure.moves(coarse.names)
-        return self._is_unstable(structure, fitted.tracker, by, fitted.residual - self.offset, coarse.jacobian)
+    def _few_steps(self, structure: Structure, tracker: Tracker) -> list[Tracker]:
+        """Trackers of a fit with the fewest integration steps, and with as short ones as compare structures."""
+        fewest = tracker.coarse
+        short = replace(fewest, fewest=max(math.ceil(record.dt / LONGEST) for record in self.tracked.records))
+        same = all(
+            self.tracked.stepping(structure.model, fewest, record.dt)
+            == self.tracked.stepping(structure.model, short, record.dt)
+            for record in self.tracked.records
+        )
+        return [fewest] if same else [fewest, short]
 
     def unfitted(self, structure: Structure, tracker: Tracker, view: View | None = None) -> Fitted:
         """Structure as it is in the place of a fit, with its cost under a view or under white noise of its own.
@@ -315,6 +343,20 @@ class Fitter:
         if not all(np.max(np.abs(numbers), initial=0.0) < RUNAWAY for numbers in (residual, jacobian)):
             raise VpmError(f"{structure.model.name} runs away from the records")
         return residual + self.offset, jacobian
+
+    def _tells(self, structure: Structure, tracker: Tracker, by: By, residual: Array, jacobian: Array) -> bool:
+        """Whether derivatives of a fit tell how a move by the parameter that moves the model farthest changes it."""
+        columns, moves = by
+        if moves is None or not columns:
+            return True
+        farthest = np.max(np.abs(jacobian), axis=0) * moves / self.tracked.farthest[:, None]
+        channel, number = map(int, np.unravel_index(np.argmax(farthest), farthest.shape))
+        theta, move = structure.theta.copy(), moves[number] * SEEN / MOVE
+        theta[columns[number]] += move
+        moved, _ = self.tracked.follow(structure.model, theta, tracker)
+        change = (moved - residual)[:, channel]
+        missed = change - move * jacobian[:, channel, number]
+        return bool(np.sum(missed**2) < WRONG**2 * np.sum(change**2))
 
     def _is_unstable(self, structure: Structure, tracker: Tracker, by: By, residual: Array, jacobian: Array) -> bool:
         """Whether derivatives of a fit move the model farther than the records move, and a tracker moves it less.

@@ -25,7 +25,7 @@ def against_free_shapes(trial: Trial, fitter: Fitter) -> Trial:
     Armstrong-Helouvry, P. Dupont and C. Canudas de Wit, *Automatica* 30, 1994). What a bell leaves of the other looks
     like another law, along all of the curve.
     """
-    look, noise = trial.look, trial.look.view.noise
+    look, noise = trial.look, trial.look.noise
     gained = look.fitted.cost - fitter.cost(trial.fitted.structure, trial.fitted.residual, noise)
     for key in look.fitted.structure.effects:
         if same_curve(key, trial.key) and _gain_of_free_shape(look, key, fitter) >= gained:
@@ -46,7 +46,7 @@ def _after_a_step(look: Look, errors: Array, slopes: Array) -> float:
     z = look.coarse.structure.standard
     start = np.concatenate([z, np.zeros(slopes.shape[1] - len(z))])
     move = -np.linalg.solve(slopes.T @ slopes + np.eye(len(start)), slopes.T @ errors + start)
-    return look.view.noise.cost(errors + slopes @ move) + 0.5 * float((start + move) @ (start + move))
+    return look.noise.cost(errors + slopes @ move) + 0.5 * float((start + move) @ (start + move))
 
 
 def _at_other_shapes(look: Look, key: Key, fitter: Fitter) -> Iterator[Array]:
@@ -62,7 +62,7 @@ def _at_other_shapes(look: Look, key: Key, fitter: Fitter) -> Iterator[Array]:
                 moved = _scaled(structure, name, factor)
                 followed = fitter.followed(moved, tracker, sizes)
                 felt = replace(moved, priors={size: moved.priors[size] for size in sizes})
-                yield View(look.view.noise).errors(replace(followed, structure=felt), fitter.tracked.parts)[1]
+                yield View(look.noise).errors(replace(followed, structure=felt), fitter.tracked.parts)[1]
 
 
 def _scaled(structure: Structure, name: str, factor: float) -> Structure:

@@ -11,6 +11,7 @@ import numpy as np
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.screening.candidates import Key
+from vpm.errors import VpmError
 from vpm.model import Effect
 from vpm.numbers import Array
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, Followed, View, bounded_step, free_step
@@ -28,10 +29,8 @@ class Look:
     ----------
     fitted : Fitted
     settings : Settings
-    coarse : Followed
-        The same with few steps of the integrator where these do, and derivatives by all that is unknown.
-    view : View
-        Channels in their root mean squares; derivatives are taken as known for effects that do nothing at first.
+    noise : NoiseModel
+        Channels in their root mean squares.
     explained : ndarray, shape (m,)
         Error power of each channel that all effects of the model remove that are not exact, as a multiple of what is
         left. Here and below error power is what stands out of noise: what a sensor adds no model can remove.
@@ -43,10 +42,7 @@ class Look:
 
     def __init__(self, fitted: Fitted, fitter: Fitter, first: Look | None = None) -> None:
         tracked, self._fitter, self.settings = fitter.tracked, fitter, fitter.settings
-        noise = white_noise(fitted.residual, tracked.parts)
-        self.coarse = self._followed(fitted)
-        slopes = noise.whitened(self.coarse.jacobian, tracked.parts).T
-        self.view = View(noise, dict(zip(self.coarse.names, slopes, strict=True)))
+        noise = self.noise = white_noise(fitted.residual, tracked.parts)
         cost = fitter.cost(fitted.structure, fitted.residual, noise)
         self.fitted = replace(fitted, cost=cost)
         self.left = self._squares(fitted.residual)
@@ -63,21 +59,30 @@ class Look:
         self._curves: dict[tuple[str, ...], Array] = {}
         self._offsets: dict[int, Array] = {}
 
-    def _followed(self, fitted: Fitted) -> Followed:
-        """Residual of a look with all derivatives, by few integration steps where contacts and friction allow it."""
-        names = tuple(fitted.structure.priors)
-        with contextlib.suppress(*ASTRAY):
-            coarse = self._fitter.followed(fitted.structure, fitted.tracker.coarse, names)
-            if not self._fitter.is_wild(coarse, fitted):
-                return coarse
-        return self._fitter.followed(fitted.structure, fitted.tracker, names, fitted.residual)
+    @cached_property
+    def coarse(self) -> Followed:
+        """Look with derivatives by all that is unknown, by few steps of the integrator where these do.
+
+        Raises
+        ------
+        VpmError
+            The structure runs away from the records.
+        """
+        own = self.fitted
+        return self._fitter.by_few_steps(own.structure, own.tracker, tuple(own.structure.priors), own.residual)
+
+    @cached_property
+    def view(self) -> View:
+        """View of a look for fits: derivatives are taken as known for effects that do nothing at first."""
+        slopes = self.noise.whitened(self.coarse.jacobian, self._fitter.tracked.parts).T
+        return View(self.noise, dict(zip(self.coarse.names, slopes, strict=True)))
 
     @cached_property
     def coarse_fitter(self) -> Fitter | None:
         """Fitter by coarse steps beside a look, if these change what it leaves by less than an effect has to."""
         offset = self.fitted.residual - self.coarse.residual
         rows = np.concatenate([offset[part] for part in self._fitter.tracked.parts])
-        share = np.sum(rows**2, axis=0) / (len(rows) * np.array(self.view.noise.deviations) ** 2)
+        share = np.sum(rows**2, axis=0) / (len(rows) * np.array(self.noise.deviations) ** 2)
         near = bool(np.max(share) < self.settings.worth)
         return Fitter(self._fitter.tracked, self.settings, offset) if near else None
 
@@ -95,7 +100,7 @@ class Look:
         All that is unknown without it gives way, and stays within what is known of it. A change that is far too large
         is scaled no farther than to the next start value: nobody knows its shape from there on.
         """
-        noise, (before, slopes) = self.view.noise, self._errors
+        noise, (before, slopes) = self.noise, self._errors
         along = noise.whitened(self._compared(other).residual, self._fitter.tracked.parts) - before
         share = float(free_step(before, np.column_stack([slopes, along]), self.coarse.structure.standard)[-1])
         ends = [before + along]
@@ -133,10 +138,10 @@ class Look:
     @cached_property
     def _given_way(self) -> Array:
         """Errors of the look's structure alone, from which what is unknown has taken most."""
-        return min(self._alone, self._giving_way(self._errors[0]), key=self.view.noise.cost)
+        return min(self._alone, self._giving_way(self._errors[0]), key=self.noise.cost)
 
     def _gain(self, left: Array, alone: Array) -> float:
-        noise, rooms = self.view.noise, self._rooms()
+        noise, rooms = self.noise, self._rooms()
         powers = (np.sum(noise.by_channel(errors) ** 2, axis=1) for errors in (left, alone))
         place = self._place(np.divide(*powers), rooms)
         return noise.cost(alone) - noise.cost(left) if rooms[place] else 0.0
@@ -158,7 +163,7 @@ class Look:
 
     def _after_a_step(self, structure: Structure, errors: Array, slopes: Array) -> Array:
         move = bounded_step(structure, *self.view.weighted(errors, slopes), self.settings.reach)
-        return min(errors, errors + slopes @ move, key=self.view.noise.cost)
+        return min(errors, errors + slopes @ move, key=self.noise.cost)
 
     @property
     def promising(self) -> float:
@@ -286,8 +291,8 @@ class Look:
     def _held_back(self, start: Followed, part: int) -> Array:
         """Squares in a look of one held-back part of the record, from a fit to the others."""
         other = Fitter(self._fitter.tracked.holding_back(part), self.settings)
-        moved, _ = other.moved(start, View(self.view.noise))
-        return other.tracked.squares(moved.residual, self.view.noise)[1]
+        moved, _ = other.moved(start, View(self.noise))
+        return other.tracked.squares(moved.residual, self.noise)[1]
 
     @cached_property
     def _drawn(self) -> tuple[Array, Array]:
@@ -313,16 +318,28 @@ class Look:
         All other laws hold, and so do most of these: without the friction that keeps a machine in step any force would
         carry it far away, and no other friction could count beside.
         """
-        whole, part = self.coarse.structure, self.settings.inexact
-        if effects:
+        if not effects:
+            return np.zeros(len(self.noise.tails))
+        whole, part = self.fitted.structure, self.settings.inexact
+        with contextlib.suppress(*ASTRAY):
+            bare = whole.bare(effects)
+            weaker = replace(bare, theta=whole.theta + part * (bare.theta - whole.theta))
+            now, left = self._residuals([replace(bare, theta=whole.theta), weaker])
+            return self._beside(now + (left - now) / part)
+        return np.zeros(len(self.noise.tails))
+
+    def _residuals(self, several: Sequence[Structure]) -> list[Array]:
+        """Residuals of structures beside a look, by few steps of the integrator or, with stiff contacts, by fine ones.
+
+        Raises
+        ------
+        VpmError
+            One of them runs away from the records.
+        """
+        for steps in (self.fitted.tracker.coarse, self.fitted.tracker):
             with contextlib.suppress(*ASTRAY):
-                bare = whole.bare(effects)
-                weaker = replace(bare, theta=whole.theta + part * (bare.theta - whole.theta))
-                same = replace(bare, theta=whole.theta)
-                tracker = self.coarse.tracker
-                now, left = (self._fitter.followed(one, tracker, ()).residual for one in (same, weaker))
-                return self._beside(now + (left - now) / part)
-        return np.zeros(len(self.view.noise.tails))
+                return [self._fitter.followed(one, steps, ()).residual for one in several]
+        raise VpmError(f"{self.fitted.structure.model.name} runs away from the records without one of its effects")
 
     def _added(self, before: Array) -> Array:
         """Error power in a look that added inexact effects remove of the error ``before`` them."""
@@ -349,17 +366,16 @@ class Look:
         """
         if effects:
             with contextlib.suppress(*ASTRAY):
-                bare = self.coarse.structure.bare(effects)
-                left = self._fitter.followed(bare, self.coarse.tracker, ()).residual
+                (left,) = self._residuals([self.fitted.structure.bare(effects)])
                 return np.minimum(self._beside(left), self._beside(self._fitter.tracked.motion))
-        return np.zeros(len(self.view.noise.tails))
+        return np.zeros(len(self.noise.tails))
 
     def _beside(self, residual: Array) -> Array:
         """Ratio of the power of another residual to that of the look, less one, by channel (m,)."""
         return np.maximum(1.0 / self._ratio(self._squares(residual), self.left) - 1.0, 0.0)
 
     def _squares(self, residual: Array) -> tuple[Array, Array]:
-        return self._fitter.tracked.squares(residual, self.view.noise)
+        return self._fitter.tracked.squares(residual, self.noise)
 
 
 def same_curve(one: Key, other: Key) -> bool:

@@ -51,7 +51,7 @@ class Proposal:
 
         An effect that does nothing leaves all as it was, and so are the derivatives by all others.
         """
-        return (look.view, look.fitted.residual) if self.neutral else (View(look.view.noise), None)
+        return (look.view, look.fitted.residual) if self.neutral else (View(look.noise), None)
 
 
 def proposals(
@@ -66,7 +66,7 @@ def proposals(
     """Best few proposals of effects beside a structure that are worth a fit under its tracker."""
     found = look.fitted.structure.repaired
     residual = data.evaluate(found, found.theta)[0]
-    listed = with_short_waves(candidates(found, data, residual, effects, either_side=True), found, bands)
+    listed = with_short_waves(candidates(found, data, residual, effects), found, bands)
     listed = [started(one, found, extensions.sizes) for one in listed]
     extended = _extended(look.fitted.structure, listed, extensions)
     groups = _side_by_side([one for one in extended if one.candidate.neutral], look)

@@ -22,7 +22,7 @@ from vpm.ranking.model_structure import Structure
 from vpm.ranking.noise_model import fitted_noise
 from vpm.ranking.result import Gap, Ranked, Ranking
 from vpm.ranking.settings import OFF_ENDS
-from vpm.ranking.several_at_once import brought_back, several_at_once
+from vpm.ranking.several_at_once import several_at_once, with_usual_friction
 from vpm.ranking.tracked_records import TrackedRecords
 from vpm.ranking.trials import Trials
 from vpm.ranking.tried_effect import Trial
@@ -40,17 +40,15 @@ class Search(Trials):
 
     def run(self, held_out: TrackedRecords) -> Ranking:
         """Run the search of a ranking, see `rank`."""
-        self.say("fitting what is uncertain")
-        self.draw_pressures()
-        looks = self.looks(self.start)
-        self.first = {look.fitted.tracker.band: look for look in looks}
+        looks = self._first_looks()
         named: dict[_Place, Ranked] = {}
         rounds: list[tuple[Ranked, ...]] = []
         interrupted = False
         before: list[frozenset[tuple[str, ...]]] = []
         try:
-            looks, rounds = brought_back(self, looks)
+            looks, rounds = with_usual_friction(self, looks)
             named = {_place(ranked): ranked for ranked, *_ in rounds}
+            begun = set(named)
             for _ in range(2 * self.settings.effects):  # effects may replace each other, but not for ever
                 present, there = looks[0].fitted.structure.effects, looks[0].fitted.structure.added
                 places = frozenset(one.key for one in there)
@@ -85,7 +83,8 @@ class Search(Trials):
                     break
                 if best is not None and present:
                     looks = self._out_of_a_dead_end(best, looks)
-            looks, rounds = self._plainer(looks, rounds, named)
+            if set(named) - begun:
+                looks, rounds = self._plainer(looks, rounds, named)
         except KeyboardInterrupt:
             interrupted = True
         ranking = self._ranking(looks, named, rounds, interrupted=interrupted)
@@ -93,6 +92,14 @@ class Search(Trials):
             return replace(ranking, gaps=self._gaps(held_out.with_hold(ranking.hold), ranking))
         except KeyboardInterrupt:
             return replace(ranking, interrupted=True)
+
+    def _first_looks(self) -> list[Look]:
+        """Looks of the search at the model as it was, with what is uncertain fitted."""
+        self.say("fitting what is uncertain")
+        self.draw_pressures()
+        looks = self.looks(self.start)
+        self.first = {look.fitted.tracker.band: look for look in looks}
+        return looks
 
     def _plainer(
         self, looks: list[Look], rounds: list[tuple[Ranked, ...]], named: dict[_Place, Ranked]
@@ -184,7 +191,7 @@ class Search(Trials):
         settings = self.settings
         ways: list[tuple[Judgement, Fitter, Fitted]] = []
         for course in SMOOTH:
-            smooth, view = Fitter(self.fitter.tracked.with_hold(course), settings), View(now.view.noise)
+            smooth, view = Fitter(self.fitter.tracked.with_hold(course), settings), View(now.noise)
             with contextlib.suppress(*ASTRAY):
                 fitted = smooth.finished(smooth.fitted(now.fitted.structure, now.fitted.tracker, view), view)
                 if (judgement := now.judged(fitted)).is_repeated(settings):

@@ -18,6 +18,7 @@ from vpm.ranking.choice_by_evidence import as_good, weighed
 from vpm.ranking.fit import ASTRAY, View
 from vpm.ranking.look import Look
 from vpm.ranking.model_structure import Structure
+from vpm.ranking.one_step_without import beside_others, shown_in_efforts
 from vpm.ranking.regression import regressed
 from vpm.ranking.result import Ranked
 from vpm.ranking.start_values import started
@@ -32,7 +33,9 @@ Found: TypeAlias = tuple[list[Look], list[tuple[Ranked, ...]]]
 
 def several_at_once(trials: Trials, looks: list[Look], best: Trial | None, tried: Sequence[Trial]) -> Found:
     """Round with several effects at once, where no effect alone does as well."""
-    looks, together = _at_several_places(trials, looks, best, tried)
+    looks, together = _rubbing_everywhere(trials, looks, best)
+    if not together:
+        looks, together = _at_several_places(trials, looks, best, tried)
     if not (best or together):
         looks, together = _resting_on_another(trials, looks, tried)
     return (looks, together) if best or together else _rubbing_on_both_sides(trials, looks)
@@ -82,7 +85,7 @@ def _alike(trials: Trials, tried: Sequence[Trial], most: int) -> list[Trial]:
     def one_fitted(group: Sequence[Trial]) -> Trial:
         structure, look = _joined(group), group[0].look
         least = min(one.fitted.cost for one in tried if one.look is look)
-        view, goal = View(look.view.noise), min(look.fitted.cost - look.needed, least)
+        view, goal = View(look.noise), min(look.fitted.cost - look.needed, least)
         begun = trials.fitter.fitted(structure, look.fitted.tracker, view, goal)
         return Trial.of(
             trials.fitter.finished(begun, view) if begun.cost < goal else begun, look, ended=begun.cost < goal
@@ -111,32 +114,80 @@ def _begun(trial: Trial) -> Structure:
     return structure.at(np.where(fresh, 1.0, structure.standard))
 
 
-def brought_back(trials: Trials, looks: list[Look]) -> Found:
-    """Looks begun with the usual friction that counts, of a model that is lost at several joints without it."""
-    if why_unbalanced(trials.start.model, trials.fitter.tracked.experiments) or not all(look.is_lost for look in looks):
+def with_usual_friction(trials: Trials, looks: list[Look]) -> Found:
+    """Looks begun with the usual friction of several joints, where that leaves nothing that another effect could do.
+
+    A description of a robot often states no friction. Each joint that lacks it hides what friction at another one would
+    explain, and known parameters go astray to make up for all of it.
+    """
+    first, *_ = looks
+    if why_unbalanced(trials.start.model, trials.fitter.tracked.experiments) or not first.has_room():
         return looks, []
     with contextlib.suppress(*ASTRAY):
-        structure = _with_usual_friction(trials, looks[0])
-        if structure is not None:
-            return _with_needed(trials, structure, looks, trials.stands, "bring the model back to its records")
+        structure = _with_usual_friction(trials, first)
+        if structure is None:
+            return looks, []
+        rubbing = trials.fitted(structure, first.fitted.tracker)
+        if not first.judged(rubbing).is_repeated(trials.settings):
+            return looks, []
+        trials.rubbing = rubbing.structure
+        if all(one.is_lost for one in looks) or not first.has_room(rubbing):
+            return _without_needless(trials, trials.look(rubbing), looks)
+    return looks, []
+
+
+def _rubbing_everywhere(trials: Trials, looks: list[Look], best: Trial | None) -> Found:
+    """Looks with the usual friction of several joints, where no effect alone does as well and something stays open."""
+    if trials.rubbing is None or looks[0].fitted.structure.effects:
+        return looks, []
+    if best is not None and not best.look.has_room(best.fitted):
+        return looks, []
+    with contextlib.suppress(*ASTRAY):
+        look = looks[0] if best is None else best.look
+        rubbing = trials.fitted(trials.rubbing, look.fitted.tracker)
+        if best is None or _does_better(trials, Trial.of(rubbing, look), best):
+            return _without_needless(trials, trials.look(rubbing), looks)
     return looks, []
 
 
 def _with_usual_friction(trials: Trials, look: Look) -> Structure | None:
-    """Structure with the usual friction that its joints lack, by regression; None where that is more than it takes.
-
-    Friction of gears may take many times the torque of the inertia. Where several joints lack it, each of them hides
-    what friction at another one would explain.
-    """
+    """Structure with the usual friction that its joints lack, by regression; None where only one of them lacks it."""
     structure, usual = look.fitted.structure, [name for name in trials.names if EFFECTS[name].usual == "friction"]
     model, data = structure.repaired, trials.data
     residual, _ = data.evaluate(model, model.theta)
-    listed = [started(one, model, trials.sizes) for one in candidates(model, data, residual, usual, either_side=True)]
-    if not 1 < len(listed) <= trials.settings.effects:
+    listed = [started(one, model, trials.sizes) for one in candidates(model, data, residual, usual)]
+    if len({one.site for one in listed}) < 2 or len(listed) > trials.settings.effects:
         return None
     for candidate in listed:
         structure = trials.extensions.extended(structure, candidate, candidate.starts[0], "motor")
     return regressed(structure, data)
+
+
+def _without_needless(trials: Trials, look: Look, looks: list[Look]) -> Found:
+    """Looks with the usual friction of several joints, but for what nothing shows beside all else.
+
+    What does least leaves first, for others may do what it did, with all that the records are more probable without. A
+    fast tracker shows what a slow one hides behind a force at another joint that nothing explains.
+    """
+    while len({site for _, site in look.fitted.structure.effects}) > 1:
+        now = trials.all_looks(look)
+        found = [trial for one in now for trial in beside_others(trials, one, look.fitted.structure.effects)]
+        shown = shown_in_efforts(trials, look.fitted.structure, look.fitted.structure.effects)
+        ordered = sorted(found, key=lambda one: one.evidence)
+        standing = {one.key: one for one in ordered if trials.stands(one) or one.key in shown}
+        needless = [trial for trial in found if trial.key not in standing]
+        if not needless:
+            named = sorted(standing.values(), key=lambda one: -one.evidence)
+            trials.say(f"{' and '.join(one.label for one in named)}: several joints lack it")
+            return now, [trials.listed(one, [one]) for one in named]
+        likely = {trial.key: trial.evidence for trial in ordered}  # under the tracker that shows it best
+        leaving = {min(needless, key=lambda one: one.judgement.least).key}
+        leaving |= {trial.key for trial in needless if likely[trial.key] < 0.0}
+        structure = look.fitted.structure
+        for key in leaving:
+            structure = structure.without(key)
+        look = trials.look(trials.fitted(structure, look.fitted.tracker))
+    return looks, []
 
 
 def _resting_on_another(trials: Trials, looks: list[Look], tried: Sequence[Trial]) -> Found:
@@ -158,7 +209,7 @@ def _resting_on_another(trials: Trials, looks: list[Look], tried: Sequence[Trial
 
 def _paired(trials: Trials, first: Trial, names: Sequence[str]) -> Found:
     """A tried effect with the best of those ``names`` that rest on it, if both count together."""
-    look = trials.look(trials.fitter.finished(first.fitted, View(first.look.view.noise)))
+    look = trials.look(trials.fitter.finished(first.fitted, View(first.look.noise)))
     beside = trials.finished(trials.tried(look, look, names))
     counting = [two for two in beside if two.counts and two.key[1] == first.key[1]]
     if not counting:

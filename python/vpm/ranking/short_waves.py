@@ -37,9 +37,7 @@ def with_short_waves(
     if not names:
         return list(listed)
     wider = [
-        one
-        for band in bands
-        for one in candidates(model, band, band.evaluate(model, model.theta)[0], sorted(names), either_side=True)
+        one for band in bands for one in candidates(model, band, band.evaluate(model, model.theta)[0], sorted(names))
     ]
     return [_joined(candidate, [one for one in wider if one.key == candidate.key]) for candidate in listed]
 

@@ -60,6 +60,7 @@ class Trials:
             model, values, known(model, self.data, self.fitter.tracked) | firsts, firsts=tuple(firsts)
         )
         self.first: dict[float, Look] = {}  # looks at the model as it was, by bandwidth
+        self.rubbing: Structure | None = None  # with the usual friction of several joints that lack it
         self.others: dict[Key, list[Structure]] = {}  # what counted as well when an effect came in
 
     def draw_pressures(self) -> None:
@@ -141,7 +142,19 @@ class Trials:
         return self.looks(look.fitted.structure, look)
 
     def look(self, fitted: Fitted) -> Look:
-        """Look at a tried structure as it was fitted."""
+        """Look at a tried structure as it was fitted, from which the search can go on.
+
+        Raises
+        ------
+        VpmError
+            Its derivatives run away from the records.
+        """
+        found = self.glance(fitted)
+        _ = found.coarse
+        return found
+
+    def glance(self, fitted: Fitted) -> Look:
+        """Look at a tried structure beside which others are judged, and no more."""
         return Look(fitted, self.fitter, self.first.get(fitted.tracker.band))
 
     def fitted(self, structure: Structure, tracker: Tracker) -> Fitted:
@@ -150,8 +163,8 @@ class Trials:
         return self.fitter.finished(self.fitter.fitted(structure, tracker, view), view)
 
     def without(self, key: Key, look: Look, side: Side | None = None) -> Look:
-        """Searched structure without one effect, fitted again under its tracker."""
-        return self.look(self.fitted(look.fitted.structure.without(key, side), look.fitted.tracker))
+        """Searched structure without one effect, fitted again under its tracker, to judge that by."""
+        return self.glance(self.fitted(look.fitted.structure.without(key, side), look.fitted.tracker))
 
     def tried(self, look: Look, begun: Look, names: Sequence[str] | None = None) -> list[Trial]:
         """Most promising effects of a search round, fitted under one tracker from the structure that was ``begun``."""
@@ -160,7 +173,7 @@ class Trials:
         fits = raced(chosen, begun, self.fitter, self.each)
         if fits and begun is not look:  # they begin far away, and take more steps
             best = min(fits, key=lambda one: one.cost)
-            fits = [self.fitter.finished(best, View(begun.view.noise)), *(one for one in fits if one is not best)]
+            fits = [self.fitter.finished(best, View(begun.noise)), *(one for one in fits if one is not best)]
         return [Trial.of(fitted, look, ended=False) for fitted in fits]
 
     def finished(self, tried: Sequence[Trial]) -> list[Trial]:
@@ -180,7 +193,7 @@ class Trials:
         ]
 
         def one_finished(trial: Trial) -> Trial:
-            view = View(trial.look.view.noise)
+            view = View(trial.look.noise)
             fitted = self.fitter.finished(trial.fitted, view)
             ends = [fitted, *self._detours(fitted, view)] if trial.splits else [fitted]
             return Trial.of(min(ends, key=lambda one: one.cost), trial.look)
@@ -212,7 +225,7 @@ class Trials:
         """Last effects of other structures in the place of a searched one, fitted."""
 
         def one_fitted(other: Structure) -> Trial:
-            structure, view = look.fitted.structure.with_last_of(other), View(look.view.noise)
+            structure, view = look.fitted.structure.with_last_of(other), View(look.noise)
             fitted = self.fitter.fitted(structure, look.fitted.tracker, view)
             return Trial.of(fitted, look, ended=False)
 
@@ -224,9 +237,15 @@ class Trials:
         return weighed([Trial.of(look.fitted, self.without(key, look), key).beside_mirror_image], self.fitter)[0]
 
     def advantage(self, fitted: Fitted, other: Fitted) -> float:
-        """Evidence of a fit of the search over another one under the same tracker, nats, under its own noise model."""
-        noise = fitted_noise(fitted.residual, self.fitter.tracked.parts, self.settings.order)
-        return evidence(fitted, self.fitter, noise) - evidence(other, self.fitter, noise)
+        """Evidence of a fit of the search over another one under the same tracker, nats, each under its own noise.
+
+        Under the noise of the one, what it leaves passes for noise, however much of it the other explains.
+        """
+        told = (
+            (one, fitted_noise(one.residual, self.fitter.tracked.parts, self.settings.order)) for one in (fitted, other)
+        )
+        mine, its = (evidence(one, self.fitter, noise) for one, noise in told)
+        return mine - its
 
     def stands(self, trial: Trial) -> bool:
         """Whether a weighed effect of the search counts and is more probable than chance."""
