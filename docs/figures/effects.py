@@ -293,8 +293,8 @@ def _remarks(effect: EffectType) -> str:
         remarks.append("*spring*")
     if effect.requires:
         remarks.append(f"corrects [{effect.requires}](#{effect.requires}), which has to be there")
-    if not effect.screened:
-        remarks.append("*ranking*" if effect.has_law else "describes what no effect explains")
+    if not effect.has_law:
+        remarks.append("describes what no effect explains")
     return f" ({'; '.join(remarks)})" if remarks else ""
 
 

@@ -4,7 +4,7 @@ import shlex
 import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated
 
 import typer
 
@@ -40,10 +40,6 @@ Validate = Annotated[
 Limit = Annotated[
     int | None, typer.Option(min=0, help="Most effects to accept. Default: two for each joint, but at least six.")
 ]
-Names = Annotated[
-    Literal["ranking", "search"],
-    typer.Option(help="Where names come from; a ranking covers machines of up to three joints, a search others."),
-]
 Substeps = Annotated[
     int, typer.Option(min=1, help="Integration steps per sample, in simulations of validation records.")
 ]
@@ -58,7 +54,6 @@ def diagnose(
     effect: Effect = None,
     without: Without = None,
     limit: Limit = None,
-    names: Names = "ranking",
     check: Check = True,
     channels: Channels = None,
     interpolate: Interpolate = False,
@@ -88,7 +83,6 @@ def diagnose(
             cutoff=cutoff,
             setup=Setup(integrator, substeps, horizon, hold=hold),
             limit=limit,
-            names=names,
             check=check,
             workers=workers or None,
             tell=tell,

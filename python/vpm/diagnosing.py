@@ -3,17 +3,18 @@
 import time
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
-from typing import Any, TypedDict, get_args
+from typing import Any, TypedDict
+from warnings import warn
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis
-from vpm.discrepancy.diagnosis_fields import examined, gaps_of, of_search, pictures, so_far, traces, unmeasured, where
+from vpm.discrepancy.diagnosis_fields import examined, gaps_of, of_findings, pictures, so_far, traces, unmeasured, where
 from vpm.discrepancy.evidence import gather
+from vpm.discrepancy.findings import Findings
 from vpm.discrepancy.noise.sensor_drift import Drift, sensor_drifts, without_drifts
 from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
 from vpm.discrepancy.preparation import (
@@ -32,9 +33,7 @@ from vpm.discrepancy.remainder.remainder import Remainder, remainder
 from vpm.discrepancy.rivals.ambiguity import Rivals
 from vpm.discrepancy.rivals.discriminating_experiment import experiments as experiments_for
 from vpm.discrepancy.screening.candidates import asked_for
-from vpm.discrepancy.search.search import Search
-from vpm.discrepancy.search.search_round import Request, Tell
-from vpm.discrepancy.settings import FLOOR_FACTOR, WORTH_A_NAME
+from vpm.discrepancy.settings import FLOOR_FACTOR
 from vpm.discrepancy.verdict import (
     is_negligible,
     only_if_open,
@@ -43,34 +42,26 @@ from vpm.discrepancy.verdict import (
     verdict,
     without_effects,
 )
-from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment, as_records
 from vpm.experiment.lengths import lines_that_tell
 from vpm.experiment.signal import check_cutoff
 from vpm.identify.fit_result import fit_of
 from vpm.identify.parallel import worker_count
-from vpm.identify.response_along_motion import has_own_drives
 from vpm.log_check import refuse_mistakes
 from vpm.log_check.checking import UNCHECKED
 from vpm.model import Model
-from vpm.naming import BROKEN, FAILED, RANKING, STOPPED, Names, named, ranked_notes, ranking_of, until_stopped
-from vpm.numbers import power
+from vpm.naming import BROKEN, FAILED, STOPPED, Request, Tell, named, ranked_notes, ranking_of, until_stopped
 from vpm.observer import measured_outputs
 from vpm.one_thread import in_one_thread
 from vpm.ranking import Ranking, Settings
 from vpm.ranking.by_tracker import diagnosed_by_tracker
 from vpm.ranking.substitute_records import why_unbalanced
-from vpm.simulate import AUTOMATIC, HOLDS, Setup, judging_mode
+from vpm.simulate import Setup, judging_mode
 from vpm.simulate.setup import READ_BACK
 from vpm.tasks import done_by
 
 #: Most effects to accept, if not given, of machines with few joints.
 LEAST_LIMIT = 6
-#: Said where commands seem to be read back, and effects were sought for held ones.
-IF_READ_BACK = (
-    "the recalibrated model is nearer to the data if commands run from sample to sample: say hold {hold} where the log "
-    "holds readings of a drive, and not what a controller sent"
-)
 #: Said where Ctrl-C came after the naming.
 STOPPED_UNMEASURED = "stopped by Ctrl-C before what was named was measured on validation records"
 STOPPED_UNJUDGED = "stopped by Ctrl-C before the noise floor, and what is left above it, was examined"
@@ -100,7 +91,6 @@ class Asked(TypedDict, total=False):
     cutoff: float | None
     setup: Setup | None
     limit: int | None
-    names: Names
     check: bool
 
 
@@ -113,7 +103,7 @@ def diagnose(
     cutoff: float | None = None,
     setup: Setup | None = None,
     limit: int | None = None,
-    names: Names = RANKING,
+    names: str | None = None,
     check: bool = True,
     workers: int | None = None,
     tell: Tell | None = None,
@@ -123,13 +113,10 @@ def diagnose(
     """Name the physics that ``model`` is missing, with evidence on data that were not fitted.
 
     Logs with a wrong unit, sign, name or clock are refused, see `vpm.check_log`. The parameters that the model file
-    calls uncertain are fitted first, for a wrong parameter is not a missing effect. Where up to three joints move, a
-    ranking of the training records names what is missing, see `vpm.rank`, and validation records decide no name.
-    Elsewhere every effect is screened at every site by its regressor; those with the largest predicted gain are
-    refitted together with the model. They have to predict validation records, by the inverse-dynamics residual and in
-    simulation. One is accepted at a time, the one with the largest validation gain per number. Where no efforts follow
-    from a motion, with closed loops or drives that go by their own samples, a ranking names, and what its observer
-    leaves of validation records is told.
+    calls uncertain are fitted first, for a wrong parameter is not a missing effect. A ranking of the training records
+    then names what is missing, see `vpm.rank`; validation records decide no name. What was named is refitted and
+    measured on these, by the inverse-dynamics residual and in simulation. Where no efforts follow from a motion, with
+    closed loops or drives that go by their own samples, it is what the ranking's observer leaves of them.
 
     Parameters
     ----------
@@ -148,9 +135,8 @@ def diagnose(
         Integrator, substeps and horizon of the simulations.
     limit : int, optional
         Most effects to accept; two for each joint, but at least six, if not given.
-    names : {"ranking", "search"}
-        Where names come from: from `vpm.rank` where that covers the machine and elsewhere from rounds of screening on
-        inverse-dynamics residuals, or from these in any case.
+    names : str, optional
+        Without effect, to be removed: a ranking names.
     check : bool
         Refuse logs with a mistake that no machine makes by itself.
     workers : int, optional
@@ -174,14 +160,15 @@ def diagnose(
     KeyboardInterrupt
         Ctrl-C while logs were checked, before anything was known.
     DiagnosisError
-        No record was given, an effect name or the source of names is unknown, or names are to come from a search where
-        no efforts follow from a motion of the machine.
+        No record was given, or an effect name is unknown.
     ExperimentError
         A channel is missing, or a log cannot be trusted.
     ExecutorError
         The executor does not take the diagnosis, or its worker died with it again and again.
     """
-    asked = Asked(effects=effects, cutoff=cutoff, setup=setup, limit=limit, names=names, check=check)
+    if names is not None:
+        warn("names= has no effect: a ranking names; leave it out", DeprecationWarning, stacklevel=2)
+    asked = Asked(effects=effects, cutoff=cutoff, setup=setup, limit=limit, check=check)
     given = (as_records(experiments), as_records(validate or ()))
     check_asked(asked, workers)
     if executor is None:
@@ -198,11 +185,9 @@ def check_asked(asked: Asked, workers: int | None) -> None:
     Raises
     ------
     DiagnosisError, IdentificationError
-        An effect, the source of names or the number of workers is none.
+        An effect or the number of workers is none.
     """
     asked_for(asked.get("effects"))
-    if (names := asked.get("names", RANKING)) not in get_args(Names):
-        raise DiagnosisError(f'names come from a "search" or a "ranking", not from "{names}"')
     worker_count(workers)
 
 
@@ -215,7 +200,7 @@ def with_provenance(
     workers: int | None,
 ) -> Diagnosis:
     """Diagnosis with its provenance, as this process knows it; paths may differ where it was computed."""
-    usual = {"effects": None, "cutoff": None, "limit": None, "names": RANKING, "check": True, "workers": None}
+    usual = {"effects": None, "cutoff": None, "limit": None, "check": True, "workers": None}
     given = {**usual, **asked, "workers": workers}
     settings: dict[str, tuple[object, object]] = {name: (given[name], default) for name, default in usual.items()}
     settings |= own_settings(asked.get("setup") or Setup(), "setup")
@@ -252,8 +237,7 @@ def diagnosed(
             raise KeyboardInterrupt(*(stop.args or (UNCHECKED.format(record=logs[0].name),))) from None
         odd = [str(one) for one in found if one.kind in NOTED]
     most = max(LEAST_LIMIT, 2 * len(model.joints)) if limit is None else limit
-    names = asked.get("names", RANKING)
-    request = Request(effects, most, tell or (lambda _: None), each, names)
+    request = Request(effects, most, tell or (lambda _: None), each)
     diagnosis = _diagnosis(model, records, request, cutoff, setup)
     bare = _without_sensor(model, records[0])
     untried = (
@@ -336,7 +320,7 @@ def _named_and_judged(job: _Job) -> Diagnosis | list[Drift]:
 
 
 def _measured(job: _Job, ranking: Ranking | None) -> Diagnosis | list[Drift]:
-    """Diagnosis from a ranking, or by a search where there is none, measured on validation records."""
+    """Diagnosis from a ranking, measured on validation records."""
     model, request, (training, validation, notes) = job.model, job.request, job.records
     if ranking is not None and ranking.hold != job.setup.course:
         notes.append(READ_BACK.format(hold=ranking.hold))
@@ -349,42 +333,26 @@ def _measured(job: _Job, ranking: Ranking | None) -> Diagnosis | list[Drift]:
     request.tell("recalibrating the nominal parameters")
     start = None if ranking is None else ranking.recalibrated
     recalibrated = recalibrated_of(model, data, notes, request.each, start)
-    if ranking is None:
-        notes.extend(_if_read_back(job, recalibrated))
-        begun, recalibrated = begun_anywhere(model, data, recalibrated, notes)
-        if begun is not data:
-            data, nominal = begun, nominal_of(model, begun, [])
+    begun, recalibrated = begun_anywhere(model, data, recalibrated, notes)
+    if begun is not data:
+        data, nominal = begun, nominal_of(model, begun, [])
     try:
-        found, ambiguous, late = named(ranking, recalibrated, data, request, notes)
+        found, ambiguous = named(ranking, recalibrated, data, request, notes)
     except NoResidualError as error:
         if ranking is None:
             raise
         return _measured_by_tracker(job, ranking, str(error))
-    known = _Known(job, data, nominal, recalibrated, ranking, ambiguous, late)
-    bare = partial(of_search, model, job.records, recalibrated, found, (data.training, data.validation), ambiguous)
+    known = _Known(job, data, nominal, recalibrated, ranking, ambiguous)
+    bare = partial(of_findings, model, job.records, recalibrated, found, (data.training, data.validation), ambiguous)
     try:
         return _told(known, found)
     except BROKEN as error:
-        notes.append(FAILED.format(what="what follows the search", error=error))
+        notes.append(FAILED.format(what="what follows the naming", error=error))
         return bare()
     except KeyboardInterrupt:
         notes.append(STOPPED_UNJUDGED)
         gap = gaps_of(data, nominal, recalibrated, found.final, {})
         return replace(bare(), verdict="effect_found" if found.accepted else "interrupted", gap=gap, interrupted=True)
-
-
-def _if_read_back(job: _Job, recalibrated: Judged) -> list[str]:
-    """Note of a diagnosis by a search that commands seem to be read back, which a ranking finds out itself."""
-    if job.setup.hold != AUTOMATIC or has_own_drives(job.model):
-        return []
-    (training, validation, _), setup = job.records, replace(job.setup, hold=HOLDS[1])
-    with suppress(VpmError, ArithmeticError):
-        data = data_of(job.model, training, validation, job.mode, job.cutoff, setup, [])
-        read = recalibrated_of(job.model, data, [], job.request.each)
-        pairs = (recalibrated.fit.residual, read.fit.residual), (recalibrated.validation, read.validation)
-        if all(power(after) < (1.0 - WORTH_A_NAME) * power(before) for before, after in pairs):
-            return [IF_READ_BACK.format(hold=HOLDS[1])]
-    return []
 
 
 def _measured_by_tracker(job: _Job, ranking: Ranking, reason: str) -> Diagnosis:
@@ -406,10 +374,9 @@ class _Known:
     recalibrated: Judged
     ranking: Ranking | None
     ambiguous: tuple[Rivals, ...]
-    late: bool  #: Whether Ctrl-C left open what else would do.
 
 
-def _told(known: _Known, found: Search) -> Diagnosis | list[Drift]:
+def _told(known: _Known, found: Findings) -> Diagnosis | list[Drift]:
     """Diagnosis after naming: noise floor, remaining residual, and verdict; or drifts of sensors."""
     data, job = known.data, known.job
     job.request.tell("measuring the noise floor")
@@ -426,22 +393,22 @@ def _told(known: _Known, found: Search) -> Diagnosis | list[Drift]:
         pairs = ((data.training, found.final.fit.residual), (data.validation, found.final.validation))
         if drifts := sensor_drifts(found.final.model, pairs, gap, FLOOR_FACTOR):
             return drifts
-    if stopped or known.late:
+    if stopped:
         job.records[2].append(STOPPED_LATE)
     told, found, final = _concluded(known, found, said, gap, floor, rest)
-    interrupted = found.interrupted or stopped or known.late
+    interrupted = found.interrupted or stopped
     return _with_pictures(known, found, replace(told, gap=told.gap | beyond, interrupted=interrupted), final, floor)
 
 
 def _concluded(
     known: _Known,
-    found: Search,
+    found: Findings,
     said: tuple[str, str, bool],
     gap: dict[str, ChannelGap],
     floor: dict[str, float],
     rest: Remainder | None,
-) -> tuple[Diagnosis, Search, Judged]:
-    """Diagnosis with its verdict, the search on which it stands, and its model, perhaps with a formula for the rest."""
+) -> tuple[Diagnosis, Findings, Judged]:
+    """Diagnosis with its verdict, the findings, and its model, perhaps with a formula for the rest."""
     (word, summary, described), data, nominal = said, known.data, known.nominal
     final, empirical = found.final, None
     if described and rest is not None:
@@ -454,14 +421,16 @@ def _concluded(
         gap = gaps_of(data, nominal, known.recalibrated, final, floor)
         summary = f"{summary} {empirical.sentence}" + (f" {rest.seals.sentence}" if rest.seals is not None else "")
     records, ambiguous = known.job.records, known.ambiguous if found.accepted else ()
-    told = of_search(known.job.model, records, nominal, found, (data.training, data.validation), ambiguous)
+    told = of_findings(known.job.model, records, nominal, found, (data.training, data.validation), ambiguous)
     fit = fit_of(final.model, data.training, final.fit, nominal.fit.residual, list(told.training))
     summary = so_far(found, summary)
     told = replace(told, verdict=word, summary=summary, gap=gap, model=final.model, fit=fit, empirical=empirical)
     return told, found, final
 
 
-def _with_pictures(known: _Known, found: Search, told: Diagnosis, final: Judged, floor: dict[str, float]) -> Diagnosis:
+def _with_pictures(
+    known: _Known, found: Findings, told: Diagnosis, final: Judged, floor: dict[str, float]
+) -> Diagnosis:
     """Result of `diagnose` with its evidence and pictures, as far as Ctrl-C leaves time for them."""
     data, nominal = known.data, known.nominal
     ambiguous = known.ambiguous if found.accepted else ()
@@ -482,7 +451,7 @@ def _with_pictures(known: _Known, found: Search, told: Diagnosis, final: Judged,
     return told
 
 
-def _rest(known: _Known, found: Search, gap: dict[str, ChannelGap]) -> Remainder | None:
+def _rest(known: _Known, found: Findings, gap: dict[str, ChannelGap]) -> Remainder | None:
     """Remainder of the residual in `diagnose`, under the effects found; none where all is known."""
     request, data = known.job.request, known.data
     request.tell("examining what is left")

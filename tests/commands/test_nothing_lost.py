@@ -9,7 +9,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from io import StringIO
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 import pytest
@@ -224,17 +223,14 @@ def test_output_to_a_file_gets_a_line_for_each_stage_and_for_long_silence(
     assert stages == ["looking", "round 1 1 of 99: friction"]
 
 
-@pytest.mark.parametrize(("names", "broken"), [("ranking", "diagnosing.examined"), ("search", "naming._settled")])
-def test_an_error_after_the_search_leaves_what_it_found(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, names: Literal["ranking", "search"], broken: str
-) -> None:
+def test_an_error_after_the_naming_leaves_what_it_found(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def fail(*_: object, **__: object) -> None:
         raise SimulationError("the beam is bent")
 
     arm = Model.load(demo.MODEL)
     logs = [Experiment.load(path, model=arm) for path in (demo.TRAIN, demo.VALIDATION)]
-    monkeypatch.setattr(f"vpm.{broken}", fail)
-    found = diagnose(arm, logs[:1], logs[1:], effects=["coulomb_friction"], names=names, workers=1)
+    monkeypatch.setattr("vpm.diagnosing.examined", fail)
+    found = diagnose(arm, logs[:1], logs[1:], effects=["coulomb_friction"], workers=1)
     assert [(effect.name, effect.site) for effect in found.effects] == [("coulomb_friction", "shoulder")]
     assert any("could not be computed: the beam is bent" in note for note in found.notes)
     buffer = StringIO()

@@ -106,7 +106,7 @@ def swung(seed: int, tip: float = TIP, push: float = 1.0, drift: tuple[float, fl
 def test_a_tip_mass_is_named_whatever_the_constant_of_the_motor() -> None:
     """All forces may grow with that constant, which the file knows to 11 %; what only rounding shows stays at zero."""
     train, test = swung(1), swung(2)
-    why = vpm.diagnose(Model.from_toml(FILE), train, test, effects=["payload"], names="search", check=False, workers=1)
+    why = vpm.diagnose(Model.from_toml(FILE), train, test, effects=["payload"], check=False, workers=1)
     assert why.verdict == "effect_found"
     assert [(one.name, one.site) for one in why.effects] == [("payload", "boom")]
     found = {name: parameter.value for name, parameter in why.model.parameters.items()}
@@ -114,7 +114,7 @@ def test_a_tip_mass_is_named_whatever_the_constant_of_the_motor() -> None:
     moment = found["boom.payload.mass"] * (LENGTH + found["boom.payload.z"]) ** 2
     assert moment == pytest.approx(TIP * LENGTH**2, rel=0.1)
     assert found["boom.payload.x"] == 0.0  # upright, as the axis is
-    assert why.gap["root.strain"].after < 0.1 * why.gap["root.strain"].recalibrated
+    assert why.gap["root.strain"].after < 0.2 * why.gap["root.strain"].recalibrated
 
 
 def test_a_drifting_bridge_is_no_missing_physics() -> None:
@@ -122,7 +122,7 @@ def test_a_drifting_bridge_is_no_missing_physics() -> None:
     ends = {"boom 3": (2e-6, 6e-6), "boom 4": (7e-6, 4e-6)}
     train, test = (swung(seed, 0.0, 0.2, ends[f"boom {seed}"]) for seed in (3, 4))
     model = Model.from_toml(FILE)
-    why = vpm.diagnose(model, train, test, effects=["payload"], names="search", check=False, workers=1)
+    why = vpm.diagnose(model, train, test, effects=["payload"], check=False, workers=1)
     assert why.verdict == "parameters_only", why.summary
     told = [re.search(r"offset of root.strain drifts from (\S+) to (\S+) 1 in (boom \d)", note) for note in why.notes]
     found = {one[3]: (float(one[1]), float(one[2])) for one in told if one is not None}

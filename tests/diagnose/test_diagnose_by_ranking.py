@@ -3,22 +3,18 @@
 import json
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
 
-import two_link_arm
 import vpm
-from hopper import HOPPER
-from places import EXAMPLES
 from sledge import MASS, SLEDGE, swung
 from synthetic import Truth, nominal, simulate_axis
 from vpm import naming
 from vpm.diagnosing import diagnose
 from vpm.discrepancy import ranked_effects
 from vpm.discrepancy.confirmation.confirmation import unmoved
-from vpm.discrepancy.ranked_effects import why_not_ranked
 from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -66,7 +62,7 @@ def records() -> list[Experiment]:
 @pytest.fixture
 def named(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> vpm.Diagnosis:
     monkeypatch.setattr(naming, "rank", lambda *_, **__: two())
-    return diagnose(nominal(), records[0], records[1], names="ranking", workers=1)
+    return diagnose(nominal(), records[0], records[1], workers=1)
 
 
 def test_names_and_their_order_are_those_of_the_ranking(named: vpm.Diagnosis) -> None:
@@ -139,7 +135,7 @@ def test_a_ranking_learns_from_the_training_records_alone(
         return ranking()
 
     monkeypatch.setattr(naming, "rank", asked)
-    diagnose(nominal(), records[0], records[1], limit=3, names="ranking", workers=1)
+    diagnose(nominal(), records[0], records[1], limit=3, workers=1)
     assert seen == [[records[0].name, records[1].name]]
 
 
@@ -151,7 +147,7 @@ def test_names_that_leave_more_of_validation_records_are_no_explanation(
     seen = replace(two(), gaps=told)
     assert seen.left == {"axis": after**2}
     monkeypatch.setattr(naming, "rank", lambda *_, **__: seen)
-    assert diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict == word
+    assert diagnose(nominal(), records[0], records[1], workers=1).verdict == word
 
 
 def test_names_that_explain_validation_records_stand_whatever_the_balance_leaves(
@@ -163,7 +159,7 @@ def test_names_that_explain_validation_records_stand_whatever_the_balance_leaves
     for left in (float("nan"), 0.1):
         seen = replace(small, gaps={"axis.position": seen_by_tracker(1.0, left**0.5)})
         monkeypatch.setattr(naming, "rank", lambda *_, seen=seen, **__: seen)
-        words.append(diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict)
+        words.append(diagnose(nominal(), records[0], records[1], workers=1).verdict)
     assert words == ["unexplained", "effect_found"]
 
 
@@ -177,7 +173,7 @@ def test_names_that_leave_more_of_an_effort_than_it_is_explain_nothing(
         seen = replace(heavy, gaps={"axis.position": seen_by_tracker(1.0, 0.1)})
         monkeypatch.setattr(naming, "rank", lambda *_, seen=seen, **__: seen)
         monkeypatch.setattr(ranked_effects, "judged_anyhow", unmoved)
-        words.append(diagnose(nominal(), records[0], records[1], names="ranking", workers=1).verdict)
+        words.append(diagnose(nominal(), records[0], records[1], workers=1).verdict)
     assert words == ["effect_found", "unexplained"]
 
 
@@ -187,23 +183,21 @@ def test_ctrl_c_in_the_ranking_gives_what_is_known(monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr(naming, "rank", stopped)
     stated = vpm.Setup(hold="first_order")
-    why = diagnose(nominal(), records[0], records[1], names="ranking", setup=stated, workers=1)
+    why = diagnose(nominal(), records[0], records[1], setup=stated, workers=1)
     assert why.interrupted
     assert why.effects == ()
     assert any(note.startswith("stopped by Ctrl-C") for note in why.notes)
     assert not any("simulate with hold" in note for note in why.notes)  # nothing was found out: what was stated stands
 
 
-def test_where_a_ranking_fails_a_search_names(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
+def test_where_a_ranking_fails_nothing_is_named(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
     def failed(*_: object, **__: object) -> Ranking:
         raise VpmError("the axis runs away from the records")
 
     monkeypatch.setattr(naming, "rank", failed)
-    # Without a restriction to effects, which a ranking is told of in its own words.
-    why = diagnose(nominal(), records[0], records[1], limit=2, names="ranking", workers=1)
-    assert {e.name for e in why.effects} == {"coulomb_friction", "bias_force"}
-    assert np.isnan(why.effects[0].evidence_nats)
-    (note,) = [note for note in why.notes if note.startswith("names come from a search")]
+    why = diagnose(nominal(), records[0], records[1], limit=2, workers=1)
+    assert (why.verdict, why.effects) == ("unexplained", ())
+    (note,) = [note for note in why.notes if note.startswith("nothing could be named")]
     assert "runs away" in note
 
 
@@ -216,35 +210,24 @@ def test_a_name_without_inverse_dynamics_is_measured_by_its_tracker(
         raise VpmError("the efforts run away")
 
     monkeypatch.setattr(ranked_effects, "_beside", lost)
-    why = diagnose(nominal(), records[0], records[1], names="ranking", workers=1)
+    why = diagnose(nominal(), records[0], records[1], workers=1)
     assert why.verdict == "effect_found"
     assert {effect.name for effect in why.effects} == {"coulomb_friction", "bias_force"}
     assert all("(observed)" in channel for channel in why.gap)
     assert any("the efforts run away: all is measured by what an observer" in note for note in why.notes)
 
 
-def test_machines_that_a_ranking_does_not_cover_say_why() -> None:
-    assert why_not_ranked(nominal(), ()) == ""
-    assert why_not_ranked(two_link_arm.nominal(), ()) == ""
-    assert why_not_ranked(Model.from_toml(HOPPER), ()) == ""
-    assert why_not_ranked(Model.load(EXAMPLES / "servo_cylinder" / "rig.toml"), ()) == ""
-    assert why_not_ranked(Model.load(EXAMPLES / "flexible_pendulum" / "flexible_pendulum.toml"), ()) == ""
-    assert why_not_ranked(Model.load(EXAMPLES / "hyl" / "fcm.toml"), ()) == "there are 7 joints, more than 3"
-    oil = "the actuators hip_drive and knee_drive have type hydraulic"
-    assert why_not_ranked(Model.load(EXAMPLES / "hyl" / "hydraulic.toml"), ()) == oil
-
-
 def test_a_refit_that_simulates_worse_is_not_kept(monkeypatch: pytest.MonkeyPatch, records: list[Experiment]) -> None:
     monkeypatch.setattr(naming, "rank", lambda *_, **__: two())
     for limit in ("LEAST_GAIN", "NORMAL_95_ONE_SIDED"):
         monkeypatch.setattr(ranked_effects, limit, -np.inf)
-    why = diagnose(nominal(), records[0], records[1], names="ranking", workers=1)
+    why = diagnose(nominal(), records[0], records[1], workers=1)
     step = why.steps[1]
     assert step.values["axis.friction.coulomb"] == pytest.approx(8.8)
     assert step.std["axis.friction.coulomb"] > 0.0
 
 
-def test_effects_that_no_search_tries_are_asked_of_a_ranking(
+def test_a_ranking_is_asked_for_the_effects_that_are_asked_for(
     monkeypatch: pytest.MonkeyPatch, records: list[Experiment]
 ) -> None:
     asked: list[object] = []
@@ -256,16 +239,6 @@ def test_effects_that_no_search_tries_are_asked_of_a_ranking(
     monkeypatch.setattr(naming, "rank", rank)
     diagnose(nominal(), records[0], records[1], effects=["quadratic_drag"], workers=1)
     assert asked == [["quadratic_drag"]]
-    with pytest.raises(DiagnosisError, match=r'does not try quadratic_drag, .*: names="search" was asked for; ask'):
-        diagnose(nominal(), records[0], records[1], effects=["quadratic_drag"], names="search", workers=1)
-    monkeypatch.setattr(naming, "why_not_ranked", lambda *_: "links bend")
-    with pytest.raises(DiagnosisError, match=r"does not try quadratic_drag, .*: links bend; ask for"):
-        diagnose(nominal(), records[0], records[1], effects=["quadratic_drag"], workers=1)
-    why = diagnose(
-        nominal(), records[0], records[1], effects=["quadratic_drag", "coulomb_friction"], limit=1, workers=1
-    )
-    assert "a search on inverse-dynamics residuals does not try quadratic_drag" in why.notes
-    assert [effect.name for effect in why.effects] == ["coulomb_friction"]
 
 
 def test_what_is_no_law_or_no_effect_is_not_tried(records: list[Experiment]) -> None:
@@ -274,11 +247,6 @@ def test_what_is_no_law_or_no_effect_is_not_tried(records: list[Experiment]) -> 
             call(nominal(), records[0], effects=["empirical_force"])
         with pytest.raises(DiagnosisError, match='no effect "coulomb_frction"; did you mean'):
             call(nominal(), records[0], effects=["coulomb_frction"])
-
-
-def test_names_come_from_one_of_two_places(records: list[Experiment]) -> None:
-    with pytest.raises(DiagnosisError, match='from a "search" or a "ranking", not from "luck"'):
-        diagnose(nominal(), records[0], records[1], names=cast("Any", "luck"))
 
 
 def test_a_parameter_without_a_derivative_along_the_motion_is_not_told_by_a_balance() -> None:

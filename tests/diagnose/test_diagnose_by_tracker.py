@@ -17,7 +17,7 @@ from sledge import OIL as DRAG
 from slider_crank import OIL, SLIDER, SLIDER_CRANK, turned
 from vpm import naming
 from vpm.cli import app
-from vpm.errors import DiagnosisError, VpmError
+from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.ranking import Ranking
@@ -251,8 +251,3 @@ def test_a_record_that_lacks_a_channel_is_refused_in_a_sentence(lacking: int) ->
         with pytest.raises(VpmError, match=words) as told:
             vpm.diagnose(Model.from_toml(SLIDER_CRANK), *less)
         assert "\n" not in str(told.value)
-
-
-def test_no_search_covers_such_machines() -> None:
-    with pytest.raises(DiagnosisError, match=r"for the closed loops \(wrist\).*take names from a ranking"):
-        vpm.diagnose(Model.from_toml(SLIDER_CRANK), *swings(2.0), names="search", check=False)

@@ -5,8 +5,6 @@ import pytest
 
 import vpm
 from places import EXAMPLES
-from vpm.discrepancy import ranked_effects
-from vpm.discrepancy.ranked_effects import free_joints, why_not_ranked
 from vpm.experiment import Experiment
 from vpm.model import Model
 from vpm.numbers import Array
@@ -41,21 +39,6 @@ def logged(model: Model) -> list[Experiment]:
             values[channel] = run[channel] + level * random.standard_normal(len(run.time))
         logs.append(Experiment.from_arrays(run.time, values, name=name, model=leg()))
     return logs
-
-
-def test_a_ranking_covers_several_cylinders_where_a_joint_has_no_drive() -> None:
-    assert free_joints(leg()) == ("slider",)
-    assert why_not_ranked(leg(), ()) == ""
-    driven = Model.load(HYL / "hydraulic.toml")
-    assert why_not_ranked(driven, ()) == "the actuators hip_drive and knee_drive have type hydraulic"
-
-
-def test_what_no_balance_sees_is_told_where_a_search_names(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A payload on the trunk loads the guide's joint alone; that nothing is said of it has to be said."""
-    monkeypatch.setattr(ranked_effects, "RANKED_JOINTS", 2)
-    *train, test = logged(leg().with_effect("payload", at="carriage", mass=0.8))
-    why = vpm.diagnose(leg(), train, test, effects=["bias_force"])
-    assert any(note.startswith("the joint slider has no drive") for note in why.notes)
 
 
 @pytest.mark.nightly

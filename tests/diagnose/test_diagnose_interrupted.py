@@ -46,7 +46,6 @@ def stopped(kind: str, sentence: str) -> vpm.Diagnosis:
         model,
         *records(kind),
         effects=BOTH,
-        names="search" if kind == "search" else "ranking",
         check=False,
         workers=1,
         tell=tell,
@@ -60,9 +59,9 @@ def named(why: vpm.Diagnosis) -> list[str]:
     return [effect.name for effect in why.effects]
 
 
-@pytest.mark.parametrize("kind", ["ranking", "search", "observer"])
+@pytest.mark.parametrize("kind", ["ranking", "observer"])
 def test_before_anything_is_named_nothing_is_said(kind: str) -> None:
-    sentences = {"search": "recalibrating the nominal", "ranking": "ranking what", "observer": "fitting what"}
+    sentences = {"ranking": "ranking what", "observer": "fitting what"}
     why = stopped(kind, sentences[kind])
     assert (why.verdict, why.effects) == ("interrupted", ())
     assert "Stopped" in why.summary
@@ -127,9 +126,8 @@ def test_a_ranking_whose_errors_were_not_measured_keeps_its_names(monkeypatch: p
     assert [one.effect for one in ranking.effects] == BOTH
 
 
-@pytest.mark.parametrize("kind", ["ranking", "search"])
-def test_without_a_noise_floor_the_errors_are_told(kind: str) -> None:
-    why = stopped(kind, "measuring the noise floor")
+def test_without_a_noise_floor_the_errors_are_told() -> None:
+    why = stopped("ranking", "measuring the noise floor")
     assert (why.verdict, sorted(named(why))) == ("effect_found", BOTH)
     gap = why.gap["axis.effort"]
     assert gap.after < 0.2 * gap.recalibrated
@@ -137,19 +135,12 @@ def test_without_a_noise_floor_the_errors_are_told(kind: str) -> None:
     assert all(effect.gain > 0.3 for effect in why.effects)
 
 
-@pytest.mark.parametrize("stage", ["looking for what else", "examining what is left", "designing discriminating"])
-def test_names_keep_verdict_and_floor_after_the_search(stage: str) -> None:
-    why = stopped("search", stage)
+@pytest.mark.parametrize("stage", ["examining what is left", "designing discriminating"])
+def test_names_keep_verdict_and_floor_after_the_naming(stage: str) -> None:
+    why = stopped("ranking", stage)
     assert (why.verdict, sorted(named(why))) == ("effect_found", BOTH)
     assert why.gap["axis.effort"].noise_floor > 0.0
     assert "Missing: " in why.summary
-
-
-def test_an_effect_that_was_just_accepted_stands() -> None:
-    """It was not yet asked whether it makes an earlier one needless."""
-    why = stopped("search", "round 2: accepted")
-    assert sorted(named(why)) == BOTH
-    assert not any(candidate.round > 2 for candidate in why.candidates)
 
 
 def test_nothing_is_concluded_from_logs_that_were_not_checked() -> None:

@@ -4,11 +4,9 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import pytest
 
 import vpm
 from vpm.discrepancy.confirmation.confirmation import is_clear
-from vpm.discrepancy.search.search_round import Request, Round
 from vpm.identify import Estimate, InverseDynamicsProblem, Worth, estimate
 
 DT = 1e-3
@@ -73,18 +71,6 @@ def test_the_size_of_a_play_is_its_width_however_hard_its_contacts_are() -> None
 
     assert clear(1e-4)
     assert not clear(2e-3)
-
-
-@pytest.mark.parametrize(("taken", "others", "meets"), [(0.3, (), True), (0.8, (), False), (0.3, ("axis",), False)])
-def test_what_takes_little_has_to_meet_motions_of_their_own_once(
-    taken: float, others: tuple[str, ...], meets: bool
-) -> None:
-    current: Any = SimpleNamespace(model=vpm.Model.from_toml(AXIS))
-    unused: Any = None
-    outcome = Round(current, unused, 1, Request(None, 1, lambda _: None, unused))
-    outcome._ranking = {("joint_compliance", site): unused for site in others}
-    best: Any = SimpleNamespace(trial=SimpleNamespace(there=SimpleNamespace(relative=taken)))
-    assert outcome.weak(best) == meets
 
 
 def test_a_fit_is_lost_if_it_is_late_and_hardly_comes_nearer() -> None:

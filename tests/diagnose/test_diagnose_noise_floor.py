@@ -5,9 +5,7 @@ import pytest
 
 from synthetic import Truth, nominal, simulate_axis
 from vpm.diagnosing import diagnose
-from vpm.discrepancy.diagnosis import RankedCandidate
 from vpm.discrepancy.noise.noise_floor import structure, white_level
-from vpm.discrepancy.search.search_round import _by_gain
 from vpm.identify import InverseDynamicsProblem
 
 
@@ -59,39 +57,10 @@ def test_noise_is_no_structure_and_what_follows_the_effort_is() -> None:
     assert structure(model, problems[0], problems[1], friction[0], friction[1]).present
 
 
-def test_ranking_puts_what_was_confirmed_first() -> None:
-    def entry(name: str, screened: float, validation: float, *, accepted: bool = False) -> RankedCandidate:
-        return RankedCandidate(name, "axis", 1, screened, validation, accepted)
-
-    ranked = [
-        entry("screened", 0.9, float("nan")),
-        entry("hurts", 0.8, -0.5),
-        entry("helps", 0.1, 0.4),
-        entry("accepted", 0.2, 0.3, accepted=True),
-    ]
-    assert [c.name for c in sorted(ranked, key=_by_gain)] == ["accepted", "helps", "screened", "hurts"]
-
-
 def test_a_name_that_leaves_most_open_is_no_explanation() -> None:
     train, test = simulate_axis(Truth(cubic=3000.0), 2, 16.0, first_seed=17)
     diagnosis = diagnose(nominal(), train, test, effects=["spring", "bias_force"])
     assert diagnosis.verdict == "unexplained"
-
-
-def test_interrupted_search_gives_what_is_known() -> None:
-    """Ctrl-C in the second round: the effect of the first one stands."""
-    train, test = simulate_axis(Truth(coulomb=9.0, bias=5.0), 2, 12.0, first_seed=7)
-
-    def tell(sentence: str) -> None:
-        if sentence.startswith("round 2: screening"):
-            raise KeyboardInterrupt
-
-    effects = ["coulomb_friction", "bias_force"]
-    diagnosis = diagnose(nominal(), train, test, effects=effects, names="search", tell=tell)
-    assert diagnosis.interrupted
-    assert len(diagnosis.effects) == 1
-    assert any(note.startswith("stopped by Ctrl-C") for note in diagnosis.notes)
-    assert not diagnose(nominal(), train, test, effects=["bias_force"]).interrupted
 
 
 def test_one_processor_finds_what_many_find() -> None:

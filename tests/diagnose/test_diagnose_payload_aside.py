@@ -68,7 +68,7 @@ def moved(seed: int) -> Experiment:
 
 def test_a_payload_beside_the_origin_of_an_uncertain_body_is_named() -> None:
     tried = ["payload", "viscous_friction", "coulomb_friction"]
-    why = vpm.diagnose(Model.from_toml(FILE), moved(1), moved(2), effects=tried, names="search", check=False, workers=1)
+    why = vpm.diagnose(Model.from_toml(FILE), moved(1), moved(2), effects=tried, check=False, workers=1)
     assert why.verdict == "effect_found"
     assert [(one.name, one.site) for one in why.effects] == [("payload", "fore")]
     found = {name: parameter.value for name, parameter in why.model.parameters.items()}

@@ -52,7 +52,7 @@ def record() -> Experiment:
 
 def test_a_payload_and_friction_are_named_beside_an_unknown_mass() -> None:
     effects = ["payload", "coulomb_friction", "viscous_friction", "bias_force", "spring", "gravity_tilt"]
-    why = vpm.diagnose(vpm.Model.from_toml(ARM), record(), effects=effects, names="search", check=False, workers=1)
+    why = vpm.diagnose(vpm.Model.from_toml(ARM), record(), effects=effects, check=False, workers=1)
     assert why.verdict == "effect_found"
     assert sorted(effect.name for effect in why.effects) == ["coulomb_friction", "payload"]
     values = {name: parameter.value for name, parameter in why.model.parameters.items()}

@@ -103,7 +103,7 @@ actuators.drive = { joint = "axis", gain = 1.0, command_unit = "N m" }
         angle = np.sum(np.sin(phases), axis=1) + random.normal(0.0, 1e-5, len(time))
         return vpm.Experiment.from_arrays(time, {"axis.position": angle, "drive.command": torque}, model=arm)
 
-    why = vpm.diagnose(arm, [record(1)], [record(2)], names="search", effects=["bias_force"], check=False, workers=1)
+    why = vpm.diagnose(arm, [record(1)], [record(2)], effects=["bias_force"], check=False, workers=1)
     (note,) = [note for note in why.notes if "stopped at" in note]
     assert "arm.inertia.yy" in note
     assert "the moment xx, 0.5 kg m^2" in note
@@ -121,7 +121,7 @@ def test_a_file_that_is_wrong_beside_a_missing_effect_is_told() -> None:
         place = np.sum(np.sin(phases), axis=1) + random.normal(0.0, 1e-5, len(time))
         return vpm.Experiment.from_arrays(time, {"axis.position": place, "drive.command": force}, model=model)
 
-    why = vpm.diagnose(model, [record(1)], [record(2)], names="search", effects=["bias_force"], check=False, workers=1)
+    why = vpm.diagnose(model, [record(1)], [record(2)], effects=["bias_force"], check=False, workers=1)
     assert [effect.name for effect in why.effects] == ["bias_force"]
     assert f"But {MASS} is 10.0 times its stated uncertainty away from the model file" in why.summary
 
@@ -149,6 +149,6 @@ actuators.drive = { joint = "axis", gain = 1.0, command_unit = "N m" }
         angle = angle + random.normal(0.0, 1e-5, len(time))
         return vpm.Experiment.from_arrays(time, {"axis.position": angle, "drive.command": torque}, model=arm)
 
-    why = vpm.diagnose(arm, [record(1)], [record(2)], names="search", effects=["bias_force"], check=False, workers=1)
+    why = vpm.diagnose(arm, [record(1)], [record(2)], effects=["bias_force"], check=False, workers=1)
     assert why.verdict == "parameters_only"
     assert "at the most probable values that explain the records" in why.summary

@@ -86,7 +86,7 @@ def moved(seed: int, load: float = 0.0) -> Experiment:
 def test_nothing_is_named_where_friction_of_shafts_turns_round_more_softly() -> None:
     """Nobody knows at which speed dry friction turns round: at a shaft of two joints as little as at a joint."""
     tried = ["coulomb_friction", "viscous_friction"]
-    why = vpm.diagnose(Model.from_toml(FILE), moved(1), moved(2), effects=tried, names="search", check=False, workers=1)
+    why = vpm.diagnose(Model.from_toml(FILE), moved(1), moved(2), effects=tried, check=False, workers=1)
     assert why.verdict == "parameters_only"
     assert not why.effects
     for shaft in ("screw", "spline"):
@@ -97,7 +97,7 @@ def test_nothing_is_named_where_friction_of_shafts_turns_round_more_softly() -> 
 def test_a_load_that_the_file_rules_out_is_said_with_the_verdict() -> None:
     """On a body of free mass a load is that mass, but none whose mass was weighed to 0.15 kg."""
     load, model, tried = 1.2, Model.from_toml(FILE), ["coulomb_friction"]
-    why = vpm.diagnose(model, moved(1, load), moved(2, load), effects=tried, names="search", check=False, workers=1)
+    why = vpm.diagnose(model, moved(1, load), moved(2, load), effects=tried, check=False, workers=1)
     away = (MASS + load - model.parameters["quill.mass"].value) / 0.15
     assert why.verdict == "parameters_only"
     assert f"quill.mass is {away:.1f} times its stated uncertainty away" in why.summary

@@ -14,7 +14,7 @@ from shared_cases import shared_case
 def test_no_constant_force_stands_beside_a_richer_law(name: str, seed: int, values: tuple[str, str]) -> None:
     case = shared_case("axis_rotary", name, seed)
     (hidden,) = case.truth.hidden
-    why = vpm.diagnose(case.model(), case.train, case.validate, effects=["bias_force", name], names="search", workers=1)
+    why = vpm.diagnose(case.model(), case.train, case.validate, effects=["bias_force", name], workers=1)
     assert [(effect.name, effect.site) for effect in why.effects] == [(name, "axis")]
     found = {parameter.name: parameter for parameter in why.effects[0].parameters}
     for one in values:

@@ -69,7 +69,7 @@ def record(model: vpm.Model, rhythm: float, seed: int) -> vpm.Experiment:
 def test_a_wrong_transition_velocity_of_seals_is_no_second_friction() -> None:
     model = vpm.Model.from_toml(FILE)
     logs = [record(model, rhythm, seed) for rhythm, seed in ((1.3, 1), (0.9, 2))]
-    why = vpm.diagnose(model, *logs, effects=["coulomb_friction"], names="search", check=False, workers=1)
+    why = vpm.diagnose(model, *logs, effects=["coulomb_friction"], check=False, workers=1)
     assert why.effects == ()
     assert np.isclose(why.model.parameters["servo.friction.coulomb"].value, DRY, rtol=0.05)
     assert np.isclose(why.model.parameters["servo.friction.transition_velocity"].value, TURNING, rtol=0.2)

@@ -74,7 +74,7 @@ def test_a_fit_passes_a_bound_of_its_drive() -> None:
 
 def test_a_size_is_known_as_well_as_the_constant_of_its_motor() -> None:
     model, tried = Model.from_toml(FILE), ["coulomb_friction", "bias_force", "spring", "dead_zone"]
-    why = vpm.diagnose(model, turned(1), turned(2), effects=tried, names="search", check=False, workers=1)
+    why = vpm.diagnose(model, turned(1), turned(2), effects=tried, check=False, workers=1)
     assert why.verdict == "effect_found"
     assert [(one.name, one.site) for one in why.effects] == [("coulomb_friction", "hub")]
     found = why.model.parameters

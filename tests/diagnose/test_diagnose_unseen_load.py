@@ -3,7 +3,6 @@
 import pytest
 
 import vpm
-from vpm.errors import DiagnosisError
 from winch import LOAD, MODEL, ROPE, record
 
 TRIED = ["coulomb_friction", "viscous_friction", "bias_force", "spring"]
@@ -24,8 +23,3 @@ def test_friction_of_the_drum_is_named() -> None:
     why = vpm.diagnose(MODEL, *logs, effects=TRIED, check=False)
     assert [(one.name, one.site) for one in why.effects] == [("coulomb_friction", "shaft")]
     assert why.model.parameters["shaft.friction.coulomb"].value == pytest.approx(9.0, rel=2e-2)
-
-
-def test_no_search_is_made_without_efforts() -> None:
-    with pytest.raises(DiagnosisError, match="does not tell the place of lift"):
-        vpm.diagnose(MODEL, record(1), record(2), names="search", check=False)

@@ -6,11 +6,6 @@ import numpy as np
 import pytest
 
 import vpm
-from vpm.discrepancy.confirmation.refusal import refuse_probe
-from vpm.discrepancy.screening.candidates import candidates
-from vpm.discrepancy.screening.probe import Baseline, probe
-from vpm.discrepancy.settings import NEGLIGIBLE
-from vpm.identify import InverseDynamicsProblem, estimate
 from vpm.numbers import Array
 
 JOINTS = ("A1", "A2", "A3", "A4")
@@ -103,22 +98,3 @@ def test_friction_of_one_joint_is_not_seen_at_others() -> None:
 
 def test_nothing_is_missing_where_no_joint_rubs() -> None:
     assert diagnosed(()).effects == ()
-
-
-def test_what_shows_at_a_joint_is_tried_though_another_one_hides_it() -> None:
-    """A spring at the elbow, beside a force at the shoulder that nothing explains."""
-    log = record((), 1, 24.0)
-    rng = np.random.default_rng(5)
-    force = np.convolve(rng.normal(0.0, 1.0, len(log)), np.exp(-np.arange(0.0, 1.0, INTERVAL) / 0.15))[: len(log)]
-    more = {"M2.command": 60.0 * force / np.std(force), "M3.command": 3.0 * log["A3.position"]}
-    values = {channel: log[channel] + more.get(channel, 0.0) for channel in log.channels}
-    units = {channel: "rad" if channel.endswith("position") else "N m" for channel in values}
-    model = arm()
-    data = InverseDynamicsProblem(model, [vpm.Experiment.from_arrays(log.time, values, units=units)])
-    free = tuple(parameter.name for parameter in model.parameters.values() if parameter.adjustable)
-    fit = estimate(model, data, free)
-    fitted = model.with_parameters(dict(zip(fit.names, map(float, fit.values), strict=True)))
-    base = Baseline(fitted, free, fit.residual, fit.jacobian)
-    found = {one.site: probe(base, data, one) for one in candidates(fitted, data, fit.residual, ["spring"])}
-    assert found["A3"].drop < NEGLIGIBLE
-    assert [site for site, one in found.items() if not refuse_probe(one)] == ["A3"]

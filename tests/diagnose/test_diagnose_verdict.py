@@ -8,7 +8,7 @@ import pytest
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.diagnosis import ChannelGap
-from vpm.discrepancy.search.search import Search
+from vpm.discrepancy.findings import Findings
 from vpm.discrepancy.verdict import _nothing_missing, _unheard, only_if_open, open_readings, verdict, without_effects
 
 SIGNAL, NOISE = 1.0, 1e-3
@@ -150,7 +150,7 @@ def test_an_effect_that_explains_nothing_is_withdrawn_where_nothing_was_open(
     """A linkage without a missing effect, of which an observer leaves less than noise: no effect is worth a name."""
     entry: Any = SimpleNamespace(key=("rotor_inertia", "crank"))
     judged: Any = SimpleNamespace()
-    found = Search((), (entry,), (), (), left={"crank": left})
+    found = Findings((), (entry,), (), (), left={"crank": left})
     gap = {"crank.position": ChannelGap(8e-4, before, before * left**0.5, 6.6e-4, "rad", 5.2, "observed")}
     told = only_if_open(found, judged, gap)
     assert (told is found) is kept

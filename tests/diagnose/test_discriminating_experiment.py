@@ -42,7 +42,7 @@ NAMES = ["bias_force", "coulomb_friction"]
 @pytest.fixture(scope="module")
 def why() -> vpm.Diagnosis:
     model, test = vpm.Model.from_toml(DAMPED_AXIS), forward_only(3, 2.0)
-    return vpm.diagnose(model, [forward_only(1, 2.0), forward_only(2, 2.0)], test, effects=NAMES, names="search")
+    return vpm.diagnose(model, [forward_only(1, 2.0), forward_only(2, 2.0)], test, effects=NAMES)
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,7 @@ def any_effect() -> vpm.Diagnosis:
     """The whole catalogue on the same records."""
     model = vpm.Model.from_toml(DAMPED_AXIS)
     test = forward_only(3, 2.0)
-    return vpm.diagnose(model, [forward_only(1, 2.0), forward_only(2, 2.0)], test, names="search")
+    return vpm.diagnose(model, [forward_only(1, 2.0), forward_only(2, 2.0)], test)
 
 
 def test_a_load_and_a_friction_are_the_same_in_one_direction(why: vpm.Diagnosis) -> None:

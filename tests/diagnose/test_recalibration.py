@@ -1,14 +1,9 @@
 """Recalibration of a pendulum that carries more than its file says, and of a spring; torques are of closed forms."""
 
-from collections.abc import Callable
-
 import numpy as np
 import pytest
 
 import vpm
-from sledge import SLEDGE, pushed
-from sledge import swung as read_back
-from vpm.experiment import Experiment
 from vpm.simulate import Setup
 
 GRAVITY, RATE, SECONDS = 9.81, 100.0, 5.0
@@ -65,9 +60,7 @@ def test_bodies_become_what_the_records_show_of_them(load: float, place: tuple[f
     about_pin = LONG + MASS * (ALONG**2 + BESIDE**2) + load * (place[0] ** 2 + place[1] ** 2)
     moments = MASS * ALONG + load * place[0], MASS * BESIDE + load * place[1]
     train, test = (swung(*moments, about_pin, seed) for seed in (1, 2))
-    why = vpm.diagnose(
-        vpm.Model.from_toml(FILE), train, test, names="search", effects=["spring"], setup=SMOOTH, check=False
-    )
+    why = vpm.diagnose(vpm.Model.from_toml(FILE), train, test, effects=["spring"], setup=SMOOTH, check=False)
     assert why.verdict in {"parameters_only", "no_disagreement"}
     found = {name: parameter.value for name, parameter in why.model.parameters.items()}
     mass, x, z = (found[f"link.{name}"] for name in ("mass", "center_of_mass.x", "center_of_mass.z"))
@@ -164,11 +157,3 @@ def test_a_fit_of_efforts_that_cannot_see_a_spring_says_which_mode_does() -> Non
     other = vpm.identify(model, record, mode="restarts", setup=SMOOTH)
     assert other["coil.spring.stiffness"] == pytest.approx(STIFFNESS, rel=0.01)
     assert not any("was compared" in sentence for sentence in other.warnings)
-
-
-@pytest.mark.parametrize(("record", "told"), [(read_back, True), (pushed, False)])
-def test_a_search_says_where_commands_seem_to_be_read_back(record: Callable[..., Experiment], told: bool) -> None:
-    """A force that runs on between samples, and one that is held for each of them."""
-    model, logs = vpm.Model.from_toml(SLEDGE), [record(seed=seed) for seed in (1, 2)]
-    why = vpm.diagnose(model, logs[0], logs[1], names="search", effects=["bias_force"], check=False, workers=1)
-    assert any("say hold first_order" in note for note in why.notes) == told

@@ -95,8 +95,7 @@ def test_friction_is_found_while_a_machine_coasts() -> None:
     oil = effect_text("viscous_friction", "slide", viscous='{ value = 1.0, unit = "N s/m", uncertainty = 0.5 }')
     model = Model.from_toml(on_rail("block", joint="slide", drive="motor") + 'command_unit = "N"\n' + oil)
     make = partial(coasting, model)
-    for names in ("ranking", "search"):
-        found = diagnose(model, [make(1.0, 0), make(2.0, 1)], make(1.5, 2), workers=1, names=names)
-        assert (found.verdict, [effect.name for effect in found.effects]) == ("effect_found", ["coulomb_friction"])
-        size = found.effects[0].parameters[0]
-        assert size.value == pytest.approx(0.6, abs=4.0 * size.std + 0.006)  # one percent for the filter of the motion
+    found = diagnose(model, [make(1.0, 0), make(2.0, 1)], make(1.5, 2), workers=1)
+    assert (found.verdict, [effect.name for effect in found.effects]) == ("effect_found", ["coulomb_friction"])
+    size = found.effects[0].parameters[0]
+    assert size.value == pytest.approx(0.6, abs=4.0 * size.std + 0.006)  # one percent for the filter of the motion

@@ -4,15 +4,10 @@ import numpy as np
 import pytest
 
 from vpm import Experiment, Model, diagnose
-from vpm.discrepancy.screening.candidates import candidates
-from vpm.discrepancy.screening.probe import Baseline, probe
-from vpm.identify import InverseDynamicsProblem
 
 GAP, MASS, ROTOR, VISCOUS = 4e-4, 12.0, 3.0, 30.0
 STIFFNESS, DAMPING = 1.5e6, 900.0
 #: Contacts in which the link sways at 14 Hz, a fifth of critically damped, and the gap between these.
-SOFT, SOFT_DAMPING, WIDE = 9.3e4, 420.0, 2e-3
-HARD = MASS * (2.0 * np.pi * 60.0) ** 2
 TEXT = f"""name = "axis"
 gravity = [0.0, 0.0, -9.81]
 
@@ -71,24 +66,6 @@ def record(
 def loose() -> tuple[Experiment, ...]:
     """Two records of a machine with play."""
     return record(GAP, 1), record(GAP, 2)
-
-
-def started(model: Model, log: Experiment) -> Model:
-    """Model with the backlash from which a refit begins, that of least residual along the motion of the motor."""
-    data = InverseDynamicsProblem(model, [log])
-    residual, jacobian = data.evaluate(model, model.theta, [model.index("body.mass")])
-    (candidate,) = candidates(model, data, residual, ["backlash"])
-    return probe(Baseline(model, ("body.mass",), residual, jacobian), data, candidate).model
-
-
-@pytest.mark.parametrize(
-    ("gap", "stiffness", "damping"),
-    [(GAP, STIFFNESS, DAMPING), (WIDE, SOFT, SOFT_DAMPING), (1.5e-3, HARD, 0.1 * np.sqrt(HARD * MASS))],
-)
-def test_a_refit_starts_with_a_gap_as_wide_as_it_is(gap: float, stiffness: float, damping: float) -> None:
-    """Contacts at 60 Hz, a twentieth of critically damped, ring: few of their bounces can be followed."""
-    model = started(Model.from_toml(TEXT), record(gap, 1, 4.0, stiffness, damping))
-    assert model.parameters["axis.backlash.gap"].value == pytest.approx(gap, rel=0.3)
 
 
 @pytest.mark.nightly

@@ -117,7 +117,8 @@ def record(seed: int, force: Force, duration: float = 10.0) -> vpm.Experiment:
 @cache
 def diagnosed(force: Force) -> vpm.Diagnosis:
     model = vpm.Model.from_toml(DAMPED_AXIS)
-    return vpm.diagnose(model, [record(1, force), record(2, force)], record(3, force), names="search")
+    known = ["coulomb_friction", "bias_force", "spring", "torque_ripple"]
+    return vpm.diagnose(model, [record(1, force), record(2, force)], record(3, force), effects=known)
 
 
 def gap_ratio(why: vpm.Diagnosis) -> float:

@@ -10,7 +10,6 @@ from quotients import of_residual
 from test_sides import TIMES, elastic, force
 from test_split_joints import commanded, slide
 from vpm import EFFECTS, Experiment, Model, simulate
-from vpm.discrepancy.screening.candidates import candidates
 from vpm.errors import ModelError
 from vpm.identify import InverseDynamicsProblem, identify
 
@@ -130,15 +129,10 @@ def test_the_cold_joint_is_cold_at_the_first_sample_alone() -> None:
     assert warmth == pytest.approx(1.0 - np.exp(-0.5 * np.arange(5)), rel=1e-12)
 
 
-def test_files_keep_them_and_a_diagnosis_leaves_them_alone() -> None:
+def test_files_keep_them() -> None:
     model = geared()
     assert Model.from_toml(model.to_toml()) == model
     assert len(set(model.internal_names)) == 4
-    bare = slide()
-    data = InverseDynamicsProblem(bare, [record(with_one("quadratic_drag"))])
-    tried = {c.effect.name for c in candidates(bare, data, data.evaluate(bare, bare.theta)[0])}
-    assert tried
-    assert not tried & set(VALUES)
 
 
 def test_what_knows_the_load_has_no_sides() -> None:

@@ -245,7 +245,7 @@ def test_a_logged_deflection_shows_what_a_rigid_model_lacks() -> None:
     assert problem.shown == ("axis_deflection.position",)
     assert np.std(problem.evaluate(slide(), slide().theta)[0][problem.blocks[1].samples]) == pytest.approx(1.0, rel=0.1)
     effects = ["viscous_friction", "spring", "joint_compliance"]
-    found = diagnose(slide(), record, wound_up(2), effects=effects, names="search")
+    found = diagnose(slide(), record, wound_up(2), effects=effects)
     assert [(e.name, e.site) for e in found.effects] == [("joint_compliance", "axis")]
     values = {p.name: p.value for p in found.effects[0].parameters}
     stiffness = next(p for p in found.effects[0].parameters if p.name == "stiffness")

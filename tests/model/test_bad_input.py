@@ -213,7 +213,7 @@ def test_a_machine_that_stands_shows_no_effect(arm: Model, place: float) -> None
     channels = {"shoulder.position": np.full(2000, place), "motor.command": np.sin(0.1 * np.arange(2000))}
     stuck = Experiment.from_arrays(np.arange(2000) / 500.0, channels, {"motor.command": "A"}, name="stuck", model=arm)
     words = f"no joint moves in stuck: shoulder.position is {place:g} rad all the time"
-    for ask in (vpm.rank, partial(vpm.diagnose, check=False), partial(vpm.diagnose, check=False, names="search")):
+    for ask in (vpm.rank, partial(vpm.diagnose, check=False), partial(vpm.diagnose, check=False)):
         with pytest.raises(DiagnosisError, match=words):
             ask(arm, [stuck])
     told = str(vpm.compare(vpm.simulate(arm, stuck, "inverse_dynamics"), stuck))

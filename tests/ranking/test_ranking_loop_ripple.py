@@ -38,6 +38,6 @@ def test_the_period_of_a_ripple_shows_beside_the_forces_of_a_loop() -> None:
     (block,) = [one for one in data.blocks if one.channel == "left_crank.effort"]
     found = np.std(residual[block.samples]) / block.weight
     assert 0.3 * RIPPLE < found < 1.2 * RIPPLE / np.sqrt(2.0)  # a filter takes the fast part; weights would be 10 N m
-    listed = candidates(model, data, residual, ["torque_ripple"], either_side=True)
+    listed = candidates(model, data, residual, ["torque_ripple"])
     (ripple,) = [one for one in listed if one.site == "left_crank"]
     assert ripple.starts[0]["period"] == pytest.approx(PERIOD, rel=0.02)

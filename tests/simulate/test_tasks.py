@@ -20,7 +20,7 @@ from task_work import die, double, late, slow
 from two_link_arm import Arm, record
 from two_link_arm import nominal as arm
 from vpm import demo, sending, tasks
-from vpm.errors import DiagnosisError, ExecutorError
+from vpm.errors import ExecutorError
 from vpm.many_diagnoses import Case, diagnose_many
 from vpm.one_thread import ONE_THREAD
 from vpm.simplify.judge import Judge
@@ -29,7 +29,7 @@ from vpm.simplify.trials import Trials
 from vpm.tasks import BatchInterruptedError, outcomes, processes
 
 #: A diagnosis of a fifth of a second.
-QUICK: dict[str, Any] = {"effects": ["coulomb_friction"], "limit": 1, "check": False, "names": "search"}
+QUICK: dict[str, Any] = {"effects": ["coulomb_friction"], "limit": 1, "check": False}
 
 
 @pytest.fixture
@@ -87,8 +87,6 @@ def test_each_of_many_diagnoses_is_that_of_one_alone(tmp_path: Path, monkeypatch
     assert "coulomb_friction at axis" in said[0]
     with ThreadPoolExecutor(2) as threads:
         assert same(diagnose_many(todo, executor=threads, **QUICK), here)
-    with pytest.raises(DiagnosisError, match="names come from"):
-        diagnose_many(todo, names="guesses")  # type: ignore[arg-type]
 
 
 def test_a_killed_worker_of_a_pool_loses_nothing(tmp_path: Path) -> None:

@@ -1,7 +1,7 @@
 """The catalogue of physical effects: one file says everything about each of them, in `vpm.catalogue.effects`.
 
 An effect is an ordinary component of a model, with a type, a site and parameters. The model file accepts what stands
-here, the diagnosis tries what it marks as screened, and the report speaks in the words that stand here. The laws are
+here, the diagnosis tries what has a law, and the report speaks in the words that stand here. The laws are
 in the core, one file per effect.
 
 Units are templates, because the same law sits on different machines: ``{C}`` is the unit of the joint coordinate (m or

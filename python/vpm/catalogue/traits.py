@@ -18,7 +18,7 @@ Seen = Literal["speed", "travel", "way", "interval", "command", "record", "one"]
 
 @dataclass(frozen=True)
 class Tried:
-    """Start values of one parameter that a search tries, and its bounds."""
+    """Start values of one parameter that are tried, and its bounds."""
 
     parameter: str
     """Its short name."""
@@ -72,12 +72,10 @@ class Traits:
     """The effect that has to be at the same site before this one is worth looking for: it is a correction of that."""
     contains: tuple[str, ...] = ()
     """Plainer effects that it is at some values of its parameters."""
-    screened: bool = True
-    """Whether a search tries it; a ranking tries all that have a law."""
     tried: tuple[Tried, ...] = ()
-    """The start values and bounds of a search, where a fit would not end well from anywhere."""
+    """The start values that are tried, and bounds, where a fit would not end well from anywhere."""
     fixed: tuple[str, ...] = ()
-    """Short names of the shapes that a search leaves at their start."""
+    """Short names of the shapes that are left at their start."""
 
     @property
     def shifts(self) -> bool:

@@ -1,4 +1,4 @@
-"""Diagnosis by residuals: preparation of records, the search for missing effects in sub-packages, and the result."""
+"""Diagnosis by residuals: records are prepared, and what was named is refitted and judged."""
 
 from vpm.discrepancy.diagnosis import (
     AcceptedEffect,

@@ -105,20 +105,20 @@ class RefusedEffect(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class RankedCandidate(Storable):
-    """Ranked candidate in a diagnosis, in the order of predicted gain.
+    """Ranked candidate in a diagnosis, in the order of what it removes.
 
     Attributes
     ----------
     name, site : str
     round : int
-        Round of the search, from 1.
+        Round of the ranking, from 1.
     screened : float
-        Share of the training mean square that its regressor would take away; NaN in a ranking.
+        Share of the error power that its fit removes under the tracker.
     unseen : float
         Share of the validation mean square that it took away after refitting; NaN if it was not refitted.
     accepted : bool
     evidence_nats, probability : float
-        What it added to the evidence, and that it is what is missing; NaN if no ranking tried it.
+        What it added to the evidence, and that it is what is missing; NaN where it did not count.
     """
 
     name: str
@@ -273,7 +273,7 @@ class ProposedExperiment(Storable):
 
 @dataclass(frozen=True, repr=False, eq=False)
 class Step(Storable):
-    """Step of a diagnosis: the model after one stage of the search.
+    """Step of a diagnosis: the model after one stage of the findings.
 
     Attributes
     ----------
@@ -378,7 +378,7 @@ class Diagnosis(Result):
     seconds : float
         Time it took.
     interrupted : bool
-        Ctrl-C ended the search: the effects are those accepted until then, and there may be more.
+        Ctrl-C ended the ranking: the effects are those accepted until then, and there may be more.
     evidence : tuple of Evidence
         For each accepted effect the residual over the state that it depends on, without it and with it.
     empirical : Empirical or None

@@ -1,4 +1,4 @@
-"""Fields of a diagnosis, computed after the search: channel errors at all stages, accepted effects, rivals, steps."""
+"""Fields of a diagnosis, computed after the naming: channel errors at all stages, accepted effects, rivals, steps."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from vpm.catalogue import EFFECTS
 from vpm.catalogue.kinds import Side, in_words
 from vpm.compare import compare
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, in_time, is_clear, weaker
+from vpm.discrepancy.confirmation.confirmation import Data, Judged, in_time, weaker
 from vpm.discrepancy.diagnosis import (
     OBSERVED,
     AcceptedEffect,
@@ -21,13 +21,12 @@ from vpm.discrepancy.diagnosis import (
     Step,
     Trace,
 )
+from vpm.discrepancy.findings import Accepted, Findings, Stage, ambiguities
 from vpm.discrepancy.noise.noise_floor import Structure, noise_floor, structure
 from vpm.discrepancy.preparation import Records
 from vpm.discrepancy.ranked_effects import candidates_of, refused_by, tracker_gaps
 from vpm.discrepancy.rivals.ambiguity import Rivals, listed
 from vpm.discrepancy.screening.candidates import Key
-from vpm.discrepancy.search.candidate_choice import Accepted
-from vpm.discrepancy.search.search import Search, Stage, ambiguities
 from vpm.identify import Fit, InverseDynamicsProblem, OutputErrorProblem, Problem, gaps
 from vpm.identify.fit_result import fit_of
 from vpm.model import Model
@@ -38,19 +37,16 @@ if TYPE_CHECKING:
     from vpm.ranking import Ranked, Ranking
     from vpm.ranking import Settings as RankingSettings
 
-#: Said of what would do in the place of an effect.
-ALIKE = "predicts the validation data as well"
 
-
-def of_search(
+def of_findings(
     model: Model,
     records: Records,
     start: Judged,
-    found: Search,
+    found: Findings,
     problems: tuple[Problem, Problem],
     ambiguous: Sequence[Rivals] = (),
 ) -> Diagnosis:
-    """Diagnosis with the fields of the search alone: all there is where what follows it failed or was stopped.
+    """Diagnosis with the fields of the findings alone: all there is where what follows it failed or was stopped.
 
     - ``start``: what the last fit is compared with
     - ``problems``: residuals of training and validation records
@@ -59,7 +55,7 @@ def of_search(
     names = ", ".join(entry.label for entry in found.accepted) or "no effect"
     return Diagnosis(
         "effect_found" if found.accepted else "interrupted" if found.interrupted else "unexplained",
-        so_far(found, f"The search accepts {names} in {model.name}; what is left on validation records is not judged."),
+        so_far(found, f"The ranking names {names} in {model.name}; what is left on validation records is not judged."),
         tuple(accepted_effect(entry, found.final) for entry in found.accepted),
         {},
         found.refused,
@@ -80,8 +76,8 @@ def of_search(
     )
 
 
-def so_far(found: Search, summary: str) -> str:
-    """Summary of a diagnosis whose search Ctrl-C may have ended."""
+def so_far(found: Findings, summary: str) -> str:
+    """Summary of a diagnosis whose naming Ctrl-C may have ended."""
     return f"Stopped before every candidate was tried. {summary}" if found.interrupted else summary
 
 
@@ -138,10 +134,8 @@ def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
     deviations = dict(zip(final.free, map(float, final.fit.std), strict=True))
     estimates = _estimates(final.model, candidate.key, entry.side, lambda dotted: deviations.get(dotted, 0.0))
     notes = [f"{alias.parameter} held: not discriminated from {alias.partner}" for alias in entry.trial.held]
-    if entry.ranked and probe.invisible and not (probe.free or probe.held):
+    if probe.invisible and not (probe.free or probe.held):
         notes.append("that is a share of the inverse-dynamics residual, which does not show it; see the observed gaps")
-    elif not entry.ranked and not is_clear(final, tuple(e.dotted for e in estimates if e.std > 0.0)):
-        notes.append("beside the effects that came later, its interval covers zero: one of them may be enough")
     return AcceptedEffect(
         candidate.effect.name,
         candidate.site,
@@ -149,7 +143,7 @@ def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
         estimates,
         entry.trial.validation.relative,
         entry.trial.validation.score,
-        (*notes, *(f"{'not discriminated from it' if entry.ranked else ALIKE}: {rival}" for rival in entry.rivals)),
+        (*notes, *(f"not discriminated from it: {rival}" for rival in entry.rivals)),
         entry.probability,
         entry.evidence,
         entry.class_probability,
@@ -182,7 +176,7 @@ def classes(accepted: Sequence[Accepted], ambiguous: Sequence[Rivals]) -> tuple[
 
 
 def step(training: Problem, validation: Problem, stage: Stage) -> Step:
-    """Field of a diagnosis: one stage of the search with its parameter values and its largest channel errors."""
+    """Field of a diagnosis: one stage of the findings with its parameter values and its largest channel errors."""
     fit, model = stage.judged.fit, stage.judged.model
     names = stage.judged.free
     return Step(

@@ -41,12 +41,9 @@ class ParallelCandidates:
         work: Callable[[Item], Outcome],
         items: Sequence[Item],
         name: Callable[[Item], str],
-        effort: Callable[[Item], float] | None = None,
     ) -> list[Outcome | Failure]:
         """Compute candidates in parallel, in the order of the items. Ctrl-C stops all and raises KeyboardInterrupt.
 
-        Those with the largest ``effort``, where it can be guessed, begin first: one long item at the end would keep the
-        other cores waiting (R. Graham, *SIAM J. Applied Mathematics* 17, 1969: longest processing time first).
         The linear algebra inside is small: with threads of its own it would only take the cores from the others.
         """
         lock, done = Lock(), 0
@@ -64,6 +61,4 @@ class ParallelCandidates:
                     self.progress(what, name(item), done, len(items))
             return outcome
 
-        begun = sorted(range(len(items)), key=lambda n: 0.0 if effort is None else -effort(items[n]))
-        outcomes = in_order([partial(one, items[n]) for n in begun], worker_count(self.workers))
-        return [outcome for _, outcome in sorted(zip(begun, outcomes, strict=True), key=lambda pair: pair[0])]
+        return in_order([partial(one, item) for item in items], worker_count(self.workers))

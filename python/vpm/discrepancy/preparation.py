@@ -184,7 +184,7 @@ def begun_anywhere(model: Model, data: Data, recalibrated: Judged, notes: list[s
         return data, recalibrated
     if not matters(recalibrated.model, first, fit.residual, fit.jacobian, Checks()):
         return data, recalibrated
-    start = model
+    start = recalibrated.model
     for _ in range(ROUNDS):
         data = replace(
             data, training=begun_likeliest(start, data.training), validation=begun_likeliest(start, data.validation)

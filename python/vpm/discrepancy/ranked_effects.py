@@ -17,20 +17,17 @@ from numpy.typing import NDArray
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, judged_anyhow, measured, unmoved
 from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RankedCandidate, RefusedEffect
+from vpm.discrepancy.findings import Accepted, Findings, Stage
 from vpm.discrepancy.rivals.ambiguity import Rivals
 from vpm.discrepancy.screening.candidates import Candidate, Key, asked_for, candidates
 from vpm.discrepancy.screening.compliance_and_stop_start import beyond
 from vpm.discrepancy.screening.probe import Probe, sort_columns
-from vpm.discrepancy.search.candidate_choice import Accepted
-from vpm.discrepancy.search.search import Search, Stage
-from vpm.discrepancy.settings import LEAST_GAIN, NORMAL_95_ONE_SIDED, RANKED_JOINTS
+from vpm.discrepancy.settings import LEAST_GAIN, NORMAL_95_ONE_SIDED
 from vpm.errors import VpmError
-from vpm.experiment import Experiment
 from vpm.identify import gain, segments
 from vpm.identify.identifiability import Span
 from vpm.identify.response_along_motion import joints_with_play
 from vpm.model import Effect, Model
-from vpm.model.splitting import name_of_bending
 from vpm.numbers import Array, power
 
 if TYPE_CHECKING:
@@ -41,32 +38,8 @@ if TYPE_CHECKING:
 BEHIND = ".link."
 
 
-def why_not_ranked(model: Model, experiments: Sequence[Experiment]) -> str:
-    """Why names do not come from a ranking, or "": it covers up to three joints and one drive with oil.
-
-    Several of these take it many times as long as a search, and it names no better there; a joint without a drive no
-    search sees. A bending that a log holds is compared by a ranking, but on a log of a real arm a search names its
-    friction more plausibly. Where a second encoder shows how far a load stays behind its drive, friction bends what is
-    between, if it acts on the load: only a ranking tries that.
-    """
-    oil = [name for name in model.actuators if model.actuator_type(name) == "hydraulic"]
-    if len(oil) > 1 and not free_joints(model):
-        return f"the actuators {' and '.join(oil)} have type hydraulic"
-    own = set(model.joints) - set(model.added_joints)
-    if len(own) > RANKED_JOINTS:
-        return f"there are {len(own)} joints, more than {RANKED_JOINTS}"
-    bent = [f"{name_of_bending(body)}.position" for body in model.bodies]
-    held = [channel for channel in bent if any(channel in record for record in experiments)]
-    return f"records hold {held[0]}" if held else ""
-
-
 class NoResidualError(VpmError):
     """Ranked effect with which no inverse-dynamics residual can be computed: only a tracker measures it."""
-
-
-def free_joints(model: Model) -> tuple[str, ...]:
-    """Joints without a drive: only the tracker of a ranking measures effects there, no inverse-dynamics residual."""
-    return tuple(name for name in model.joints if name not in {*model.driven_joints, *model.added_joints})
 
 
 def tracker_gaps(ranking: Ranking, balanced: Sequence[str] | None) -> dict[str, ChannelGap]:
@@ -87,14 +60,14 @@ def tracker_gaps(ranking: Ranking, balanced: Sequence[str] | None) -> dict[str, 
     }
 
 
-def searched(
+def found_by(
     ranking: Ranking,
     recalibrated: Judged,
     data: Data,
     settings: RankingSettings,
     effects: Sequence[str] | None = None,
-) -> tuple[Search, tuple[Rivals, ...]]:
-    """Outcome of a ranking in the form of a search, with rivals of each ranked effect.
+) -> tuple[Findings, tuple[Rivals, ...]]:
+    """Findings of a ranking, with rivals of each ranked effect.
 
     - ``ranking``: of the training records
     - ``recalibrated``: the model without effects
@@ -107,7 +80,7 @@ def searched(
     known: tuple[Rivals, ...] = ()
 
     def offered(final: Judged) -> tuple[Candidate, ...]:
-        return candidates(final.model, data.training, final.fit.residual, asked_for(effects), either_side=True)
+        return candidates(final.model, data.training, final.fit.residual, asked_for(effects))
 
     def beside(current: Judged, model: Model, one: Ranked) -> Trial:
         try:
@@ -131,8 +104,8 @@ def staged(
     beside: Callable[[Judged, Model, Ranked], Trial],
     offered: Callable[[Judged], tuple[Candidate, ...]],
     settings: RankingSettings,
-) -> Search:
-    """Stages of a search from a ranking: its effects are added and refitted one by one.
+) -> Findings:
+    """Findings from a ranking: its effects are added and refitted one by one.
 
     - ``recalibrated``: the model without effects
     - ``beside``: measures an effect: of a model without it, the model with it, and the effect
@@ -171,7 +144,7 @@ def staged(
         }
     gains = {entry.key: entry.trial.validation.relative for entry in accepted}
     refused, tried = refused_by(ranking, outside, settings), candidates_of(ranking, gains, settings)
-    return Search(
+    return Findings(
         tuple(stages),
         tuple(accepted),
         refused,
@@ -242,8 +215,8 @@ def _refitted(
 
 
 def _candidate(current: Judged, one: Ranked, data: Data) -> Candidate:
-    """Candidate of the search for a ranked effect, with the bounds that data give its shape, or None."""
-    listed = candidates(current.model, data.training, current.fit.residual, [one.effect], either_side=True)
+    """Candidate for a ranked effect, with the bounds that data give its shape, or None."""
+    listed = candidates(current.model, data.training, current.fit.residual, [one.effect])
     plain = Candidate(EFFECTS[one.effect], one.site, ({},))
     return next((each for each in listed if each.key == one.key), plain)
 

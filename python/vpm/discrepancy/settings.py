@@ -1,6 +1,5 @@
 """Settings of the residual diagnosis: every number that decides, each with its reason."""
 
-import numpy as np
 
 # ---- chance ----------------------------------------------------------------------------------------------------------
 
@@ -32,39 +31,16 @@ MODEST_GAIN, MODEST_FACTOR = 0.3, 3.0
 #: From this gain on an effect does most of the work: on a machine of several joints, where errors of two missing
 #: effects cancel in a simulation, the residual decides alone; a delay is named whatever the timing of samples.
 CLEAR_GAIN = 0.5
-#: A rival that takes less than this share of what the effect takes from the training residual is none.
-LEAST_SHARE = 0.8
-#: Predicted gain asked of a spring more where links bend already: noise of the motion rings in them. How many are
-#: refitted, and evaluations of that: each is a simulation, and a spring that is there gains most in the first.
-RINGING, FEW, FEW_EVALUATIONS = 0.2, 1, 6
-
-# ---- choice ----------------------------------------------------------------------------------------------------------
-
-#: An instrument is blamed for what the machine may have done only if it leaves less than this share of the gap.
-SENSOR_SHARE = 0.25
+#: Evaluations of a refit with a spring where links bend already: each is a simulation, and a spring that is there gains
+#: most in the first.
+FEW_EVALUATIONS = 6
 #: What leaves up to so many times as much as the best explains the data as well, if it is also little of the whole gap.
 SAME = 1.5
-#: Difference of two logarithms of evidence that says nothing.
-TIE = 0.01
-#: Samples that what builds up over a way has to last, to be seen to build up.
-SAMPLED = 2.0
-#: Most joints of a machine that a ranking covers, beside those that effects split off.
-RANKED_JOINTS = 3
-#: Candidates refitted in one round: those of the largest predicted gain for their numbers, of the machine and of each
-#: joint, and of the largest gain of all. Without the last, several names of one regressor crowd out a richer law.
-SHORT_LIST, OF_JOINT, RICHEST = 7, 3, 2
-#: Rivals that are refitted in the place of an effect.
-RIVALS_TRIED = 3
 
 # ---- fits ------------------------------------------------------------------------------------------------------------
 
 #: A fit stops when the sum of squares changes by less than this share: far below what a verdict rests on.
 TOLERANCE = 1e-6
-#: A refit that has lowered the training error by less than this share in so many evaluations, and hardly goes on, ends:
-#: validation data have to show ten times as much.
-SLOW_GAIN, SLOW_EVALUATIONS = 0.01, 10
-#: Of two candidates, one that leaves so many times what the other leaves is not the one that comes in.
-HOPELESS = 10.0
 #: Share of each record that is kept out of the fit when no validation record is given.
 HELD_OUT = 0.3
 #: Validation records that make the range of a command or a joint so many times as wide show what training ones cannot.
@@ -121,8 +97,6 @@ MOST_SAMPLES = 4000
 
 # ---- start values ----------------------------------------------------------------------------------------------------
 
-#: Two equal steps of a place change the column of its size alike, to rounding.
-EVEN = 1e-6
 #: Share of the largest influence on a residual below which that of a parameter is rounding.
 ROUNDED = 1e-12
 #: Deviations of its sensor's noise that the way of a coordinate at rest spans: four to either side.
@@ -148,11 +122,6 @@ FREQUENCIES, LOOSE = (3.0, 8.0, 20.0, 50.0), 0.05
 SOFTEST, LEAST_DRIVEN = 0.5, 1e-4
 #: Frequency of the contacts of backlash, Hz, damping ratio, and widths as shares of the half travel.
 CONTACT_FREQUENCY, CONTACT, GAP_SHARES = 50.0, 0.1, (5e-4, 3e-3, 1.5e-2)
-#: Springs that are simulated along the motion: frequencies, Hz, and damping ratios.
-SWINGS, RATIOS = np.geomspace(4.0, 64.0, 16), (0.1, 0.3)
-#: Contact of a backlash that is simulated, Hz, and its damping ratio: between soft ones flights are independent. Widths
-#: as shares of the half travel, 1.5 times apart, and the share of a width over which a contact closes.
-SOFT_CONTACT, SOFT_RATIO, FINE_GAPS, CLOSING = 20.0, 0.5, np.geomspace(5e-5, 5e-2, 18), 1e-3
 
 # ---- discriminating experiments --------------------------------------------------------------------------------------
 

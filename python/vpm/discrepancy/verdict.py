@@ -10,12 +10,11 @@ from scipy.special import ndtri
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
 from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RefusedEffect
+from vpm.discrepancy.findings import Accepted, Findings, Stage
 from vpm.discrepancy.noise.noise_floor import Structure
 from vpm.discrepancy.preparation import is_as_stated, ruled_out, ruled_out_together, stated
 from vpm.discrepancy.remainder.remainder import Remainder
 from vpm.discrepancy.screening.candidates import joint_at
-from vpm.discrepancy.search.candidate_choice import Accepted
-from vpm.discrepancy.search.search import Search, Stage
 from vpm.discrepancy.settings import (
     CLEAR_GAIN,
     FALSE_ALARM_LEVEL,
@@ -77,7 +76,7 @@ def verdict(
     data: Data | None,
     nominal: Judged,
     recalibrated: Judged,
-    found: Search,
+    found: Findings,
     gap: dict[str, ChannelGap],
     left: Structure | None,
     rest: Remainder | None,
@@ -121,7 +120,7 @@ class _Errors:
     def of(
         cls,
         data: Data | None,
-        found: Search,
+        found: Findings,
         gap: Mapping[str, ChannelGap],
         left: Structure | None,
         rest: Remainder | None,
@@ -145,7 +144,7 @@ class _Errors:
 
 
 def _of_named(
-    found: Search,
+    found: Findings,
     data: Data | None,
     gap: Mapping[str, ChannelGap],
     errors: _Errors,
@@ -197,7 +196,7 @@ def open_readings(gap: Mapping[str, ChannelGap]) -> tuple[str, ...]:
     )
 
 
-def _spoiled(found: Search, gap: Mapping[str, ChannelGap], tracked: float) -> str:
+def _spoiled(found: Findings, gap: Mapping[str, ChannelGap], tracked: float) -> str:
     """What spoils the verdict on named effects: most of an effort where they act, or of a deflection, is left; or "".
 
     No noise excuses that of an effort: the floor of a drive that gives next to nothing is as large. A backlash is hard
@@ -220,7 +219,7 @@ def _spoiled(found: Search, gap: Mapping[str, ChannelGap], tracked: float) -> st
     return ""
 
 
-def _rests_on_tracker(found: Search, data: Data | None) -> bool:
+def _rests_on_tracker(found: Findings, data: Data | None) -> bool:
     """Whether the verdict rests on a tracker: all named effects act at joints with play, or without a residual."""
     at = _joints(found)
     if data is None or not at:
@@ -228,7 +227,7 @@ def _rests_on_tracker(found: Search, data: Data | None) -> bool:
     return at <= joints_with_play(found.final.model) or not at & {*data.training.joints, ""}
 
 
-def _joints(found: Search) -> set[str]:
+def _joints(found: Findings) -> set[str]:
     """Joints of the verdict at which named effects act; "" for effects on all."""
     model, sites = found.final.model, [entry.key[1] for entry in found.accepted]
     return {model.joint_of_body(site) if site in model.bodies else joint_at(model, site) for site in sites}
@@ -240,7 +239,7 @@ def _clear_of_noise(gap: ChannelGap) -> float:
     return float(np.sqrt(max(gap.recalibrated**2 - floor**2, 0.0))) / gap.signal if gap.signal else 0.0
 
 
-def _is_explanation(found: Search, tracked: float, mostly_open: bool) -> bool:
+def _is_explanation(found: Findings, tracked: float, mostly_open: bool) -> bool:
     """Whether the verdict is that named effects explain the model error.
 
     The share ``tracked`` of the error power that a tracker has left, of the joint that is explained best, decides where
@@ -253,7 +252,7 @@ def _is_explanation(found: Search, tracked: float, mostly_open: bool) -> bool:
     return tracked <= _most_left(found) or (tracked < 1.0 and not mostly_open)
 
 
-def _most_left(found: Search) -> float:
+def _most_left(found: Findings) -> float:
     """Largest share of the error power that effects of a clear verdict may have left under the tracker.
 
     From impact to impact a play multiplies what is a little off, so that there most of the work is enough.
@@ -355,7 +354,7 @@ class Joints:
 
     @classmethod
     def of(cls, gap: Mapping[str, ChannelGap], left: Structure | None, tracked: Mapping[str, float]) -> Joints:
-        """Open and closed joints, from the residual by joint and what a tracker leaves, see `Search.left`."""
+        """Open and closed joints, from the residual by joint and what a tracker leaves, see `Findings.left`."""
         efforts = {
             channel.removesuffix(".effort"): g
             for channel, g in gap.items()
@@ -385,8 +384,8 @@ class Joints:
         return (joint_at(model, entry.key[1]) or self.worst) in self.open
 
 
-def only_where_closed(found: Search, data: Data, gap: Mapping[str, ChannelGap], left: Structure) -> Search:
-    """Search without effects at joints whose residual stays open, if other joints are closed.
+def only_where_closed(found: Findings, data: Data, gap: Mapping[str, ChannelGap], left: Structure) -> Findings:
+    """Findings without effects at joints whose residual stays open, if other joints are closed.
 
     What happens at one joint says nothing of effects at another one. All is fitted again without them.
     """
@@ -409,8 +408,8 @@ def only_where_closed(found: Search, data: Data, gap: Mapping[str, ChannelGap], 
     )
 
 
-def only_if_open(found: Search, recalibrated: Judged, gap: Mapping[str, ChannelGap]) -> Search:
-    """Search without effects that explain nothing where nothing was open.
+def only_if_open(found: Findings, recalibrated: Judged, gap: Mapping[str, ChannelGap]) -> Findings:
+    """Findings without effects that explain nothing where nothing was open.
 
     An observer finds as much left with them as without, and that is noise or next to nothing.
     """

@@ -162,7 +162,7 @@ def _of_unseen(model: Model, problem: InverseDynamicsProblem) -> list[Array]:
     sites = [joint for joint in model.joints if joint not in (*problem.motions[0].joints, *model.added_joints)]
     found = []
     for site, law in product(sites, effects_for_site("joint")):
-        if not law.screened or law.motion or law.memory or law.requires:
+        if not law.has_law or law.motion or law.memory or law.requires:
             continue
         try:
             more = model.with_effect(law.name, site)

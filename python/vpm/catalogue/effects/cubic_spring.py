@@ -18,7 +18,6 @@ EFFECT = EffectType(
     law="tau = -stiffness (q - rest)^3",
     sentence="{at} is pulled back towards {rest} with the cube of its way, with {stiffness}.",
     impossible="either sign is possible: beside a spring a negative one makes it softer on its way",
-    screened=False,
     tried=(Tried("rest", "way", (0.0,), (-10.0, 10.0)),),
     link_side_alone=True,
     in_springs=True,

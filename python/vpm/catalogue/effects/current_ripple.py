@@ -29,7 +29,6 @@ EFFECT = EffectType(
         " alike."
     ),
     impossible="a motor that pushes the other way at some angles is wired wrongly",
-    screened=False,
     motor_side_alone=True,
     takes_effort=True,
     signature=Signature(

@@ -24,7 +24,6 @@ EFFECT = EffectType(
         " drives, and {driven} of it brakes where it is driven."
     ),
     impossible=NEGATIVE_SHARE,
-    screened=False,
     beside_others=True,
     signature=Signature(
         ("effort",),

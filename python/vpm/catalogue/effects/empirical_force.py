@@ -48,7 +48,6 @@ EFFECT = EffectType(
     ),
     sentence="{at} is loaded by a force that was fitted to data and that no law of physics stands behind.",
     impossible="either sign is possible: it is a fit",
-    screened=False,
     motor_side_alone=True,
     signature=Signature(
         ("velocity", "position", "acceleration", "effort", "command"),

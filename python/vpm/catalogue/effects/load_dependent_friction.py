@@ -24,7 +24,6 @@ EFFECT = EffectType(
         " it brakes where the joint pushes the drive."
     ),
     impossible=NEGATIVE_SHARE,
-    screened=False,
     motor_side_alone=True,
     takes_effort=True,
     signature=Signature(

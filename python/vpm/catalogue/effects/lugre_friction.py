@@ -45,7 +45,6 @@ EFFECT = EffectType(
         " {coulomb} in fast motion."
     ),
     impossible="a negative friction of bristles would push along the motion and feed energy into it",
-    screened=False,
     memory="lugre.memory",
     contains=("coulomb_friction",),
     signature=Signature(

@@ -27,7 +27,6 @@ EFFECT = EffectType(
     sentence="{at} rubs differently along its way, by {cosine} (cosine) and {sine} (sine), every {period} alike.",
     impossible="either sign is possible; the friction of each place as a whole has to stay above zero",
     requires="coulomb_friction",
-    screened=False,
     signature=Signature(
         ("position", "velocity"),
         "A wave that repeats over the way and turns over with the direction",

@@ -22,7 +22,6 @@ EFFECT = EffectType(
     law="tau = -drag |v| v",
     sentence="{at} resists motion in proportion to the square of its speed, with {drag}.",
     impossible="a negative drag would feed energy into the motion instead of taking it out",
-    screened=False,
     usual="force",
     signature=Signature(
         ("velocity",), "A parabola that changes its sign at rest", "Fast motion at several constant speeds"

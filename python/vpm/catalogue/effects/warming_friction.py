@@ -27,7 +27,6 @@ EFFECT = EffectType(
         " speed, which fade with a time constant of {time_constant}."
     ),
     impossible="a negative one would mean friction that grows as the machine gets warm",
-    screened=False,
     memory="warming.memory",
     tried=(Tried("time_constant", "record", (0.1, 0.4), (0.01, 1.0)),),
     signature=Signature(

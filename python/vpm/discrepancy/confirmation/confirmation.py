@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from vpm.discrepancy.screening.candidates import acts_on
 from vpm.discrepancy.screening.compliance_and_stop_start import ends_apart
-from vpm.discrepancy.screening.probe import Alias, Baseline, Probe, size_is_clear
+from vpm.discrepancy.screening.probe import Alias, Probe, size_is_clear
 from vpm.discrepancy.settings import (
     FEW_EVALUATIONS,
-    HOPELESS,
     LEAST_GAIN,
-    ROUNDED,
-    SLOW_EVALUATIONS,
-    SLOW_GAIN,
     TOLERANCE,
 )
 from vpm.errors import DivergedError
@@ -25,18 +21,15 @@ from vpm.identify import (
     Gain,
     InverseDynamicsProblem,
     OutputErrorProblem,
-    Problem,
-    Worth,
     estimate,
     gain,
     gaps,
     segments,
 )
 from vpm.identify.estimation import MOST_EVALUATIONS, standing
-from vpm.identify.identifiability import Span, closest_column, is_alias, least_step
-from vpm.identify.parts import moves_drives
-from vpm.identify.response_along_motion import bends, has_hidden, has_own_drives
-from vpm.identify.tangent import Tangent, drives_on_tangent, estimate_on_tangent, has_tangent
+from vpm.identify.identifiability import least_step
+from vpm.identify.response_along_motion import bends
+from vpm.identify.tangent import estimate_on_tangent, has_tangent
 from vpm.model import Model
 from vpm.numbers import Array, power
 
@@ -72,16 +65,6 @@ class Judged:
         free = tuple(name for name in self.free if name in model.parameters)
         return free, {name: pair for name, pair in self.bounds.items() if name in free}
 
-    @property
-    def baseline(self) -> Baseline:
-        """Baseline for the next screening round, from a judged model of the confirmation.
-
-        What a bound holds stays there: beyond it, it would seem to explain what no fit can.
-        """
-        inside = [place for place, name in enumerate(self.free) if name not in self.fit.at_bounds]
-        names, columns = tuple(self.free[place] for place in inside), self.fit.jacobian[:, inside]
-        return Baseline(self.model, names, self.fit.residual, columns)
-
 
 @dataclass(frozen=True)
 class Trial:
@@ -107,43 +90,21 @@ class Trial:
         return self.validation if self.here is None else max(self.validation, self.here, key=lambda one: one.relative)
 
 
-def judge(
-    model: Model,
-    free: tuple[str, ...],
-    data: Data,
-    bounds: dict[str, tuple[float, float]],
-    origin: Array | None = None,
-    worth: Worth | None = None,
-    *,
-    linear_only: bool = False,
-) -> Judged:
+def judge(model: Model, free: tuple[str, ...], data: Data, bounds: dict[str, tuple[float, float]]) -> Judged:
     """Confirmation's judgement: fit ``free`` on training records, predict validation records.
 
-    For ``origin`` see `vpm.identify.tangent`. Where links bend and nothing else is worked out, the tangent at the start
-    is taken if none is given. A fit that is not on a tangent of links ends early if it is not ``worth`` its time, or
-    after its first step if that is ``linear_only``.
+    Where links bend and nothing else is worked out, their tangent at the start is taken.
 
     Raises DivergedError: the fitted model cannot simulate the validation records.
 
     Raises KeyboardInterrupt: Ctrl-C ended the fit: its values say nothing of a candidate.
     """
     bounds = ends_apart(model, free, bounds)
-    if origin is None and has_tangent(model, data.training):
-        origin = model.theta
-    if origin is None:
-        most = FEW_EVALUATIONS if bends(model) and model.added_joints else MOST_EVALUATIONS
-        fit = estimate(
-            model,
-            data.training,
-            free,
-            bounds=bounds,
-            tolerance=TOLERANCE,
-            linear_only=linear_only,
-            most_evaluations=most,
-            worth=worth,
-        )
+    if has_tangent(model, data.training):
+        fit = estimate_on_tangent(model, data.training, free, model.theta, bounds=bounds, tolerance=TOLERANCE)
     else:
-        fit = estimate_on_tangent(model, data.training, free, origin, bounds=bounds, tolerance=TOLERANCE, worth=worth)
+        most = FEW_EVALUATIONS if bends(model) and model.added_joints else MOST_EVALUATIONS
+        fit = estimate(model, data.training, free, bounds=bounds, tolerance=TOLERANCE, most_evaluations=most)
     if fit.interrupted:
         raise KeyboardInterrupt
     fitted = model.with_parameters(dict(zip(free, map(float, fit.values), strict=True)))
@@ -164,41 +125,6 @@ def unmoved(
     except DivergedError as error:
         stopped = str(error)
     return Judged(model, free, fit, validation, simulated, bounds), stopped
-
-
-def confirm(current: Judged, data: Data, probe: Probe, rival: float = np.inf) -> Trial:
-    """Confirm a candidate: refit with it, release parameters that became visible, measure the validation gain.
-
-    ``rival`` is the sum of squares that another candidate leaves of the training records. A refit above ``HOPELESS``
-    times that may end early.
-    """
-    bounds = {**current.bounds, **_bounds(probe)}
-    start = probe.model.with_parameters(_inside(probe, bounds))
-    start = nearer_start(start, probe.free, current.free, data.training)
-    free = (*current.free, *probe.free)
-    held: tuple[Alias, ...] = ()
-    origin, still = _origin(data.training, probe, start), _still(data.training, probe)
-    if probe.invisible:
-        near: Problem = data.training if origin is None else Tangent(data.training, origin)
-        rough = estimate(start, near, free, bounds=bounds, linear_only=True)
-        moved = origin is not None and probe.candidate.effect.site not in still
-        released, held = _release(start, data.training if moved else near, free, rough, probe)
-        start = start.with_parameters(dict(zip(free, map(float, rough.values), strict=True)))
-        free = (*free, *released)
-        origin = start.theta if moved else origin
-    worth = Worth(min((1.0 - SLOW_GAIN) * power(current.fit.residual), HOPELESS * rival), SLOW_EVALUATIONS)
-    judged, diverged = judged_anyhow(start, free, data, bounds, origin, worth)
-    own = free[len(current.free) :]
-    return measured(current, data, probe, judged, own, (*probe.held, *held), diverged)
-
-
-def finished(current: Judged, data: Data, trial: Trial) -> Trial:
-    """Confirmation trial whose refit ended early, fitted to the end; any other trial unchanged."""
-    if not trial.judged.fit.early:
-        return trial
-    known = trial.judged
-    judged, diverged = judged_anyhow(known.model, known.free, data, dict(known.bounds))
-    return measured(current, data, trial.probe, judged, trial.parameters, trial.held, diverged)
 
 
 def measured(
@@ -234,36 +160,13 @@ def measured(
 
 
 def judged_anyhow(
-    start: Model,
-    free: tuple[str, ...],
-    data: Data,
-    bounds: dict[str, tuple[float, float]],
-    origin: Array | None = None,
-    worth: Worth | None = None,
+    start: Model, free: tuple[str, ...], data: Data, bounds: dict[str, tuple[float, float]]
 ) -> tuple[Judged, str]:
     """Confirmation's judgement by the residual alone where a fit cannot simulate, with the reason."""
     try:
-        return judge(start, free, data, bounds, origin, worth), ""
+        return judge(start, free, data, bounds), ""
     except DivergedError as error:
-        return judge(start, free, replace(data, simulation=None), bounds, origin, worth), str(error)
-
-
-def _still(data: InverseDynamicsProblem, probe: Probe) -> frozenset[str]:
-    """Kinds of sites where a candidate to confirm moves nothing that a refit on a tangent uses."""
-    return frozenset({"joint"} if drives_on_tangent(probe.model, data) else {"joint", "actuator"})
-
-
-def _origin(data: InverseDynamicsProblem, probe: Probe, start: Model) -> Array | None:
-    """Origin for a confirmation refit on a tangent: link deflections without the candidate, where valid.
-
-    Drives are taken as without it where it is none of theirs, and else as where the fit starts.
-    """
-    if not has_tangent(probe.model, data):
-        return None
-    alike = probe.candidate.effect.site in _still(data, probe)
-    if drives_on_tangent(probe.model, data):
-        return probe.model.theta if alike else start.theta
-    return probe.model.theta if alike or probe.candidate.neutral else None
+        return judge(start, free, replace(data, simulation=None), bounds), str(error)
 
 
 def weaker(problem: InverseDynamicsProblem, current: Judged, judged: Judged) -> Array:
@@ -332,31 +235,6 @@ def _inside(probe: Probe, bounds: dict[str, tuple[float, float]]) -> dict[str, f
     return values
 
 
-def _release(
-    model: Model, data: Problem, free: tuple[str, ...], fit: Estimate, probe: Probe
-) -> tuple[tuple[str, ...], tuple[Alias, ...]]:
-    """Parameters to release in a second confirmation refit: they matter once the size is not zero."""
-    fixed = {dotted for short, dotted in _short_names(probe).items() if short in probe.candidate.fixed}
-    asleep = [name for name in probe.invisible if name not in fixed]
-    theta = model.theta.copy()
-    theta[[model.index(name) for name in free]] = fit.values
-    _, fresh = data.evaluate(model, theta, [model.index(name) for name in asleep])
-    released: list[str] = []
-    held: list[Alias] = []
-    known, span, names = fit.jacobian, Span.of(fit.jacobian), list(free)
-    least = ROUNDED * float(np.max(np.linalg.norm(known, axis=0) * np.abs(fit.values), initial=0.0))
-    typical = {name: probe.candidate.effect.parameter(short).typical for short, name in _short_names(probe).items()}
-    for name, column in zip(asleep, fresh.T, strict=True):
-        if np.linalg.norm(column) * typical[name] <= least:
-            continue
-        if is_alias(column, span, fit.residual):
-            held.append(Alias(name, names[closest_column(column, known)]))
-            continue
-        released.append(name)
-        known, span, names = np.column_stack([known, column]), span.beside(column[:, None]), [*names, name]
-    return tuple(released), tuple(held)
-
-
 def _as_stated(judged: Judged) -> Array:
     """Covariance of a confirmed estimate beside stated uncertainties, which are measurements of their own.
 
@@ -391,35 +269,6 @@ def is_clear(judged: Judged, own: tuple[str, ...]) -> bool:
         across = full[np.ix_(index, shape)]
         covariance = covariance - across @ np.linalg.pinv(full[np.ix_(shape, shape)], hermitian=True) @ across.T
     return size_is_clear(size, judged.fit.values[index], covariance)
-
-
-def nearer_start(start: Model, added: Sequence[str], known: Sequence[str], data: InverseDynamicsProblem) -> Model:
-    """Start of a refit: recalibrated, or with the ``known`` parameters of the model file if that fits better.
-
-    Without an effect of its command a drive with states can only be recalibrated to a weak one, with soft oil and a
-    small valve. From there the true values lie behind a ridge once the effect is present.
-    Where nothing of the drives changes, or they have no states, a fit is linear enough to end at one place from both.
-
-    - ``start``: with the candidate at its estimated values, and what is known as it was fitted without it
-    - ``added``: dotted names of the candidate's own parameters
-    - ``known``: free parameters of the model without the candidate
-    """
-    if not has_own_drives(start) or any(has_hidden(start, m.joints) for m in data.motions):
-        return start
-    shared = {name: data.nominal.parameters[name].value for name in known if name in data.nominal.parameters}
-    if not shared or not any(moves_drives(start, name) for name in added):
-        return start
-    stated = start.with_parameters(shared)
-    return min((start, stated), key=lambda model: _left_at(model, data))
-
-
-def _left_at(model: Model, data: InverseDynamicsProblem) -> float:
-    """Sum of squares at a start of the refit; infinite where the model cannot follow the motion."""
-    try:
-        residual, _ = data.evaluate(model, model.theta)
-    except DivergedError:
-        return np.inf
-    return power(residual)
 
 
 @dataclass(frozen=True)

@@ -11,15 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial
-from vpm.discrepancy.confirmation.refusal import refuse_ringing
 from vpm.discrepancy.noise.noise_spectrum import noise_shapes, noise_spectrum, with_noise
 from vpm.discrepancy.settings import (
     ABOVE_WHITE,
     DRAWS,
     DRIFTING,
     ENOUGH,
-    FLOOR_FACTOR,
     GROWING,
     NEW,
     QUIET_SHARE,
@@ -30,7 +27,6 @@ from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.experiment.signal import RETAINED_BAND
 from vpm.identify import InverseDynamicsProblem, gaps
-from vpm.identify.response_along_motion import bends
 from vpm.model import Model
 from vpm.numbers import Array
 from vpm.simulate import Setup, simulate_arrays
@@ -133,33 +129,6 @@ def _rows(problem: InverseDynamicsProblem, record: int) -> slice:
     count = len(problem.blocks) // len(problem.motions)
     mine = problem.blocks[record * count :][:count]
     return slice(mine[0].samples.start, mine[-1].samples.stop)
-
-
-def noise_alone(model: Model, data: Data, validation: Array) -> bool:
-    """Whether the ``validation`` residual of flexible links is no more than ringing by noise."""
-    if not bends(model) or data.simulation is None:
-        return False
-    allowed = _ringing(model, data)
-    return all(gap <= FLOOR_FACTOR * allowed[name] for name, (gap, _, _) in gaps(data.validation, validation).items())
-
-
-def only_ringing(current: Judged, data: Data, trial: Trial) -> str:
-    """Why a trial only damps the ringing of links by noise, or ""."""
-    if data.simulation is None or not bends(current.model) or not trial.probe.candidate.effect.damps:
-        return ""
-    before, after = _ringing(current.model, data), _ringing(trial.judged.model, data)
-    weights = {block.channel: block.weight**2 for block in data.validation.blocks}
-    alone = [sum(weight * ringing[name] ** 2 for name, weight in weights.items()) for ringing in (before, after)]
-    # One record of noise that rings in a narrow band may be twice as large as another: only its share is known.
-    return refuse_ringing(1.0 - alone[1] / alone[0], trial)
-
-
-def _ringing(model: Model, data: Data) -> dict[str, float]:
-    """Root mean square ringing by noise of the records in a model's own simulation, by channel."""
-    if data.simulation is None:
-        return {}
-    nothing = np.zeros(data.validation.blocks[-1].samples.stop)
-    return noise_floor(model, data.validation, nothing, data.simulation.mode, data.simulation.setup)
 
 
 @dataclass(frozen=True)

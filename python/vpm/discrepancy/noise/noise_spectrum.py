@@ -23,7 +23,7 @@ from vpm.identify.response_along_motion import has_own_drives, respond
 from vpm.model import Model
 from vpm.numbers import Array
 
-#: Colours worked out last for each problem, with their model: one round of a search asks for those of the last one.
+#: Colours worked out last for each problem, with their model: stages of a diagnosis ask for them again.
 _KNOWN: WeakKeyDictionary[InverseDynamicsProblem, tuple[Model, tuple[Array | None, ...]]] = WeakKeyDictionary()
 _LOCK = Lock()
 

@@ -11,16 +11,39 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from scipy.special import stdtrit
 
 from vpm.discrepancy.confirmation.confirmation import Data, Judged, in_time
-from vpm.discrepancy.confirmation.refusal import Thresholds
 from vpm.discrepancy.remainder.empirical_formula import Described, describe
 from vpm.discrepancy.remainder.seal_friction import Seals, seals
-from vpm.discrepancy.settings import EFFORT_SHARE, WORTH_A_NAME
-from vpm.identify import InverseDynamicsProblem, gain, segments
+from vpm.discrepancy.settings import EFFORT_SHARE, FALSE_ALARM_LEVEL, MODEST_FACTOR, MODEST_GAIN, WORTH_A_NAME
+from vpm.identify import Gain, InverseDynamicsProblem, gain, segments
 from vpm.identify.parallel import in_order
 from vpm.model import Model
 from vpm.numbers import Array, power
+
+
+@dataclass(frozen=True)
+class Thresholds:
+    """Thresholds below which an effect is refused."""
+
+    #: Number of candidates tried in the whole diagnosis; the false-alarm level is divided by it (Bonferroni).
+    candidates: int
+    #: Sampling interval of the coarsest record, s; delays and lags below it that explain little are part of sampling.
+    interval: float
+
+    def score(self, pieces: int) -> float:
+        """Threshold of the validation gain, in standard deviations by Student's t for so few pieces."""
+        return float(stdtrit(max(1, pieces - 1), 1.0 - FALSE_ALARM_LEVEL / max(1, self.candidates)))
+
+    def needed(self, validation: Gain) -> float:
+        """Standard deviations of gain below which an effect is refused; more where most of the residual stays."""
+        modest = validation.relative < MODEST_GAIN
+        return self.score(validation.pieces) * (MODEST_FACTOR if modest else 1.0)
+
+    def met(self, validation: Gain) -> bool:
+        """Whether a gain meets the thresholds: it is large enough and sure."""
+        return validation.relative >= WORTH_A_NAME and validation.score >= self.needed(validation)
 
 
 @dataclass(frozen=True)

@@ -114,42 +114,36 @@ def candidates(
     data: InverseDynamicsProblem,
     residual: Array,
     effects: Sequence[str] | None = None,
-    *,
-    either_side: bool = False,
 ) -> tuple[Candidate, ...]:
     """List the candidates: all effects that could be missing from ``model``, at each site.
 
     - ``model``: effects that it already has are left out
     - ``data``: gives speeds, travel and commands for the start values
     - ``residual``: residual of ``model`` on ``data``; periods of a ripple are read from it
-    - ``effects``: restrict the search to these; to those that a diagnosis tries if not given
-    - ``either_side``: whether both sides of a joint that is split may have the same effect, each its own
+    - ``effects``: only these; all that have a law if not given
     """
     hidden = set(model.added_joints) - springs_shown(model, data)
     return tuple(
         _candidate(effect, site, model, data, residual)
-        for effect, site in _absent(model, effects, either_side=either_side)
+        for effect, site in _absent(model, effects)
         if site not in hidden and not beyond(effect, site, model)
     )
 
 
-def left_out(model: Model, effects: Sequence[str] | None = None) -> dict[Key, str]:
-    """Reasons why some effects are not among the `candidates` of ``model``."""
-    reasons = {(effect.name, site): beyond(effect, site, model) for effect, site in _absent(model, effects)}
-    return {key: reason for key, reason in reasons.items() if reason}
+def _absent(model: Model, effects: Sequence[str] | None) -> list[tuple[EffectType, str]]:
+    """Effects of the catalogue that ``model`` does not have, with each possible site, before they become candidates.
 
-
-def _absent(model: Model, effects: Sequence[str] | None, *, either_side: bool = False) -> list[tuple[EffectType, str]]:
-    """Effects of the catalogue that ``model`` does not have, with each possible site, before they become candidates."""
+    Both sides of a joint that is split may have the same effect, each its own.
+    """
     present, by_key = Counter((effect.name, effect.at) for effect in model.effects), {e.key for e in model.effects}
-    tried = {effect.name for effect in EFFECTS.values() if effect.screened} if effects is None else set(effects)
+    tried = asked_for(effects)
     found = []
     for effect in EFFECTS.values():
         if effect.name not in tried:
             continue
         for site in sites_worth_trying(effect, model):
             needed = effect.requires is None or (effect.requires, site) in by_key
-            sides = 2 if either_side and effect.has_sides and model.joint_behind(site) else 1
+            sides = 2 if effect.has_sides and model.joint_behind(site) else 1
             if present[effect.name, site] < sides and needed:
                 found.append((effect, site))
     return found

@@ -14,21 +14,15 @@ from vpm.catalogue import EFFECTS, EffectType
 from vpm.discrepancy.settings import (
     BEYOND_LEAST,
     BEYOND_MOST,
-    CLOSING,
     COMPARED,
     CONTACT,
     CONTACT_FREQUENCY,
-    FINE_GAPS,
     FREQUENCIES,
     GAP_SHARES,
     LEAST_DRIVEN,
     LOOSE,
-    RATIOS,
-    SOFT_CONTACT,
-    SOFT_RATIO,
     SOFTEST,
     STOP_SHARES,
-    SWINGS,
 )
 from vpm.experiment.signal import differentiate
 from vpm.identify import InverseDynamicsProblem
@@ -153,24 +147,6 @@ def structural_starts(
         }
     starts = tuple({"stiffness": k, "damping": 2.0 * LOOSE * math.sqrt(k * inertia)} for k in stiffnesses)
     return (*({"stiffness": k, "damping": c} for k, c in known), *starts), {"stiffness": held, "inertia": share}
-
-
-def fine_starts(effect: EffectType, site: str, model: Model, travel: float) -> Starts:
-    """Start values of a spring or a backlash that are simulated along the motion, where efforts follow at once.
-
-    The residual depends on a stiffness only near the true value, where the resonance is, and on a width only where
-    flights end together. A linearised step from elsewhere predicts a gain that is not there.
-    """
-    inertia = moved(model, site)
-    if effect.has_play:
-        stiffness = inertia * (2.0 * math.pi * SOFT_CONTACT) ** 2
-        contact = {"stiffness": stiffness, "contact_damping": 2.0 * SOFT_RATIO * math.sqrt(stiffness * inertia)}
-        return tuple({**contact, "gap": gap, "width": CLOSING * gap} for gap in (travel * FINE_GAPS).tolist())
-    return tuple(
-        {"stiffness": stiffness, "damping": 2.0 * ratio * math.sqrt(stiffness * inertia)}
-        for stiffness in (inertia * (2.0 * math.pi * SWINGS) ** 2).tolist()
-        for ratio in RATIOS
-    )
 
 
 def softest(model: Model, site: str) -> float:

@@ -1,1 +1,0 @@
-"""The search: rounds that accept one effect each, and backward elimination."""
