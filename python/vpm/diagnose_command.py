@@ -38,7 +38,7 @@ Validate = Annotated[
     list[Path] | None, typer.Option(help="Record that is never fitted; repeat. Default: 30 % of each log.")
 ]
 Limit = Annotated[
-    int | None, typer.Option(min=0, help="Most effects to accept. Default: two for each joint, but at least six.")
+    int | None, typer.Option(min=0, help="Most effects to accept. Default: six, and two for each joint but the first.")
 ]
 Substeps = Annotated[
     int, typer.Option(min=1, help="Integration steps per sample, in simulations of validation records.")
@@ -66,7 +66,7 @@ def diagnose(
 ) -> None:
     """Name the physical effect that a model is missing, with evidence on validation data.
 
-    Ctrl-C ends the search and reports what is known until then.
+    Ctrl-C ends the ranking and reports what is known until then.
     """
     from vpm.diagnosing import diagnose as find_missing
     from vpm.report import print_story, write_report

@@ -60,7 +60,7 @@ from vpm.simulate import Setup, judging_mode
 from vpm.simulate.setup import READ_BACK
 from vpm.tasks import done_by
 
-#: Most effects to accept, if not given, of machines with few joints.
+#: Most effects to accept, if not given, of a machine with one joint; each further one may lack two frictions.
 LEAST_LIMIT = 6
 #: Said where Ctrl-C came after the naming.
 STOPPED_UNMEASURED = "stopped by Ctrl-C before what was named was measured on validation records"
@@ -134,7 +134,7 @@ def diagnose(
     setup : Setup, optional
         Integrator, substeps and horizon of the simulations.
     limit : int, optional
-        Most effects to accept; two for each joint, but at least six, if not given.
+        Most effects to accept; six, and two for each joint but the first, if not given.
     names : str, optional
         Without effect, to be removed: a ranking names.
     check : bool
@@ -236,7 +236,7 @@ def diagnosed(
             # Also where Ctrl-C came before the first record was looked at.
             raise KeyboardInterrupt(*(stop.args or (UNCHECKED.format(record=logs[0].name),))) from None
         odd = [str(one) for one in found if one.kind in NOTED]
-    most = max(LEAST_LIMIT, 2 * len(model.joints)) if limit is None else limit
+    most = LEAST_LIMIT + 2 * (len(model.joints) - 1) if limit is None else limit
     request = Request(effects, most, tell or (lambda _: None), each)
     diagnosis = _diagnosis(model, records, request, cutoff, setup)
     bare = _without_sensor(model, records[0])

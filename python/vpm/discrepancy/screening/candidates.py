@@ -136,7 +136,7 @@ def _absent(model: Model, effects: Sequence[str] | None) -> list[tuple[EffectTyp
     Both sides of a joint that is split may have the same effect, each its own.
     """
     present, by_key = Counter((effect.name, effect.at) for effect in model.effects), {e.key for e in model.effects}
-    tried = asked_for(effects)
+    tried = asked_for(None) if effects is None else effects
     found = []
     for effect in EFFECTS.values():
         if effect.name not in tried:
