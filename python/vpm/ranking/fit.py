@@ -349,12 +349,9 @@ class Fitter:
         columns, moves = by
         if moves is None or not columns:
             return True
-        farthest = np.max(np.abs(jacobian), axis=0) * moves / self.tracked.farthest[:, None]
-        channel, number = map(int, np.unravel_index(np.argmax(farthest), farthest.shape))
-        theta, move = structure.theta.copy(), moves[number] * SEEN / MOVE
-        theta[columns[number]] += move
-        moved, _ = self.tracked.follow(structure.model, theta, tracker)
-        change = (moved - residual)[:, channel]
+        channel, number, _ = self._farthest(moves, jacobian)
+        move = moves[number] * SEEN / MOVE
+        change = (self._moved_by(structure, tracker, columns[number], move) - residual)[:, channel]
         missed = change - move * jacobian[:, channel, number]
         return bool(np.sum(missed**2) < WRONG**2 * np.sum(change**2))
 
@@ -367,17 +364,31 @@ class Fitter:
         columns, moves = by
         if moves is None or not columns:
             return False
-        motion = self.tracked.farthest
-        farthest = np.max(np.abs(jacobian), axis=0) * moves / MOVE / motion[:, None]  # by one deviation
-        channel, number = map(int, np.unravel_index(np.argmax(farthest), farthest.shape))
-        if farthest[channel, number] <= 1.0:
+        channel, number, way = self._farthest(moves, jacobian)
+        if way <= 1.0:
             return False
-        theta = structure.theta.copy()
-        theta[columns[number]] += moves[number]
         with contextlib.suppress(*ASTRAY):
-            moved, _ = self.tracked.follow(structure.model, theta, tracker)
-            return bool(np.max(np.abs(moved - residual)[:, channel]) / MOVE <= motion[channel])
+            moved = self._moved_by(structure, tracker, columns[number], moves[number])
+            return bool(np.max(np.abs(moved - residual)[:, channel]) / MOVE <= self.tracked.farthest[channel])
         return False
+
+    def _farthest(self, moves: Array, jacobian: Array) -> tuple[int, int, float]:
+        """Channel and derivative of a fit that one deviation moves farthest, and how far as a share of the records."""
+        ways = np.max(np.abs(jacobian), axis=0) * moves / MOVE / self.tracked.farthest[:, None]
+        channel, number = map(int, np.unravel_index(np.argmax(ways), ways.shape))
+        return channel, number, float(ways[channel, number])
+
+    def _moved_by(self, structure: Structure, tracker: Tracker, column: int, move: float) -> Array:
+        """Residual (N, m) of a fit with one parameter moved.
+
+        Raises
+        ------
+        VpmError
+            The structure runs away from the records.
+        """
+        theta = structure.theta.copy()
+        theta[column] += move
+        return self.tracked.follow(structure.model, theta, tracker)[0]
 
 
 def in_roots(errors: Array, slopes: Array, roots: Array) -> tuple[Array, Array]:

@@ -43,11 +43,6 @@ class Data:
     validation: InverseDynamicsProblem
     simulation: OutputErrorProblem | None  #: Simulation of the validation records, the second criterion.
 
-    @property
-    def interval(self) -> float:
-        """Shortest sampling interval of the training records, s."""
-        return min(m.dt for m in self.training.motions)
-
 
 @dataclass(frozen=True)
 class Judged:
@@ -212,27 +207,6 @@ def simulated_gain(current: Judged, judged: Judged, data: Data) -> Gain | None:
     if data.simulation is None or current.simulated is None or judged.simulated is None:
         return None
     return gain(current.simulated, judged.simulated, segments(data.simulation))
-
-
-def _bounds(probe: Probe) -> dict[str, tuple[float, float]]:
-    """Bounds of a candidate's shape from the data, by dotted name, for its confirmation."""
-    given = probe.candidate.bounds
-    return {dotted: given[short] for short, dotted in _short_names(probe).items() if short in given}
-
-
-def _short_names(probe: Probe) -> dict[str, str]:
-    mine = (dict(e.parameter_names) for e in probe.model.effects if e.key == probe.candidate.key)
-    return next(mine, {})
-
-
-def _inside(probe: Probe, bounds: dict[str, tuple[float, float]]) -> dict[str, float]:
-    """Linearised estimates of a probe, moved into the bounds as start values of the confirmation."""
-    values = {}
-    for name in probe.free:
-        parameter = probe.model.parameters[name]
-        low, high = bounds.get(name, (parameter.minimum, parameter.maximum))
-        values[name] = float(np.clip(probe.values[name], low, high))
-    return values
 
 
 def _as_stated(judged: Judged) -> Array:

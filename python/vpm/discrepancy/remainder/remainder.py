@@ -25,19 +25,17 @@ from vpm.numbers import Array, power
 
 @dataclass(frozen=True)
 class Thresholds:
-    """Thresholds below which an effect is refused."""
+    """Thresholds below which a description of the remainder says nothing."""
 
-    #: Number of candidates tried in the whole diagnosis; the false-alarm level is divided by it (Bonferroni).
+    #: Number of descriptions tried; the false-alarm level is divided by it (Bonferroni).
     candidates: int
-    #: Sampling interval of the coarsest record, s; delays and lags below it that explain little are part of sampling.
-    interval: float
 
     def score(self, pieces: int) -> float:
         """Threshold of the validation gain, in standard deviations by Student's t for so few pieces."""
         return float(stdtrit(max(1, pieces - 1), 1.0 - FALSE_ALARM_LEVEL / max(1, self.candidates)))
 
     def needed(self, validation: Gain) -> float:
-        """Standard deviations of gain below which an effect is refused; more where most of the residual stays."""
+        """Standard deviations of gain below which it says nothing; more where most of the residual stays."""
         modest = validation.relative < MODEST_GAIN
         return self.score(validation.pieces) * (MODEST_FACTOR if modest else 1.0)
 
@@ -72,7 +70,7 @@ def remainder(recalibrated: Judged, final: Judged, data: Data, workers: int = 1)
     """
     bases = [final] if recalibrated is final else [recalibrated, final]
     choices = tuple(in_order([partial(describe, base, data) for base in bases], workers))
-    view = _View(data, motion_band(data.training, final.model), Thresholds(len(bases), data.interval))
+    view = _View(data, motion_band(data.training, final.model), Thresholds(len(bases)))
     left = view(final)
     clear = [view.clearly_better(choice, left) for choice in choices]
     pressed = None if recalibrated is final else view.pressed(recalibrated, left)

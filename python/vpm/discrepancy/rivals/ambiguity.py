@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from vpm.discrepancy.confirmation.confirmation import Judged, Trial
+from vpm.discrepancy.confirmation.confirmation import Trial
 from vpm.discrepancy.diagnosis import Ambiguity
 
 
@@ -16,7 +16,6 @@ class Rivals:
     effect: str
     site: str
     trials: tuple[Trial, ...]  #: Those that predict the validation data as well.
-    without: Judged | None = None  #: The model without it; None where that cannot be computed.
 
     @property
     def label(self) -> str:
