@@ -223,7 +223,7 @@ def test_a_machine_that_stands_shows_no_effect(arm: Model, place: float) -> None
 def test_no_step_is_measured_by_errors_of_zero() -> None:
     """Infinite numbers went on to LAPACK, which wrote to the terminal."""
     structure: Any = SimpleNamespace(
-        standard=np.zeros(2), leaning=(), ends=np.tile([-1.0, 1.0], (2, 1)), model=SimpleNamespace(name="arm")
+        standard=np.zeros(2), anywhere=[], ends=np.tile([-1.0, 1.0], (2, 1)), model=SimpleNamespace(name="arm")
     )
     with pytest.raises(VpmError, match="arm: the records leave no error that a step could be measured by"):
         bounded_step(structure, np.zeros(5), np.full((5, 2), 1e10), 1.0)

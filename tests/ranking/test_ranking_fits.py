@@ -7,7 +7,7 @@ from typing import Any, cast
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from scipy.signal import lfilter
 
@@ -22,8 +22,10 @@ from vpm.discrepancy.screening.candidates import candidates
 from vpm.experiment import Experiment
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
+from vpm.numbers import Array
 from vpm.ranking.fit import Fitter, View, bounded_step, by_secant, counted_too_often
 from vpm.ranking.judgement import Judgement
+from vpm.ranking.lever import Lever
 from vpm.ranking.look import Look
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.parameter_priors import Sizes
@@ -630,12 +632,45 @@ def test_a_spring_keeps_its_pull_where_a_step_moves_its_rest(
     assert stiffness * place == pytest.approx(size * (rest + further) + change * rest, rel=1e-6, abs=1e-9)
 
 
+MOVES = st.lists(st.floats(-1.0, 1.0), min_size=3, max_size=3).map(np.array)
+
+
+@given(st.floats(0.1, 10.0), MOVES, st.floats(-0.05, 0.05), MOVES.map(lambda way: 0.05 * way))
+def test_first_and_second_moments_of_a_mass_move_straight(mass: float, place: Array, share: float, way: Array) -> None:
+    """Where a joint turns it the mass alone shows little: what records tell is what it weighs and takes to turn."""
+    lever, more = Lever(0, (1, 2, 3), is_mass=True), share * mass
+    assume(float(place @ place) > 0.1)
+    after, there = lever.moved(mass, place, more, way)
+    straight = place @ place * (mass + more) + 2.0 * mass * place @ way
+    assert after * there == pytest.approx(mass * (place + way) + more * place, rel=1e-9, abs=1e-12)
+    assert after * there @ there == pytest.approx(straight, rel=1e-9)
+    back = lever.way(mass, place, after, there)
+    assert [back[0], *back[1]] == pytest.approx([more, *way], rel=1e-6, abs=1e-9)
+
+
+def test_a_payload_is_moved_by_its_moments_within_its_prior() -> None:
+    model = Model.from_toml(SLEDGE).with_effect("payload", "sledge", mass=1.0, x=0.5, y=0.0, z=0.0)
+    names = [f"sledge.payload.{one}" for one in ("mass", "x", "z")]
+    prior = Prior(0.0, 1.0, -np.inf, np.inf)
+    structure = Structure(model, model.theta.copy(), dict.fromkeys(names, prior))
+    assert structure.anywhere == []  # far away a mass is as hard to turn as a house
+    move = np.array([-0.1, 0.1, 0.2])
+    moved = structure.moved(move)
+    mass, x, z = moved.values.values()
+    assert [mass * x, mass * z] == pytest.approx([1.0 * 0.6 - 0.1 * 0.5, 0.2])
+    assert mass * (x**2 + z**2) == pytest.approx(0.5**2 * 0.9 + 2.0 * 0.5 * 0.1)
+    assert structure.way_to(moved) == pytest.approx(move)
+    narrow = {**structure.priors, names[0]: replace(prior, low=0.5, high=0.95)}
+    kept = replace(structure, priors=narrow).moved(move)
+    assert kept.values[names[0]] == pytest.approx(0.9)
+
+
 def test_a_place_is_moved_as_it_is_where_nothing_pulls() -> None:
     model = Model.from_toml(SLEDGE).with_effect("spring", "way", stiffness=0.0, rest=0.1)
     names = ("way.spring.stiffness", "way.spring.rest")
     prior = Prior(0.0, 1.0, -np.inf, np.inf)
     structure = Structure(model, model.theta.copy(), dict.fromkeys(names, prior))
-    assert structure.leaning == []
+    assert not structure.levers
     assert list(structure.moved(np.array([3.0, 0.5])).values.values()) == pytest.approx([3.0, 0.6])
 
 

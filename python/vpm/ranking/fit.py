@@ -139,7 +139,7 @@ class Fitter:
                 better = self._pulled(now, view, (errors, slopes), before)
             slow = better is None or before - better[2] < tolerance
             if better is not None:
-                move = better[0].standard - now.structure.standard
+                move = now.structure.way_to(better[0])
                 now, last, before = replace(now, structure=better[0], residual=better[1]), errors, better[2]
                 errors = view.noise.whitened(now.residual, self.tracked.parts)
                 slopes = by_secant(slopes, errors - last, move)
@@ -446,7 +446,7 @@ def bounded_step(
     leave those of its body behind, they come along: else it stops at what they allow.
     """
     z, scale = structure.standard, max(float(np.mean(errors**2)) if variance is None else variance, 1e-300)
-    far = np.isin(np.arange(len(z)), [place for _, place in structure.leaning])
+    far = np.isin(np.arange(len(z)), structure.anywhere)
     known = np.where(far, FAINT, 1.0)
     with np.errstate(over="ignore", invalid="ignore"):
         normal = slopes.T @ slopes / scale + np.diag(known)

@@ -23,6 +23,7 @@ from vpm.identify.moments import (
 )
 from vpm.model import Effect, Model
 from vpm.numbers import Array
+from vpm.ranking.lever import Lever
 from vpm.ranking.settings import MOVE
 from vpm.weighing.priors import Prior
 
@@ -217,29 +218,44 @@ class Structure:
         return [[self.place(name) for name in pair] for pair in rods(self.model, self.priors)]
 
     @cached_property
-    def leaning(self) -> list[tuple[int, int]]:
-        """Sizes of a structure's effects and location parameters that may lie anywhere, among the unknown.
-
-        Of a spring records tell the stiffness, and the product of that and the place where it rests.
-        """
+    def levers(self) -> list[Lever]:
+        """Sizes of a structure's effects and the places that these act at, among the unknown."""
         names, found = list(self.priors), []
-        for effect in self.model.effects if self.free_places else ():
+        for effect in self.model.effects:
             own = [(effect.type.parameter(short), name) for short, name in effect.parameter_names.items()]
-            places = [name for one, name in own if one.is_place and name in names]
-            sizes = [name for one, name in own if not one.shape and name in names]
-            if len(places) == len(sizes) == 1 and self.theta[self.place(sizes[0])] != 0.0:
-                found.append((names.index(sizes[0]), names.index(places[0])))
+            places = tuple(names.index(name) for one, name in own if one.is_place and name in names)
+            sizes = [names.index(name) for one, name in own if not one.shape and name in names]
+            if places and len(sizes) == 1 and self.theta[self.columns[sizes[0]]] != 0.0:
+                found.append(Lever(sizes[0], places, effect.type.adds_inertia))
         return found
 
+    @property
+    def anywhere(self) -> list[int]:
+        """Places of a structure's effects, among the unknown, that records need not show and that may be anywhere."""
+        return [one.places[0] for one in self.levers if self.free_places and not one.is_mass]
+
     def moved(self, move: Array) -> Structure:
-        """Structure moved by prior deviations; products of size and location move linearly."""
+        """Structure moved by prior deviations; products of sizes and places move in a straight line."""
         to, change = self.at(self.standard + move), move * self.slopes
-        for size, place in self.leaning:
-            before, where = (float(self.theta[self.columns[one]]) for one in (size, place))
-            after = float(to.theta[self.columns[size]])
-            if after * before > 0.0:
-                to.theta[self.columns[place]] = (before * (where + change[place]) + where * (after - before)) / after
+        for lever in self.levers:
+            size, places = self.columns[lever.size], [self.columns[place] for place in lever.places]
+            before, more = float(self.theta[size]), float(to.theta[size] - self.theta[size])
+            after, there = lever.moved(before, self.theta[places], more, change[list(lever.places)])
+            prior = list(self.priors.values())[lever.size]
+            if prior.low <= after <= prior.high:
+                to.theta[size], to.theta[places] = after, there
         return to
+
+    def way_to(self, other: Structure) -> Array:
+        """Prior deviations by which another structure was moved from this one."""
+        way = other.standard - self.standard
+        for lever in self.levers:
+            size, places = self.columns[lever.size], [self.columns[place] for place in lever.places]
+            before, after = ((float(theta[size]), theta[places]) for theta in (self.theta, other.theta))
+            more, there = lever.way(*before, *after)
+            way[lever.size] = more / self.slopes[lever.size]
+            way[list(lever.places)] = there / self.slopes[list(lever.places)]
+        return way
 
     def carried(self, model: Model, renamed: Mapping[str, str] = MappingProxyType({})) -> Structure:
         """Structure carried to another model, for parameters that it has too."""

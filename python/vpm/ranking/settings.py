@@ -53,7 +53,7 @@ REGRESSIONS, QUIET = 3, 0.01
 NEARER, RETREAT = 0.7 ** np.arange(1, 10), 0.08
 #: Shares of a step that are tried, and of one by secants, which may point elsewhere: new derivatives help more there.
 TRIALS, TRIALS_BY_SECANTS = 4, 2
-#: Weight of the prior of a place in a step beside a size, see `Structure.leaning`: it leads elsewhere than it points.
+#: Weight of the prior of a place in a step beside a size, see `Structure.anywhere`: it leads elsewhere than it points.
 FAINT = 1e-6
 #: Share of the change by one start value that the next smaller one makes, about: the catalogue's are four times apart.
 NEXT_START = 0.25
