@@ -10,6 +10,9 @@ import pytest
 from sledge import DRY, SLEDGE, pushed
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.model import Model
+from vpm.numbers import Array
+from vpm.ranking.fit import Fitter, Followed, View
+from vpm.ranking.model_structure import Structure
 from vpm.ranking.ranking_search import Search
 from vpm.ranking.settings import STEPS, Settings
 from vpm.ranking.tracked_records import TrackedRecords, Tracker
@@ -43,32 +46,41 @@ def test_a_structure_takes_as_many_steps_as_the_one_that_it_is_compared_with() -
     assert tracked.stepping(Model.from_toml(SLEDGE), replace(COARSE, fewest=STEPS), 1e-3)[1] == STEPS
 
 
-def test_coarse_steps_are_corrected_to_what_fine_ones_leave() -> None:
+def test_few_steps_are_corrected_to_what_those_of_the_tracker_leave() -> None:
     """Where a fit begins they agree to rounding, and the error of a step beside grows only with the distance."""
     own = search()
     look = own.look(own.fitted(own.start, Tracker(1.0)))
-    fitter = look.coarse_fitter
-    assert fitter is not None
-    structure = look.fitted.structure
+    structure, start = look.fitted.structure, look.start
+    assert start.few == COARSE
 
     def left(move: float) -> float:
         moved = structure.at(structure.standard + move)
-        coarse, fine = (
-            one.unfitted(moved, way).residual for one, way in ((fitter, COARSE), (own.fitter, Tracker(1.0)))
-        )
-        return float(np.abs(coarse - fine).max())
+        few, fine = own.fitter._by_few_steps(moved, start), own.fitter.unfitted(moved, Tracker(1.0)).residual
+        return float(np.abs(few - fine).max())
 
     near, far = left(0.01), left(0.1)
     assert left(0.0) <= 1e-15
     assert near < 0.2 * far < 0.02 * np.abs(look.fitted.residual).max()
 
 
-def test_coarse_steps_that_change_the_error_by_an_effect_compare_nothing() -> None:
+def test_a_fit_that_few_steps_lead_astray_goes_on_by_those_of_its_tracker(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Few steps may find a way down where there is none: what is told of a fit is what its own steps leave."""
     own = search()
-    look = own.look(own.fitted(own.start, Tracker(1.0)))
-    noise = look.view.noise
-    look.coarse = replace(look.coarse, residual=look.coarse.residual + np.array(noise.deviations) * 0.3)
-    assert look.coarse_fitter is None
+    begun = own.start.at(own.start.standard + 0.3)
+    view = View(own.fitter.noise_of(begun, Tracker(1.0)))
+    found = own.fitter.finished(own.fitter.fitted(begun, Tracker(1.0), view), view)
+    plain, misled = Fitter._by_few_steps, list[bool]()
+
+    def downwards(fitter: Fitter, structure: Structure, near: Followed) -> Array:
+        left = plain(fitter, structure, near)
+        misled.append(near.few is not None)
+        return 0.5 * left if near.few else left
+
+    monkeypatch.setattr(Fitter, "_by_few_steps", downwards)
+    other = own.fitter.finished(own.fitter.fitted(begun, Tracker(1.0), view), view)
+    assert True in misled
+    assert other.cost == pytest.approx(found.cost, abs=own.settings.tolerance)
+    assert other.cost == pytest.approx(own.fitter.unfitted(other.structure, Tracker(1.0), view).cost, rel=1e-12)
 
 
 @pytest.mark.parametrize(("low", "leaves"), [(1e-7, True), (1e-3, False)])

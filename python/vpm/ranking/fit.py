@@ -40,6 +40,20 @@ class Followed:
     names: tuple[str, ...]  #: Unknown parameters by which there are derivatives.
     residual: Array  #: Shape (N, m).
     jacobian: Array  #: Shape (N, m, len(names)).
+    few: Tracker | None = None  #: Tracker of fewer steps, of which the derivatives are and with which a fit goes on.
+    offset: Array | float = 0.0  #: What its steps leave less.
+
+    @property
+    def coarse(self) -> Followed:
+        """What the tracker of fewer steps leaves, with its derivatives."""
+        return replace(
+            self, tracker=self.few or self.tracker, residual=self.residual - self.offset, few=None, offset=0.0
+        )
+
+    @property
+    def fine(self) -> Followed:
+        """What is left, from which a fit goes on by the steps of its own tracker."""
+        return replace(self, few=None, offset=0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +92,13 @@ class View:
 class Fitter:
     """Fits structures to the residual of a tracker on the stretches for training.
 
-    Derivatives come from as few steps of the integrator as will do: they only show the way, and cost most. So may
-    residuals, with an ``offset`` (N, m) by which more steps differ near by (N. Alexandrov and R. Lewis, *Optimization
-    and Engineering* 2, 2001).
+    Derivatives come from as few steps of the integrator as will do: they only show the way, and cost most. So do
+    residuals on the way, with what more steps leave more where they were last taken (N. Alexandrov and R. Lewis,
+    *Optimization and Engineering* 2, 2001).
     """
 
-    def __init__(self, tracked: TrackedRecords, settings: Settings, offset: Array | float = 0.0) -> None:
-        self.tracked, self.settings, self.offset = tracked, settings, offset
+    def __init__(self, tracked: TrackedRecords, settings: Settings) -> None:
+        self.tracked, self.settings = tracked, settings
 
     def fitted(
         self,
@@ -93,12 +107,15 @@ class Fitter:
         view: View,
         goal: float = math.inf,
         residual: Array | None = None,
+        *,
+        rough: bool = False,
     ) -> Fitted:
         """Fit by bounded Gauss-Newton steps under a view; the first ``residual`` may be known.
 
-        It gives up where several times the gain that a step predicts would not bring the `cost` below a goal.
-        Derivatives cost many times what residuals do, so that secants correct them from step to step. Where a step by
-        these leads nowhere, they are worked out anew.
+        A ``rough`` one trusts few steps of the integrator to its end, as `Fitted.tracker` then tells. A fit gives up
+        where several times the gain that a step predicts would not bring the `cost` below a goal. Derivatives cost many
+        times what residuals do, so that secants correct them from step to step. Where a step by these leads nowhere,
+        they are worked out anew.
 
         Raises
         ------
@@ -107,7 +124,7 @@ class Fitter:
         """
         names = tuple(name for name in structure.priors if name not in view.known)
         now = self.followed(structure.at(structure.standard), tracker, names, residual)
-        return self._descended(now, view, goal)[0]
+        return self._descended(now, view, goal, rough=rough)[0]
 
     def moved(self, start: Followed, view: View, anew: bool = False) -> tuple[Fitted, Array]:
         """Fit from a start with known derivatives, near the end of another fit: secants update them.
@@ -123,10 +140,20 @@ class Fitter:
         return self._descended(start, view, fresh=False, anew=anew)
 
     def _descended(
-        self, now: Followed, view: View, goal: float = math.inf, fresh: bool = True, anew: bool = True
+        self,
+        start: Followed,
+        view: View,
+        goal: float = math.inf,
+        *,
+        fresh: bool = True,
+        anew: bool = True,
+        rough: bool = False,
     ) -> tuple[Fitted, Array]:
-        """Gauss-Newton descent of a fit from known derivatives, updated by secants or computed ``anew``."""
-        before = self.cost(now.structure, now.residual, view.noise)
+        """Gauss-Newton descent of a fit from known derivatives, updated by secants or computed ``anew``.
+
+        Where few steps led up instead of down, it goes on by those of its own tracker.
+        """
+        now, told, before = start, start, self.cost(start.structure, start.residual, view.noise)
         errors, slopes = view.errors(now, self.tracked.parts)
         tolerance = self._tolerance(view, errors, slopes) if now.structure.priors else math.inf
         ended = False
@@ -148,18 +175,48 @@ class Fitter:
                 break
             fresh = slow
             if fresh:
-                now = self.followed(now.structure, now.tracker, now.names, now.residual)
+                if (exact := now if rough else self._exact(now, told, view)) is None:
+                    return self._descended(told.fine, view, goal, fresh=False, anew=anew)
+                now = self._anew(exact, rough=rough)
+                now = now if start.few else now.fine
+                told, before = now, self.cost(now.structure, now.residual, view.noise)
                 errors, slopes = view.errors(now, self.tracked.parts)
                 tolerance = self._tolerance(view, errors, slopes)
-        return Fitted(now.structure, now.tracker, now.residual, before, ended), slopes
+        if rough and now.few is not None and now.structure is not start.structure:
+            return Fitted(now.structure, now.few, now.residual, before), slopes
+        if (exact := self._exact(now, told, view)) is None:
+            if not ended:
+                return self._descended(told.fine, view, goal, fresh=False, anew=anew)
+            exact = told  # what few steps gained was next to nothing
+        before = self.cost(exact.structure, exact.residual, view.noise)
+        return Fitted(exact.structure, exact.tracker, exact.residual, before, ended), slopes
+
+    def _anew(self, now: Followed, *, rough: bool) -> Followed:
+        """Where a fit has come to, with derivatives worked out anew; a rough one keeps what more steps leave more."""
+        if not rough or now.few is None:
+            return self.followed(now.structure, now.tracker, now.names, now.residual)
+        near = self.followed(now.structure, now.few, now.names)
+        return replace(now, residual=near.residual + now.offset, jacobian=near.jacobian)
+
+    def _exact(self, now: Followed, told: Followed, view: View) -> Followed | None:
+        """What a fit came to by few steps since it was told exactly, by those of its own tracker; None if worse."""
+        if now.few is None or now.structure is told.structure:
+            return now
+        with contextlib.suppress(*ASTRAY):
+            residual, _ = self._pass(now.structure, now.tracker)
+            after, before = (
+                self.cost(*one, view.noise) for one in ((now.structure, residual), (told.structure, told.residual))
+            )
+            return replace(now, residual=residual) if after <= before else None
+        return None
 
     def finished(self, found: Fitted, view: View) -> Fitted:
-        """Fit continued with all derivatives, by fine steps, until nothing is gained.
+        """Fit continued with all derivatives until nothing is gained.
 
         Raises
         ------
         VpmError
-            By fine steps the structure runs away from the records.
+            A rough one runs away from the records by the steps of its own tracker.
         """
         if not found.tracker.fine:
             found = self.unfitted(found.structure, Tracker(found.tracker.band), view)
@@ -177,22 +234,9 @@ class Fitter:
     ) -> Followed:
         """Residual of a tracker with derivatives by some parameters, for a fit.
 
-        Raises
-        ------
-        VpmError
-            The structure runs away from the records.
-        """
-        if not tracker.fine:
-            by = [structure.place(name) for name in names], structure.moves(names)
-            return Followed(structure, tracker, tuple(names), *self._pass(structure, tracker, by))
-        if residual is None:
-            residual, _ = self._pass(structure, tracker)
-        return replace(self.by_few_steps(structure, tracker, names, residual), tracker=tracker, residual=residual)
+        Derivatives are by as few integration steps as these are stable with.
 
-    def by_few_steps(self, structure: Structure, tracker: Tracker, names: Sequence[str], residual: Array) -> Followed:
-        """Residual for a fit with derivatives by as few integration steps as these are stable with.
-
-        - ``residual``: of the tracker itself
+        - ``residual``: of the tracker itself, where it is known
 
         Raises
         ------
@@ -200,17 +244,21 @@ class Fitter:
             The structure runs away from the records.
         """
         by = [structure.place(name) for name in names], structure.moves(names)
+        if not tracker.fine:
+            return Followed(structure, tracker, tuple(names), *self._pass(structure, tracker, by))
+        if residual is None:
+            residual, _ = self._pass(structure, tracker)
         fewest, *more = self._few_steps(structure, tracker)
         with contextlib.suppress(*ASTRAY):  # contacts may be too stiff for few steps
             left, jacobian = self._pass(structure, fewest, by)
-            if not self._is_unstable(structure, tracker, by, residual - self.offset, jacobian):
-                return Followed(structure, fewest, tuple(names), left, jacobian)
+            if not self._is_unstable(structure, tracker, by, residual, jacobian):
+                return Followed(structure, tracker, tuple(names), residual, jacobian, fewest, residual - left)
         for short in more:
             with contextlib.suppress(*ASTRAY):
-                _, jacobian = self._pass(structure, short, by)
-                if self._tells(structure, tracker, by, residual - self.offset, jacobian):
+                left, jacobian = self._pass(structure, short, by)
+                if self._tells(structure, tracker, by, residual, jacobian):
                     return Followed(structure, tracker, tuple(names), residual, jacobian)
-        return Followed(structure, tracker, tuple(names), *self._pass(structure, tracker, by))
+        return Followed(structure, tracker, tuple(names), residual, self._pass(structure, tracker, by)[1])
 
     def _few_steps(self, structure: Structure, tracker: Tracker) -> list[Tracker]:
         """Trackers of a fit with the fewest integration steps, and with as short ones as compare structures."""
@@ -300,7 +348,7 @@ class Fitter:
         for trial in range(trials):
             tried = now.structure.moved(share * move)
             try:
-                residual, _ = self._pass(tried, now.tracker)
+                residual = self._by_few_steps(tried, now)
             except ASTRAY:
                 share *= RETREAT
                 continue
@@ -331,10 +379,14 @@ class Fitter:
             return None
         tried = now.structure.moved(move)
         with contextlib.suppress(*ASTRAY):
-            residual, _ = self._pass(tried, now.tracker)
+            residual = self._by_few_steps(tried, now)
             after = self.cost(tried, residual, view.noise)
             return (tried, residual, after) if after < before else None
         return None
+
+    def _by_few_steps(self, structure: Structure, near: Followed) -> Array:
+        """Residual of a structure near another one in a fit, by few steps if these stand for its tracker there."""
+        return self._pass(structure, near.few or near.tracker)[0] + near.offset
 
     def _pass(self, structure: Structure, tracker: Tracker, by: By = NOTHING) -> tuple[Array, Array]:
         residual, jacobian = self.tracked.follow(structure.model, structure.theta, tracker, *by)
@@ -342,7 +394,7 @@ class Fitter:
             residual, jacobian = self.tracked.follow(structure.model, structure.theta, tracker, by[0])
         if not all(np.max(np.abs(numbers), initial=0.0) < RUNAWAY for numbers in (residual, jacobian)):
             raise VpmError(f"{structure.model.name} runs away from the records")
-        return residual + self.offset, jacobian
+        return residual, jacobian
 
     def _tells(self, structure: Structure, tracker: Tracker, by: By, residual: Array, jacobian: Array) -> bool:
         """Whether derivatives of a fit tell how a move by the parameter that moves the model farthest changes it."""

@@ -60,6 +60,18 @@ class Look:
         self._offsets: dict[int, Array] = {}
 
     @cached_property
+    def start(self) -> Followed:
+        """Start for fits from a look: derivatives by all that is unknown.
+
+        Raises
+        ------
+        VpmError
+            The structure runs away from the records.
+        """
+        own = self.fitted
+        return self._fitter.followed(own.structure, own.tracker, tuple(own.structure.priors), own.residual)
+
+    @property
     def coarse(self) -> Followed:
         """Look with derivatives by all that is unknown, by few steps of the integrator where these do.
 
@@ -68,23 +80,13 @@ class Look:
         VpmError
             The structure runs away from the records.
         """
-        own = self.fitted
-        return self._fitter.by_few_steps(own.structure, own.tracker, tuple(own.structure.priors), own.residual)
+        return self.start.coarse
 
     @cached_property
     def view(self) -> View:
         """View of a look for fits: derivatives are taken as known for effects that do nothing at first."""
         slopes = self.noise.whitened(self.coarse.jacobian, self._fitter.tracked.parts).T
         return View(self.noise, dict(zip(self.coarse.names, slopes, strict=True)))
-
-    @cached_property
-    def coarse_fitter(self) -> Fitter | None:
-        """Fitter by coarse steps beside a look, if these change what it leaves by less than an effect has to."""
-        offset = self.fitted.residual - self.coarse.residual
-        rows = np.concatenate([offset[part] for part in self._fitter.tracked.parts])
-        share = np.sum(rows**2, axis=0) / (len(rows) * np.array(self.noise.deviations) ** 2)
-        near = bool(np.max(share) < self.settings.worth)
-        return Fitter(self._fitter.tracked, self.settings, offset) if near else None
 
     def predicted_gain(self, other: Followed) -> float:
         """Gain that a look predicts for another structure by one step of a fit, nats.
@@ -154,7 +156,7 @@ class Look:
     @cached_property
     def _errors(self) -> tuple[Array, Array]:
         """Errors of the look's structure alone, with derivatives by coarse steps, for all trials."""
-        return self.view.errors(replace(self.coarse, residual=self.fitted.residual), self._fitter.tracked.parts)
+        return self.view.errors(self.start, self._fitter.tracked.parts)
 
     @cached_property
     def _alone(self) -> Array:
@@ -285,8 +287,7 @@ class Look:
     @cached_property
     def _of_others(self) -> list[Array]:
         """Squares in a look of parts of the record that are held back from a fit in turn."""
-        start = replace(self.coarse, tracker=self.fitted.tracker, residual=self.fitted.residual)
-        return [self._held_back(start, part) for part in range(PARTS - 1)]
+        return [self._held_back(self.start, part) for part in range(PARTS - 1)]
 
     def _held_back(self, start: Followed, part: int) -> Array:
         """Squares in a look of one held-back part of the record, from a fit to the others."""

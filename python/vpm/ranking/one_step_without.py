@@ -28,7 +28,7 @@ def beside_others(trials: Trials, look: Look, keys: Sequence[Key]) -> list[Trial
     - ``look``: at the structure with all of them, as it was fitted
     """
     fitted, parts = look.fitted, trials.fitter.tracked.parts
-    followed = replace(look.coarse, residual=fitted.residual)
+    followed = look.start
     noise = View(fitted_noise(fitted.residual, parts, trials.settings.order))
     step_by, weighed_by = (_precision(followed, view, parts) for view in (View(look.noise), noise))
     found = []

@@ -51,14 +51,9 @@ def _doubling(ordered: Sequence[Proposal]) -> Iterator[Sequence[Proposal]]:
 def _fitted(
     several: Sequence[Proposal], wanted: float, look: Look, fitter: Fitter, each: ParallelCandidates
 ) -> list[Fitted]:
-    coarse = look.coarse_fitter
-
     def one_fitted(one: Proposal) -> Fitted:
         view, residual = one.seen_in(look)
-        goal = look.fitted.cost - wanted
-        if coarse is None or one.splits:
-            return fitter.fitted(one.structure, look.fitted.tracker, view, goal, residual)
-        return coarse.fitted(one.structure, look.coarse.tracker, view, goal)
+        return fitter.fitted(one.structure, look.fitted.tracker, view, look.fitted.cost - wanted, residual, rough=True)
 
     ends = each("fitting", one_fitted, several, lambda one: " at ".join(one.structure.effects[-1]))
     return [end for end in ends if isinstance(end, Fitted)]

@@ -150,7 +150,7 @@ class Trials:
             Its derivatives run away from the records.
         """
         found = self.glance(fitted)
-        _ = found.coarse
+        _ = found.start
         return found
 
     def glance(self, fitted: Fitted) -> Look:
