@@ -33,7 +33,7 @@ from vpm.ranking.proposals import Proposal, _seated, proposals
 from vpm.ranking.ranking_search import Search, _is_worse
 from vpm.ranking.settings import PLACES, Settings
 from vpm.ranking.several_at_once import _spares_file
-from vpm.ranking.start_values import started
+from vpm.ranking.start_values import _different_waves, started
 from vpm.ranking.structure_extensions import Extensions
 from vpm.ranking.tracked_records import TrackedRecords, Tracker, tracker_gains
 from vpm.ranking.trials import Trials
@@ -663,6 +663,13 @@ def test_a_payload_is_moved_by_its_moments_within_its_prior() -> None:
     narrow = {**structure.priors, names[0]: replace(prior, low=0.5, high=0.95)}
     kept = replace(structure, priors=narrow).moved(move)
     assert kept.values[names[0]] == pytest.approx(0.9)
+
+
+def test_a_wave_that_several_bands_show_begins_once() -> None:
+    """They differ by half a wave on all of the way at least: over less than that a fit finds its way."""
+    starts = [{"period": period} for period in (0.5, 0.1, 0.502, 0.0975, 0.05)]
+    assert [one["period"] for one in _different_waves(starts, 1.5)] == [0.5, 0.1, 0.05]
+    assert [one["period"] for one in _different_waves(starts, 4.0)] == [0.5, 0.1, 0.0975, 0.05]
 
 
 def test_a_place_is_moved_as_it_is_where_nothing_pulls() -> None:

@@ -62,6 +62,8 @@ LOSS = 0.1
 #: Where a place that may lie anywhere begins, as multiples of half of the way that is seen, from its middle: within the
 #: way, just outside on either side, and so far away that it pulls nearly the same everywhere.
 PLACES = (0.0, -2.0, 2.0, -8.0, 8.0)
+#: Waves on all of the way that is seen by which start periods differ at least: a fit finds its way over less than that.
+ALIKE = 0.5
 #: Shares of the way from the end of a range to the middle of its prior where fits with another effect may begin.
 OFF_ENDS = (1.0, 0.5, 0.25, 0.125)
 #: Delay that is nothing unusual, s: a few intervals of a field bus.

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from vpm.discrepancy.screening.candidates import Candidate
 from vpm.discrepancy.screening.compliance_and_stop_start import moved
 from vpm.model import Model
 from vpm.ranking.parameter_priors import Sizes
-from vpm.ranking.settings import LOSS, PLACES
+from vpm.ranking.settings import ALIKE, LOSS, PLACES
 
 
 def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
@@ -19,6 +19,7 @@ def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
         # One wave on all of the way that is seen: a longer one is a slope.
         (low, high), (first, last) = ends["period"], sizes.ways[candidate.site]
         ends["period"] = low, max(high, last - first)
+        candidate = replace(candidate, starts=_different_waves(candidate.starts, last - first))
     candidate = _placed(replace(candidate, bounds=ends), sizes)
     if candidate.effect.has_play:
         return replace(candidate, starts=tuple(_backlash(start) for start in candidate.starts), fixed=())
@@ -28,6 +29,19 @@ def started(candidate: Candidate, model: Model, sizes: Sizes) -> Candidate:
         starts = tuple(_stop(start, candidate.site, model, sizes) for start in candidate.starts if seen)
         return replace(candidate, starts=starts, neutral=False)
     return candidate
+
+
+def _different_waves(starts: Sequence[Mapping[str, float]], way: float) -> tuple[Mapping[str, float], ...]:
+    """Start values with periods that records tell apart: by half a wave or more on all of the ``way``.
+
+    Several bands of the residual show the same one, and a fit from near by ends there.
+    """
+    found = list[Mapping[str, float]]()
+    for start in starts:
+        waves = way / start["period"]
+        if all(abs(waves - way / one["period"]) >= ALIKE for one in found):
+            found.append(start)
+    return tuple(found)
 
 
 def _placed(candidate: Candidate, sizes: Sizes) -> Candidate:
