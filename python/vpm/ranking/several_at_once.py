@@ -86,7 +86,7 @@ def _alike(trials: Trials, tried: Sequence[Trial], most: int) -> list[Trial]:
         structure, look = _joined(group), group[0].look
         least = min(one.fitted.cost for one in tried if one.look is look)
         view, goal = View(look.noise), min(look.fitted.cost - look.needed, least)
-        begun = trials.fitter.fitted(structure, look.fitted.tracker, view, goal)
+        begun = trials.fitter.fitted(structure, look.fitted.tracker, view, goal, rough=True)
         return Trial.of(
             trials.fitter.finished(begun, view) if begun.cost < goal else begun, look, ended=begun.cost < goal
         )

@@ -226,7 +226,7 @@ class Trials:
 
         def one_fitted(other: Structure) -> Trial:
             structure, view = look.fitted.structure.with_last_of(other), View(look.noise)
-            fitted = self.fitter.fitted(structure, look.fitted.tracker, view)
+            fitted = self.fitter.fitted(structure, look.fitted.tracker, view, rough=True)
             return Trial.of(fitted, look, ended=False)
 
         ends = self.each("exchanging", one_fitted, others, lambda other: " at ".join(other.effects[-1]))
