@@ -5,8 +5,6 @@
 
 #: Probability of accepting any effect by chance, shared among all candidates that are tried.
 FALSE_ALARM_LEVEL = 0.01
-#: Significance asked of an effect's size on the training data.
-SIZE_LEVEL = 0.05
 #: One-sided 95 % quantile of the normal distribution: what is worse by less is worse by chance.
 NORMAL_95_ONE_SIDED = 1.6448536269514722
 #: Parameters that move by more of their stated uncertainties are reported, and no effect may drive one so far.
@@ -34,8 +32,6 @@ CLEAR_GAIN = 0.5
 #: Evaluations of a refit with a spring where links bend already: each is a simulation, and a spring that is there gains
 #: most in the first.
 FEW_EVALUATIONS = 6
-#: What leaves up to so many times as much as the best explains the data as well, if it is also little of the whole gap.
-SAME = 1.5
 
 # ---- fits ------------------------------------------------------------------------------------------------------------
 
