@@ -10,11 +10,11 @@ from typing import Any, TypedDict
 from warnings import warn
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis
 from vpm.discrepancy.diagnosis_fields import examined, gaps_of, of_findings, pictures, so_far, traces, unmeasured, where
 from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.findings import Findings
+from vpm.discrepancy.judged_model import Data, Judged
 from vpm.discrepancy.noise.sensor_drift import Drift, sensor_drifts, without_drifts
 from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
 from vpm.discrepancy.preparation import (

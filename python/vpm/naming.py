@@ -4,9 +4,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TypeVar
 
-from vpm.discrepancy.confirmation.confirmation import Data, Judged
 from vpm.discrepancy.diagnosis import RefusedEffect
 from vpm.discrepancy.findings import Findings, Stage
+from vpm.discrepancy.judged_model import Data, Judged
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.ranked_effects import found_by
 from vpm.discrepancy.ranked_effects import notes as notes_of

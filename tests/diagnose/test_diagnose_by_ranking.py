@@ -14,7 +14,7 @@ from synthetic import Truth, nominal, simulate_axis
 from vpm import naming
 from vpm.diagnosing import diagnose
 from vpm.discrepancy import ranked_effects
-from vpm.discrepancy.confirmation.confirmation import unmoved
+from vpm.discrepancy.judged_model import unmoved
 from vpm.errors import DiagnosisError, VpmError
 from vpm.experiment import Experiment
 from vpm.model import Model
@@ -172,7 +172,7 @@ def test_names_that_leave_more_of_an_effort_than_it_is_explain_nothing(
         heavy = ranking(tried("rotor_inertia", {"axis.rotor.inertia": mass}, 0.9, evidence=900.0, probability=0.99))
         seen = replace(heavy, gaps={"axis.position": seen_by_tracker(1.0, 0.1)})
         monkeypatch.setattr(naming, "rank", lambda *_, seen=seen, **__: seen)
-        monkeypatch.setattr(ranked_effects, "judged_anyhow", unmoved)
+        monkeypatch.setattr(ranked_effects, "judged_anyhow", lambda *asked: (unmoved(*asked), ""))
         words.append(diagnose(nominal(), records[0], records[1], workers=1).verdict)
     assert words == ["effect_found", "unexplained"]
 

@@ -1,13 +1,9 @@
-"""Effects with a motion of their own: the step of their screening, their size, and what has to meet them."""
-
-from types import SimpleNamespace
-from typing import Any
+"""Effects with a motion of their own: their inverse dynamics and its derivatives."""
 
 import numpy as np
 
 import vpm
-from vpm.discrepancy.confirmation.confirmation import is_clear
-from vpm.identify import Estimate, InverseDynamicsProblem, Worth, estimate
+from vpm.identify import InverseDynamicsProblem
 
 DT = 1e-3
 AXIS = """
@@ -56,41 +52,3 @@ def test_a_joint_that_winds_up_is_balanced_with_the_memory_of_its_motor_side() -
         sides = [both.with_parameters({name: both.parameters[name].value + sign * step}) for sign in (1.0, -1.0)]
         more, less = (data.evaluate(side, side.theta)[0] for side in sides)
         assert np.linalg.norm(column - (more - less) / (2.0 * step)) < 0.02 * np.linalg.norm(column), name
-
-
-def test_the_size_of_a_play_is_its_width_however_hard_its_contacts_are() -> None:
-    own = ("axis.backlash.gap", "axis.backlash.stiffness", "axis.backlash.contact_damping")
-    model = vpm.Model.from_toml(AXIS).with_effect("backlash", at="axis", gap=2e-3, stiffness=4e3)
-
-    def clear(gap: float) -> bool:
-        stds = np.array([gap, 8e3, 20.0])  # contacts as hard as rigid: no data bound their stiffness from above
-        values = np.array([model.parameters[name].value for name in own])
-        fit = Estimate(own, values, np.zeros(9), np.zeros((9, 3)), np.diag(stds**2), (), (), 1)
-        judged: Any = SimpleNamespace(model=model, free=own, fit=fit)
-        return is_clear(judged, own)
-
-    assert clear(1e-4)
-    assert not clear(2e-3)
-
-
-def test_a_fit_is_lost_if_it_is_late_and_hardly_comes_nearer() -> None:
-    worth = Worth(cost=1.0, evaluations=4)
-    assert not worth.lost([9.0, 8.9, 8.8]), "not late yet"
-    assert worth.lost([9.0, 8.9, 8.8, 8.7])
-    assert not worth.lost([9.0, 8.0, 7.0, 6.0]), "it still comes nearer"
-    assert not worth.lost([9.0, 1.0, 1.0, 1.0]), "it has come near enough"
-
-
-def test_a_fit_without_worth_ends_early_with_the_best_until_then() -> None:
-    """Steep at first and flat afterwards: what it has to reach is out of reach."""
-    model = vpm.Model.from_toml(AXIS).with_effect("spring", at="axis", stiffness=0.5, rest=0.0)
-    truth = model.without_effect("spring", "axis").with_effect("coulomb_friction", at="axis", coulomb=0.2)
-    data = InverseDynamicsProblem(model, [record(truth)])
-    start = model.with_effect("torque_ripple", at="axis", period=0.11, cosine=0.02)
-    free = ("axis.friction.viscous", "axis.ripple.period", "axis.ripple.cosine")
-    whole = estimate(start, data, free, tolerance=1e-14)
-    least = float(whole.residual @ whole.residual)
-    ended = estimate(start, data, free, tolerance=1e-14, worth=Worth(0.5 * least, 3))
-    assert ended.evaluations < whole.evaluations
-    assert not ended.interrupted
-    assert float(ended.residual @ ended.residual) <= 1.05 * least

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 from second_suite.cases import make_case
-from vpm.discrepancy.confirmation.confirmation import Judged, shrinkage
 from vpm.discrepancy.diagnosis import ChannelGap
+from vpm.discrepancy.judged_model import Judged, shrinkage
 from vpm.discrepancy.verdict import Joints
 from vpm.identify import InverseDynamicsProblem
 

@@ -5,7 +5,7 @@ import pytest
 
 from inverse_dynamics import inverse_dynamics_data
 from shared_cases import shared_case
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, judge
+from vpm.discrepancy.judged_model import Data, Judged, judged_anyhow
 from vpm.discrepancy.remainder.remainder import Remainder, remainder
 from vpm.discrepancy.remainder.seal_friction import seals
 
@@ -17,14 +17,14 @@ def loaded(hidden: str, seed: int) -> tuple[Data, Judged, Judged, float]:
     """Records of a servo-cylinder, its model without and with a constant force beside dry friction, and the truth."""
     case = shared_case("servo_cylinder", hidden, seed)
     model, free, data = inverse_dynamics_data(case)
-    without = judge(model, free, data, {})
+    without, _ = judged_anyhow(model, free, data, {})
     named, own = without.model, ["axis.bias.force"]
     if "axis.friction.coulomb" not in model.parameters:
         named, own = (
             named.with_effect("coulomb_friction", at="axis", transition_velocity=1e-3),
             [*own, "axis.friction.coulomb"],
         )
-    found = judge(named.with_effect("bias_force", at="axis"), (*free, *own), data, {})
+    found, _ = judged_anyhow(named.with_effect("bias_force", at="axis"), (*free, *own), data, {})
     return data, without, found, next(iter(case.truth.hidden[0].parameters.values()))
 
 
@@ -68,7 +68,7 @@ def test_a_constant_force_that_is_there_stays_the_explanation() -> None:
 def test_it_is_told_at_the_right_cylinder_of_a_leg() -> None:
     case = shared_case("hydraulic_leg", "pressure_dependent_friction@knee_drive", 21)
     model, free, data = inverse_dynamics_data(case)
-    told_of = seals(judge(model, free, data, {}), data)
+    told_of = seals(judged_anyhow(model, free, data, {})[0], data)
     assert told_of is not None
     assert told_of.drive == "knee_drive"
     assert np.isclose(told_of.share * PISTON, case.truth.hidden[0].parameters["area"], rtol=0.1)

@@ -49,7 +49,7 @@ def test_what_noise_hides_is_no_evidence_that_nothing_is_missing(floor: float, s
 @pytest.mark.parametrize(("after", "word"), [(0.1, "effect_found"), (0.9, "unexplained")])
 def test_without_efforts_an_effect_that_leaves_the_error_explains_nothing(after: float, word: str) -> None:
     """An observer alone tells what is left: a share of 0.81 of the error power is no explanation."""
-    effect: Any = SimpleNamespace(key=("lugre_friction", "shaft"), trial=SimpleNamespace())
+    effect: Any = SimpleNamespace(key=("lugre_friction", "shaft"))
     effect.label = "lugre_friction at shaft"
     model: Any = SimpleNamespace(effects=(), bodies=(), joints=("shaft",), parameters={}, joint_behind={}.get)
     final: Any = SimpleNamespace(model=model, free=(), fit=SimpleNamespace(std=(), unseen=()))
@@ -66,7 +66,7 @@ def test_an_effect_that_leaves_the_deflection_behind_its_joint_explains_nothing(
 
     Errors are those of its record; the noise of the link's encoder is 2e-4 rad.
     """
-    effect: Any = SimpleNamespace(key=("cubic_spring", "knee"), trial=SimpleNamespace())
+    effect: Any = SimpleNamespace(key=("cubic_spring", "knee"))
     effect.label = "cubic_spring at knee"
     model: Any = SimpleNamespace(
         effects=(), bodies=(), joints=("knee",), parameters={}, joint_behind=lambda joint: f"{joint}_deflection"
@@ -98,7 +98,7 @@ def test_an_effect_that_leaves_the_deflection_behind_its_joint_explains_nothing(
 )
 def test_a_play_that_does_most_of_the_work_is_the_explanation(effect: str, left: float, word: str) -> None:
     """Its impacts are no more where they were in the log, and the residual with it is as large as without."""
-    entry: Any = SimpleNamespace(key=(effect, "shoulder"), trial=SimpleNamespace())
+    entry: Any = SimpleNamespace(key=(effect, "shoulder"))
     entry.label = f"{effect} at shoulder"
     added: Any = SimpleNamespace(type=EFFECTS[effect], at="shoulder")
     model: Any = SimpleNamespace(

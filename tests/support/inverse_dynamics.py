@@ -1,7 +1,7 @@
 """Inverse-dynamics problems of a blind case, without simulations."""
 
 from blind import Case
-from vpm.discrepancy.confirmation.confirmation import Data
+from vpm.discrepancy.judged_model import Data
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 

@@ -10,7 +10,6 @@ import numpy as np
 from vpm.catalogue import EFFECTS
 from vpm.catalogue.kinds import Side, in_words
 from vpm.compare import compare
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, in_time, weaker
 from vpm.discrepancy.diagnosis import (
     OBSERVED,
     AcceptedEffect,
@@ -22,11 +21,13 @@ from vpm.discrepancy.diagnosis import (
     Trace,
 )
 from vpm.discrepancy.findings import Accepted, Findings, Stage, ambiguities
+from vpm.discrepancy.judged_model import Data, Judged, weaker
 from vpm.discrepancy.noise.noise_floor import Structure, noise_floor, structure
 from vpm.discrepancy.preparation import Records
 from vpm.discrepancy.ranked_effects import candidates_of, refused_by, tracker_gaps
 from vpm.discrepancy.rivals.ambiguity import Rivals, listed
 from vpm.discrepancy.screening.candidates import Key
+from vpm.discrepancy.shifted_commands import in_time
 from vpm.identify import Fit, InverseDynamicsProblem, OutputErrorProblem, Problem, gaps
 from vpm.identify.fit_result import fit_of
 from vpm.model import Model
@@ -119,7 +120,7 @@ def examined(
     """Noise floor, errors at all stages and residual structure of the final model: fields of a diagnosis."""
     floor = noise_floor(final.model, data.validation, final.validation, mode, setup)
     timed = in_time(final, data)
-    left = structure(final.model, data.training, data.validation, timed.fitted, timed.validation)
+    left = structure(final.model, data.training, data.validation, timed.fit.residual, timed.validation)
     return floor, gaps_of(data, nominal, recalibrated, final, floor), left
 
 
@@ -130,19 +131,18 @@ def _signal(problem: InverseDynamicsProblem | OutputErrorProblem, channel: str) 
 
 def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
     """Field of a diagnosis: an accepted effect with its estimates in the final model, and its evidence."""
-    probe, candidate = entry.trial.probe, entry.trial.probe.candidate
+    measured = entry.measured
     deviations = dict(zip(final.free, map(float, final.fit.std), strict=True))
-    estimates = _estimates(final.model, candidate.key, entry.side, lambda dotted: deviations.get(dotted, 0.0))
-    notes = [f"{alias.parameter} held: not discriminated from {alias.partner}" for alias in entry.trial.held]
-    if probe.invisible and not (probe.free or probe.held):
+    estimates = _estimates(final.model, entry.key, entry.side, lambda dotted: deviations.get(dotted, 0.0))
+    notes = [f"{alias.parameter} held: not discriminated from {alias.partner}" for alias in measured.held]
+    if measured.invisible and not (measured.free or measured.held):
         notes.append("that is a share of the inverse-dynamics residual, which does not show it; see the observed gaps")
     return AcceptedEffect(
-        candidate.effect.name,
-        candidate.site,
-        _sentence(candidate.key, entry.side, estimates),
+        *entry.key,
+        _sentence(entry.key, entry.side, estimates),
         estimates,
-        entry.trial.validation.relative,
-        entry.trial.validation.score,
+        measured.validation.relative,
+        measured.validation.score,
         (*notes, *(f"not discriminated from it: {rival}" for rival in entry.rivals)),
         entry.probability,
         entry.evidence,
@@ -169,7 +169,7 @@ def classes(accepted: Sequence[Accepted], ambiguous: Sequence[Rivals]) -> tuple[
     beside = {(rivals.effect, rivals.site): rivals.trials for rivals in ambiguous}
     found = []
     for entry in accepted:
-        others = (*entry.rivals, *(trial.probe.candidate.label for trial in beside.get(entry.key, ())))
+        others = (*entry.rivals, *(trial.label for trial in beside.get(entry.key, ())))
         if others:
             found.append(tuple(dict.fromkeys((entry.label, *others))))
     return tuple(found)

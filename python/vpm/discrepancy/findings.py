@@ -5,22 +5,47 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from vpm.catalogue import EffectType
 from vpm.catalogue.kinds import Side, in_words
-from vpm.discrepancy.confirmation.confirmation import Judged, Trial
 from vpm.discrepancy.diagnosis import Ambiguity, RankedCandidate, RefusedEffect
+from vpm.discrepancy.judged_model import Judged
 from vpm.discrepancy.screening.candidates import Key
+from vpm.identify import Gain
 from vpm.model import Model
 
 
 @dataclass(frozen=True)
+class Alias:
+    """Parameter held at its start, because data show it only together with another one."""
+
+    parameter: str
+    partner: str
+
+
+@dataclass(frozen=True)
+class Measured:
+    """Measured effect: the model with it, refitted, and its gain on validation records."""
+
+    key: Key
+    judged: Judged
+    validation: Gain
+    free: tuple[str, ...]  #: Dotted names of the effect's parameters that the residual identifies.
+    held: tuple[Alias, ...] = ()  #: Those that it does not discriminate from others.
+    invisible: tuple[str, ...] = ()  #: Those without any influence on it.
+
+    @property
+    def label(self) -> str:
+        """Label of a measured effect: ``effect at site``."""
+        return " at ".join(self.key)
+
+
+@dataclass(frozen=True)
 class Accepted:
-    """Accepted effect: the trial that was chosen, and rivals that would do as well.
+    """Accepted effect as it was measured, and rivals that would do as well.
 
     With its evidence in nats, its probability and its side of a joint that is split.
     """
 
-    trial: Trial
+    measured: Measured
     rivals: tuple[str, ...]
     evidence: float = float("nan")
     probability: float = float("nan")
@@ -29,18 +54,13 @@ class Accepted:
 
     @property
     def key(self) -> Key:
-        """Effect and site of an accepted candidate."""
-        return self.trial.probe.candidate.key
-
-    @property
-    def effect(self) -> EffectType:
-        """Catalogue entry of an accepted candidate."""
-        return self.trial.probe.candidate.effect
+        """Effect and site of an accepted effect."""
+        return self.measured.key
 
     @property
     def label(self) -> str:
-        """Label of an accepted candidate: ``effect at site``, with its side behind what gives way."""
-        return in_words(self.trial.probe.candidate.label, self.side)
+        """Label of an accepted effect: ``effect at site``, with its side behind what gives way."""
+        return in_words(self.measured.label, self.side)
 
 
 @dataclass(frozen=True)
@@ -80,11 +100,10 @@ def ambiguities(accepted: Sequence[Accepted]) -> tuple[Ambiguity, ...]:
     """Ambiguities of the findings: rivals of an accepted effect in its round, and parameters held beside it."""
     found = []
     for entry in accepted:
-        candidate = entry.trial.probe.candidate
         if entry.rivals:
             reason = "the records do not discriminate them"
-            found.append(Ambiguity(candidate.effect.name, candidate.site, entry.rivals, reason))
-        for alias in entry.trial.held:
+            found.append(Ambiguity(*entry.key, entry.rivals, reason))
+        for alias in entry.measured.held:
             reason = f"{alias.parameter} was held at its start: these data show it only together with {alias.partner}"
-            found.append(Ambiguity(candidate.effect.name, candidate.site, (alias.partner,), reason))
+            found.append(Ambiguity(*entry.key, (alias.partner,), reason))
     return tuple(found)

@@ -13,7 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
+from vpm.discrepancy.judged_model import Data, Judged, judged_anyhow
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import shares_at, slow_share, slow_speeds
 from vpm.discrepancy.settings import FAR, HELD_OUT, QUICKER, REACH, WIDER

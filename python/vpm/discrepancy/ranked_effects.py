@@ -15,17 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vpm.catalogue import EFFECTS
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, Trial, judged_anyhow, measured, unmoved
 from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RankedCandidate, RefusedEffect
-from vpm.discrepancy.findings import Accepted, Findings, Stage
+from vpm.discrepancy.findings import Accepted, Alias, Findings, Measured, Stage
+from vpm.discrepancy.judged_model import Data, Judged, judged_anyhow, shrinkage, unmoved
 from vpm.discrepancy.rivals.ambiguity import Rivals
 from vpm.discrepancy.screening.candidates import Candidate, Key, asked_for, candidates
 from vpm.discrepancy.screening.compliance_and_stop_start import beyond
-from vpm.discrepancy.screening.probe import Probe, sort_columns
-from vpm.discrepancy.settings import LEAST_GAIN, NORMAL_95_ONE_SIDED
+from vpm.discrepancy.settings import LEAST_GAIN, NORMAL_95_ONE_SIDED, ROUNDED
 from vpm.errors import VpmError
 from vpm.identify import gain, segments
-from vpm.identify.identifiability import Span
+from vpm.identify.identifiability import Span, closest_column, is_alias
 from vpm.identify.response_along_motion import joints_with_play
 from vpm.model import Effect, Model
 from vpm.numbers import Array, power
@@ -82,7 +81,7 @@ def found_by(
     def offered(final: Judged) -> tuple[Candidate, ...]:
         return candidates(final.model, data.training, final.fit.residual, asked_for(effects))
 
-    def beside(current: Judged, model: Model, one: Ranked) -> Trial:
+    def beside(current: Judged, model: Model, one: Ranked) -> Measured:
         try:
             return _beside(current, model, one, data)
         except VpmError as error:
@@ -101,7 +100,7 @@ def found_by(
 def staged(
     ranking: Ranking,
     recalibrated: Judged,
-    beside: Callable[[Judged, Model, Ranked], Trial],
+    beside: Callable[[Judged, Model, Ranked], Measured],
     offered: Callable[[Judged], tuple[Candidate, ...]],
     settings: RankingSettings,
 ) -> Findings:
@@ -122,15 +121,17 @@ def staged(
         for place, one in enumerate(ranking.effects):
             gone = [*lost, *ranking.effects[place + 1 :]]
             try:
-                trial = beside(stages[-1].judged, _without(ranking.model, gone), one)
+                measured = beside(stages[-1].judged, _without(ranking.model, gone), one)
             except NoResidualError:
                 raise
             except VpmError as error:
                 outside[one.key] = f"it {_removes(one)}, but no residual can be computed: {error}"
                 lost.append(one)
                 continue
-            accepted.append(Accepted(trial, one.rivals, one.evidence, one.probability, one.side, one.class_probability))
-            stages.append(Stage("added", *one.key, trial.judged))
+            accepted.append(
+                Accepted(measured, one.rivals, one.evidence, one.probability, one.side, one.class_probability)
+            )
+            stages.append(Stage("added", *one.key, measured.judged))
         if ranking.rounds:
             outside |= _unpromising(ranking, stages[-1].judged.model, offered(stages[-1].judged))
     except KeyboardInterrupt:
@@ -142,7 +143,7 @@ def staged(
             for one in ranking.effects
             if one.key not in known
         }
-    gains = {entry.key: entry.trial.validation.relative for entry in accepted}
+    gains = {entry.key: entry.measured.validation.relative for entry in accepted}
     refused, tried = refused_by(ranking, outside, settings), candidates_of(ranking, gains, settings)
     return Findings(
         tuple(stages),
@@ -163,7 +164,7 @@ def _without(model: Model, gone: Sequence[Ranked]) -> Model:
     return model
 
 
-def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
+def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Measured:
     """Model with one more ranked effect, refitted as far as the inverse-dynamics residual shows its parameters.
 
     A parameter moves if the residual tells it from all others at these values, and stays where it is if not. The refit
@@ -171,23 +172,43 @@ def _beside(current: Judged, model: Model, one: Ranked, data: Data) -> Trial:
 
     Raises VpmError: efforts cannot be balanced in this model.
     """
-    candidate = _candidate(current, one, data)
     known, own = fitted_in(current, model, one)
     residual, columns = data.training.evaluate(model, model.theta, [model.index(name) for name in (*known, *own)])
     visible = _has_derivatives(columns)
     beside, fresh = columns[:, : len(known)][:, visible[: len(known)]], np.where(visible, columns, 0.0)[:, len(known) :]
     known = tuple(compress(known, visible))
-    split = len(known)
-    sizes = np.array([abs(model.parameters[name].value) or 1.0 for name in (*known, *own)])
-    keep, held, blind = sort_columns(
-        own, fresh, Span.of(beside), (known, beside), residual, (sizes[:split], sizes[split:])
+    moving, held, invisible = _sorted(model, (known, beside), (own, fresh), residual)
+    judged = _refitted(current, model, one, (*known, *moving), data)
+    validation = judged.validation * shrinkage(data.validation, current, judged)
+    gained = gain(current.validation, validation, segments(data.validation))
+    return Measured(one.key, judged, gained, moving, held, invisible)
+
+
+def _sorted(
+    model: Model, known: tuple[Sequence[str], Array], added: tuple[Sequence[str], Array], residual: Array
+) -> tuple[tuple[str, ...], tuple[Alias, ...], tuple[str, ...]]:
+    """Parameters of a ranked effect that the residual identifies, confuses with others, and does not show.
+
+    ``known`` and ``added`` are names and columns. Lengths are those of changes as large as the values, without which SI
+    units would decide what is small.
+    """
+    (names, columns), (own, fresh) = known, added
+    span = Span.of(columns)
+    lengths, others = (
+        np.linalg.norm(part, axis=0) * [abs(model.parameters[name].value) or 1.0 for name in several]
+        for several, part in ((own, fresh), known)
     )
-    moving = tuple(own[place] for place in keep)
-    values = {name: model.parameters[name].value for name in own}
-    probe = Probe(candidate, model, moving, held, blind, values, dict.fromkeys(own, np.nan), np.nan)
-    free = (*known, *moving)
-    judged, diverged = _refitted(current, model, candidate, one, free, data)
-    return measured(current, data, probe, judged, moving, held, diverged)
+    largest = float(np.max([*others, *lengths], initial=0.0))
+    visible = [i for i in range(len(own)) if lengths[i] > ROUNDED * largest]
+    keep, held = list(visible), []
+    for i in visible:
+        rest = [j for j in keep if j != i]
+        if is_alias(fresh[:, i], span.beside(fresh[:, rest]), residual):
+            closest = closest_column(fresh[:, i], np.column_stack([columns, fresh[:, rest]]))
+            held.append(Alias(own[i], [*names, *(own[j] for j in rest)][closest]))
+            keep.remove(i)
+    invisible = tuple(name for i, name in enumerate(own) if i not in visible)
+    return tuple(own[i] for i in keep), tuple(held), invisible
 
 
 def _has_derivatives(columns: Array) -> NDArray[np.bool_]:
@@ -196,29 +217,20 @@ def _has_derivatives(columns: Array) -> NDArray[np.bool_]:
         return np.asarray(np.isfinite(np.sum(columns**2, axis=0)))
 
 
-def _refitted(
-    current: Judged, model: Model, candidate: Candidate, one: Ranked, free: tuple[str, ...], data: Data
-) -> tuple[Judged, str]:
+def _refitted(current: Judged, model: Model, one: Ranked, free: tuple[str, ...], data: Data) -> Judged:
     """Refit of ranked effects, or the ranking's own values where these predict better."""
-    bounds = _bounds(current, model, candidate, one)
-    still, stopped = unmoved(model, free, data, bounds)
-    judged, diverged = judged_anyhow(model, free, data, bounds)
+    bounds = _bounds(current, model, one, data)
+    still = unmoved(model, free, data, bounds)
+    judged, _ = judged_anyhow(model, free, data, bounds)
     if judged.simulated is None and still.simulated is not None:
-        return still, stopped
+        return still
     if power(judged.fit.residual) > power(still.fit.residual):
-        return still, stopped
+        return still
     if data.simulation is not None and judged.simulated is not None and still.simulated is not None:
         gained = gain(still.simulated, judged.simulated, segments(data.simulation))
         if gained.relative < -LEAST_GAIN and gained.harm > NORMAL_95_ONE_SIDED:
-            return still, stopped
-    return judged, diverged
-
-
-def _candidate(current: Judged, one: Ranked, data: Data) -> Candidate:
-    """Candidate for a ranked effect, with the bounds that data give its shape, or None."""
-    listed = candidates(current.model, data.training, current.fit.residual, [one.effect])
-    plain = Candidate(EFFECTS[one.effect], one.site, ({},))
-    return next((each for each in listed if each.key == one.key), plain)
+            return still
+    return judged
 
 
 def fitted_in(current: Judged, model: Model, one: Ranked) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -250,12 +262,14 @@ def _renamed(old: Model, new: Model) -> dict[str, str]:
     return names
 
 
-def _bounds(current: Judged, model: Model, candidate: Candidate, one: Ranked) -> dict[str, tuple[float, float]]:
+def _bounds(current: Judged, model: Model, one: Ranked, data: Data) -> dict[str, tuple[float, float]]:
     """Bounds of a ranked effect's shape from the data, wide enough for the values of the ranking."""
+    listed = candidates(current.model, data.training, current.fit.residual, [one.effect])
+    shape = next((each.bounds for each in listed if each.key == one.key), {})
     renamed = _renamed(current.model, model)
     given = {renamed.get(name, name): pair for name, pair in current.bounds.items()}
     names = model.effect(*one.key, one.side).parameter_names
-    given.update({names[short]: pair for short, pair in candidate.bounds.items() if short in names})
+    given.update({names[short]: pair for short, pair in shape.items() if short in names})
     found = {}
     for name, (low, high) in given.items():
         if name in model.parameters:
@@ -288,7 +302,7 @@ def _tried(ranking: Ranking, key: Key, label: str) -> Ranked:
     return next(one for one in several if f"{one.effect} at {one.site}" == label)
 
 
-def _placed(rival: Ranked, final: Judged, entry: Accepted, data: Data) -> Trial:
+def _placed(rival: Ranked, final: Judged, entry: Accepted, data: Data) -> Measured:
     """Model with a rival in the place of a ranked effect, beside all others.
 
     Raises VpmError: it cannot stand there.
@@ -406,5 +420,5 @@ def candidates_of(
 
 def notes(accepted: Sequence[Accepted]) -> list[str]:
     """Notes on parameters that only the ranking could estimate."""
-    blind = [", ".join(entry.trial.probe.invisible) for entry in accepted if entry.trial.probe.invisible]
+    blind = [", ".join(entry.measured.invisible) for entry in accepted if entry.measured.invisible]
     return [f"{names}: as the ranking fitted it, for the inverse-dynamics residual does not show it" for names in blind]

@@ -5,8 +5,6 @@
 
 #: Probability of accepting any effect by chance, shared among all candidates that are tried.
 FALSE_ALARM_LEVEL = 0.01
-#: Significance asked of an effect's size on the training data.
-SIZE_LEVEL = 0.05
 #: One-sided 95 % quantile of the normal distribution: what is worse by less is worse by chance.
 NORMAL_95_ONE_SIDED = 1.6448536269514722
 #: Parameters that move by more of their stated uncertainties are reported, and no effect may drive one so far.
@@ -15,7 +13,7 @@ FAR = 3.0
 # ---- shares of a mean square -----------------------------------------------------------------------------------------
 
 #: Share of a signal below which neither a residual nor an instrument's error means anything: links are cut into pieces
-#: and gauges calibrated to no better. A candidate that promises less of the training error is not refitted.
+#: and gauges calibrated to no better.
 NEGLIGIBLE = 0.005
 #: An effect that does less than this share of what was measured is none: no law is as exact, nor a lever or a ratio.
 SLIGHT = 0.003
@@ -28,14 +26,11 @@ WORTH_A_NAME = 0.1
 #: Below this gain most of the residual is something else, which an effect might merely imitate: the evidence then has
 #: to be this many times as strong.
 MODEST_GAIN, MODEST_FACTOR = 0.3, 3.0
-#: From this gain on an effect does most of the work: on a machine of several joints, where errors of two missing
-#: effects cancel in a simulation, the residual decides alone; a delay is named whatever the timing of samples.
+#: From this gain on an effect does most of the work.
 CLEAR_GAIN = 0.5
 #: Evaluations of a refit with a spring where links bend already: each is a simulation, and a spring that is there gains
 #: most in the first.
 FEW_EVALUATIONS = 6
-#: What leaves up to so many times as much as the best explains the data as well, if it is also little of the whole gap.
-SAME = 1.5
 
 # ---- fits ------------------------------------------------------------------------------------------------------------
 

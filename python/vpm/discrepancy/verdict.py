@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import ndtri
 
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
 from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RefusedEffect
 from vpm.discrepancy.findings import Accepted, Findings, Stage
+from vpm.discrepancy.judged_model import Data, Judged, judged_anyhow
 from vpm.discrepancy.noise.noise_floor import Structure
 from vpm.discrepancy.preparation import is_as_stated, ruled_out, ruled_out_together, stated
 from vpm.discrepancy.remainder.remainder import Remainder

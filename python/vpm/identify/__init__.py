@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from vpm.identify.comparison import FIT_MODES, problem
-from vpm.identify.estimation import Estimate, Worth, estimate
+from vpm.identify.estimation import Estimate, estimate
 from vpm.identify.export import write_fit
 from vpm.identify.fit import identify
 from vpm.identify.fit_result import Fit
@@ -52,7 +52,6 @@ __all__ = [
     "Profile",
     "ShootingProblem",
     "Whiteness",
-    "Worth",
     "bootstrap",
     "estimate",
     "gain",

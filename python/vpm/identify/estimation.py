@@ -26,11 +26,6 @@ from vpm.numbers import Array
 #: Evaluations after which a fit is ended as it stands.
 MOST_EVALUATIONS = 40
 
-#: A fit that lowers the sum of squares by less than this share in half of the evaluations that it has to show its worth
-#: hardly comes nearer.
-PROGRESS = 0.05
-#: The same for a fit that has shown its worth: towards a bound, steps shrink with the distance and never end.
-CREEPING = 0.002
 #: Share of the sum of squares by which a step of a descent falls that decides nothing any more.
 FLAT = 1e-4
 #: Share by which the sum of squares may grow along a direction that the data cannot see.
@@ -45,7 +40,7 @@ Progress = Callable[[int, float], None]
 
 @dataclass(frozen=True)
 class Estimate:
-    """Result of one least-squares run, as arrays over the free parameters; ``early`` if `Worth` ended it."""
+    """Result of one least-squares run, as arrays over the free parameters."""
 
     names: tuple[str, ...]
     values: Array
@@ -56,7 +51,6 @@ class Estimate:
     at_bounds: tuple[str, ...]
     evaluations: int
     interrupted: bool = False
-    early: bool = False
 
     @property
     def std(self) -> Array:
@@ -80,7 +74,6 @@ def estimate(
     linear_only: bool = False,
     progress: Progress | None = None,
     most_evaluations: int = MOST_EVALUATIONS,
-    worth: Worth | None = None,
     nearest: bool = False,
 ) -> Estimate:
     """Estimate ``free`` parameters of ``model``: the residual of ``data`` becomes least.
@@ -103,8 +96,6 @@ def estimate(
         Stop after the first step.
     most_evaluations : int
         Where to stop in any case.
-    worth : Worth, optional
-        A fit that has not reached it in time ends with the best values until then.
     nearest : bool
         Leave what nothing shows where it was.
 
@@ -118,7 +109,7 @@ def estimate(
 
     def among(bodies: tuple[Coordinates, Array, Array]) -> Estimate:
         frame, *ends = bodies
-        counter = _Counter(model, data, columns, progress, worth, frame)
+        counter = _Counter(model, data, columns, progress, frame)
         found = _started(counter, (ends[0], ends[1]), tolerance, most_evaluations, linear_only, nearest)
         return replace(found, at_bounds=touching(free, found.values, *box, near=NEAR_ZERO))
 
@@ -138,7 +129,7 @@ def _started(
     model, data, free = counter.model, counter.data, counter.names
     frame, (low, high) = counter.frame, box
     first = start = np.clip(frame.at(model.theta[counter.columns]), low, high)
-    interrupted = early = False
+    interrupted = False
     try:
         if counter.columns:
             start = _linear_step(counter, start, low, high)
@@ -149,16 +140,15 @@ def _started(
         # Derivatives may leave all bounds where the motion itself does not; the best with derivatives stands then.
         if counter.best is not None and not np.all(np.isfinite(residual)):
             start, (residual, jacobian) = counter.best
-    except (KeyboardInterrupt, _HopelessError) as reason:
+    except KeyboardInterrupt:
         if counter.best is None:
             raise
         start, (residual, jacobian) = counter.best
-        interrupted = isinstance(reason, KeyboardInterrupt)
-        early = not interrupted
+        interrupted = True
     values, jacobian = frame.parameters(start), frame.by_parameters(jacobian)
     unseen = unseen_combinations(jacobian, free)
     covariance = _covariance(data, residual, jacobian, unseen, free)
-    return Estimate(tuple(free), values, residual, jacobian, covariance, unseen, (), counter.count, interrupted, early)
+    return Estimate(tuple(free), values, residual, jacobian, covariance, unseen, (), counter.count, interrupted)
 
 
 def standing(model: Model, data: Problem, free: Sequence[str]) -> Estimate:
@@ -192,39 +182,6 @@ def beside_stated(found: Estimate, model: Model, data: Problem) -> Estimate:
     return replace(found, covariance=covariance + moved @ moved.T)
 
 
-@dataclass(frozen=True)
-class Worth:
-    """Sum of squares that a fit has to reach within so many evaluations to be worth its time."""
-
-    cost: float  #: Sum of squares that it is to reach.
-    evaluations: int  #: Number of evaluations after which it ends if it has not, and hardly comes nearer.
-
-    def lost(self, reached: Sequence[float]) -> bool:
-        """Whether an estimation is lost: its sums of squares are far from the goal and hardly come nearer."""
-        return reached[-1] > self.cost and self._hardly_nearer(reached, PROGRESS)
-
-    def creeps(self, reached: Sequence[float]) -> bool:
-        """Whether an estimation creeps: its sums of squares still fall, but by so little that it decides nothing."""
-        return self._hardly_nearer(reached, CREEPING)
-
-    def _hardly_nearer(self, reached: Sequence[float], progress: float) -> bool:
-        late = len(reached) >= self.evaluations
-        return late and reached[-1] > (1.0 - progress) * reached[-1 - self.evaluations // 2]
-
-
-class _HopelessError(Exception):
-    """A fit ended early, because it has not reached what makes it worth its time."""
-
-
-@dataclass(frozen=True)
-class _Point:
-    """Values of the free parameters, and the residual there with its derivative, if that was asked for."""
-
-    x: Array
-    residual: Array
-    slopes: Array | None
-
-
 class _Counter:
     """Evaluates the problem at given values of the free parameters; remembers the last points and the best.
 
@@ -237,29 +194,25 @@ class _Counter:
         data: Problem,
         columns: list[int],
         progress: Progress | None,
-        worth: Worth | None = None,
-        frame: Coordinates | None = None,
+        frame: Coordinates,
     ) -> None:
-        self.frame = frame or Coordinates()
-        self.model, self.data, self.columns, self.progress, self.worth = model, data, columns, progress, worth
+        self.model, self.data, self.columns, self.progress, self.frame = model, data, columns, progress, frame
         self.theta = model.theta.copy()
         self.count = 0
-        self._tried: _Point | None = None
-        self._whole: _Point | None = None
+        self._tried: tuple[Array, Array] | None = None
+        self._whole: tuple[Array, tuple[Array, Array]] | None = None
         self.best: tuple[Array, tuple[Array, Array]] | None = None
         self._least = np.inf
-        self._reached: list[float] = []
 
     def __call__(self, x: Array) -> tuple[Array, Array]:
-        known = self._whole
-        if known is not None and known.slopes is not None and np.array_equal(x, known.x):
-            return known.residual, known.slopes
+        if self._whole is not None and np.array_equal(x, self._whole[0]):
+            return self._whole[1]
         residual, slopes = self._evaluate(x, self.columns)
-        if self._tried is None or not np.array_equal(x, self._tried.x):
+        if self._tried is None or not np.array_equal(x, self._tried[0]):
             self._count(residual)
-        self._whole = _Point(x.copy(), residual, slopes)
+        self._whole = x.copy(), (residual, slopes)
         if (cost := float(residual @ residual)) < self._least:
-            self._least, self.best = cost, (self._whole.x, (residual, slopes))
+            self._least, self.best = cost, self._whole
         return residual, slopes
 
     @property
@@ -267,12 +220,13 @@ class _Counter:
         return [self.model.parameter_names[column] for column in self.columns]
 
     def residual(self, x: Array) -> Array:
-        for known in (self._tried, self._whole):
-            if known is not None and np.array_equal(x, known.x):
-                return known.residual
+        if self._tried is not None and np.array_equal(x, self._tried[0]):
+            return self._tried[1]
+        if self._whole is not None and np.array_equal(x, self._whole[0]):
+            return self._whole[1][0]
         residual, _ = self._evaluate(x, [])
         self._count(residual)
-        self._tried = _Point(x.copy(), residual, None)
+        self._tried = x.copy(), residual
         return residual
 
     def jacobian(self, x: Array) -> Array:
@@ -289,11 +243,8 @@ class _Counter:
 
     def _count(self, residual: Array) -> None:
         self.count += 1
-        self._reached.append(min([float(residual @ residual), *self._reached[-1:]]))
         if self.progress is not None:
             self.progress(self.count, float(np.sqrt(np.mean(residual**2))))
-        if self.worth is not None and (self.worth.lost(self._reached) or self.worth.creeps(self._reached)):
-            raise _HopelessError
 
     def _evaluate(self, x: Array, columns: list[int]) -> tuple[Array, Array]:
         """Evaluate for an estimation; infinite where the values make no machine."""

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from vpm.errors import DivergedError
-from vpm.identify.estimation import Estimate, Worth, estimate
+from vpm.identify.estimation import Estimate, estimate
 from vpm.identify.inverse_dynamics import InverseDynamicsProblem
 from vpm.identify.response_along_motion import bends, has_hidden, has_own_drives, joints_with_play, shows_drives_alone
 from vpm.model import Model
@@ -55,16 +55,13 @@ def estimate_on_tangent(
     *,
     bounds: Mapping[str, tuple[float, float]],
     tolerance: float,
-    worth: Worth | None = None,
 ) -> Estimate:
     """A fit on one tangent after the other, until where it ends the tangent still holds.
 
     - ``origin``: shape (P,), where the tangent touches
-    - ``worth``: a fit of drives that has not reached it after a whole step, nor was to by the tangent, ends there
     """
     residual, _ = data.evaluate(model, model.theta)
     cost, at, columns = float(residual @ residual), model, [model.index(name) for name in free]
-    early = False
     flying = bool(joints_with_play(model)) and not bends(model)
     flying = flying and has_hidden(model, data.motions[0].joints)
     for _ in range(FLYING if flying else TANGENTS):
@@ -83,12 +80,8 @@ def estimate_on_tangent(
         near = share == 1.0 and np.linalg.norm(residual - rough.residual) <= OFF * np.linalg.norm(residual)
         if near or rough.interrupted:
             break
-        least = float(min(residual @ residual, rough.residual @ rough.residual))
-        early = worth is not None and share == 1.0 and drives_on_tangent(model, data) and least > worth.cost
-        if early:
-            break
         cost, at, origin = float(residual @ residual), reached, reached.theta
-    return replace(rough, values=reached.theta[columns], residual=residual, early=early)
+    return replace(rough, values=reached.theta[columns], residual=residual)
 
 
 def _on_the_way(start: Array, end: Array, share: float) -> Array:

@@ -7,18 +7,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from vpm.catalogue import EFFECTS
-from vpm.discrepancy.confirmation.confirmation import Judged, Trial, is_clear
 from vpm.discrepancy.diagnosis import Diagnosis, Trace
 from vpm.discrepancy.diagnosis_fields import of_findings, so_far
+from vpm.discrepancy.findings import Measured
+from vpm.discrepancy.judged_model import Judged
 from vpm.discrepancy.preparation import Records, moved_far
 from vpm.discrepancy.ranked_effects import fitted_in, staged, tracker_gaps
 from vpm.discrepancy.screening.candidates import Candidate, asked_for, candidates
-from vpm.discrepancy.screening.probe import Probe
 from vpm.discrepancy.verdict import only_if_open, verdict, without_effects
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
-from vpm.identify import Estimate, InverseDynamicsProblem, estimate, gain, gaps, segments
+from vpm.identify import Estimate, InverseDynamicsProblem, estimate, gain, segments
 from vpm.identify.estimation import beside_stated, standing
 from vpm.model import Model
 from vpm.ranking.result import Ranked, Ranking
@@ -148,7 +147,7 @@ def _standing(model: Model, free: tuple[str, ...], training: TrackerResidual) ->
         return replace(still, names=free, values=values, jacobian=jacobian, covariance=unknown)
 
 
-def _beside(current: Judged, model: Model, one: Ranked, data: _Followed, *, refit: bool) -> Trial:
+def _beside(current: Judged, model: Model, one: Ranked, data: _Followed, *, refit: bool) -> Measured:
     """Model with a ranked effect, measured by tracker on validation records.
 
     Values of the ranking are those beside all that it found. Where a part of that is left out, one linear step fits the
@@ -167,20 +166,8 @@ def _beside(current: Judged, model: Model, one: Ranked, data: _Followed, *, refi
             raise KeyboardInterrupt
         moved = _judged(first.on(model), judged.free, data)
         judged = min(judged, moved, key=lambda each: float(each.fit.residual @ each.fit.residual))
-    values = {name: model.parameters[name].value for name in own}
-    candidate = Candidate(EFFECTS[one.effect], one.site, ({},))
-    return Trial(
-        Probe(candidate, model, own, (), (), values, dict.fromkeys(own, np.nan), np.nan),
-        judged,
-        own,
-        (),
-        gain(current.fit.residual, judged.fit.residual, segments(data.training)),
-        gain(current.validation, judged.validation, segments(data.validation)),
-        None,
-        "",
-        not np.isnan(judged.fit.covariance).any() and is_clear(judged, own),
-        error=max(share for _, share, _ in gaps(data.validation, current.validation).values()),
-    )
+    gained = gain(current.validation, judged.validation, segments(data.validation))
+    return Measured(one.key, judged, gained, own)
 
 
 def _offered(final: Judged, data: _Followed, effects: Sequence[str] | None) -> tuple[Candidate, ...]:

@@ -9,8 +9,8 @@ from scipy.linalg import block_diag
 
 from vpm.catalogue import without_law
 from vpm.catalogue.empirical import TERMS
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, judged_anyhow
 from vpm.discrepancy.diagnosis import Empirical, EmpiricalTerm
+from vpm.discrepancy.judged_model import Data, Judged, judged_anyhow
 from vpm.discrepancy.remainder.sparse_formula import Formula, select
 from vpm.discrepancy.remainder.state_dependence import Shares, busiest_joint, rhythm, shares
 from vpm.discrepancy.settings import MOST_NAMED, PERIOD_RANGE, WORTH_A_NAME

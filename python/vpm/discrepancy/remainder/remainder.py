@@ -13,10 +13,11 @@ from functools import partial
 import numpy as np
 from scipy.special import stdtrit
 
-from vpm.discrepancy.confirmation.confirmation import Data, Judged, in_time
+from vpm.discrepancy.judged_model import Data, Judged
 from vpm.discrepancy.remainder.empirical_formula import Described, describe
 from vpm.discrepancy.remainder.seal_friction import Seals, seals
 from vpm.discrepancy.settings import EFFORT_SHARE, FALSE_ALARM_LEVEL, MODEST_FACTOR, MODEST_GAIN, WORTH_A_NAME
+from vpm.discrepancy.shifted_commands import in_time
 from vpm.identify import Gain, InverseDynamicsProblem, gain, segments
 from vpm.identify.parallel import in_order
 from vpm.model import Model

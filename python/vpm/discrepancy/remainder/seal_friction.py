@@ -13,11 +13,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from vpm.discrepancy.confirmation.confirmation import Data, Judged
-from vpm.discrepancy.screening.probe import linear_step
+from vpm.discrepancy.judged_model import Data, Judged
 from vpm.discrepancy.settings import TRANSITION_SHARES, UNIT_PRESSURE
-from vpm.identify import InverseDynamicsProblem
+from vpm.identify import InverseDynamicsProblem, robust_covariance, segments
 from vpm.identify.drives import driven, first_drives
+from vpm.identify.identifiability import column_lengths
 from vpm.identify.response_along_motion import has_hidden
 from vpm.model import Model
 from vpm.numbers import NORMAL_95, Array
@@ -134,7 +134,13 @@ def _fitted(base: Judged, data: Data, drive: str, columns: tuple[Array, Array], 
     ``slopes`` are those of the validation residual by what is free.
     """
     known = base.fit.jacobian
-    step, std, _ = linear_step(data.training, np.column_stack([known, columns[0]]), base.fit.residual)
+    jacobian = np.column_stack([known, columns[0]])
+    lengths = column_lengths(jacobian)
+    scaled = jacobian / lengths
+    taken = np.linalg.lstsq(scaled, -base.fit.residual, rcond=1e-10)[0]
+    left = base.fit.residual + scaled @ taken
+    std = np.sqrt(np.diag(robust_covariance(scaled, left, segments(data.training)))) / lengths
+    step = taken / lengths
     seen = base.fit.residual + known @ step[:-1] + step[-1] * columns[0]
     met = base.validation + slopes @ step[:-1] + step[-1] * columns[1]
     return Seals(drive, float(step[-1]), float(std[-1]), seen, met)

@@ -16,7 +16,7 @@ import numpy as np
 
 from vpm.catalogue import without_law
 from vpm.catalogue.empirical import TERMS
-from vpm.discrepancy.confirmation.confirmation import Data, Judged
+from vpm.discrepancy.judged_model import Data, Judged
 from vpm.discrepancy.screening.ripple_periods import ripple_periods
 from vpm.discrepancy.settings import FOLDS, LONGEST_PERIOD, MOST_TERMS, PERIODS, TERM_GAIN, TRANSITION_SHARES
 from vpm.identify import InverseDynamicsProblem

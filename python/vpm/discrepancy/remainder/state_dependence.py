@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.discrepancy.confirmation.confirmation import Data, Judged
+from vpm.discrepancy.judged_model import Data, Judged
 from vpm.discrepancy.settings import BINS, CLEARLY, FEWEST_PERIODS, MOST_SAMPLES, PULL
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.statistics import robust_covariance

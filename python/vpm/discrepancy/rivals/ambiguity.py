@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from vpm.discrepancy.confirmation.confirmation import Trial
 from vpm.discrepancy.diagnosis import Ambiguity
+from vpm.discrepancy.findings import Measured
 
 
 @dataclass(frozen=True)
 class Rivals:
-    """Rivals of an accepted effect: trials in its place that predict the validation records as well."""
+    """Rivals of an accepted effect, measured in its place."""
 
     effect: str
     site: str
-    trials: tuple[Trial, ...]  #: Those that predict the validation data as well.
+    trials: tuple[Measured, ...]  #: Those that predict the validation data as well.
 
     @property
     def label(self) -> str:
@@ -28,7 +28,7 @@ def listed(known: Sequence[Ambiguity], found: Sequence[Rivals]) -> tuple[Ambigui
     said = {(a.name, a.site, other) for a in known for other in a.others}
     more = []
     for entry in found:
-        labels = (trial.probe.candidate.label for trial in entry.trials)
+        labels = (trial.label for trial in entry.trials)
         names = tuple(label for label in labels if (entry.effect, entry.site, label) not in said)
         if names:
             reason = "put in its place and fitted, it predicts the validation data as well"

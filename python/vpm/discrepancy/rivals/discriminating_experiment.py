@@ -15,8 +15,8 @@ from functools import partial
 
 import numpy as np
 
-from vpm.discrepancy.confirmation.confirmation import Judged
 from vpm.discrepancy.diagnosis import ProposedExperiment
+from vpm.discrepancy.judged_model import Judged
 from vpm.discrepancy.rivals.ambiguity import Rivals
 from vpm.discrepancy.screening.candidates import joint_at
 from vpm.discrepancy.settings import AMPLITUDES, DURATION, EXPERIMENT_SAMPLES, LONGEST_EXPERIMENT, RANGE_SHARE, SPEEDS
@@ -46,10 +46,9 @@ def experiments(
         for trial in rivals.trials:
             if has_hidden(trial.judged.model, data.motions[0].joints):
                 continue  # its residual needs a motion that no channel measures
-            rival = trial.probe.candidate.label
             here = joint_at(final.model, rivals.site)
             joint = here if here in data.joints else data.joints[0]
-            best = propose(final, trial.judged, (rivals.label, rival), excitation_range(data, joint), noise)
+            best = propose(final, trial.judged, (rivals.label, trial.label), excitation_range(data, joint), noise)
             if best is not None:
                 found.append(best)
     return tuple(found)

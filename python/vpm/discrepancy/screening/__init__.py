@@ -1,1 +1,1 @@
-"""Screening: all candidates with their start values, and the linear step by which each is judged."""
+"""Screening: all candidates with their start values and bounds."""

@@ -79,11 +79,6 @@ def beyond(effect: EffectType, site: str, model: Model) -> str:
     return ""
 
 
-def coupled(model: Model) -> bool:
-    """Whether a model has several joints without those that added compliance split off, so that errors cancel."""
-    return len(set(model.joints) - set(model.added_joints)) > 1
-
-
 def _joint(model: Model, site: str) -> str:
     """Joint of a compliance or stop: the site itself, or the joint before a body or beam."""
     return site if site in model.joints else model.joint_before(site)

@@ -1,1 +1,0 @@
-"""Confirmation of a candidate: its refit, its prediction of validation records, and reasons of refusal."""
