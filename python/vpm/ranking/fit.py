@@ -112,10 +112,10 @@ class Fitter:
     ) -> Fitted:
         """Fit by bounded Gauss-Newton steps under a view; the first ``residual`` may be known.
 
-        A ``rough`` one trusts few steps of the integrator to its end, as `Fitted.tracker` then tells. A fit gives up
-        where several times the gain that a step predicts would not bring the `cost` below a goal. Derivatives cost many
-        times what residuals do, so that secants correct them from step to step. Where a step by these leads nowhere,
-        they are worked out anew.
+        A ``rough`` one trusts few steps of the integrator to its end where these change little, as `Fitted.tracker`
+        then tells. A fit gives up where several times the gain that a step predicts would not bring the `cost` below a
+        goal. Derivatives cost many times what residuals do, so that secants correct them from step to step. Where a
+        step by these leads nowhere, they are worked out anew.
 
         Raises
         ------
@@ -125,6 +125,14 @@ class Fitter:
         names = tuple(name for name in structure.priors if name not in view.known)
         now = self.followed(structure.at(structure.standard), tracker, names, residual)
         return self._descended(now, view, goal, rough=rough)[0]
+
+    def _by_steps_that_do(self, now: Followed) -> Followed:
+        """Where a fit is, to go on by few steps if these change what is left by less than an effect has to."""
+        if now.few is None:
+            return now
+        offset = np.broadcast_to(now.offset, now.residual.shape)
+        powers = (sum(np.sum(one[part] ** 2, axis=0) for part in self.tracked.parts) for one in (offset, now.residual))
+        return now if np.all(next(powers) < self.settings.worth * next(powers)) else now.fine
 
     def moved(self, start: Followed, view: View, anew: bool = False) -> tuple[Fitted, Array]:
         """Fit from a start with known derivatives, near the end of another fit: secants update them.
@@ -151,9 +159,10 @@ class Fitter:
     ) -> tuple[Fitted, Array]:
         """Gauss-Newton descent of a fit from known derivatives, updated by secants or computed ``anew``.
 
-        Where few steps led up instead of down, it goes on by those of its own tracker.
+        Few steps of the integrator show the way where they do as well; where they led up, those of the tracker do.
         """
-        now, told, before = start, start, self.cost(start.structure, start.residual, view.noise)
+        now = self._by_steps_that_do(start)
+        told, before = now, self.cost(start.structure, start.residual, view.noise)
         errors, slopes = view.errors(now, self.tracked.parts)
         tolerance = self._tolerance(view, errors, slopes) if now.structure.priors else math.inf
         ended = False
@@ -178,7 +187,7 @@ class Fitter:
                 if (exact := now if rough else self._exact(now, told, view)) is None:
                     return self._descended(told.fine, view, goal, fresh=False, anew=anew)
                 now = self._anew(exact, rough=rough)
-                now = now if start.few else now.fine
+                now = self._by_steps_that_do(now) if start.few else now.fine
                 told, before = now, self.cost(now.structure, now.residual, view.noise)
                 errors, slopes = view.errors(now, self.tracked.parts)
                 tolerance = self._tolerance(view, errors, slopes)
