@@ -27,7 +27,7 @@ def hanging(springs: str, mass: str) -> Model:
 
 
 def hung_up(seed: int, model: Model) -> Experiment:
-    """A motor's motion with what hangs on a spring behind it, in closed form; the deflection reads ``ZERO`` too much."""
+    """A motor's motion with what hangs on a spring behind it, in closed form; the deflection reads ``ZERO`` more."""
     generator = np.random.default_rng(seed)
     time = 2e-3 * np.arange(4000)
     rates = 2.0 * np.pi * generator.uniform(0.5, 5.0, 8)
@@ -35,7 +35,11 @@ def hung_up(seed: int, model: Model) -> Experiment:
     bent = L * rates**2 / (K - L * rates**2 + 1j * DAMPING * rates) * sizes
     force = -J * rates**2 * sizes - (K + 1j * DAMPING * rates) * bent
     position, deflection, effort = (np.real(np.exp(1j * np.outer(time, rates)) @ each) for each in (sizes, bent, force))
-    values = {"axis.position": position, "drive.command": effort + L * G, "axis_deflection.position": deflection - L * G / K + ZERO}
+    values = {
+        "axis.position": position,
+        "drive.command": effort + L * G,
+        "axis_deflection.position": deflection - L * G / K + ZERO,
+    }
     noisy = {name: x + 1e-3 * x.std() * generator.standard_normal(x.size) for name, x in values.items()}
     return Experiment.from_arrays(time, noisy, model=model, name=f"run {seed}")
 
