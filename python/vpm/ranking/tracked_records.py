@@ -277,8 +277,8 @@ class TrackedRecords:
         noise = [np.column_stack([drawn_noise(log, name, random) for name in channels]) for log in self.experiments]
         left = self.follow(model, theta, tracker)[0]
 
-        def amplified(*places: int) -> list[float]:
-            """Logarithms of the power by which noise of some readings moves these, over its own."""
+        def amplified(*places: int) -> float:
+            """Mean logarithm of the power by which noise of some readings moves these, over its own."""
             share, noisy = np.isin(np.arange(len(channels)), places), copy.copy(self)
             pairs = zip(self.records, noise, strict=True)
             noisy.records = tuple(replace(record, readings=record.readings + more * share) for record, more in pairs)
@@ -286,10 +286,10 @@ class TrackedRecords:
             moved = added + left - noisy.follow(model, theta, tracker)[0]
             powers = (sum(np.sum(values[rows] ** 2, axis=0) for rows in self.rows) for values in (moved, added))
             after, before = (np.maximum(power[list(places)], 1e-300) for power in powers)
-            return np.log(np.maximum(after / before, 1e-300)).tolist()
+            return float(np.mean(np.log(np.maximum(after / before, 1e-300))))
 
         places = [channels.index(name) for name in self.drawn_to]
-        return float(np.mean(amplified(*places))) > 0.0 and float(np.mean([amplified(one) for one in places])) > 0.0
+        return amplified(*places) > 0.0 and sum(amplified(one) for one in places) > 0.0
 
     def _passed(self, band: float, parts: Parts, channel: str) -> list[Array]:
         """Share of white sensor noise that a tracker passes to the residual, by frequency.
