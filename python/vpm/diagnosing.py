@@ -34,6 +34,7 @@ from vpm.discrepancy.rivals.ambiguity import Rivals
 from vpm.discrepancy.rivals.discriminating_experiment import experiments as experiments_for
 from vpm.discrepancy.screening.candidates import asked_for
 from vpm.discrepancy.settings import FLOOR_FACTOR
+from vpm.discrepancy.unknown_zeros import with_unknown_zeros
 from vpm.discrepancy.verdict import (
     is_negligible,
     only_if_open,
@@ -237,6 +238,7 @@ def diagnosed(
             raise KeyboardInterrupt(*(stop.args or (UNCHECKED.format(record=logs[0].name),))) from None
         odd = [str(one) for one in found if one.kind in NOTED]
     most = LEAST_LIMIT + 2 * (len(model.joints) - 1) if limit is None else limit
+    model, zeros = with_unknown_zeros(model, records[0])
     request = Request(effects, most, tell or (lambda _: None), each)
     diagnosis = _diagnosis(model, records, request, cutoff, setup)
     bare = _without_sensor(model, records[0])
@@ -247,7 +249,7 @@ def diagnosed(
     blind += _of_lengths(model, experiments)
     summary = diagnosis.summary + _or_late_readings(model, diagnosis, bare)
     far = beyond_training(model, *records[:2]) if validate else []
-    return replace(diagnosis, summary=summary, notes=(*odd, *far, *diagnosis.notes, *blind))
+    return replace(diagnosis, summary=summary, notes=(*odd, *zeros, *far, *diagnosis.notes, *blind))
 
 
 def _without_sensor(model: Model, records: Sequence[Experiment]) -> list[str]:

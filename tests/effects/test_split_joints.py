@@ -266,3 +266,11 @@ def test_a_file_may_map_a_deflection_that_the_model_lacks() -> None:
     assert Model.from_toml(SLIDE + table).channel_table["axis_deflection.position"].column == "gauge"
     with pytest.raises(ModelError, match="is no channel of the model"):
         Model.from_toml(SLIDE + table.replace("axis_deflection", "axis_reflection"))
+
+
+def test_a_sensor_of_a_deflection_goes_with_its_spring() -> None:
+    content = slide().with_effect("joint_compliance", at="axis", **SPLITS["joint_compliance"]).to_dict()
+    content["sensors"] = {"scale": {"measures": "axis_deflection.position"}, "encoder": {"measures": "axis.position"}}
+    read = Model.from_dict(content).with_effect("sensor_offset", at="scale", value=1e-6)
+    stiff = read.without_effect("joint_compliance", at="axis")
+    assert (stiff.sensors, stiff.effects) == (("encoder",), ())

@@ -154,7 +154,22 @@ def recalibrated_of(
     blocks = data.training.blocks
     notes.extend(changed_between(fit.names, fit.values, fit.residual, fit.jacobian, blocks, units, blind, Checks()))
     notes.extend(moved_far(model, recalibrated))
+    if ranked is not None:
+        notes.extend(_moved_by_observer(model, ranked, unseen))
     return recalibrated
+
+
+def _moved_by_observer(model: Model, ranked: Model, unseen: set[str]) -> list[str]:
+    """Notes on parameters that the prepared residual does not show, and an observer finds far from the model file."""
+    notes = []
+    for name in sorted(unseen.intersection(model.adjustable)):
+        file, found = model.parameters[name], ranked.parameters[name].value
+        if (times := abs(found - file.value) / stated(file)) > FAR:
+            notes.append(
+                f"an observer moved {name} from {short(file.value)} to {short(found)} {file.unit}, {times:.1f} times "
+                "its stated uncertainty: question the file, or look for what it lacks there"
+            )
+    return notes
 
 
 def is_as_stated(model: Model, ranked: Model | None, name: str) -> bool:

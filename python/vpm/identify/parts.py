@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from vpm.catalogue import EFFECTS
 from vpm.model import Model
 from vpm.model.effects import Effect
+from vpm.model.splitting import name_behind
 
 Indices = NDArray[np.int64]
 Content = Mapping[str, Any]
@@ -145,11 +146,15 @@ def _content(model: Model) -> dict[str, Any]:
 
 
 def _without(content: Content, effects: Sequence[Effect], *, rigid: bool = False) -> Model:
-    """Part of a machine without some effects, and with rigid links."""
+    """Part of a machine without some effects and what reads their deflections, and with rigid links."""
     gone = {(effect.name, effect.at, effect.side) for effect in effects}
+    lost = {name_behind(effect.at) for effect in effects if effect.type.splits}
+    sensors = content.get("sensors", {})
+    blind = {name for name, one in sensors.items() if _owner(one["measures"]) in lost}
     of = itemgetter("type", "at")
     kept = [entry for entry in content.get("effects", ()) if (*of(entry), entry.get("side", "motor")) not in gone]
-    changed = {**content, "effects": kept}
+    changed = {**content, "effects": [entry for entry in kept if entry["at"] not in blind]}
+    changed["sensors"] = {name: one for name, one in sensors.items() if name not in blind}
     if rigid:
         changed["beams"] = {name: {**beam, "level": "rigid"} for name, beam in content["beams"].items()}
     return Model.from_dict(changed)

@@ -69,10 +69,10 @@ class Correction:
     def _entry(self, entry: ChannelEntry) -> ChannelEntry:
         if self.column:
             part = entry.columns[self.column]
-            late = part.model_copy(update={"delay": part.delay + self.delay})
+            late = part.model_copy(update={"delay": float(f"{part.delay + self.delay:.4g}")})
             return entry.model_copy(update={"columns": {**entry.columns, self.column: late}})
         if self.delay:
-            return entry.model_copy(update={"delay": entry.delay + self.delay})
+            return entry.model_copy(update={"delay": float(f"{entry.delay + self.delay:.4g}")})
         if self.unit:
             # An offset is in the old unit; in SI it is scaled as the numbers of the column are.
             sign = math.copysign(1.0, self.factor)
@@ -152,6 +152,19 @@ class Correction:
             and not self.column
             and all((self.delay < 0.0) == name.endswith((".command", ".disturbance")) for name in self.channels)
         )
+
+
+@dataclass(frozen=True)
+class LateShaft(Correction):
+    """A shaft that is late, whose angle tells that of a joint beside others: `column` is the channel of the shaft."""
+
+    def entries(self, table: Mapping[str, ChannelEntry]) -> dict[str, ChannelEntry]:
+        """Corrected entry of the shaft."""
+        return Correction((self.column,), delay=self.delay).entries(table)
+
+    def sentence(self, units: Mapping[str, str]) -> str:
+        """Sentence on the shaft that is late; ``units`` are those that were read."""
+        return Correction((self.column,), delay=self.delay).sentence(units)
 
 
 class Pair(NamedTuple):

@@ -16,7 +16,7 @@ from vpm.experiment import Experiment
 from vpm.identify.response_along_motion import bends
 from vpm.log_check.correction import Correction, Pair
 from vpm.log_check.shares import FORCES, Judge, Shares, Tangent, mean_logarithm
-from vpm.log_check.tried_corrections import delays, delays_of_columns, of_two, scales
+from vpm.log_check.tried_corrections import delays, delays_of_columns, delays_of_shafts, of_two, scales
 from vpm.model import ChannelEntry
 
 Change = TypeVar("Change", Correction, Pair)
@@ -271,7 +271,9 @@ class Explainer:
         is drawn to every reading, and gives way where it is light. Of a motor and a flywheel on one shaft, a late
         reading of the wheel shows at the motor.
         """
-        tried = (*delays(self.model, used, self.settings), *delays_of_columns(self.table, used, self.settings))
+        columns = delays_of_columns(self.table, used, self.settings)
+        shafts = delays_of_shafts(self.model, self.table, used, self.settings)
+        tried = (*delays(self.model, used, self.settings), *columns, *shafts)
         corrections = tried if left.above(self.settings.negligible) else ()
         least, found = self.settings.held * part.dt, list[_Trial]()
         for at in (tangent, None):

@@ -12,7 +12,7 @@ import numpy as np
 
 from vpm.errors import VpmError
 from vpm.expression import Quantity, read_expression
-from vpm.log_check.correction import TIME, Correction, Pair, factor_between
+from vpm.log_check.correction import TIME, Correction, LateShaft, Pair, factor_between
 from vpm.log_check.settings import Settings
 from vpm.model import ChannelEntry, Model
 from vpm.numbers import Array
@@ -86,6 +86,25 @@ def delays_of_columns(
             beside = _told_apart(table, channel, late, used)
             if beside:
                 found = Correction((channel,), column=late, beside=beside)
+                yield from (replace(found, delay=delay) for delay in settings.delays)
+
+
+def delays_of_shafts(
+    model: Model, table: Mapping[str, ChannelEntry], used: Sequence[str], settings: Settings
+) -> Iterator[Correction]:
+    """Corrections to try: a shaft that is stamped late, which tells the angle of one joint beside others; see `delays`.
+
+    That joint is late then, and those that are measured themselves move it along as the shaft does.
+    """
+    shafts = {name: model.ratios(name) for name in model.transmissions if f"{name}.position" in table}
+    for name, ratios in shafts.items():
+        told = [joint for joint in ratios if f"{joint}.position" in used and f"{joint}.position" not in table]
+        if len(told) == 1 and sum(told[0] in other for other in shafts.values()) == 1:
+            share = {f"{joint}.position": float(model.theta[model.index(one)]) for joint, one in ratios.items()}
+            own = share.pop(f"{told[0]}.position")
+            beside = tuple((channel, -one / own) for channel, one in share.items())
+            if beside and all(channel in used for channel, _ in beside):
+                found = LateShaft((f"{told[0]}.position",), column=f"{name}.position", beside=beside)
                 yield from (replace(found, delay=delay) for delay in settings.delays)
 
 

@@ -269,7 +269,7 @@ class Model(Evaluations, Storable):
         return model
 
     def without_effect(self, name: str, at: str, side: Side = "motor") -> Self:
-        """Model with one effect less, and without what sits in the spring that goes with it.
+        """Model with one effect less, and without what sits in the spring that goes with it or reads its deflection.
 
         Raises
         ------
@@ -279,6 +279,9 @@ class Model(Evaluations, Storable):
         gone, content = self.effect(name, at, side), self.to_dict()
         springs = {name_of_bending(at), name_behind(at)} if gone.type.motion else set()
         inside = springs & set(self.added_joints)
+        sensors = content.get("sensors", {})
+        inside |= {name for name, one in sensors.items() if one["measures"].partition(".")[0] in inside}
+        content["sensors"] = {name: one for name, one in sensors.items() if name not in inside}
         kept = zip(self.effects, content["effects"], strict=True)
         content["effects"] = [entry for effect, entry in kept if effect != gone and effect.at not in inside]
         return type(self)(content)

@@ -398,7 +398,9 @@ class Fitter:
         return self._pass(structure, near.few or near.tracker)[0] + near.offset
 
     def _pass(self, structure: Structure, tracker: Tracker, by: By = NOTHING) -> tuple[Array, Array]:
-        residual, jacobian = self.tracked.follow(structure.model, structure.theta, tracker, *by)
+        columns, moves = by
+        theta = structure.theta if moves is None else structure.with_room(columns, moves)
+        residual, jacobian = self.tracked.follow(structure.model, theta, tracker, *by)
         if self._is_unstable(structure, tracker, by, residual, jacobian):
             residual, jacobian = self.tracked.follow(structure.model, structure.theta, tracker, by[0])
         if not all(np.max(np.abs(numbers), initial=0.0) < RUNAWAY for numbers in (residual, jacobian)):

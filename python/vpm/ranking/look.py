@@ -250,6 +250,12 @@ class Look:
             return judgement
         return replace(judgement, score=max(score, self._score_of_all(fitted, left[1])))
 
+    def size_of(self, key: Key) -> float:
+        """Amplitude of an effect of the look's structure, as a share of that of all, where it is largest."""
+        own = self.fitted.structure
+        removed = self._removed([own.model.effect(*key, own.side(key))])
+        return float(np.sqrt(np.max(removed / np.maximum(self.explained, removed + 1e-300))))
+
     def explained_by(self, trial: Fitted, judgement: Judgement) -> Judgement:
         """Judgement in a look of what another structure explains of the error, and not of its mirror image.
 

@@ -158,6 +158,18 @@ class Structure:
         slopes = dict(zip(self.priors, np.abs(self.slopes), strict=True))
         return MOVE * np.array([slopes[name] or 1.0 for name in names])
 
+    def with_room(self, places: Sequence[int], moves: Array) -> Array:
+        """Parameters of a structure whose bodies stay possible where one moment at a time moves for a quotient.
+
+        The moments of a rod are equal, and those of a plate add up: all three grow by what a step would lack.
+        """
+        theta = self.theta.copy()
+        for moments in self._moments:
+            steps = [abs(float(move)) for place, move in zip(places, moves, strict=True) if place in moments]
+            own = theta[moments]
+            theta[moments] += max(max(steps, default=0.0) - float(np.min(np.sum(own) - 2.0 * own)), 0.0)
+        return theta
+
     @property
     def values(self) -> dict[str, float]:
         """Unknown parameters of a structure by name, SI."""

@@ -35,7 +35,7 @@ class Sizes:
     """Natural sizes for priors by joint and transmission: effort, speed and way in the records."""
 
     def __init__(self, model: Model, data: InverseDynamicsProblem) -> None:
-        self.model = model
+        self.model, self.records = model, data.experiments
         records = range(len(data.motions))
         efforts = np.concatenate([data.effort(model, model.theta, record)[1] for record in records])
         positions, velocities, accelerations = map(np.concatenate, zip(*map(data.state, records), strict=True))

@@ -14,6 +14,7 @@ from vpm.catalogue import EFFECTS
 from vpm.catalogue.kinds import Side
 from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.discrepancy.screening.candidates import Candidate, Key, candidates
+from vpm.discrepancy.unknown_zeros import zeros_of
 from vpm.identify import InverseDynamicsProblem
 from vpm.numbers import Array
 from vpm.ranking.fit import ASTRAY, Fitter, Followed, View
@@ -132,15 +133,16 @@ def _hopeful(
     """
 
     def promised(one: _Extended) -> list[tuple[float, _Extended]]:
-        gain, share = look.gain_along(fitter.followed(one.structure, look.coarse.tracker, ()))
-        found = [(gain, one)]
+        followed = _zeroed(fitter.followed(one.structure, look.coarse.tracker, ()), look, fitter)
+        gain, share = look.gain_along(followed)
+        found = [(gain, replace(one, structure=followed.structure))]
         effect = one.candidate.effect  # within a gap the load tells no way
         if effect.splits and not effect.has_play and "stiffness" in one.start and 0.0 < share < 1.0:
             start = {**one.start, "stiffness": one.start["stiffness"] / share}
             with contextlib.suppress(*ASTRAY):
                 other = extensions.extended(look.fitted.structure, one.candidate, start, one.side)
-                stiffer = replace(one, structure=other, start=start)
-                found.append((look.gain_along(fitter.followed(other, look.coarse.tracker, ()))[0], stiffer))
+                followed = _zeroed(fitter.followed(other, look.coarse.tracker, ()), look, fitter)
+                found.append((look.gain_along(followed)[0], replace(one, structure=followed.structure, start=start)))
         return found
 
     gains = each("trying", promised, several, lambda one: f"{one.candidate.label}, {look.fitted.tracker.label}")
@@ -151,6 +153,22 @@ def _hopeful(
                 hopes[one.candidate.key].append((gain, one))
     ordered = [sorted(found, key=lambda pair: -pair[0]) for found in hopes.values()]
     return [one for found in ordered for _, one in found[: fitter.settings.starts]]
+
+
+def _zeroed(followed: Followed, look: Look, fitter: Fitter) -> Followed:
+    """Followed proposal with new zeros of its deflection readings where they leave no mean error.
+
+    What the spring of a proposal holds at rest is no part of what shows it: nobody knows where its reading begins.
+    """
+    structure, residual = followed.structure, followed.residual.copy()
+    theta, channels = structure.theta.copy(), fitter.tracked.records[0].channels
+    for name, channel in zeros_of(structure.model).items():
+        if name in structure.priors and name not in look.coarse.names and channel in channels:
+            place = channels.index(channel)
+            mean = float(np.mean(residual[:, place]))
+            theta[structure.place(name)] += mean
+            residual[:, place] -= mean
+    return replace(followed, structure=replace(structure, theta=theta), residual=residual)
 
 
 def _side_by_side(neutral: Sequence[_Extended], look: Look) -> list[_Pass]:

@@ -8,6 +8,7 @@ from dataclasses import replace
 from vpm.discrepancy.parallel_candidates import ParallelCandidates, Progress
 from vpm.discrepancy.screening.candidates import asked_for
 from vpm.discrepancy.stuck_channels import check_moving
+from vpm.discrepancy.unknown_zeros import with_unknown_zeros
 from vpm.errors import DiagnosisError
 from vpm.experiment import Experiment, as_records, derived_channels, joints_from_sensors, without_derived
 from vpm.model import Model
@@ -85,6 +86,7 @@ def rank(
     if not records:
         raise DiagnosisError("no record was given; pass at least one experiment")
     check_moving(model, records)
+    model, zeros = with_unknown_zeros(model, records)
     derived = derived_channels(records)
     records, unseen = without_derived(records, derived), without_derived(unseen, derived)
     each = ParallelCandidates(workers, progress)
@@ -93,4 +95,4 @@ def rank(
     # What a validation record lacks is said before the search.
     ranking = search.run(TrackedRecords(model, unseen, search.settings, setup))
     told = [COMPUTED.format(channel=channel, source=source) for channel, source in derived.items()]
-    return replace(ranking, notes=(*told, *ranking.notes))
+    return replace(ranking, notes=(*zeros, *told, *ranking.notes))

@@ -12,7 +12,7 @@ import numpy as np
 from vpm.catalogue.kinds import Side
 from vpm.model import Effect
 from vpm.numbers import rough_percent
-from vpm.ranking.choice_by_evidence import evidence, weighed
+from vpm.ranking.choice_by_evidence import evidence, likely, weighed
 from vpm.ranking.command_timing import against_timing
 from vpm.ranking.disturbed_records import disturbed
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
@@ -104,12 +104,13 @@ class Search(Trials):
     def _plainer(
         self, looks: list[Look], rounds: list[tuple[Ranked, ...]], named: dict[_Place, Ranked]
     ) -> tuple[list[Look], list[tuple[Ranked, ...]]]:
-        """Search with one effect in the place of several, if that is more probable by the records and the model file.
+        """Search with one effect in the place of all, if that is more probable by the records and the model file.
 
-        Known parameters go astray to make up for what is missing. A second effect may then lead on from there, where a
-        single one with what the file states explains all of it.
+        Known parameters go astray to make up for what is missing. Effects may then lead on from there, where a single
+        one with what the file states explains all of it. One effect stands where its values leave the file in peace.
         """
-        if len(looks[0].fitted.structure.effects) < 2:
+        found = looks[0].fitted.structure
+        if len(found.effects) < 2 and found.doubt <= self.settings.odds:
             return looks, rounds
         with contextlib.suppress(*ASTRAY):
             bare = list(self.first.values())
@@ -140,11 +141,22 @@ class Search(Trials):
     ) -> Ranking:
         """Ranking of a search, with the values under the tracker by which all of them predict the records best."""
         best = max(looks, key=lambda look: self._foresight(look.fitted.structure, looks))
-        found = best.fitted.structure
-        recalibrated = next(iter(self.first.values())).fitted.structure.repaired
+        fits = best.fitted, next(iter(self.first.values())).fitted
+        found, first = (one.structure if interrupted else self._likeliest(one) for one in fits)
         hold = self.fitter.tracked.setup.course
         effects = tuple(_named(named, one, found.values) for one in found.added)
-        return Ranking(effects, tuple(rounds), found.repaired, recalibrated, {}, interrupted, hold, self._notes(best))
+        return Ranking(effects, tuple(rounds), found.repaired, first.repaired, {}, interrupted, hold, self._notes(best))
+
+    def _likeliest(self, fitted: Fitted) -> Structure:
+        """Structure of a search at its most likely values, under the noise that it leaves.
+
+        Errors last longer than a sample. A fit that takes them for as many independent ones believes the records too
+        much and the model file too little.
+        """
+        with contextlib.suppress(*ASTRAY):
+            noise = fitted_noise(fitted.residual, self.fitter.tracked.parts, self.settings.order)
+            return likely(fitted, self.fitter, noise).structure
+        return fitted.structure
 
     def _foresight(self, structure: Structure, looks: Sequence[Look]) -> float:
         """Log-density of the fitted samples as a searched structure predicts them under all trackers together.
@@ -254,7 +266,8 @@ class Search(Trials):
             if not look.has_room():
                 continue
             seen = self.tried(look, start)
-            ends = [self.examined(trial) for trial in self.finished(seen) if trial.counts]
+            done = [self.by_its_own_size(trial) for trial in self.finished(seen)]
+            ends = [self.examined(trial) for trial in done if trial.counts]
             tried += [*(trial for trial in ends if not trial.counts), *seen]
             counting += [trial for trial in ends if trial.counts]
             if not all(trial.look.has_room(trial.fitted) for trial in counting):

@@ -8,9 +8,10 @@ from weakref import WeakKeyDictionary
 
 from vpm.catalogue.kinds import Side
 from vpm.discrepancy.screening.candidates import Candidate, Key
+from vpm.discrepancy.unknown_zeros import with_unknown_zeros
 from vpm.model import Model
 from vpm.ranking.model_structure import Structure, sides_taken
-from vpm.ranking.parameter_priors import Sizes
+from vpm.ranking.parameter_priors import Sizes, stated
 
 #: How sharply a law bends: a detail that need not be seen.
 DETAILS = frozenset({"transition_velocity", "width"})
@@ -35,7 +36,8 @@ class Extensions:
     def extended(self, structure: Structure, candidate: Candidate, start: Mapping[str, float], side: Side) -> Structure:
         """Extension of a structure by one effect, on one side of a joint that is split.
 
-        What splits a joint takes the friction and the like that was there to that side.
+        What splits a joint takes the friction and the like that was there to that side. A logged deflection behind it
+        has an unknown zero.
 
         Raises
         ------
@@ -49,9 +51,11 @@ class Extensions:
             structure = structure.beside(candidate.site, side)
         own: Side = "motor" if splits else side
         if kind not in made:
-            made[kind] = structure.model.with_effect(candidate.effect.name, candidate.site, side=own, **start)
+            model = structure.model.with_effect(candidate.effect.name, candidate.site, side=own, **start)
+            made[kind], _ = with_unknown_zeros(model, self.sizes.records) if splits else (model, [])
         effect, carried = made[kind].effect(*candidate.key, own), structure.carried(made[kind])
-        priors = dict(carried.priors)
+        zeros = stated(made[kind]) if splits else {}
+        priors = {**carried.priors, **{name: zeros[name] for name in zeros if name not in structure.model.parameters}}
         for short, name in effect.parameter_names.items():
             if name in structure.model.parameters:
                 continue

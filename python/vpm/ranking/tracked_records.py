@@ -269,21 +269,27 @@ class TrackedRecords:
         """Whether noise of the readings moves the tracked model by more than it moves them.
 
         A tracker that is stable passes on what is slow, and damps all else. A machine that falls over, or meets the
-        ground, faster than it is drawn back amplifies any difference, so that no parameter explains what is left.
+        ground, faster than it is drawn back amplifies any difference, so that no parameter explains what is left. It
+        does so to the noise of one reading alone, too. What a coarse sensor does to the readings of a fine one is no
+        fall.
         """
-        random, noisy, noise = np.random.default_rng(SEED), copy.copy(self), list[Array]()
-        for record, log in zip(self.records, self.experiments, strict=True):
-            drawn = [drawn_noise(log, name, random) * (name in self.drawn_to) for name in record.channels]
-            noise.append(np.column_stack(drawn))
-        noisy.records = tuple(
-            replace(record, readings=record.readings + more) for record, more in zip(self.records, noise, strict=True)
-        )
-        places = [self.records[0].channels.index(name) for name in self.drawn_to]
-        added = np.concatenate(noise)[:, places]
-        left, other = (one.follow(model, theta, tracker)[0][:, places] for one in (self, noisy))
-        moved = [np.sum(values[rows] ** 2, axis=0) for rows in self.rows for values in (added + left - other, added)]
-        ratio = np.sum(moved[::2], axis=0) / np.maximum(np.sum(moved[1::2], axis=0), 1e-300)
-        return float(np.mean(np.log(np.maximum(ratio, 1e-300)))) > 0.0
+        random, channels = np.random.default_rng(SEED), self.records[0].channels
+        noise = [np.column_stack([drawn_noise(log, name, random) for name in channels]) for log in self.experiments]
+        left = self.follow(model, theta, tracker)[0]
+
+        def amplified(*places: int) -> float:
+            """Mean logarithm of the power by which noise of some readings moves these, over its own."""
+            share, noisy = np.isin(np.arange(len(channels)), places), copy.copy(self)
+            pairs = zip(self.records, noise, strict=True)
+            noisy.records = tuple(replace(record, readings=record.readings + more * share) for record, more in pairs)
+            added = np.concatenate(noise) * share
+            moved = added + left - noisy.follow(model, theta, tracker)[0]
+            powers = (sum(np.sum(values[rows] ** 2, axis=0) for rows in self.rows) for values in (moved, added))
+            after, before = (np.maximum(power[list(places)], 1e-300) for power in powers)
+            return float(np.mean(np.log(np.maximum(after / before, 1e-300))))
+
+        places = [channels.index(name) for name in self.drawn_to]
+        return amplified(*places) > 0.0 and sum(amplified(one) for one in places) > 0.0
 
     def _passed(self, band: float, parts: Parts, channel: str) -> list[Array]:
         """Share of white sensor noise that a tracker passes to the residual, by frequency.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -204,6 +205,18 @@ class Trials:
     def examined(self, trial: Trial) -> Trial:
         """Trial of the search that counts, asked what it explains of noise, and what other shapes would do."""
         return against_free_shapes(trial.beside_mirror_image, self.fitter)
+
+    def by_its_own_size(self, trial: Trial) -> Trial:
+        """Trial of the search whose effect is as large as it is in its own structure, if its look is none to go by.
+
+        Known parameters may take most of an effect's place by values that the model file rules out. What it does
+        beside those is then as little as what a law is wrong by.
+        """
+        looked, own = trial.look.fitted.structure, trial.fitted.structure
+        if looked.doubt - own.doubt <= self.settings.odds:
+            return trial
+        size = max(trial.judgement.size, self.glance(trial.fitted).size_of(trial.key))
+        return replace(trial, judgement=replace(trial.judgement, size=size))
 
     def _detours(self, fitted: Fitted, view: View) -> list[Fitted]:
         """Fits of a splitting effect in the search, continued from where a faster tracker leads.
