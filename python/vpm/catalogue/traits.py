@@ -50,6 +50,8 @@ class Traits:
     """What joints have of themselves, so that no log is blamed for it; a force may look like a wrong sign."""
     plain: Plain = ""
     """What its first parameter is in other descriptions of robots, where it stands for a joint as a number alone."""
+    zero: bool = False
+    """Whether it is nothing but a shifted zero, as every reading may have one."""
     late: Late = ""
     """How what it passes on comes late."""
     damps: bool = False

@@ -205,11 +205,9 @@ class Search(Trials):
         for course in SMOOTH:
             smooth, view = Fitter(self.fitter.tracked.with_hold(course), settings), View(now.noise)
             with contextlib.suppress(*ASTRAY):
-                begun = smooth.followed(now.fitted.structure, now.coarse.tracker, ())
-                if now.predicted_gain(begun) >= now.promising:
-                    fitted = smooth.finished(smooth.fitted(now.fitted.structure, now.fitted.tracker, view), view)
-                    if (judgement := now.judged(fitted)).is_repeated(settings):
-                        ways.append((judgement, smooth, fitted))
+                fitted = smooth.finished(smooth.fitted(now.fitted.structure, now.fitted.tracker, view), view)
+                if (judgement := now.judged(fitted)).is_repeated(settings):
+                    ways.append((judgement, smooth, fitted))
             if not ways:
                 return []  # if straight lines are no better, no curve is
         *_, least = max(ways, key=lambda way: way[0].removed)

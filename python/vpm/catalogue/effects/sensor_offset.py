@@ -19,6 +19,7 @@ EFFECT = EffectType(
         "bias_force": "through gravity or a spring a shifted zero acts like a load; other poses discriminate",
         "spring": "a shifted rest position and a shifted zero agree; a reference position discriminates",
     },
+    zero=True,
     signature=Signature(
         ("position", "time"),
         "The slope of gravity or of a spring over the way; nothing without either",
