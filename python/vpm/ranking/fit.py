@@ -127,12 +127,28 @@ class Fitter:
         return self._descended(now, view, goal, rough=rough)[0]
 
     def _by_steps_that_do(self, now: Followed) -> Followed:
-        """Where a fit is, to go on by few steps if these change what is left by less than an effect has to."""
+        """Where a fit is, to go on by few steps if these change what is left by less than an effect has to.
+
+        Twice as many may do where the tracker's own are of order four, which cost more.
+        """
         if now.few is None:
             return now
-        offset = np.broadcast_to(now.offset, now.residual.shape)
-        powers = (sum(np.sum(one[part] ** 2, axis=0) for part in self.tracked.parts) for one in (offset, now.residual))
-        return now if np.all(next(powers) < self.settings.worth * next(powers)) else now.fine
+        model, several = now.structure.model, [now.few]
+        if self.tracked.setup.method(model, drawn=True) == "additive":
+            steps = max(self.tracked.stepping(model, now.few, record.dt)[1] for record in self.tracked.records)
+            several.append(replace(now.few, fewest=2 * steps))
+        for few in several:
+            with contextlib.suppress(*ASTRAY):
+                offset = now.offset if few is now.few else now.residual - self._pass(now.structure, few)[0]
+                if self._is_little(offset, now.residual):
+                    return replace(now, few=few, offset=offset)
+        return now.fine
+
+    def _is_little(self, change: Array | float, residual: Array) -> bool:
+        """Whether a change of the residual of a fit is less than an effect has to make, in each channel."""
+        changes = np.broadcast_to(change, residual.shape)
+        powers = (sum(np.sum(one[part] ** 2, axis=0) for part in self.tracked.parts) for one in (changes, residual))
+        return bool(np.all(next(powers) < self.settings.worth * next(powers)))
 
     def moved(self, start: Followed, view: View, anew: bool = False) -> tuple[Fitted, Array]:
         """Fit from a start with known derivatives, near the end of another fit: secants update them.
@@ -204,8 +220,7 @@ class Fitter:
         """Where a fit has come to, with derivatives worked out anew; a rough one keeps what more steps leave more."""
         if not rough or now.few is None:
             return self.followed(now.structure, now.tracker, now.names, now.residual)
-        near = self.followed(now.structure, now.few, now.names)
-        return replace(now, residual=near.residual + now.offset, jacobian=near.jacobian)
+        return replace(now, jacobian=self.followed(now.structure, now.tracker.coarse, now.names).jacobian)
 
     def _exact(self, now: Followed, told: Followed, view: View) -> Followed | None:
         """What a fit came to by few steps since it was told exactly, by those of its own tracker; None if worse."""
