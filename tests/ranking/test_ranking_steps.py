@@ -63,6 +63,22 @@ def test_few_steps_are_corrected_to_what_those_of_the_tracker_leave() -> None:
     assert near < 0.2 * far < 0.02 * np.abs(look.fitted.residual).max()
 
 
+def test_a_fit_goes_on_by_few_steps_only_where_these_change_little(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Beside a small error what more steps leave more is wrong elsewhere; of order four, twice as many may do."""
+    own = search()
+    fitter, start = own.fitter, own.look(own.fitted(own.start, Tracker(1.0))).start
+    assert fitter._by_steps_that_do(start).few == COARSE
+    much = replace(start, offset=0.3 * start.residual)
+    assert fitter._by_steps_that_do(much).few is None
+    monkeypatch.setattr(type(fitter.tracked.setup), "method", lambda *_, **__: "additive")
+    monkeypatch.setattr(fitter.tracked, "stepping", lambda *_: ("crank_nicolson", 1))
+    for share, twice in ((0.1, 2), (0.3, None)):
+        monkeypatch.setattr(fitter, "_pass", lambda *_, share=share: ((1.0 - share) * start.residual, None))
+        found = fitter._by_steps_that_do(much)
+        assert (found.few.fewest if found.few else None) == twice
+        assert np.all(found.offset == pytest.approx(share * start.residual if twice else 0.0))
+
+
 def test_a_fit_that_few_steps_lead_astray_goes_on_by_those_of_its_tracker(monkeypatch: pytest.MonkeyPatch) -> None:
     """Few steps may find a way down where there is none: what is told of a fit is what its own steps leave."""
     own = search()
