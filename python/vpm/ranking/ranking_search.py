@@ -142,16 +142,17 @@ class Search(Trials):
         """Ranking of a search, with the values under the tracker by which all of them predict the records best."""
         best = max(looks, key=lambda look: self._foresight(look.fitted.structure, looks))
         fits = best.fitted, next(iter(self.first.values())).fitted
-        found, first = (one.structure if interrupted else self._likeliest(one) for one in fits)
+        as_fitted = interrupted or best.fitted.structure.added
+        found, first = (one.structure if as_fitted else self._likeliest(one) for one in fits)
         hold = self.fitter.tracked.setup.course
         effects = tuple(_named(named, one, found.values) for one in found.added)
         return Ranking(effects, tuple(rounds), found.repaired, first.repaired, {}, interrupted, hold, self._notes(best))
 
     def _likeliest(self, fitted: Fitted) -> Structure:
-        """Structure of a search at its most likely values, under the noise that it leaves.
+        """Structure of a search that names nothing at its most likely values, under the noise that it leaves.
 
         Errors last longer than a sample. A fit that takes them for as many independent ones believes the records too
-        much and the model file too little.
+        much and the model file too little. Beside effects, what a force leaves that nothing explains is no noise.
         """
         with contextlib.suppress(*ASTRAY):
             noise = fitted_noise(fitted.residual, self.fitter.tracked.parts, self.settings.order)
