@@ -71,15 +71,9 @@ class Look:
         own = self.fitted
         return self._fitter.followed(own.structure, own.tracker, tuple(own.structure.priors), own.residual)
 
-    @property
+    @cached_property
     def coarse(self) -> Followed:
-        """Look with derivatives by all that is unknown, by few steps of the integrator where these do.
-
-        Raises
-        ------
-        VpmError
-            The structure runs away from the records.
-        """
+        """Start of a look as few steps of the integrator tell it, where these do."""
         return self.start.coarse
 
     @cached_property
