@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from vpm import Experiment, Model, diagnose
+from vpm import Experiment, Model, diagnose, simulate
+from vpm.catalogue import EFFECTS
 
 GAP, MASS, ROTOR, VISCOUS = 4e-4, 12.0, 3.0, 30.0
 STIFFNESS, DAMPING = 1.5e6, 900.0
@@ -78,3 +79,18 @@ def test_play_is_named_and_none_is_seen_where_there_is_none(loose: tuple[Experim
     assert gap.value == pytest.approx(GAP, rel=0.15)
     tight = record(1e-9, 1), record(1e-9, 2)
     assert "backlash" not in {effect.name for effect in diagnose(model, tight[:1], tight[1:], effects=effects).effects}
+
+
+def test_a_backlash_without_a_gap_is_the_compliance_that_it_contains() -> None:
+    """Contacts that meet in one point make a straight line, over whatever way they close."""
+    bare, damping = Model.from_toml(TEXT), (300.0, 600.0)
+    spring = bare.with_effect("joint_compliance", "axis", stiffness=2e5, damping=sum(damping), inertia=1.0)
+    contacts = dict(zip(("damping", "contact_damping"), damping, strict=True))
+    play = bare.with_effect("backlash", "axis", stiffness=2e5, gap=0.0, width=1e-4, inertia=1.0, **contacts)
+    time = 1e-3 * np.arange(500)
+    force = {"drive.command": 500.0 * np.sin(60.0 * time)}
+    pushed = Experiment.from_arrays(time, force, units={"drive.command": "N"}, name="push")
+    ways = [simulate(one, pushed, integrator="rk4")["axis_deflection.position"] for one in (spring, play)]
+    assert np.max(np.abs(ways[0])) > 1e-4
+    assert ways[1] == pytest.approx(ways[0], abs=1e-12)
+    assert "joint_compliance" in EFFECTS["backlash"].contains

@@ -37,8 +37,7 @@ def weighed(counting: Sequence[Trial], fitter: Fitter) -> list[Trial]:
     doubts = [_doubt(told[place], fits[place]) for place in places]
     allowed = [one for one, doubt in zip(same, doubts, strict=True) if doubt - min(doubts) <= fitter.settings.odds]
     best = min(allowed, key=lambda trial: trial.order)
-    enough = best.left / (1.0 - fitter.settings.worth)  # beside what leaves no more, the best would not count
-    alike = [one for one in told if one in probable or one.left < enough or same_curve(one.key, best.key)]
+    alike = [one for one in told if one in probable or same_curve(one.key, best.key)]
     if within := [one for one in alike if best.contains(one)]:
         best, same = within[0], within[:1]
         told = [replace(trial, evidence=np.nan) if trial.contains(best) else trial for trial in told]

@@ -33,7 +33,7 @@ EFFECT = EffectType(
         " {damping} within it as well."
     ),
     impossible="a negative stiffness would pull the contacts into each other, a negative damping would feed energy in",
-    contains=("rotor_inertia",),
+    contains=("rotor_inertia", "joint_compliance"),
     motion="deflection",
     impacts=True,
     fixed=("damping", "width"),
