@@ -12,13 +12,12 @@ from vpm.discrepancy.diagnosis import OBSERVED, ChannelGap, RefusedEffect
 from vpm.discrepancy.findings import Accepted, Findings, Stage
 from vpm.discrepancy.judged_model import Data, Judged, judged_anyhow
 from vpm.discrepancy.noise.noise_floor import Structure
-from vpm.discrepancy.preparation import is_as_stated, ruled_out, ruled_out_together, stated
+from vpm.discrepancy.preparation import is_as_stated, ruled_out, ruled_out_together
 from vpm.discrepancy.remainder.remainder import Remainder
 from vpm.discrepancy.screening.candidates import joint_at
 from vpm.discrepancy.settings import (
     CLEAR_GAIN,
     FALSE_ALARM_LEVEL,
-    FAR,
     FLOOR_FACTOR,
     LEAST_GAIN,
     NEGLIGIBLE,
@@ -28,7 +27,7 @@ from vpm.identify import gain, segments
 from vpm.identify.response_along_motion import joints_with_play
 from vpm.identify.settings import MOSTLY_OPEN
 from vpm.model import Model
-from vpm.numbers import NORMAL_95, percent, short
+from vpm.numbers import percent, short
 
 #: Said of what stays after effects were found.
 _REST = " A structured residual above the noise remains."
@@ -89,9 +88,8 @@ def verdict(
     """
     errors = _Errors.of(data, found, gap, left, rest)
     if found.accepted:
-        away = driven_away(nominal.model, recalibrated, found.final, found.ranked)
-        word, summary, more = _of_named(found, data, gap, errors, left, rest, {} if found.interrupted else away)
-        doubt = _doubt(nominal.model, found.ranked, recalibrated, found.final) if word == "effect_found" else ""
+        word, summary, more = _of_named(found, data, gap, errors, left, rest)
+        doubt = _doubt(nominal.model, found.ranked, found.final) if word == "effect_found" else ""
         return word, summary + doubt, more
     if not errors.remaining:
         doubt = _doubt(nominal.model, found.ranked, recalibrated)
@@ -150,19 +148,10 @@ def _of_named(
     errors: _Errors,
     left: Structure | None,
     rest: Remainder | None,
-    away: Mapping[str, float],
 ) -> tuple[str, str, bool]:
-    """Verdict on named effects, of which ``away`` are parameters that they drive away from the model file."""
+    """Verdict on named effects."""
     names, worst = ", then ".join(e.label for e in found.accepted), errors.worst
     numbers = f"Error on validation data: {_stages(worst)}, {_percent(worst.after, worst)} after."
-    if away:
-        name, times = next(iter(away.items()))
-        return (
-            "unexplained",
-            "Only together with values that the model file rules out do effects of the catalogue explain the gap: with "
-            f"{names}, {name} would be off by {times:.1f} times its stated uncertainty. {numbers}",
-            True,
-        )
     tracked = min(found.left.values(), default=np.nan)
     open_anywhere = errors.structured or (data is None and bool(errors.still))  # without efforts an observer can tell
     described_better = rest is not None and (rest.open > MOSTLY_OPEN or rest.seals is not None)
@@ -302,16 +291,16 @@ def _unheard(gap: Mapping[str, ChannelGap], model: Model) -> str:
     return "".join(sentence.format(channels=", ".join(names)) for sentence, names in pairs if names)
 
 
-def _doubt(nominal: Model, ranked: Model | None, recalibrated: Judged, *final: Judged) -> str:
-    """Sentence of the verdict on the parameter farthest from the model file, with effects and without, or "".
+def _doubt(nominal: Model, ranked: Model | None, final: Judged) -> str:
+    """Sentence of the verdict on the parameter of the final model that is farthest from the model file, or "".
 
-    Noise of an encoder that a controller answers to looks like damping to the residual. What an observer of all
-    channels finds as the file states it is no doubt, see `driven_away`.
+    A load that was taken along moves masses, whatever else is missing. So does an effect that imitates another force
+    together with a shifted centre of mass: nobody can tell which it is. Noise of an encoder that a controller answers
+    to looks like damping to the residual; what an observer of all channels finds as the file states it is no doubt.
     """
     for far, where in ((ruled_out, ""), (ruled_out_together, " at the most probable values that explain the records")):
-        before, *after = (far(nominal, one) for one in (recalibrated, *final))
-        shown = {name: times for name, times in before.items() if not is_as_stated(nominal, ranked, name)}
-        if away := {name: times for name, times in shown.items() if all(name in one for one in after)}:
+        told = far(nominal, final).items()
+        if away := {name: times for name, times in told if not is_as_stated(nominal, ranked, name)}:
             name = max(away, key=lambda one: away[one])
             return (
                 f" But {name} is {away[name]:.1f} times its stated uncertainty away from the model file{where}: "
@@ -436,32 +425,3 @@ def _refused(entry: Accepted, joints: Joints, model: Model) -> RefusedEffect:
     joint = joint_at(model, entry.key[1]) or joints.worst
     share = 100.0 * joints.open[joint]
     return RefusedEffect(*entry.key, f"{share:.0f} % of the mean square of the gap at {joint} is left with it")
-
-
-def driven_away(nominal: Model, recalibrated: Judged, final: Judged, ranked: Model | None = None) -> dict[str, float]:
-    """Parameters that accepted effects clearly drive away from their prior in the model file.
-
-    A stated uncertainty is a measurement, and a correct effect brings known parameters back to it. One that imitates
-    another force together with a shifted centre of mass moves them away.
-
-    - ``nominal``: as the file has it
-    - ``recalibrated``, ``final``: without the effects, and with them
-    - ``ranked``: with the effects, as an observer of all joints knows it: the residual may see some of them alone
-
-    Stated uncertainties by which the parameter stands away, the farthest first. Parameters that were as far before are
-    left out: the file is wrong whatever is missing. So are those that the data hardly show beside the effects.
-    """
-    found = {}
-    for name, std in zip(final.free, final.fit.std, strict=True):
-        if name not in nominal.parameters or name not in recalibrated.model.parameters:
-            continue
-        parameter = nominal.parameters[name]
-        spread = stated(parameter)
-        after = final.model.parameters[name].value
-        away = abs(after - parameter.value) - NORMAL_95 * float(std)
-        moved = abs(after - recalibrated.model.parameters[name].value)
-        if is_as_stated(nominal, ranked, name):
-            continue
-        if min(away, moved) > FAR * spread:
-            found[name] = abs(after - parameter.value) / spread
-    return dict(sorted(found.items(), key=lambda item: -item[1]))
