@@ -206,6 +206,11 @@ class EffectType(Traits):
         return any(parameter.scale in {"mass", "inertia"} for parameter in self.parameters)
 
     @property
+    def is_load(self) -> bool:
+        """Whether a kind of effect is a mass somewhere on a body."""
+        return self.site == "body" and self.adds_inertia and any(one.is_place for one in self.parameters)
+
+    @property
     def title(self) -> str:
         """Name of a kind of effect in words: ``"Coulomb friction"``."""
         words = self.name.replace("_", " ")

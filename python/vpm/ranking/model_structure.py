@@ -146,12 +146,11 @@ class Structure:
     @property
     def doubt(self) -> float:
         """How improbable a structure's values are by its model file, and those of its effects by their priors, nats."""
-        return 0.5 * float(self._from_file @ self._from_file)
+        return self.doubt_of(self.model.adjustable)
 
-    @property
-    def _from_file(self) -> Array:
-        """Deviations (k,) of a structure's values from what its model file states; of its effects' by their priors."""
-        return self.standard[[place for place, name in enumerate(self.priors) if name in self.model.adjustable]]
+    def doubt_of(self, names: Collection[str]) -> float:
+        """How improbable a structure's values of some parameters are by their priors, nats."""
+        return 0.5 * float(np.sum(self.standard[[name in names for name in self.priors]] ** 2))
 
     def moves(self, names: Sequence[str]) -> Array:
         """Step of each parameter of a structure for a difference quotient (len(names),)."""

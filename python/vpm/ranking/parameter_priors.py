@@ -10,6 +10,7 @@ from vpm.catalogue import EffectParameter
 from vpm.catalogue.shared import SLOW
 from vpm.discrepancy.screening.candidates import (
     Candidate,
+    extent_of,
     joint_at,
     shares_at,
     slow_speeds,
@@ -98,6 +99,10 @@ class Sizes:
             "time": DELAY,
             "command": self.commands.get(site, 1.0),
         }
+        if site in self.model.bodies and self.model.parameters[f"{site}.mass"].value > 0.0:
+            # A load is as heavy as what carries it, and about as far out.
+            sizes["mass"] = max(sizes["mass"], self.model.parameters[f"{site}.mass"].value)
+            sizes["coordinate"] = extent_of(self.model, site)[1] or sizes["coordinate"]
         return sizes.get(parameter.scale, parameter.typical)
 
     def _shown(self, site: str) -> tuple[float, float, float]:

@@ -17,6 +17,7 @@ from vpm.ranking.command_timing import against_timing
 from vpm.ranking.disturbed_records import disturbed
 from vpm.ranking.fit import ASTRAY, Fitted, Fitter, View
 from vpm.ranking.judgement import Judgement
+from vpm.ranking.load_taken_along import loaded
 from vpm.ranking.look import Look
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.noise_model import fitted_noise
@@ -141,12 +142,27 @@ class Search(Trials):
     ) -> Ranking:
         """Ranking of a search, with the values under the tracker by which all of them predict the records best."""
         best = max(looks, key=lambda look: self._foresight(look.fitted.structure, looks))
-        fits = best.fitted, next(iter(self.first.values())).fitted
+        fits = best.fitted, self._first(best.fitted.structure)
         as_fitted = interrupted or best.fitted.structure.added
         found, first = (one.structure if as_fitted else self._likeliest(one) for one in fits)
         hold = self.fitter.tracked.setup.course
         effects = tuple(_named(named, one, found.values) for one in found.added)
         return Ranking(effects, tuple(rounds), found.repaired, first.repaired, {}, interrupted, hold, self._notes(best))
+
+    def _first(self, found: Structure) -> Fitted:
+        """First fit of the search, in which bodies that took a load along are as the model file states them.
+
+        What values far from the file did in the place of the load is no calibration.
+        """
+        first, loaded_bodies = (
+            next(iter(self.first.values())).fitted,
+            {one.at for one in found.added if one.type.is_load},
+        )
+        kept = {name: one for name, one in self.start.priors.items() if name.partition(".")[0] not in loaded_bodies}
+        if first.structure.doubt_of(self.start.priors.keys() - kept.keys()) > self.settings.odds:
+            with contextlib.suppress(*ASTRAY):
+                return self.fitted(replace(self.start, priors=kept), first.tracker)
+        return first
 
     def _likeliest(self, fitted: Fitted) -> Structure:
         """Structure of a search that names nothing at its most likely values, under the noise that it leaves.
@@ -233,12 +249,30 @@ class Search(Trials):
         """
         best, tried = self._best(looks, [self._off_its_ends(look) for look in looks])
         found = looks[0].fitted.structure
-        if best is not None or found.effects or found.doubt <= self.settings.odds:
+        if best is not None or found.doubt <= self.settings.odds:
             return best, tried
-        with contextlib.suppress(*ASTRAY):
-            best, more = self._best(looks, [self._as_stated(look) for look in looks])
-            tried = [*more, *tried]
+        if not found.effects:
+            with contextlib.suppress(*ASTRAY):
+                best, more = self._best(looks, [self._as_stated(look) for look in looks])
+                tried = [*more, *tried]
+        if best is None and (load := self._load(looks)) is not None:
+            return load, [load, *tried]
         return best, tried
+
+    def _load(self, looks: Sequence[Look]) -> Trial | None:
+        """Load that a body of the search took along, if it is more probable than values far from the model file.
+
+        It leaves no less error than these do: how improbable they are tells.
+        """
+        found: list[Trial] = []
+        for look in looks:
+            for structure in loaded(look.fitted.structure, self.start, self.extensions, self.names):
+                with contextlib.suppress(*ASTRAY):
+                    fitted = self.fitted(structure, look.fitted.tracker)
+                    more = self.advantage(fitted, look.fitted)
+                    found.append(replace(Trial.of(fitted, look), evidence=more))
+        best = max(found, key=lambda one: one.evidence, default=None)
+        return best if best is not None and best.evidence > self.settings.odds else None
 
     def _off_its_ends(self, look: Look) -> Look:
         """Look of the search from which fits with another effect can come back, see `Structure.off_its_ends`.
@@ -324,6 +358,8 @@ class Search(Trials):
             except ASTRAY:  # it runs away without, or another one rests on it
                 return looks, ()
             now = Trial.of(look.fitted, bare[-1], key)
+            if one.type.is_load and self.advantage(look.fitted, bare[-1].fitted) > self.settings.odds:
+                return looks, ()  # values far from the model file would take its place
             trials = (now, *self.in_its_place(bare[-1], self.others.get(key, ())))
             told = [self.examined(trial) for trial in trials if trial.counts]
             counting = [trial for trial in told if trial.counts]

@@ -59,6 +59,8 @@ class Trial:
     @property
     def removing(self) -> str:
         """Text on what a tried effect does: ``removes 3 % of the error power``."""
+        if self.judgement.removed <= self.look.settings.worth:
+            return "does what values far from the model file did"
         return f"removes {rough_percent(self.judgement.removed)} of the error power"
 
     @property

@@ -215,12 +215,18 @@ def _payload_places(model: Model, body: str) -> tuple[Mapping[str, float], ...]:
     """
     if body in model.beams:  # in the frame of its tip
         return ({},)
+    centre, aside = extent_of(model, body)
+    places = [np.zeros(3), *(centre + aside * np.vstack([np.eye(3), -np.eye(3)]))] if aside else [np.zeros(3)]
+    return tuple(dict(zip("xyz", place.tolist(), strict=True)) for place in places)
+
+
+def extent_of(model: Model, body: str) -> tuple[Array, float]:
+    """Centre of mass (m, shape (3,)) of a candidate's body, and how far from its origin its masses are, m."""
     values = model.parameters
     centre = np.array([values[f"{body}.center_of_mass.{axis}"].value for axis in "xyz"])
     moments = sum(values[f"{body}.inertia.{axis}"].value for axis in ("xx", "yy", "zz"))
-    aside = max(float(np.linalg.norm(centre)), float(np.sqrt(0.5 * moments / values[f"{body}.mass"].value)))
-    places = [np.zeros(3), *(centre + aside * np.vstack([np.eye(3), -np.eye(3)]))] if aside else [np.zeros(3)]
-    return tuple(dict(zip("xyz", place.tolist(), strict=True)) for place in places)
+    gyration = float(np.sqrt(0.5 * moments / values[f"{body}.mass"].value))
+    return centre, max(float(np.linalg.norm(centre)), gyration)
 
 
 def slow_speeds(data: InverseDynamicsProblem, shares: Array) -> tuple[float, float]:
