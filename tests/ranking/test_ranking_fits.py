@@ -800,3 +800,20 @@ def test_a_rod_has_room_for_moves_of_one_moment_at_a_time() -> None:
         model.with_parameters({**moved, name: moved[name] + move})
         with pytest.raises(ModelError, match="cannot exceed the sum"):
             model.with_parameters({**stuck, name: stuck[name] + move})
+
+
+def test_an_effect_is_as_large_as_in_the_channel_where_it_does_more_than_errors_of_laws() -> None:
+    """Beside what a stiff spring does to a position nothing is large; another channel may show it all the same."""
+    model = Model.from_toml(SLEDGE)
+    several = []
+    for record in records():
+        speed = np.gradient(record["way.position"], record.dt)
+        noise = 1e-3 * np.random.default_rng(5).standard_normal(len(record))
+        several.append(record.with_channel("way.velocity", speed + noise, "m/s"))
+    fitter = Fitter(TrackedRecords(model, several, Settings()), Settings())
+    fitted = fitter.unfitted(structure_of(model), Tracker(1.0))
+    look = Look(fitted, fitter)
+    position = fitter.tracked.records[0].channels.index("way.position")
+    look.explained = np.where(np.arange(2) == position, 1e8, 10.0)
+    left = np.where(np.arange(2) == position, 0.3, 0.6)
+    assert look.judged(replace(fitted, residual=left * fitted.residual)).size > 0.1

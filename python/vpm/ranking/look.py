@@ -222,12 +222,14 @@ class Look:
 
         Nobody knows how exact a model can be in each channel. So the errors of all have scales of their own, of which
         each is the most likely one, and shares of error power that are left multiply. In one channel at least enough
-        has to go: a little of each of many is what a law takes that has numbers to spare.
+        has to go: a little of each of many is what a law takes that has numbers to spare. That is one in which the
+        effect does more than errors of laws, if it does so in any.
         """
         left = self._squares(fitted.residual)
         ratio = self._ratio(self.left, left)
         removed, gone = max(1.0 - float(np.prod(ratio)), 1e-12), np.maximum(1.0 - ratio, 1e-12)
-        place = self._place(ratio, np.sqrt(gone / (self.bent + gone)) > self.settings.inexact)
+        reads, large = (np.sqrt(gone / (power + gone)) for power in (self.bent, self.explained))
+        place = self._place(ratio, (reads > self.settings.inexact) & (large > self.settings.slight))
         apart = [self._ratio([b], [a]) for b, a in zip(self.left, left, strict=True)]
         shares = [1.0 - max(float(np.prod(one)), float(one[place])) for one in apart]
         there = float(gone[place])
