@@ -55,7 +55,7 @@ from vpm.naming import BROKEN, FAILED, STOPPED, Request, Tell, named, ranked_not
 from vpm.observer import measured_outputs
 from vpm.one_thread import in_one_thread
 from vpm.ranking import Ranking, Settings
-from vpm.ranking.by_tracker import diagnosed_by_tracker
+from vpm.ranking.by_tracker import deviations_by_tracker, diagnosed_by_tracker
 from vpm.ranking.substitute_records import why_unbalanced
 from vpm.simulate import Setup, judging_mode
 from vpm.simulate.setup import READ_BACK
@@ -386,7 +386,7 @@ def _told(known: _Known, found: Findings) -> Diagnosis | list[Drift]:
     floor, gap, left = measure(found.final)
     if (kept := only_where_closed(found, data, gap, left)) is not found:
         found, (floor, gap, left) = kept, measure(kept.final)
-    beyond = tracker_gaps(known.ranking, data.training.joints) if known.ranking is not None else {}
+    beyond = tracker_gaps(known.ranking, data.training.joints, gap) if known.ranking is not None else {}
     if (kept := only_if_open(found, known.recalibrated, gap | beyond)) is not found:
         found, (floor, gap, left), beyond = kept, measure(kept.final), without_effects(beyond)
     rest, stopped = until_stopped(lambda: _rest(known, found, gap), None)
@@ -400,6 +400,16 @@ def _told(known: _Known, found: Findings) -> Diagnosis | list[Drift]:
     told, found, final = _concluded(known, found, said, gap, floor, rest)
     interrupted = found.interrupted or stopped
     return _with_pictures(known, found, replace(told, gap=told.gap | beyond, interrupted=interrupted), final, floor)
+
+
+def _by_tracker(known: _Known, found: Findings) -> dict[str, float]:
+    """Deviations after naming of parameters that the residual does not show, and the ranking alone estimated."""
+    names = [name for entry in found.accepted for name in entry.measured.invisible]
+    if not names or known.ranking is None:
+        return {}
+    job = known.job
+    told = deviations_by_tracker(known.ranking, job.model, job.records, job.setup, names)
+    return {name: told[name] for name in names if name in told}
 
 
 def _concluded(
@@ -423,7 +433,8 @@ def _concluded(
         gap = gaps_of(data, nominal, known.recalibrated, final, floor)
         summary = f"{summary} {empirical.sentence}" + (f" {rest.seals.sentence}" if rest.seals is not None else "")
     records, ambiguous = known.job.records, known.ambiguous if found.accepted else ()
-    told = of_findings(known.job.model, records, nominal, found, (data.training, data.validation), ambiguous)
+    problems, unseen = (data.training, data.validation), _by_tracker(known, found)
+    told = of_findings(known.job.model, records, nominal, found, problems, ambiguous, unseen)
     fit = fit_of(final.model, data.training, final.fit, nominal.fit.residual, list(told.training))
     summary = so_far(found, summary)
     told = replace(told, verdict=word, summary=summary, gap=gap, model=final.model, fit=fit, empirical=empirical)

@@ -5,7 +5,7 @@ import pytest
 
 import vpm
 from vpm.identify.comparison import comparison
-from vpm.identify.estimation import beside_stated, standing
+from vpm.identify.estimation import beside_held, beside_stated, standing
 
 SLIDE = """
 name = "slide"
@@ -41,3 +41,16 @@ def test_where_positions_show_ratios_alone_all_are_as_sure_as_the_stated_mass(st
     found = standing(model, data, NAMES)
     assert np.all(np.isinf(found.std))
     np.testing.assert_allclose(beside_stated(found, model, data).std / found.values, expected, rtol=0.02)
+
+
+@pytest.mark.parametrize(("stated", "expected"), [(0.1, 0.05), ("inf", np.inf)])
+def test_what_was_fitted_beside_a_held_gain_is_no_surer_than_the_stated_mass_makes_that(
+    stated: object, expected: float
+) -> None:
+    model = vpm.Model.from_toml(SLIDE.format(mass=stated))
+    data = comparison(model, [swung(model)], "free_run")
+    mass, gain, viscous = NAMES
+    found = standing(model, data, (mass, viscous))
+    assert np.all(found.std < 1e-3 * found.values)
+    std = beside_held(found, model, data, [gain])
+    np.testing.assert_allclose([std[name] / model.parameters[name].value for name in NAMES], expected, rtol=0.02)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -29,6 +30,7 @@ from vpm.discrepancy.rivals.ambiguity import Rivals, listed
 from vpm.discrepancy.screening.candidates import Key
 from vpm.discrepancy.shifted_commands import in_time
 from vpm.identify import Fit, InverseDynamicsProblem, OutputErrorProblem, Problem, gaps
+from vpm.identify.estimation import beside_held
 from vpm.identify.fit_result import fit_of
 from vpm.model import Model
 from vpm.numbers import stretches
@@ -46,18 +48,21 @@ def of_findings(
     found: Findings,
     problems: tuple[Problem, Problem],
     ambiguous: Sequence[Rivals] = (),
+    told: Mapping[str, float] = MappingProxyType({}),
 ) -> Diagnosis:
     """Diagnosis with the fields of the findings alone: all there is where what follows it failed or was stopped.
 
     - ``start``: what the last fit is compared with
     - ``problems``: residuals of training and validation records
+    - ``told``: deviations of parameters that the residual does not show, by dotted names
     """
     training, validation, notes = records
     names = ", ".join(entry.label for entry in found.accepted) or "no effect"
+    std = {**_deviations(found, problems[0]), **told}
     return Diagnosis(
         "effect_found" if found.accepted else "interrupted" if found.interrupted else "unexplained",
         so_far(found, f"The ranking names {names} in {model.name}; what is left on validation records is not judged."),
-        tuple(accepted_effect(entry, found.final) for entry in found.accepted),
+        tuple(accepted_effect(entry, found.final.model, std) for entry in found.accepted),
         {},
         found.refused,
         found.ranking,
@@ -129,11 +134,19 @@ def _signal(problem: InverseDynamicsProblem | OutputErrorProblem, channel: str) 
     return float(np.sqrt(np.average([b.scale**2 for b in mine], weights=[b.moving.sum() for b in mine])))
 
 
-def accepted_effect(entry: Accepted, final: Judged) -> AcceptedEffect:
+def _deviations(found: Findings, training: Problem) -> dict[str, float]:
+    """Field of a diagnosis: deviations of what the final model has, by dotted names."""
+    final, aliases = found.final, (alias for entry in found.accepted for alias in entry.measured.held)
+    held = [name for name in dict.fromkeys(alias.parameter for alias in aliases) if name not in final.free]
+    if held:
+        return beside_held(final.fit, final.model, training, held)
+    return dict(zip(final.free, map(float, final.fit.std), strict=True))
+
+
+def accepted_effect(entry: Accepted, final: Model, deviations: Mapping[str, float]) -> AcceptedEffect:
     """Field of a diagnosis: an accepted effect with its estimates in the final model, and its evidence."""
     measured = entry.measured
-    deviations = dict(zip(final.free, map(float, final.fit.std), strict=True))
-    estimates = _estimates(final.model, entry.key, entry.side, lambda dotted: deviations.get(dotted, 0.0))
+    estimates = _estimates(final, entry.key, entry.side, lambda dotted: deviations.get(dotted, 0.0))
     notes = [f"{alias.parameter} held: not discriminated from {alias.partner}" for alias in measured.held]
     if measured.invisible and not (measured.free or measured.held):
         notes.append("that is a share of the inverse-dynamics residual, which does not show it; see the observed gaps")

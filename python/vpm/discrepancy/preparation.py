@@ -314,9 +314,9 @@ def moved_far(model: Model, recalibrated: Judged) -> list[str]:
     ]
     if together := ruled_out_together(model, recalibrated):
         notes.append(
-            f"the records show {', '.join(together)} only together; no values that explain them lie nearer to the "
-            f"model file than {max(together.values()):.1f} times their stated uncertainties: question the file, or "
-            "look for what it lacks there, such as a load"
+            f"the records show {', '.join(together)} only together with others; no values that explain them "
+            f"lie nearer to the model file than {max(together.values()):.1f} times the stated uncertainty: question "
+            "the file, or look for what it lacks there, such as a load"
         )
     known = [names for names, _ in on_the_border(model, recalibrated.free)]
     found = on_the_border(recalibrated.model, recalibrated.free)

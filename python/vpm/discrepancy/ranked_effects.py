@@ -6,7 +6,7 @@ dynamics cannot be computed with an effect. Reported values are those of the res
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import compress
 from typing import TYPE_CHECKING
@@ -41,21 +41,27 @@ class NoResidualError(VpmError):
     """Ranked effect with which no inverse-dynamics residual can be computed: only a tracker measures it."""
 
 
-def tracker_gaps(ranking: Ranking, balanced: Sequence[str] | None) -> dict[str, ChannelGap]:
+def tracker_gaps(
+    ranking: Ranking, balanced: Sequence[str] | None, judged: Collection[str] = ()
+) -> dict[str, ChannelGap]:
     """Errors of the ranking's tracker on validation records at joints with play, or without inverse-dynamics residual.
 
-    So of shafts that turn with such a joint. Of all channels where there is no such residual, and so no joint of which
-    the efforts are ``balanced``.
+    So of shafts that turn with such a joint, and of readings of a sensor at which an effect was named, unless the
+    residual has ``judged`` them or follows them. Of all channels where there is no such residual, and so no joint of
+    which the efforts are ``balanced``.
     """
     model, joints = ranking.recalibrated, set(ranking.recalibrated.joints) - set(balanced or ())
     joints |= joints_with_play(ranking.model)
     joints |= {shaft for shaft in model.transmissions if joints & set(model.ratios(shaft))}
+    followed, named = {*judged, *(f"{joint}.position" for joint in model.joints)}, {one.site for one in ranking.effects}
     return {
         f"{channel} ({OBSERVED})": ChannelGap(
             gap.before, gap.recalibrated, gap.after, gap.noise, gap.unit, gap.signal, OBSERVED
         )
         for channel, gap in ranking.gaps.items()
-        if balanced is None or channel.rpartition(".")[0] in joints
+        if balanced is None
+        or channel.rpartition(".")[0] in joints
+        or (channel not in followed and ranking.model.sensor_of(channel) in named)
     }
 
 

@@ -19,7 +19,7 @@ from vpm.identify.identifiability import (
 from vpm.identify.moments import AXES, PAIRS, Coordinates, real_bodies
 from vpm.identify.problem import Problem, segments
 from vpm.identify.solver import DAMPING, Box, Point, descend, sizes
-from vpm.identify.statistics import robust_covariance
+from vpm.identify.statistics import information_root, robust_covariance
 from vpm.model import Model
 from vpm.numbers import Array
 
@@ -180,6 +180,31 @@ def beside_stated(found: Estimate, model: Model, data: Problem) -> Estimate:
     covariance[np.ix_(seen, seen)] = _covariance(data, found.residual, found.jacobian[:, seen], (), names)
     moved = along @ np.linalg.inv(along[known]) * np.array(stated)[known]
     return replace(found, covariance=covariance + moved @ moved.T)
+
+
+def beside_held(found: Estimate, model: Model, data: Problem, held: Sequence[str]) -> dict[str, float]:
+    """Standard deviations of an estimation and of parameters ``held`` beside it, from what the model file states.
+
+    What was held is as sure as the records and the stated uncertainties of all parameters make it together. Its error
+    moves the estimates along, which were fitted as if it were known.
+    """
+    names, first = [*found.names, *held], len(found.names)
+    columns = [model.index(name) for name in names]
+    residual, jacobian = data.evaluate(model, model.theta, columns)
+    lengths = column_lengths(jacobian := above_rounding(jacobian, model, columns))
+    told = information_root(jacobian / lengths, residual, segments(data)) * lengths
+    stated = [1.0 / (model.parameters[name].uncertainty or np.inf) for name in names]
+    rows = np.vstack([told, np.diag(stated)])
+    scales = column_lengths(rows)
+    spread = np.linalg.pinv(rows / scales) / scales[:, None]
+    covariance = blinded(spread @ spread.T, unseen_combinations(rows, names), names)
+    own, others = np.split(jacobian / lengths, [first], axis=1)
+    along = np.linalg.lstsq(own, others, rcond=None)[0] * lengths[first:] / lengths[:first, None]
+    known = np.where(np.isfinite(covariance), covariance, 0.0)[first:, first:]
+    variance = np.diag(covariance).copy()
+    moved = np.diag(found.covariance + along @ known @ along.T)
+    variance[:first] = np.where(np.isfinite(variance[:first]), moved, np.inf)
+    return dict(zip(names, map(float, np.sqrt(variance)), strict=True))
 
 
 class _Counter:

@@ -25,6 +25,8 @@ MOST_ORDER = 30
 MOST_PERSISTENT = 0.97
 #: Least share of a residual that its own fit leaves: one sample that decides a parameter alone says nothing of noise.
 LEAST_LEFT = 0.1
+#: Variance of a score that counts as none, as of a residual of zeros.
+LEAST_SCORE = 1e-200
 
 
 def correlation_length(residual: Array) -> int:
@@ -61,12 +63,28 @@ def robust_covariance(jacobian: Array, residual: Array, segments: Iterable[slice
     - result: shape (p, p)
     """
     bread = np.linalg.pinv(jacobian.T @ jacobian, hermitian=True)
-    meat = np.zeros_like(bread)
+    covariance: Array = bread @ _meat(jacobian, residual, segments) @ bread
+    return 0.5 * (covariance + covariance.T)
+
+
+def information_root(jacobian: Array, residual: Array, segments: Iterable[slice]) -> Array:
+    """Statistical information of a least-squares estimate: rows R with ``R'R`` the inverse of `robust_covariance`.
+
+    Parameters that the residual does not show have none: columns may be copies of each other. Shape (p, p).
+    """
+    values, vectors = np.linalg.eigh(_meat(jacobian, residual, segments))
+    least = max(float(np.finfo(float).eps * values[-1]), LEAST_SCORE) if len(values) else 0.0
+    rows: Array = (vectors / np.sqrt(np.maximum(values, least))).T @ jacobian.T @ jacobian
+    return rows
+
+
+def _meat(jacobian: Array, residual: Array, segments: Iterable[slice]) -> Array:
+    """Statistical covariance of the score of a least-squares estimate, summed over segments."""
+    meat = np.zeros((jacobian.shape[1], jacobian.shape[1]))
     for segment in segments:
         sums = window_sums(jacobian[segment] * residual[segment, None], correlation_length(residual[segment]) + 1)
         meat += sums.T @ sums
-    covariance: Array = bread @ meat @ bread
-    return 0.5 * (covariance + covariance.T)
+    return meat
 
 
 def window_sums(score: Array, length: int) -> Array:

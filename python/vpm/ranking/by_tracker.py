@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -94,6 +95,21 @@ def diagnosed_by_tracker(
     word, summary, _ = verdict(None, nominal, recalibrated, found, gap, None, None)
     traced = _traces(data.validation, nominal, found.final)
     return replace(told, verdict=word, summary=so_far(found, summary), gap=gap, traces=traced)
+
+
+def deviations_by_tracker(
+    ranking: Ranking, model: Model, records: Records, setup: Setup, names: Sequence[str]
+) -> dict[str, float]:
+    """Standard deviations by tracker of parameters of ranked effects; none where no tracker keeps the model.
+
+    ``names``: those that an inverse-dynamics residual does not show, as the gain of a tachometer.
+    """
+    found = ranking.model
+    free = tuple(name for name in (*model.adjustable, *names) if name in found.parameters)
+    with contextlib.suppress(VpmError, ArithmeticError):
+        data, _ = _followed(ranking, model, records[:2], Settings(), setup)
+        return dict(zip(free, map(float, _standing(found, free, data.training).std), strict=True))
+    return {}
 
 
 def _followed(
