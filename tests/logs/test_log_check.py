@@ -136,6 +136,15 @@ def test_names_a_mistake_beside_friction_far_above_inertia(seed: int) -> None:
     assert (one.kind, one.channels) == ("unit", ("two.position",))
 
 
+def test_a_log_of_which_the_model_explains_nothing_is_not_called_right(logs: dict[str, Columns]) -> None:
+    """Numbers of samples read as seconds: a factor that is no unit of time."""
+    found = vpm.check_log(MODEL, record(scaled("t", 37.0)(logs["none"])), workers=1)
+    assert found.mistakes == ()
+    (one,) = (each for each in found.findings if each.kind == "unexplained")
+    assert one.channels == ("one.position", "two.position")
+    assert "sampling time" in one.repair
+
+
 def test_no_machine_moves_before_its_command(logs: dict[str, Columns]) -> None:
     log = record(stamped_late("i2", 5)(logs["none"]))
     (one,) = vpm.check_log(MODEL, log, workers=1).mistakes

@@ -202,6 +202,8 @@ class _Check:
                 break
         if says and not found:
             self._in_vain.append(left)
+            if outputs and all(left.told(name) > self.settings.lost for name in outputs):
+                found.append(_of_unexplained(outputs, left, record.name))
         if others := left.above(self.settings.doubtful) - affected:
             found = [doubted(one, others) for one in found]
         units = _units(model, record, table)
@@ -332,6 +334,13 @@ def _evidence(found: Explanation, place: str) -> str:
         )
     left, then = (rough_percent(shares.by_channel[place]) for shares in (before, after))
     return f"of {place} the model leaves {left} unexplained as it is, and {then} with {corrected}"
+
+
+def _of_unexplained(outputs: Sequence[str], left: Shares, record: str) -> Finding:
+    least = rough_percent(min(left.told(name) for name in outputs))
+    sentence = f"of {', '.join(outputs)} the model leaves at least {least} unexplained, and no other unit helps"
+    repair = "look at the sampling time, at gear ratios and at signs of several channels at once, then at the model"
+    return Finding("unexplained", tuple(outputs), (record,), sentence, repair)
 
 
 def _of_parameters(undetermined: Sequence[str], records: tuple[str, ...]) -> Finding:

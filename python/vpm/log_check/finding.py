@@ -17,7 +17,8 @@ class Finding(Storable):
     kind : str
         ``unit``, ``scale``, ``sign``, ``swap``, ``clock`` or ``delay`` of channels, ``side`` of a dead centre;
         ``constant``, ``frozen``,
-        ``clipped``, ``spikes``, ``filtered`` or ``coarse`` of one by itself; ``unseen`` of parameters.
+        ``clipped``, ``spikes``, ``filtered`` or ``coarse`` of one by itself; ``unseen`` of parameters; ``unexplained``
+        where nothing helps.
     channels : tuple of str
     records : tuple of str
         Logs in which it is.
