@@ -144,8 +144,10 @@ def recalibrated_of(
     if ranked is not None and unseen:
         start = with_ranked(recalibrated.model, ranked, unseen)
         recalibrated, stopped = judged_anyhow(start, (*free, *transitions), alone, bounds)
-    if ranked is not None and (held := _as_stated(model, ranked, ruled_out(model, recalibrated))):
-        start, rest = with_ranked(recalibrated.model, ranked, held), tuple(name for name in free if name not in held)
+    rest = free
+    while ranked is not None and (held := _as_stated(model, ranked, ruled_out(model, recalibrated))):
+        # Once these are held, others may go as far in their place.
+        start, rest = with_ranked(recalibrated.model, ranked, held), tuple(name for name in rest if name not in held)
         recalibrated, stopped = judged_anyhow(start, (*rest, *transitions), alone, bounds)
     if stopped:
         notes.append(f"the recalibrated model could not simulate the validation records: {stopped}")

@@ -150,16 +150,14 @@ class Search(Trials):
         return Ranking(effects, tuple(rounds), found.repaired, first.repaired, {}, interrupted, hold, self._notes(best))
 
     def _first(self, found: Structure) -> Fitted:
-        """First fit of the search, in which bodies that took a load along are as the model file states them.
+        """First fit of the search; where it found a load, one with bodies as the model file states them.
 
-        What values far from the file did in the place of the load is no calibration.
+        What values far from the file do in the place of a load is no calibration.
         """
-        first, loaded_bodies = (
-            next(iter(self.first.values())).fitted,
-            {one.at for one in found.added if one.type.is_load},
-        )
-        kept = {name: one for name, one in self.start.priors.items() if name.partition(".")[0] not in loaded_bodies}
-        if first.structure.doubt_of(self.start.priors.keys() - kept.keys()) > self.settings.odds:
+        first, bodies = next(iter(self.first.values())).fitted, self.start.model.bodies
+        kept = {name: one for name, one in self.start.priors.items() if name.partition(".")[0] not in bodies}
+        far = first.structure.doubt_of(self.start.priors.keys() - kept.keys()) > self.settings.odds
+        if far and any(one.type.is_load for one in found.added):
             with contextlib.suppress(*ASTRAY):
                 return self.fitted(replace(self.start, priors=kept), first.tracker)
         return first

@@ -1,0 +1,45 @@
+"""Loads that a ranking names where a body is far from what its model file states, and others where it is not."""
+
+import pytest
+
+from model_texts import effect_text, on_rail
+from sledge import MASS, pushed
+from vpm import Model, rank
+from vpm.experiment import Experiment
+from vpm.ranking.result import Ranking
+
+#: Stated uncertainty of the sledge's mass, kg.
+UNCERTAIN = 0.05
+
+
+@pytest.fixture(scope="module")
+def logs() -> list[Experiment]:
+    return [pushed(seed=seed, duration=5.0) for seed in (1, 2)]
+
+
+def ranked(stated: float, logs: list[Experiment]) -> Ranking:
+    """Ranking of a sledge that, by its file, has that mass (kg)."""
+    text = on_rail(
+        "sledge", f"{{ value = {stated}, uncertainty = {UNCERTAIN} }}", joint="way", drive="motor", gain="4.0"
+    )
+    oil = effect_text("viscous_friction", "way", viscous="{ value = 7.0, uncertainty = 1.5 }")
+    return rank(Model.from_toml(text + oil), logs[:1], logs[1:], workers=1)
+
+
+def test_a_mass_that_a_body_took_along_is_named(logs: list[Experiment]) -> None:
+    """A mass of 3 kg where 2 are stated: fitted, it leaves no error, at a value 20 uncertainties off."""
+    found = ranked(2.0, logs)
+    (load,) = found.effects
+    assert load.key == ("payload", "sledge")
+    mass = found.model.parameters["sledge.payload.mass"].value
+    assert mass + found.model.parameters["sledge.mass"].value == pytest.approx(MASS, rel=5e-3)
+    assert found.model.parameters["sledge.mass"].value == pytest.approx(2.0, abs=UNCERTAIN)
+    assert found.recalibrated.parameters["sledge.mass"].value == 2.0
+    assert found.gaps["way.position"].after < 0.1 * found.gaps["way.position"].recalibrated
+
+
+@pytest.mark.parametrize("stated", [2.9, 3.6])
+def test_a_file_that_is_a_little_off_or_too_heavy_takes_no_load(stated: float, logs: list[Experiment]) -> None:
+    found = ranked(stated, logs)
+    assert found.effects == ()
+    assert found.model.parameters["sledge.mass"].value == pytest.approx(MASS, rel=5e-3)
