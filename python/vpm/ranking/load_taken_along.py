@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
@@ -11,6 +12,7 @@ from vpm.catalogue import EFFECTS
 from vpm.catalogue.kinds import EffectType
 from vpm.discrepancy.screening.candidates import Candidate, extent_of
 from vpm.numbers import Array
+from vpm.ranking.fit import ASTRAY
 from vpm.ranking.model_structure import Structure
 from vpm.ranking.structure_extensions import Extensions
 
@@ -38,7 +40,8 @@ def loaded(structure: Structure, file: Structure, extensions: Extensions, names:
             own = [name for name in file.priors if name.startswith(f"{body}.") and name in structure.priors]
             more = _more(structure, file, body)
             if own and more is not None:
-                yield _with_load(_as_stated(structure, file, own), effect, body, more, extensions)
+                with contextlib.suppress(*ASTRAY):
+                    yield _with_load(_as_stated(structure, file, own), effect, body, more, extensions)
 
 
 def _more(structure: Structure, file: Structure, body: str) -> tuple[float, Array] | None:

@@ -99,7 +99,7 @@ class Sizes:
             "time": DELAY,
             "command": self.commands.get(site, 1.0),
         }
-        if site in self.model.bodies and self.model.parameters[f"{site}.mass"].value > 0.0:
+        if site in self.model.bodies:
             # A load is as heavy as what carries it, and about as far out.
             sizes["mass"] = max(sizes["mass"], self.model.parameters[f"{site}.mass"].value)
             sizes["coordinate"] = extent_of(self.model, site)[1] or sizes["coordinate"]
