@@ -4,9 +4,12 @@ import pytest
 
 from model_texts import effect_text, on_rail
 from sledge import MASS, pushed
-from vpm import Model, rank
+from vpm import EFFECTS, Model, rank
+from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.experiment import Experiment
+from vpm.ranking.ranking_search import Search
 from vpm.ranking.result import Ranking
+from vpm.ranking.settings import Settings
 
 #: Stated uncertainty of the sledge's mass, kg.
 UNCERTAIN = 0.05
@@ -17,13 +20,16 @@ def logs() -> list[Experiment]:
     return [pushed(seed=seed, duration=5.0) for seed in (1, 2)]
 
 
-def ranked(stated: float, logs: list[Experiment]) -> Ranking:
-    """Ranking of a sledge that, by its file, has that mass (kg)."""
-    text = on_rail(
-        "sledge", f"{{ value = {stated}, uncertainty = {UNCERTAIN} }}", joint="way", drive="motor", gain="4.0"
-    )
+def described(stated: float) -> Model:
+    """Sledge that, by its file, has that mass (kg)."""
+    mass = f"{{ value = {stated}, uncertainty = {UNCERTAIN} }}"
+    text = on_rail("sledge", mass, joint="way", drive="motor", gain="4.0")
     oil = effect_text("viscous_friction", "way", viscous="{ value = 7.0, uncertainty = 1.5 }")
-    return rank(Model.from_toml(text + oil), logs[:1], logs[1:], workers=1)
+    return Model.from_toml(text + oil)
+
+
+def ranked(stated: float, logs: list[Experiment]) -> Ranking:
+    return rank(described(stated), logs[:1], logs[1:], workers=1)
 
 
 def test_a_mass_that_a_body_took_along_is_named(logs: list[Experiment]) -> None:
@@ -43,3 +49,14 @@ def test_a_file_that_is_a_little_off_or_too_heavy_takes_no_load(stated: float, l
     found = ranked(stated, logs)
     assert found.effects == ()
     assert found.model.parameters["sledge.mass"].value == pytest.approx(MASS, rel=5e-3)
+
+
+def test_no_load_is_asked_for_where_a_fit_by_another_tracker_stays_by_the_file(logs: list[Experiment]) -> None:
+    """A fit that stopped far from the file is no sign of a load: one of two may have come back."""
+    search = Search(described(2.0), logs[:1], tuple(EFFECTS), Settings(), None, ParallelCandidates(1), lambda _: None)
+    far = search.looks(search.start)
+    load = search._load(far)
+    assert load is not None
+    assert load.key == ("payload", "sledge")
+    near = search.look(search.fitter.unfitted(search.start, far[0].fitted.tracker))
+    assert search._load([*far, near]) is None

@@ -260,14 +260,18 @@ class Search(Trials):
     def _load(self, looks: Sequence[Look]) -> Trial | None:
         """Load that a body of the search took along, if it is more probable than values far from the model file.
 
-        It leaves no less error than these do: how improbable they are tells.
+        It leaves no less error than these do: how improbable they are tells. A fit without the load begins where the
+        one with it ended, too, for one may have stopped on its way back to the file.
         """
+        if any(look.fitted.structure.doubt <= self.settings.odds for look in looks):
+            return None  # values by the file explain the records as well
         found: list[Trial] = []
         for look in looks:
             for structure in loaded(look.fitted.structure, self.start, self.extensions, self.names):
                 with contextlib.suppress(*ASTRAY):
                     fitted = self.fitted(structure, look.fitted.tracker)
-                    more = self.advantage(fitted, look.fitted)
+                    bare = self.fitted(fitted.structure.without(structure.effects[-1]), look.fitted.tracker)
+                    more = min(self.advantage(fitted, one) for one in (look.fitted, bare))
                     found.append(replace(Trial.of(fitted, look), evidence=more))
         best = max(found, key=lambda one: one.evidence, default=None)
         return best if best is not None and best.evidence > self.settings.odds else None
