@@ -131,8 +131,10 @@ def recalibrated_of(
     """Prepare the recalibrated model: uncertain parameters fitted, judged by the residual if it cannot simulate.
 
     What the residual does not show, such as a spring behind which no drive acts, has its value in the ``ranked`` model.
+    Bodies of which that has all values of the file are held: a ranking found that they carry a load.
     """
-    free = model.adjustable
+    held_bodies = set() if ranked is None else _untouched(model, ranked)
+    free = tuple(name for name in model.adjustable if name.partition(".")[0] not in held_bodies)
     if not free:
         notes.append("the model file gives no parameter an uncertainty, so none was recalibrated")
     transitions = _transitions(model, data.training)
@@ -159,6 +161,12 @@ def recalibrated_of(
     if ranked is not None:
         notes.extend(_moved_by_observer(model, ranked, unseen))
     return recalibrated
+
+
+def _untouched(model: Model, ranked: Model) -> set[str]:
+    """Bodies of a prepared model that a ranking left as the file states them."""
+    moved = {name.partition(".")[0] for name in model.adjustable if ranked.parameters[name] != model.parameters[name]}
+    return set(model.bodies) - moved
 
 
 def _moved_by_observer(model: Model, ranked: Model, unseen: set[str]) -> list[str]:
