@@ -47,6 +47,7 @@ def test_a_spring_that_lifts_a_centre_of_mass_is_named_with_a_doubt() -> None:
     """A spring that hardens is, to fifth order, a linear one beside a centre of mass closer to the axis."""
     case = shared_case("axis_rotary", "cubic_spring", 43)
     why = vpm.diagnose(case.model(), case.train, case.validate, effects=["spring", "bias_force"], workers=1)
+    assert why.verdict == "effect_found"
     assert "But body.center_of_mass.z is 7.7 times its stated uncertainty away" in why.summary
 
 
