@@ -336,11 +336,8 @@ class System:
     def observe(
         self,
         theta: ArrayLike,
-        initial_state: ArrayLike,
-        inputs: ArrayLike,
+        records: Sequence[tuple[ArrayLike, ArrayLike, ArrayLike, ArrayLike]],
         channels: Sequence[int],
-        readings: ArrayLike,
-        gains: ArrayLike,
         time_step: float,
         substeps: int,
         integrator: str,
@@ -349,8 +346,10 @@ class System:
         alone: bool = ...,
         moves: ArrayLike | None = ...,
         innovations: bool = ...,
-    ) -> tuple[Array, Array, Array]:
-        """Follow ``readings`` (N, m) with given ``gains`` (N, nx * m); as `simulate`, before each correction.
+    ) -> list[tuple[Array, Array, Array]]:
+        """Follow each of ``records``; as `simulate`, before each correction.
+
+        A record has its first state (nx,), inputs, readings (N, m) and gains on these (N, nx * m).
 
         Derivatives (N, m, k) are those of the measured outputs alone; outputs are, too, where ``alone``. They are those
         of the steps. Where ``moves`` (k,) tell by how much each parameter may be moved for a difference, approximate

@@ -13,6 +13,7 @@ from scipy.signal import lfilter
 
 import vpm
 from model_texts import effect_text, rod, two_links
+from places import EXAMPLES
 from second_suite import arm
 from sledge import GAIN, MASS, OIL, SLEDGE, pushed
 from vpm.catalogue import EFFECTS
@@ -123,9 +124,9 @@ def test_derivatives_without_those_of_the_matrix_miss_the_exact_ones_by_the_orde
     columns = [model.index(name) for name in ("link3.mass", "m2.gain", "m4.gain")]
 
     def slopes(substeps: int, moves: list[float] | None) -> Any:
-        record = (np.zeros(12), 5.0 * swing, places, 0.2 * swing, gain, 0.004, substeps)
-        how = ("linearly_implicit", columns, "zero_order", True, moves)
-        return model.core.observe(model.theta, *record, *how)[2]
+        records = [(np.zeros(12), 5.0 * swing, 0.2 * swing, gain)]
+        how = (places, 0.004, substeps, "linearly_implicit", columns, "zero_order", True, moves)
+        return model.core.observe(model.theta, records, *how)[0][2]
 
     gaps = []
     for substeps in (1, 2, 4):
@@ -134,6 +135,28 @@ def test_derivatives_without_those_of_the_matrix_miss_the_exact_ones_by_the_orde
     assert 1e-9 < gaps[0] < 1e-2
     assert gaps[1] < 0.35 * gaps[0]
     assert gaps[2] < 0.35 * gaps[1]
+
+
+def test_differences_of_a_large_machine_are_those_of_runs_one_by_one() -> None:
+    model = Model.load(EXAMPLES / "tudor" / "tudor.toml")
+    channels = [f"{joint}.position" for joint in model.joints]
+    time = 0.002 * np.arange(200)
+    swing = np.sin(np.outer(time, 4.0 + np.arange(3.0)))
+    gain = tracker_gains(model, channels, (3.0, 3.0), (len(time), 0.002), model.theta).reshape(len(time), -1)
+    record = (np.zeros(len(model.state_names)), 0.5 * swing, 0.02 * swing, gain)
+    how = ([model.output_channels.index(channel) for channel in channels], 0.002, 1, "crank_nicolson")
+    columns = [model.index(name) for name in ("strip_1.young", "strip_2.density", "motor_2.gain")]
+    moves = 1e-6 * model.theta[columns]
+
+    def left(theta: Array) -> Array:
+        return model.core.observe(theta, [record], *how, alone=True)[0][0]
+
+    [(_, _, slopes)] = model.core.observe(model.theta, [record], *how, columns, "zero_order", True, moves)
+    for number, (column, move) in enumerate(zip(columns, moves, strict=True)):
+        moved = model.theta.copy()
+        moved[column] += move
+        assert np.array_equal(slopes[:, :, number], (left(moved) - left(model.theta)) / move)
+        assert np.any(slopes[:, :, number])
 
 
 def test_structures_are_compared_by_steps_whose_errors_are_small() -> None:

@@ -18,10 +18,12 @@ use std::ops::{Add, AddAssign, Div, DivAssign, Mul, MulAssign, Neg, Sub, SubAssi
 pub use crate::scalar::choice::Choice;
 pub use crate::scalar::dual::{Dual, seed};
 pub use crate::scalar::search::{ARGUMENTS, Search};
+pub use crate::scalar::twins::Twins;
 
 mod choice;
 mod dual;
 mod search;
+mod twins;
 
 /// A real number, possibly carrying derivatives.
 ///
@@ -110,6 +112,39 @@ pub trait Scalar:
         None
     }
 
+    /// Values of scalars that carry no derivative, those of each number together; none for others.
+    #[inline]
+    fn values(numbers: &[Self]) -> Option<&[f64]> {
+        Self::plain(numbers)
+    }
+    /// As [`Scalar::values`], to be written.
+    #[inline]
+    fn values_mut(numbers: &mut [Self]) -> Option<&mut [f64]> {
+        Self::plain_mut(numbers)
+    }
+
+    /// How many runs a scalar belongs to, side by side.
+    const LANES: usize = 1;
+    /// Scalar of two runs, where there are as many lanes; else that of the first.
+    #[inline]
+    fn side_by_side(first: f64, _second: f64) -> Self {
+        Self::from_f64(first)
+    }
+    /// Value of a scalar in one of its lanes.
+    #[inline]
+    fn lane(&self, _lane: usize) -> f64 {
+        self.re()
+    }
+    /// Whether scalars can carry derivatives.
+    #[inline]
+    fn has_derivatives() -> bool {
+        Self::values(&[]).is_none()
+    }
+    /// Whether the magnitude of a scalar's value is at most this.
+    #[inline]
+    fn is_within(self, most: f64) -> bool {
+        self.re().abs() <= most
+    }
     /// Whether scalars are plain values with their first derivatives along some directions.
     #[inline]
     fn is_first_order() -> bool {

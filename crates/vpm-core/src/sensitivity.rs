@@ -27,6 +27,11 @@ pub struct Pair<S> {
 pub(crate) trait Job: Sync {
     /// Runs a job of sensitivities with the parameters `theta`.
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>>;
+
+    /// Runs a job of sensitivities with two sets of parameters, each as if it were alone.
+    fn run_twice(&self, [first, second]: [&[f64]; 2]) -> Result<[Pair<f64>; 2]> {
+        Ok([self.run(first)?, self.run(second)?])
+    }
 }
 
 /// Sensitivity of a job's first array to each parameter index in `variables`, with its values. Place by place,
@@ -77,13 +82,20 @@ pub(crate) fn difference<J: Job>(
     steps: &[f64],
     places: Option<&[usize]>,
 ) -> Result<(Pair<f64>, Vec<f64>)> {
-    let pair = job.run(theta)?;
-    let moved = |(&variable, &step): (&usize, &f64)| {
+    let moved = variables.iter().zip(steps).map(|(&variable, &step)| {
         let mut moved = theta.to_vec();
         moved[variable] += step;
-        job.run(&moved).map(|run| run.first)
+        moved
+    });
+    let all: Vec<Vec<f64>> = std::iter::once(theta.to_vec()).chain(moved).collect();
+    let some = |pair: &[Vec<f64>]| match pair {
+        [first, second] => job.run_twice([first, second]).map(Vec::from),
+        one => one.iter().map(|theta| job.run(theta)).collect(),
     };
-    let runs: Vec<Vec<f64>> = variables.par_iter().zip(steps).map(moved).collect::<Result<_>>()?;
+    let runs: Vec<Vec<Pair<f64>>> = all.par_chunks(2).map(some).collect::<Result<_>>()?;
+    let mut runs = runs.into_iter().flatten();
+    let Some(pair) = runs.next() else { return Err(Error::Interrupted) };
+    let runs: Vec<Vec<f64>> = runs.map(|run| run.first).collect();
     let count = places.map_or(pair.first.len(), <[usize]>::len);
     let mut jacobian = vec![0.0; count * variables.len()];
     for (number, row) in jacobian.chunks_exact_mut(variables.len().max(1)).enumerate() {

@@ -21,7 +21,7 @@ pub(crate) use bounds::{Bounds, repair};
 pub use hold::{Course, Hold, Inputs};
 pub use kalman::{Estimate, Kalman, Linear, by_rows};
 pub(crate) use names::{output_name, state_name};
-pub use observer::{Filtered, Gains, Noise, Readings, filter, observe};
+pub use observer::{Filtered, Gains, Noise, Observed, Readings, filter, observe, observe_all};
 pub use prescribed::{observed, prescribed};
 pub use resolution::{Unstuck, resolution, unstuck};
 pub(crate) use sampled::SampledDrives;
@@ -32,7 +32,7 @@ pub(crate) use stepper::{Drive, Plan, Stepper};
 use crate::description::Description;
 use crate::error::{Diverged, Error, Result};
 use crate::integrator::{Halt, Method};
-use crate::scalar::{Scalar, seed};
+use crate::scalar::{Scalar, Twins, seed};
 use crate::sensitivity::{Interrupt, Job, LANES, MANY, Pair, check_variables, difference, differentiate_by};
 use crate::system::{Build, Trouble};
 use crate::table::Table;
@@ -117,10 +117,8 @@ pub fn free_run<'a>(setting: Setting<'a>, initial_state: &'a [f64], inputs: impl
     inputs.expect(&setting)?;
     check_state("initial_state", setting.description, initial_state)?;
     let horizon = inputs.table.rows();
-    execute(
-        setting,
-        Plan { drive: Drive::Commands(inputs), initial: initial_state, starts: &[0], horizon, gains: None },
-    )
+    let drive = Drive::Commands(inputs);
+    execute(setting, Plan { drive, initial: initial_state, starts: &[0], horizon, gains: None, beside: None })
 }
 
 /// Simulates in closed loop: the controllers follow `references`, with `disturbances` on commands. Both are N x inputs.
@@ -141,7 +139,7 @@ pub fn closed_loop(
         return Err(Error::OpenLoop);
     }
     let drive = Drive::Loop { references, disturbances };
-    execute(setting, Plan { drive, initial: initial_state, starts: &[0], horizon: rows, gains: None })
+    execute(setting, Plan { drive, initial: initial_state, starts: &[0], horizon: rows, gains: None, beside: None })
 }
 
 /// Simulates free runs of `horizon` samples from each sample in `starts`. Each begins in its row of `initial_states`.
@@ -174,7 +172,7 @@ pub fn restarts<'a>(
         }
     }
     let initial = initial_states.numbers();
-    let plan = Plan { drive: Drive::Commands(inputs), initial, starts, horizon, gains: None };
+    let plan = Plan { drive: Drive::Commands(inputs), initial, starts, horizon, gains: None, beside: None };
     execute(setting, plan)
 }
 
@@ -213,20 +211,55 @@ impl Simulation<'_> {
     }
 }
 
+impl Simulation<'_> {
+    /// Two runs of a simulation in lanes of numbers; none where one could lead to other steps than the other, or where
+    /// one fails.
+    fn run_in_lanes(&self, theta: &[Twins]) -> Option<[Pair<f64>; 2]> {
+        let Setting { description, stepping, interrupt, .. } = self.setting;
+        let by_values = !description.loops.is_empty()
+            || !description.balls.is_empty()
+            || description.actuators.iter().any(|actuator| actuator.drive.is_sampled());
+        if by_values || stepping.method.controls_errors() {
+            return None;
+        }
+        let mut stepper = self.stepper(theta).ok()?;
+        let Pair { first: outputs, second: states } =
+            stepper.compile_if_it_pays().then(|| stepper.run(interrupt).ok())??;
+        let (first, second) = states.split_at(states.len() / 2);
+        let lane = |lane: usize, states: &[f64]| Pair {
+            first: outputs.iter().map(|number| number.lane(lane)).collect(),
+            second: states.to_vec(),
+        };
+        Some([lane(0, first), lane(1, second)])
+    }
+}
+
 impl Job for Simulation<'_> {
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
         let mut stepper = self.stepper(theta)?;
         stepper.compile_if_it_pays();
         stepper.run(self.setting.interrupt)
     }
+
+    /// Both runs in the lanes of one, where that has machine code.
+    fn run_twice(&self, [first, second]: [&[f64]; 2]) -> Result<[Pair<f64>; 2]> {
+        let theta: Vec<Twins> = first.iter().zip(second).map(|(&a, &b)| Twins::side_by_side(a, b)).collect();
+        match self.run_in_lanes(&theta) {
+            Some(both) => Ok(both),
+            None => Ok([self.run(first)?, self.run(second)?]),
+        }
+    }
+}
+
+/// Checks whether the steps of a simulation suit its machine, and its `initial` states.
+fn check_beginning(setting: Setting<'_>, initial: &[f64]) -> Result<()> {
+    let Some(first) = initial.get(..setting.description.n_states()) else { return Ok(()) };
+    check_step(setting.description, setting.theta, setting.stepping, first)?;
+    check_starts(setting, initial)
 }
 
 fn execute(setting: Setting<'_>, plan: Plan<'_>) -> Result<Run> {
-    let dim = setting.description.n_states();
-    if let Some(first) = plan.initial.get(..dim) {
-        check_step(setting.description, setting.theta, setting.stepping, first)?;
-        check_starts(setting, plan.initial)?;
-    }
+    check_beginning(setting, plan.initial)?;
     let job = Simulation { setting, plan };
     let width = setting.description.n_outputs();
     let measured = plan.gains.filter(|gains| !gains.alone).map(|gains| {

@@ -45,6 +45,7 @@ impl<'a> Course<'a> {
             starts: &[0],
             horizon: rows,
             gains: None,
+            beside: None,
         };
         Ok(Self { stepper: Stepper::new(&setting, &plan, setting.theta)?, setting, rows, next: 0 })
     }

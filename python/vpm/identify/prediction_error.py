@@ -95,8 +95,8 @@ class PredictionErrorProblem:
         places = [model.output_channels.index(name) for name in record.channels]
         stepping = (record.dt, self._setup.substeps, self._setup.method(model), columns, self._setup.course)
         table = gains.gains.reshape(len(record.time), -1)
-        first, inputs, readings = record.first, record.inputs, record.readings
-        outputs, _, slopes = model.core.observe(theta, first, inputs, places, readings, table, *stepping)
+        followed = [(record.first, record.inputs, record.readings, table)]
+        [(outputs, _, slopes)] = model.core.observe(theta, followed, places, *stepping)
         return outputs, slopes
 
     def _lay_out(self, model: Model) -> tuple[Block, ...]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import contextlib
 import copy
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from itertools import pairwise
+from itertools import groupby, pairwise
 from typing import TypeAlias
 from weakref import WeakKeyDictionary
 
@@ -313,7 +313,7 @@ class TrackedRecords:
     def states(self, model: Model, tracker: Tracker) -> list[Array]:
         """States (N, nx) of the tracked model along each record."""
         begun = zip(self.records, self._begun(model), strict=True)
-        return [self._run(model, model.theta, tracker, NOTHING, *one)[1] for one in begun]
+        return [states for _, states, _ in self._runs(model, model.theta, tracker, NOTHING, begun)]
 
     def outputs(self, model: Model, channels: Sequence[str]) -> list[Array]:
         """Outputs (N,) of a model along all records, as the slowest tracker has them; none where it runs away."""
@@ -323,8 +323,8 @@ class TrackedRecords:
             return []
         with contextlib.suppress(VpmError, ArithmeticError):
             begun = zip(self.records, self._begun(model), strict=True)
-            ran = [self._run(model, model.theta, coarse, NOTHING, *one, alone=False)[0] for one in begun]
-            return list(np.concatenate(ran).T[places])
+            ran = self._runs(model, model.theta, coarse, NOTHING, begun, alone=False)
+            return list(np.concatenate([outputs for outputs, _, _ in ran]).T[places])
         return []
 
     def follow(
@@ -346,15 +346,16 @@ class TrackedRecords:
         places, by = among_parameters(own, columns, moves)
         residuals: list[Array] = []
         slopes: list[Array] = []
-        for record, start in zip(self.records, self._starts_of(model, theta), strict=True):
-            outputs, _, slope = self._run(model, theta[:own], tracker, by, record, start)
+        begun = list(zip(self.records, self._starts_of(model, theta), strict=True))
+        runs = self._runs(model, theta[:own], tracker, by, begun)
+        for (record, start), (outputs, _, slope) in zip(begun, runs, strict=True):
             whole = np.zeros((*outputs.shape, len(columns)))
             whole[:, :, places] = -slope
             before = own + len(residuals) * len(firsts.states)
             for number, size in enumerate(firsts.sizes):
                 if before + number in columns:
                     moved = firsts.added(model, start, STEP * size * (np.arange(len(firsts.sizes)) == number))
-                    others, _, _ = self._run(model, theta[:own], tracker, NOTHING, record, moved)
+                    [(others, _, _)] = self._runs(model, theta[:own], tracker, NOTHING, [(record, moved)])
                     whole[:, :, columns.index(before + number)] = (outputs - others) / (STEP * size)
             for place, told in self._told_slowly(self.experiments[len(residuals)], record):
                 outputs[:, place], whole[:, place] = told(outputs[:, place]), told(whole[:, place])
@@ -377,7 +378,7 @@ class TrackedRecords:
         logs = zip(ends, self.experiments, self.records, self._starts_of(model, theta), strict=True)
         for end, log, record, start in logs:
             other = replace(record, readings=-residual[end - len(record.time) : end])
-            outputs, _, _ = self._run(model, theta[:own], tracker, NOTHING, other, start, innovations=True)
+            [(outputs, _, _)] = self._runs(model, theta[:own], tracker, NOTHING, [(other, start)], innovations=True)
             for place, told in self._told_slowly(log, record):
                 outputs[:, place] = told(outputs[:, place])
             records.append(replace(other, readings=other.readings + outputs))
@@ -448,49 +449,64 @@ class TrackedRecords:
             known[id(record.time)] = bending_gains(model, channels, readings, (start, record.inputs[0]), grid)
         return known[id(record.time)]
 
-    def _run(
+    def _runs(
         self,
         model: Model,
         theta: Array,
         tracker: Tracker,
         by: By,
-        record: Record,
-        start: Array,
+        begun: Iterable[tuple[Record, Array]],
         *,
         alone: bool = True,
         innovations: bool = False,
-    ) -> tuple[Array, Array, Array]:
-        """Outputs of a tracked record (N, m), states (N, nx) and derivatives ``by`` some numbers (N, m, k).
+    ) -> Iterator[tuple[Array, Array, Array]]:
+        """Outputs of tracked records (N, m), states (N, nx) and derivatives ``by`` some numbers (N, m, k), one by one.
 
-        Outputs are those of its channels ``alone``, or all of the model. Its readings may be ``innovations``.
+        Each record comes with its first state. Outputs are those of its channels ``alone``, or all of the model. Its
+        readings may be ``innovations``.
         """
-        known = [column for column, name in enumerate(record.channels) if name in model.output_channels]
-        channels = [record.channels[column] for column in known]
+        for (names, dt), several in groupby(begun, key=lambda one: (one[0].channels, one[0].dt)):
+            known = [column for column, name in enumerate(names) if name in model.output_channels]
+            channels = [names[column] for column in known]
+            method, steps = self.stepping(model, tracker, dt)
+            runs = model.core.observe(
+                theta,
+                [
+                    (
+                        start,
+                        record.inputs,
+                        record.readings[:, known],
+                        self._gains_along(model, theta, tracker, record, start),
+                    )
+                    for record, start in several
+                ],
+                [model.output_channels.index(name) for name in channels],
+                dt,
+                self.setup.substeps * steps,
+                method,
+                list(by[0]),
+                self.setup.course,
+                alone=alone,
+                moves=by[1],
+                innovations=innovations,
+            )
+            fewer = alone and len(known) < len(names)
+            for outputs, states, slopes in runs:
+                yield (
+                    _among(known, len(names), outputs) if fewer else outputs,
+                    states,
+                    _among(known, len(names), slopes) if fewer else slopes,
+                )
+
+    def _gains_along(self, model: Model, theta: Array, tracker: Tracker, record: Record, start: Array) -> Array:
+        """Gains of a tracker along a record (N, nx * m) on those of its channels that the model shows."""
+        channels = [name for name in record.channels if name in model.output_channels]
         bands = tracker.band, max(tracker.band, *self.settings.bands)
         gains = tracker_gains(model, channels, bands, (len(record.time), record.dt), theta, self.of_pressures)
         gains[:, :, [name not in self.drawn_to for name in channels]] = 0.0
         bent = self._bending(model, record, channels, start)
         gains[: len(bent)] += bent
-        method, steps = self.stepping(model, tracker, record.dt)
-        outputs, states, slopes = model.core.observe(
-            theta,
-            start,
-            record.inputs,
-            [model.output_channels.index(name) for name in channels],
-            record.readings[:, known],
-            gains.reshape(len(record.time), -1),
-            record.dt,
-            self.setup.substeps * steps,
-            method,
-            list(by[0]),
-            self.setup.course,
-            alone=alone,
-            moves=by[1],
-            innovations=innovations,
-        )
-        if alone and len(known) < len(record.channels):
-            outputs, slopes = (_among(known, len(record.channels), one) for one in (outputs, slopes))
-        return outputs, states, slopes
+        return gains.reshape(len(record.time), -1)
 
 
 def among_parameters(own: int, columns: Sequence[int], moves: Array | None) -> tuple[list[int], By]:

@@ -110,6 +110,11 @@ impl Method {
         }
     }
 
+    /// Whether an integrator's method chooses its steps by their errors.
+    pub fn controls_errors(self) -> bool {
+        matches!(self, Self::Adaptive { .. } | Self::Guarded)
+    }
+
     /// Whether an integrator's method takes what is stiff implicitly by [`Ode::additive_rates`].
     pub fn is_additive(self) -> bool {
         matches!(self, Self::Additive | Self::CrankNicolson)

@@ -219,7 +219,7 @@ pub fn sticks(method: Method, turn: f64, taken: Taken) -> bool {
 /// Additive methods take such friction where it leads to, and errors that grow so fast are seen by all steps that look at them.
 /// Checked: runs of a slider with each method.
 pub fn bends(method: Method, [stiffness, damping]: [f64; 2]) -> bool {
-    if stiffness <= 0.0 || matches!(method, Method::Adaptive { .. } | Method::Guarded) || method.is_additive() {
+    if stiffness <= 0.0 || method.controls_errors() || method.is_additive() {
         return true;
     }
     rests::<3>(method, &mut Bristles { stiffness, damping }, stiffness, stiffness.sqrt())

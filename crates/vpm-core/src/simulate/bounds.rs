@@ -123,7 +123,7 @@ impl Bounds {
     #[inline]
     pub(crate) fn outside<S: Scalar>(&self, state: &[S]) -> Option<usize> {
         // Written so that a value that is no number is beyond any bound.
-        let wrong = |(state, most): (&S, &f64)| !(state.is_finite() && state.re().abs() <= *most);
+        let wrong = |(state, most): (&S, &f64)| !(state.is_finite() && state.is_within(*most));
         state.iter().zip(&self.most).position(wrong)
     }
 

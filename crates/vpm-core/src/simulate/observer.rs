@@ -9,11 +9,14 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, Dyn};
 
-use super::{Drive, Inputs, Plan, Run, Setting, Stepper, check_state, check_step, execute};
+use super::stepper::Beside;
+use super::{
+    Drive, Inputs, Plan, Run, Setting, Simulation, Stepper, check_beginning, check_state, check_step, execute,
+};
 use crate::description::Description;
 use crate::error::{Error, Result};
-use crate::scalar::Dual;
-use crate::sensitivity::LANES;
+use crate::scalar::{Dual, Twins};
+use crate::sensitivity::{LANES, Pair};
 use crate::sensor::Layout;
 use crate::system::Dynamics;
 use crate::table::Table;
@@ -92,6 +95,40 @@ pub struct Filtered {
     pub deviations: Vec<f64>,
 }
 
+/// A record for an observer.
+#[derive(Clone, Copy, Debug)]
+pub struct Observed<'a> {
+    /// State in which it begins.
+    pub initial: &'a [f64],
+    /// What drives the machine.
+    pub inputs: Inputs<'a>,
+    /// What corrects it; the same channels in all records.
+    pub gains: Gains<'a>,
+}
+
+impl<'a> Observed<'a> {
+    fn rows(&self) -> usize {
+        self.inputs.table.rows()
+    }
+
+    fn check(&self, setting: &Setting<'_>) -> Result<()> {
+        let Self { initial, inputs, gains } = self;
+        gains.readings.check(setting, inputs)?;
+        let entries = setting.description.n_states() * gains.readings.channels.len();
+        gains.gains.expect("gains", self.rows(), entries)?;
+        if let Some(moves) = gains.moves {
+            check_moves(moves, setting.sensitivities.len())?;
+        }
+        check_state("initial_state", setting.description, initial)
+    }
+
+    /// Plan for an observer of the record alone.
+    fn plan(&self) -> Plan<'a> {
+        let (drive, horizon) = (Drive::Commands(self.inputs), self.rows());
+        Plan { drive, initial: self.initial, starts: &[0], horizon, gains: Some(self.gains), beside: None }
+    }
+}
+
 impl Readings<'_> {
     fn check(&self, setting: &Setting<'_>, inputs: &Inputs<'_>) -> Result<()> {
         let count = setting.description.n_outputs();
@@ -161,6 +198,7 @@ pub fn filter<'a>(
         starts: &[0],
         horizon: inputs.table.rows(),
         gains: None,
+        beside: None,
     };
     Filter::new(&setting, &plan, readings, noise)?.run(setting)
 }
@@ -176,16 +214,44 @@ pub fn observe<'a>(
     inputs: impl Into<Inputs<'a>>,
     gains: Gains<'a>,
 ) -> Result<Run> {
-    let inputs = inputs.into();
-    gains.readings.check(&setting, &inputs)?;
-    let (rows, entries) = (inputs.table.rows(), setting.description.n_states() * gains.readings.channels.len());
-    gains.gains.expect("gains", rows, entries)?;
-    if let Some(moves) = gains.moves {
-        check_moves(moves, setting.sensitivities.len())?;
-    }
-    check_state("initial_state", setting.description, initial_state)?;
-    let drive = Drive::Commands(inputs);
-    execute(setting, Plan { drive, initial: initial_state, starts: &[0], horizon: rows, gains: Some(gains) })
+    let record = Observed { initial: initial_state, inputs: inputs.into(), gains };
+    record.check(&setting)?;
+    execute(setting, record.plan())
+}
+
+/// Observers of many records, each as by [`observe`]. Without derivatives two of them run side by side, where there is machine
+/// code for that.
+///
+/// # Errors
+/// As [`filter`].
+pub fn observe_all(setting: Setting<'_>, records: &[Observed<'_>]) -> Result<Vec<Run>> {
+    records.iter().try_for_each(|record| record.check(&setting))?;
+    let each = |records: &[Observed<'_>]| match records {
+        [first, second] if setting.sensitivities.is_empty() => observe_two(setting, [first, second]),
+        some => some.iter().map(|record| execute(setting, record.plan())).collect(),
+    };
+    Ok(records.chunks(2).map(each).collect::<Result<Vec<_>>>()?.into_iter().flatten().collect())
+}
+
+/// Observers of two records, side by side where that is possible. The shorter one waits at its end.
+fn observe_two(setting: Setting<'_>, [first, second]: [&Observed<'_>; 2]) -> Result<Vec<Run>> {
+    [first, second].iter().try_for_each(|record| check_beginning(setting, record.initial))?;
+    let (readings, gains) = (second.gains.readings.table, second.gains.gains);
+    let beside = Some(Beside { initial: second.initial, inputs: second.inputs.table, readings, gains });
+    let horizon = first.rows().max(second.rows());
+    let theta: Vec<Twins> = setting.theta.iter().map(|&value| Twins::from(value)).collect();
+    let alike = first.inputs.hold == second.inputs.hold && first.rows() > 0 && second.rows() > 0;
+    let job = Simulation { setting, plan: Plan { horizon, beside, ..first.plan() } };
+    let Some(runs) = alike.then(|| job.run_in_lanes(&theta)).flatten() else {
+        return [first, second].iter().map(|record| execute(setting, record.plan())).collect();
+    };
+    let cut = |(mut run, record): (Pair<f64>, &Observed<'_>)| {
+        let kept = |length: usize| length / horizon * record.rows();
+        run.first.truncate(kept(run.first.len()));
+        run.second.truncate(kept(run.second.len()));
+        Run { outputs: run.first, states: run.second, jacobian: Vec::new() }
+    };
+    Ok(runs.into_iter().zip([first, second]).map(cut).collect())
 }
 
 /// Refuses moves of parameters that give the observer no differences.

@@ -14,7 +14,7 @@ use super::{Setting, Stepping, diverged, halted, leapt, strayed, troubled};
 use crate::delay::SampleDelay;
 use crate::description::Description;
 use crate::error::{Diverged, Result};
-use crate::integrator::{Integrator, Method};
+use crate::integrator::Integrator;
 use crate::ode::Ode;
 use crate::scalar::Scalar;
 use crate::sensitivity::{Interrupt, Pair};
@@ -44,6 +44,21 @@ pub(crate) struct Plan<'a> {
     pub(crate) horizon: usize,
     /// What corrects the state at every sample, if anything does.
     pub(crate) gains: Option<Gains<'a>>,
+    /// Another observer's plan for the second lanes of numbers, if they have any; the longer of both is the horizon.
+    pub(crate) beside: Option<Beside<'a>>,
+}
+
+/// What differs in a plan from that of the first lanes: an observer of another record.
+#[derive(Clone, Copy)]
+pub(crate) struct Beside<'a> {
+    /// State at its start.
+    pub(crate) initial: &'a [f64],
+    /// Inputs of its record.
+    pub(crate) inputs: Table<'a>,
+    /// Its readings.
+    pub(crate) readings: Table<'a>,
+    /// Gains on these.
+    pub(crate) gains: Table<'a>,
 }
 
 impl Plan<'_> {
@@ -83,7 +98,7 @@ pub(crate) struct Stepper<'a, S> {
     truth: Vec<S>,
     /// How many that are.
     depth: usize,
-    /// States of the piece, row by row.
+    /// States of the piece, row by row, lane after lane.
     states: Vec<f64>,
     /// The state as users know it.
     posture: Vec<S>,
@@ -149,9 +164,9 @@ impl<'a, S: Scalar> Stepper<'a, S> {
             state: vec![zero; dim],
             place: vec![0.0; description.n_coordinates()],
             rate: vec![zero; dim],
-            commands: given.numbers().iter().map(|&command| S::from_f64(command)).collect(),
+            commands: commands(given, plan),
             truth: vec![zero; depth * width],
-            states: vec![0.0; rows * dim],
+            states: vec![0.0; S::LANES * rows * dim],
             posture: vec![zero; dim],
             shown: vec![zero; width],
             outputs: vec![zero; rows * asked.map_or(width, <[usize]>::len)],
@@ -166,7 +181,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     pub(crate) fn compile_if_it_pays(&mut self) -> bool {
         let Stepping { substeps, method, .. } = self.stepping;
         let evaluations = self.plan.starts.len() * self.plan.horizon * substeps * method.evaluations();
-        let (derived, corrected) = (S::plain(&[]).is_none(), self.plan.gains.is_some());
+        let (derived, corrected) = (S::has_derivatives(), self.plan.gains.is_some());
         if !(code_pays(evaluations) || ((derived || corrected) && code_pays_in_fits(evaluations))) {
             return false;
         }
@@ -227,9 +242,10 @@ impl<'a, S: Scalar> Stepper<'a, S> {
 
     /// Restarts the stepper in the initial state of piece `number`.
     pub(crate) fn restart(&mut self, number: usize) {
-        let initial = self.plan.initial.iter().skip(number * self.state.len());
-        for (state, &value) in self.state.iter_mut().zip(initial) {
-            *state = S::from_f64(value);
+        let initial = &self.plan.initial[number * self.state.len()..];
+        let beside = self.plan.beside.map_or(initial, |other| other.initial);
+        for (state, (&value, &other)) in self.state.iter_mut().zip(initial.iter().zip(beside)) {
+            *state = S::side_by_side(value, other);
         }
         self.system.enter(&mut self.state);
         self.integrator.reset();
@@ -251,8 +267,10 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         }
         self.check_stops(row, start)?;
         self.system.show(&self.state, &mut self.posture);
-        let states = self.states[row * dim..(row + 1) * dim].iter_mut();
-        states.zip(&self.posture).for_each(|(state, number)| *state = number.re());
+        for lane in 0..S::LANES {
+            let states = self.states[(lane * self.plan.horizon + row) * dim..].iter_mut();
+            states.zip(&self.posture).for_each(|(state, number)| *state = number.lane(lane));
+        }
         self.control(row, start);
         self.hold(row, start).map_err(|astray| strayed(self, astray, (row, start)))?;
         self.record(row, start);
@@ -278,17 +296,25 @@ impl<'a, S: Scalar> Stepper<'a, S> {
     /// Corrects the stepper's state by gains on readings of sample `row` less its outputs, if there are any.
     fn correct(&mut self, row: usize) {
         let Some(Gains { readings, gains, innovations, .. }) = self.plan.gains else { return };
-        let outputs = &self.shown;
-        let measured = readings.channels.iter().zip(readings.table.row(row));
+        let (outputs, beside) = (&self.shown, self.plan.beside);
+        let own = last_or(readings.table, row);
+        let other = beside.map_or(own, |other| last_or(other.readings, row));
         let mut missed = take(&mut self.missed);
         missed.clear();
-        missed.extend(measured.map(|(&channel, &reading)| {
+        missed.extend(readings.channels.iter().zip(own.iter().zip(other)).map(|(&channel, (&reading, &other))| {
             let predicted = if innovations { S::zero() } else { outputs[channel] };
-            S::from_f64(reading) - predicted
+            S::side_by_side(reading, other) - predicted
         }));
+        let (own, other) = (last_or(gains, row), beside.map(|other| last_or(other.gains, row)));
         let moved = |place: usize| {
-            let gains = &gains.row(row)[place * missed.len()..];
-            missed.iter().zip(gains).fold(S::zero(), |sum, (&missed, &gain)| sum + missed * gain)
+            let first = place * missed.len();
+            let pairs = missed.iter().zip(&own[first..]);
+            match other {
+                None => pairs.fold(S::zero(), |sum, (&missed, &gain)| sum + missed * gain),
+                Some(other) => pairs
+                    .zip(&other[first..])
+                    .fold(S::zero(), |sum, ((&missed, &gain), &other)| sum + missed * S::side_by_side(gain, other)),
+            }
         };
         self.state.iter_mut().enumerate().for_each(|(place, state)| *state += moved(place));
         self.correct_arriving(row, moved);
@@ -339,7 +365,7 @@ impl<'a, S: Scalar> Stepper<'a, S> {
 
     /// Refuses a stepper's piston that went through its stop; steps of controlled error do not let it.
     fn check_stops(&mut self, row: usize, start: usize) -> Result<()> {
-        if matches!(self.stepping.method, Method::Adaptive { .. } | Method::Guarded) {
+        if self.stepping.method.controls_errors() {
             return Ok(());
         }
         self.place.iter_mut().zip(&self.state).for_each(|(value, state)| *value = state.re());
@@ -434,6 +460,21 @@ impl<'a, S: Scalar> Stepper<'a, S> {
         let outputs = self.outputs[..rows * self.width].iter().map(Scalar::re).collect();
         (outputs, self.states[..rows * self.state.len()].to_vec())
     }
+}
+
+/// Row of a table; past its end the last.
+#[inline]
+fn last_or(table: Table<'_>, row: usize) -> &[f64] {
+    table.row(row.min(table.rows().saturating_sub(1)))
+}
+
+/// Inputs that are `given` in a stepper's plan, row by row.
+fn commands<S: Scalar>(given: Table<'_>, plan: &Plan<'_>) -> Vec<S> {
+    let Some(beside) = plan.beside else {
+        return given.numbers().iter().map(|&command| S::from_f64(command)).collect();
+    };
+    let rows = (0..plan.horizon).map(|row| last_or(given, row).iter().zip(last_or(beside.inputs, row)));
+    rows.flatten().map(|(&first, &second)| S::side_by_side(first, second)).collect()
 }
 
 impl Stepper<'_, f64> {

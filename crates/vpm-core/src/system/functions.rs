@@ -132,6 +132,11 @@ impl Function {
         self.compiled(&self.native, Native::compile)
     }
 
+    /// Machine code of a recorded function in numbers without derivatives, likewise.
+    pub(crate) fn code<S: Scalar>(&self) -> std::result::Result<&Native, String> {
+        if S::plain(&[]).is_some() { self.native() } else { self.pairs() }
+    }
+
     /// Machine code of a recorded function for two motions at a time, likewise.
     pub(crate) fn pairs(&self) -> std::result::Result<&Native, String> {
         self.compiled(&self.pairs, Native::compile_pairs)

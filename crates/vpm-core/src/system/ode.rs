@@ -111,7 +111,7 @@ impl<S: Scalar> System<S> {
     /// to rest within a step, so that no order tells what is left out of their matrices.
     #[must_use]
     pub(crate) fn with_approximate_derivatives(self) -> Self {
-        Self { approximate: !Self::is_plain() && self.memories.len() == 0, ..self }
+        Self { approximate: S::has_derivatives() && self.memories.len() == 0, ..self }
     }
 
     /// Enters a user's state: brings it into the coordinates of the ODE.
@@ -245,7 +245,7 @@ impl<S: Scalar> System<S> {
     /// Compiles the ODE's samples and steps by `method` to machine code, or says why not.
     pub fn compile(&mut self, method: Method) -> std::result::Result<(), String> {
         self.ready = false;
-        if !Self::is_plain() {
+        if S::has_derivatives() {
             let constant = self.approximate
                 && method == Method::LinearlyImplicit
                 && self.routines.compile(&Kind::Rates).is_ok()
@@ -256,12 +256,19 @@ impl<S: Scalar> System<S> {
             return kinds.map(|kind| self.routines.compile(&kind)).fold(Ok(()), std::result::Result::and);
         }
         // An additive step begins with the rates of the sample before it, if that has any.
-        let rates = Some(Kind::Rates).filter(|_| !method.is_additive() || self.seen != Kind::Sample);
+        let begun = method.is_additive() && self.seen == Kind::Sample && Self::is_plain();
+        let rates = Some(Kind::Rates).filter(|_| !begun);
         let needed: Vec<Kind> = rates.into_iter().chain([self.seen.clone()]).chain(self.closing()).collect();
         self.routines.compile_all(&needed)?;
+        let Some(kind) = kind_of(method).filter(|kind| *kind != Kind::Elasticity || !Self::is_plain()) else {
+            return Ok(());
+        };
+        let made = self.routines.compile(&kind);
+        if !Self::is_plain() {
+            return made;
+        }
         // A matrix alone that has no code is worked out as before.
-        let kind = kind_of(method).filter(|kind| *kind != Kind::Elasticity);
-        if let Some(kind) = kind.filter(|kind| self.routines.compile(kind).is_err() && self.is_direct(kind)) {
+        if made.is_err() && self.is_direct(&kind) {
             self.routines.forget(&kind);
         }
         Ok(())
@@ -304,7 +311,7 @@ impl<S: Scalar> System<S> {
     /// Whether the ODE is small enough to record a whole step. The matrix, which is at hand, shows about how large it
     /// is.
     fn has_small_steps(&mut self) -> bool {
-        let larger = LARGER[usize::from(!Self::is_plain())];
+        let larger = LARGER[usize::from(S::has_derivatives())];
         let most = self.most_of_step();
         self.routines.get(&Kind::Prepared).is_some_and(|routine| larger * routine.size() <= most)
     }

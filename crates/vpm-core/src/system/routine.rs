@@ -33,7 +33,7 @@ pub(crate) struct Routine<S> {
 #[derive(Clone, Debug)]
 enum Engine<S> {
     Operations(Evaluator<S>),
-    /// Machine code, of plain numbers.
+    /// Machine code, of numbers without derivatives.
     Code(Work),
     /// The same of its derivatives, for numbers that carry some.
     Derivatives(Derivatives),
@@ -77,15 +77,15 @@ impl<S: Scalar> Routine<S> {
         let (outputs, engine) = (vec![S::zero(); function.often.outputs().len()], Evaluator::new(&function.often));
         let directions = function.directions.as_ref().map(|program| {
             let values: Vec<f64> = inputs[..given].iter().map(Scalar::re).collect();
-            let product = S::plain(&[]).is_none().then(|| Along::new(program, &inputs[..given]));
+            let product = S::has_derivatives().then(|| Along::new(program, &inputs[..given]));
             Box::new(Directions { columns: Along::new(program, &values), product })
         });
         Self { function, inputs, outputs, engine: Engine::Operations(engine), directions }
     }
 
-    /// Compiles a routine to machine code of plain numbers, or says why not.
+    /// Compiles a routine to machine code of numbers without derivatives, or says why not.
     pub(crate) fn compile(&mut self) -> std::result::Result<(), String> {
-        self.engine = Engine::Code(self.function.native()?.work());
+        self.engine = Engine::Code(self.function.code::<S>()?.work());
         Ok(())
     }
 
@@ -133,7 +133,7 @@ impl<S: Scalar> Routine<S> {
     pub(crate) fn step(&mut self, x: &[S], step: f64) -> Option<&[S]> {
         self.put(self.function.places.reach(), &[S::from_f64(step)]);
         let (next, exact) = self.at(x).split_at(x.len());
-        (exact[0].re() == 1.0).then_some(next)
+        (exact[0].re() == 1.0 && exact[0].is_constant()).then_some(next)
     }
 
     /// Begins an additive step of a routine at the rates `v` of all coordinates.
@@ -160,8 +160,8 @@ impl<S: Scalar> Routine<S> {
         match &mut self.engine {
             Engine::Operations(evaluator) => evaluator.evaluate(&self.inputs, &mut self.outputs),
             Engine::Code(work) => {
-                let plain = (S::plain(&self.inputs), S::plain_mut(&mut self.outputs));
-                if let (Ok(native), (Some(inputs), Some(outputs))) = (self.function.native(), plain) {
+                let values = (S::values(&self.inputs), S::values_mut(&mut self.outputs));
+                if let (Ok(native), (Some(inputs), Some(outputs))) = (self.function.code::<S>(), values) {
                     // The lengths are those of the function, so that this cannot fail.
                     let done = native.call(inputs, outputs, work);
                     debug_assert!(done.is_ok());
@@ -340,17 +340,18 @@ impl<S: Scalar> Routines<S> {
         };
         self.make(kind).map_err(words)?;
         self.get(kind).map_or(Ok(()), |routine| fits(&routine.function))?;
-        if S::plain(&[]).is_some() {
-            return self.get(kind).map_or(Ok(()), Routine::compile);
-        }
-        if !S::is_first_order() {
-            return Err("no machine code is made for derivatives of derivatives".to_owned());
-        }
-        if self.get(kind).is_some_and(|routine| routine.function.of_values) {
+        let one_machine = !S::has_derivatives() && self.theta.iter().all(Scalar::is_constant);
+        if !one_machine && self.get(kind).is_some_and(|routine| routine.function.of_values) {
             return Err(
                 "the machine is another one at other parameters, so that its code would be made again and again"
                     .to_owned(),
             );
+        }
+        if !S::has_derivatives() {
+            return self.get(kind).map_or(Ok(()), Routine::compile);
+        }
+        if !S::is_first_order() {
+            return Err("no machine code is made for derivatives of derivatives".to_owned());
         }
         let values: Vec<f64> = self.theta.iter().map(Scalar::re).collect();
         let by = self.get(kind).map_or_else(Vec::new, |routine| routine.moving());
@@ -395,7 +396,7 @@ impl<S: Scalar> Routines<S> {
     /// Whether the routine's last matrix lacks derivatives, see [`crate::ode::Ode::turns`].
     #[inline]
     pub(crate) fn turns(&self) -> bool {
-        S::plain(&[]).is_none()
+        S::has_derivatives()
             && self.last.and_then(|last| self.made.get(last)).is_some_and(|(_, routine)| routine.turns())
     }
 

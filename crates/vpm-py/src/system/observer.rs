@@ -2,7 +2,7 @@
 
 use numpy::{PyArray2, PyArray3};
 use pyo3::prelude::*;
-use vpm_core::simulate::{Gains, Hold, Inputs, Noise, Readings, filter, observe};
+use vpm_core::simulate::{Gains, Hold, Inputs, Noise, Observed, Readings, filter, observe_all};
 
 use super::System;
 use super::simulation::Request;
@@ -11,6 +11,20 @@ use crate::arrays::{self, Numbers, cube, matrix};
 type Table<'py> = Bound<'py, PyArray2<f64>>;
 type Cube<'py> = Bound<'py, PyArray3<f64>>;
 type Any<'py> = Bound<'py, PyAny>;
+/// What an observer gives of a record: outputs, states, derivatives.
+type Followed<'py> = (Table<'py>, Table<'py>, Cube<'py>);
+
+/// A record for an observer: its first state, inputs, readings and gains.
+struct Record([Numbers; 4]);
+
+impl Record {
+    fn new((initial, inputs, readings, gains): &(Any<'_>, Any<'_>, Any<'_>, Any<'_>)) -> PyResult<Self> {
+        let initial = Numbers::vector("initial_state", initial)?;
+        let [inputs, readings, gains] = [("inputs", inputs), ("readings", readings), ("gains", gains)]
+            .map(|(name, numbers)| Numbers::table(name, numbers));
+        Ok(Self([initial, inputs?, readings?, gains?]))
+    }
+}
 
 #[pymethods]
 impl System {
@@ -63,20 +77,18 @@ impl System {
         ))
     }
 
-    /// Outputs (N, ny) that an observer with given gains (N, nx * m) predicts from the samples before, or the measured ones (N, m) alone, its
-    /// states before they are corrected (N, nx), and the derivatives of the measured outputs (N, m, k): of the steps, or approximate ones where
-    /// these take less time and `moves` (k,) tell by how much parameters may be moved for them.
-    #[pyo3(signature = (theta, initial_state, inputs, channels, readings, gains, time_step, substeps, integrator, sensitivities=vec![], hold="zero_order", alone=false, moves=None, innovations=false))]
+    /// Of each record, its first state, inputs, readings and gains (N, nx * m): outputs (N, ny) that an observer with these gains predicts from
+    /// the samples before, or the measured ones (N, m) alone, its states before they are corrected (N, nx), and the derivatives of the measured
+    /// outputs (N, m, k): of the steps, or approximate ones where these take less time and `moves` (k,) tell by how much parameters may be moved
+    /// for them.
+    #[pyo3(signature = (theta, records, channels, time_step, substeps, integrator, sensitivities=vec![], hold="zero_order", alone=false, moves=None, innovations=false))]
     #[expect(clippy::too_many_arguments, reason = "the arguments of the Python function")]
     fn observe<'py>(
         &self,
         py: Python<'py>,
         theta: &Any<'py>,
-        initial_state: &Any<'py>,
-        inputs: &Any<'py>,
+        records: Vec<(Any<'py>, Any<'py>, Any<'py>, Any<'py>)>,
         channels: Vec<i64>,
-        readings: &Any<'py>,
-        gains: &Any<'py>,
         time_step: f64,
         substeps: i64,
         integrator: &str,
@@ -85,21 +97,24 @@ impl System {
         alone: bool,
         moves: Option<Any<'py>>,
         innovations: bool,
-    ) -> PyResult<(Table<'py>, Table<'py>, Cube<'py>)> {
+    ) -> PyResult<Vec<Followed<'py>>> {
         let request = Request::new(self, theta, (time_step, substeps, integrator), &sensitivities)?;
         let hold = self.checked(py, Hold::from_name(hold))?;
-        let initial = Numbers::vector("initial_state", initial_state)?;
-        let (inputs, readings) = (Numbers::table("inputs", inputs)?, Numbers::table("readings", readings)?);
-        let (gains, channels) = (Numbers::table("gains", gains)?, arrays::places("channels", &channels)?);
+        let records: Vec<Record> = records.iter().map(Record::new).collect::<PyResult<_>>()?;
+        let channels = arrays::places("channels", &channels)?;
         let moves = moves.map(|moves| Numbers::vector("moves", &moves)).transpose()?;
-        let run = self.compute(py, |interrupt| {
+        let moves = moves.as_ref().map(Numbers::values);
+        let runs = self.compute(py, |interrupt| {
             let setting = request.setting(&self.description, interrupt);
-            let inputs = Inputs { table: inputs.as_table()?, hold };
-            let readings = Readings { channels: &channels, table: readings.as_table()? };
-            let (gains, moves) = (gains.as_table()?, moves.as_ref().map(Numbers::values));
-            let gains = Gains { readings, gains, innovations, alone, moves };
-            observe(setting, initial.values(), inputs, gains)
+            let mut observed = Vec::with_capacity(records.len());
+            for Record([initial, inputs, readings, gains]) in &records {
+                let inputs = Inputs { table: inputs.as_table()?, hold };
+                let readings = Readings { channels: &channels, table: readings.as_table()? };
+                let gains = Gains { readings, gains: gains.as_table()?, innovations, alone, moves };
+                observed.push(Observed { initial: initial.values(), inputs, gains });
+            }
+            observe_all(setting, &observed)
         })?;
-        self.run(py, run, [channels.len(), sensitivities.len()])
+        runs.into_iter().map(|run| self.run(py, run, [channels.len(), sensitivities.len()])).collect()
     }
 }

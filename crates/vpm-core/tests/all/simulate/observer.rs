@@ -1,8 +1,12 @@
 //! Observers: gains in closed form, the innovations that they leave, derivatives.
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+
 use vpm_core::integrator::Method;
 use vpm_core::samples::{Random, Sample, double_pendulum, random_tree, slider};
-use vpm_core::simulate::{Filtered, Gains, Noise, Readings, Run, filter, observe};
+use vpm_core::simulate::{
+    Filtered, Gains, Hold, Inputs, Noise, Observed, Readings, Run, Setting, filter, observe, observe_all,
+};
 use vpm_core::table::Table;
 
 use super::sensitivities::check;
@@ -315,6 +319,52 @@ fn innovations_give_their_record_again() {
     for ((output, e), reading) in measured(&bench, &again).iter().zip(&left).zip(&readings) {
         assert!((output + e - reading).abs() < 1e-11, "{output} + {e} is not {reading}");
     }
+}
+
+/// What observers leave of two records of different lengths, together and one by one, and how often they asked whether to stop.
+fn side_by_side(machine: &Machine, method: Method, hold: Hold) -> ([Vec<Run>; 2], [usize; 2]) {
+    let asked = AtomicUsize::new(0);
+    let interrupt = || asked.fetch_add(1, Ordering::Relaxed) == usize::MAX;
+    let bench = Bench::new(machine, STEP, 2, method);
+    let setting = Setting { interrupt: &interrupt, ..bench.setting() };
+    let logs = [record(&bench, 900), record(&bench, 700)];
+    let gains = [0.3, 0.1, 0.0, 0.2, 2.0, 0.0, 0.1, 1.5, 0.0, 0.0].repeat(900);
+    let firsts = [FIRST, FIRST.map(|value| 0.9 * value)];
+    let observed: Vec<_> = logs
+        .iter()
+        .zip(&firsts)
+        .map(|((inputs, readings), initial)| {
+            let rows = readings.len() / 2;
+            let table = |name, numbers, width| Table::new(name, numbers, rows, width).unwrap();
+            let readings = Readings { channels: &[0, 4], table: table("readings", readings, 2) };
+            let gains = table("gains", &gains[..10 * rows], 10);
+            let gains = Gains { readings, gains, innovations: false, alone: true, moves: None };
+            Observed { initial, inputs: Inputs { table: table("inputs", inputs, 2), hold }, gains }
+        })
+        .collect();
+    let together = observe_all(setting, &observed).unwrap();
+    let often = asked.swap(0, Ordering::Relaxed);
+    let alone = observed.iter().map(|one| observe(setting, one.initial, one.inputs, one.gains).unwrap()).collect();
+    ([together, alone], [often, asked.into_inner()])
+}
+
+#[test]
+fn two_records_side_by_side_leave_bitwise_what_each_leaves_alone() {
+    for method in Method::FIXED {
+        for hold in [Hold::ZeroOrder, Hold::FirstOrder] {
+            let ([together, alone], [often, one_by_one]) = side_by_side(&arm(), method, hold);
+            assert!(together == alone, "{method}");
+            assert!(one_by_one > 0 && 10 * often < 7 * one_by_one, "{method} asked {often} times, {one_by_one} alone");
+        }
+    }
+}
+
+#[test]
+fn steps_of_controlled_errors_are_those_of_each_record() {
+    let method = Method::Adaptive { tolerance: 1e-7 };
+    let ([together, alone], [often, one_by_one]) = side_by_side(&arm(), method, Hold::ZeroOrder);
+    assert!(together == alone);
+    assert_eq!(often, one_by_one);
 }
 
 /// A closed loop: a point of one body on a point of another.
