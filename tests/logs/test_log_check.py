@@ -145,6 +145,17 @@ def test_a_log_of_which_the_model_explains_nothing_is_not_called_right(logs: dic
     assert "sampling time" in one.repair
 
 
+def test_a_closed_loop_without_efforts_is_explained_by_its_motion() -> None:
+    """No efforts follow from the motion of a loop, so they tell nothing of its log."""
+    model = vpm.Model.load("examples/loops/parallelogram.toml")
+    time = np.arange(3000) / 500.0
+    command = {"motor.command": 12.0 + 4.0 * np.sin(4.0 * time) + 2.0 * np.sin(9.0 * time)}
+    run = vpm.simulate(model, vpm.Experiment.from_arrays(time, command, model=model))
+    logged = {**command, "left_crank.position": run["left_crank.position"]}
+    found = vpm.check_log(model, vpm.Experiment.from_arrays(time, logged, model=model), workers=1)
+    assert "unexplained" not in {one.kind for one in found.findings}
+
+
 def test_no_machine_moves_before_its_command(logs: dict[str, Columns]) -> None:
     log = record(stamped_late("i2", 5)(logs["none"]))
     (one,) = vpm.check_log(MODEL, log, workers=1).mistakes

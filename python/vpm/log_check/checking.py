@@ -202,8 +202,8 @@ class _Check:
                 break
         if says and not found:
             self._in_vain.append(left)
-            if outputs and all(left.told(name) > self.settings.lost for name in outputs):
-                found.append(_of_unexplained(outputs, left, record.name))
+            if outputs and (least := min(map(left.unexplained, outputs))) > self.settings.lost:
+                found.append(_of_unexplained(outputs, least, record.name))
         if others := left.above(self.settings.doubtful) - affected:
             found = [doubted(one, others) for one in found]
         units = _units(model, record, table)
@@ -336,9 +336,9 @@ def _evidence(found: Explanation, place: str) -> str:
     return f"of {place} the model leaves {left} unexplained as it is, and {then} with {corrected}"
 
 
-def _of_unexplained(outputs: Sequence[str], left: Shares, record: str) -> Finding:
-    least = rough_percent(min(left.told(name) for name in outputs))
-    sentence = f"of {', '.join(outputs)} the model leaves at least {least} unexplained, and no other unit helps"
+def _of_unexplained(outputs: Sequence[str], least: float, record: str) -> Finding:
+    joined, share = ", ".join(outputs), rough_percent(least)
+    sentence = f"of {joined} the model leaves at least {share} unexplained, and no other unit helps"
     repair = "look at the sampling time, at gear ratios and at signs of several channels at once, then at the model"
     return Finding("unexplained", tuple(outputs), (record,), sentence, repair)
 

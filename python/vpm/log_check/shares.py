@@ -85,6 +85,10 @@ class Shares:
         names = (channel, f"{joint}.position") if kind == "velocity" else (channel,)
         return max(self.efforts.get(name, 1.0) for name in names)
 
+    def unexplained(self, channel: str) -> float:
+        """What is left of a channel by its motion and by the efforts that tell of it, whichever is less."""
+        return min(self.by_channel.get(channel, 1.0), self.told(channel))
+
     def logarithm(self, channels: Iterable[str]) -> float:
         """Mean of the logarithms of the shares of some channels."""
         return mean_logarithm(self.by_channel, channels)
