@@ -135,9 +135,12 @@ def _signal(problem: InverseDynamicsProblem | OutputErrorProblem, channel: str) 
 
 
 def _deviations(found: Findings, training: Problem) -> dict[str, float]:
-    """Field of a diagnosis: deviations of what the final model has, by dotted names."""
-    final, aliases = found.final, (alias for entry in found.accepted for alias in entry.measured.held)
-    held = [name for name in dict.fromkeys(alias.parameter for alias in aliases) if name not in final.free]
+    """Field of a diagnosis: deviations of what the final model has, by dotted names.
+
+    Values of the model file that were held, as masses beside a load, are no surer than the file says.
+    """
+    final, aliases = found.final, (alias.parameter for entry in found.accepted for alias in entry.measured.held)
+    held = [name for name in dict.fromkeys((*aliases, *final.model.adjustable)) if name not in final.free]
     if held:
         return beside_held(final.fit, final.model, training, held)
     return dict(zip(final.free, map(float, final.fit.std), strict=True))
