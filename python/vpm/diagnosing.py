@@ -22,6 +22,8 @@ from vpm.discrepancy.preparation import (
     begun_anywhere,
     beyond_training,
     data_of,
+    moved_by_observer,
+    moved_far,
     nominal_of,
     recalibrated_of,
     records_of,
@@ -395,6 +397,7 @@ def _told(known: _Known, found: Findings) -> Diagnosis | list[Drift]:
         pairs = ((data.training, found.final.fit.residual), (data.validation, found.final.validation))
         if drifts := sensor_drifts(found.final.model, pairs, gap, FLOOR_FACTOR):
             return drifts
+    job.records[2].extend([*moved_far(job.model, found.final), *moved_by_observer(job.model, found.final)])
     if stopped:
         job.records[2].append(STOPPED_LATE)
     told, found, final = _concluded(known, found, said, gap, floor, rest)

@@ -7,7 +7,9 @@ import numpy as np
 import pytest
 
 import vpm
+from model_texts import changed
 from shared_cases import shared_case
+from sledge import OIL, SLEDGE, pushed
 from vpm.discrepancy.preparation import _as_stated, ruled_out_together
 from vpm.discrepancy.verdict import _doubt
 
@@ -119,3 +121,13 @@ actuators.drive = { joint = "axis", gain = 1.0, command_unit = "N m" }
     why = vpm.diagnose(arm, [record(1)], [record(2)], effects=["bias_force"], check=False, workers=1)
     assert why.verdict == "parameters_only"
     assert "at the most probable values that explain the records" in why.summary
+
+
+def test_no_note_tells_where_a_parameter_went_before_the_effect_was_named() -> None:
+    """Oil takes the place of dry friction until that is named, and is then what the file states."""
+    model = changed(SLEDGE, ("{ value = 7.0, uncertainty = 1.5 }", "{ value = 8.2, uncertainty = 0.3 }"))
+    first, second = (pushed(dry=3.0, seed=seed, duration=5.0) for seed in (1, 2))
+    why = vpm.diagnose(model, first, second, workers=1)
+    assert [effect.name for effect in why.effects] == ["coulomb_friction"]
+    assert abs(why.model.parameters["way.friction.viscous"].value - OIL) < 0.1
+    assert not any("way.friction.viscous" in note for note in why.notes)

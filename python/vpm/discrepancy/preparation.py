@@ -157,9 +157,6 @@ def recalibrated_of(
     blind = {name for one in fit.unseen for name in one.names}
     blocks = data.training.blocks
     notes.extend(changed_between(fit.names, fit.values, fit.residual, fit.jacobian, blocks, units, blind, Checks()))
-    notes.extend(moved_far(model, recalibrated))
-    if ranked is not None:
-        notes.extend(_moved_by_observer(model, ranked, unseen))
     return recalibrated
 
 
@@ -169,11 +166,11 @@ def _untouched(model: Model, ranked: Model) -> set[str]:
     return set(model.bodies) - moved
 
 
-def _moved_by_observer(model: Model, ranked: Model, unseen: set[str]) -> list[str]:
+def moved_by_observer(model: Model, final: Judged) -> list[str]:
     """Notes on parameters that the prepared residual does not show, and an observer finds far from the model file."""
-    notes = []
+    notes, unseen = [], {name for one in final.fit.unseen for name in one.names}
     for name in sorted(unseen.intersection(model.adjustable)):
-        file, found = model.parameters[name], ranked.parameters[name].value
+        file, found = model.parameters[name], final.model.parameters[name].value
         if (times := abs(found - file.value) / stated(file)) > FAR:
             notes.append(
                 f"an observer moved {name} from {short(file.value)} to {short(found)} {file.unit}, {times:.1f} times "
@@ -220,7 +217,6 @@ def begun_anywhere(model: Model, data: Data, recalibrated: Judged, notes: list[s
         if np.all(moved[[model.index(name) for name in recalibrated.free]] <= known):
             break
     notes.append("links bend or move where records begin: their first states are unknown, and sought in each record")
-    notes.extend(moved_far(model, recalibrated))
     return data, recalibrated
 
 
@@ -314,23 +310,23 @@ def quickest(record: Experiment, m: Motion, joints: Sequence[str]) -> float:
     return found
 
 
-def moved_far(model: Model, recalibrated: Judged) -> list[str]:
-    """Notes on parameters that a recalibration moved far from their prior, alone or together, or to a border."""
+def moved_far(model: Model, final: Judged) -> list[str]:
+    """Notes on parameters that calibration moved far from their prior, alone or together, or to a border."""
     notes = [
-        f"recalibration moved {name} from {short(model.parameters[name].value)} to "
-        f"{short(recalibrated.model.parameters[name].value)} {model.parameters[name].unit}, "
+        f"calibration moved {name} from {short(model.parameters[name].value)} to "
+        f"{short(final.model.parameters[name].value)} {model.parameters[name].unit}, "
         f"{times:.1f} times its stated uncertainty"
-        for name, times in ruled_out(model, recalibrated).items()
+        for name, times in ruled_out(model, final).items()
     ]
-    if together := ruled_out_together(model, recalibrated):
+    if together := ruled_out_together(model, final):
         notes.append(
             f"the records show {', '.join(together)} only together with others; no values that explain them "
             f"lie nearer to the model file than {max(together.values()):.1f} times the stated uncertainty: question "
             "the file, or look for what it lacks there, such as a load"
         )
-    known = [names for names, _ in on_the_border(model, recalibrated.free)]
-    found = on_the_border(recalibrated.model, recalibrated.free)
-    return notes + [f"recalibration stopped at {sentence}" for names, sentence in found if names not in known]
+    known = [names for names, _ in on_the_border(model, final.free)]
+    found = on_the_border(final.model, final.free)
+    return notes + [f"calibration stopped at {sentence}" for names, sentence in found if names not in known]
 
 
 def ruled_out(model: Model, recalibrated: Judged) -> dict[str, float]:

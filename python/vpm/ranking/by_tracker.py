@@ -85,10 +85,11 @@ def diagnosed_by_tracker(
         lambda final: _offered(final, data, effects),
         settings,
     )
-    notes.extend([BY_TRACKER.format(reason=reason, band=band), *moved_far(model, recalibrated)])
+    notes.append(BY_TRACKER.format(reason=reason, band=band))
     gap = tracker_gaps(ranking, None)
     if gap and (kept := only_if_open(found, recalibrated, gap)) is not found:
         found, gap = kept, without_effects(gap)
+    notes.extend(moved_far(model, found.final))
     told = of_findings(model, records, nominal, found, (data.training, data.validation))
     if not gap:
         return told
