@@ -9,6 +9,7 @@ import vpm
 from quotients import quotient
 from sledge import POLE, SAMPLED, SLEDGE, STIFFNESS, pushed, wound
 from slider_crank import OIL, SLIDER, SLIDER_CRANK, turned
+from vpm.errors import DivergedError
 from vpm.model import Model
 from vpm.ranking.settings import Settings
 from vpm.ranking.substitute_records import opened, shown
@@ -111,3 +112,15 @@ def test_the_stand_in_of_a_loop_moves_as_the_loop_does_and_weighs_what_its_inert
     assert not applied[:, 2].any()
     wanted = 1.05 * SLIDER * acceleration[:, 2]
     assert np.std(required[:, 2] - wanted) < 0.03 * np.std(wanted)
+
+
+def test_the_record_is_named_in_which_a_loop_comes_into_a_flat_pose() -> None:
+    model, time = Model.load("examples/loops/parallelogram.toml"), np.arange(1500) / 250.0
+    swing = 0.5 * np.sin(3.0 * time)
+
+    def record(name: str, middle: float) -> vpm.Experiment:
+        channels = {"motor.command": swing, "left_crank.position": middle + swing}
+        return vpm.Experiment.from_arrays(time, channels, model=model, name=name)
+
+    with pytest.raises(DivergedError, match=r"^flat: the closed loops .* singular configuration"):
+        vpm.rank(model, [record("upright", 1.0), record("flat", 0.3)], [record("other", 1.0)], workers=1)

@@ -14,7 +14,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from vpm.errors import VpmError
+from vpm.errors import CoreError, DivergedError, VpmError
 from vpm.experiment import Experiment, drawn_noise, read_noise
 from vpm.first_bending import bending_gains
 from vpm.identify.shooting import state_channel
@@ -311,9 +311,18 @@ class TrackedRecords:
         return found
 
     def states(self, model: Model, tracker: Tracker) -> list[Array]:
-        """States (N, nx) of the tracked model along each record."""
-        begun = zip(self.records, self._begun(model), strict=True)
-        return [states for _, states, _ in self._runs(model, model.theta, tracker, NOTHING, begun)]
+        """States (N, nx) of the tracked model along each record.
+
+        Raises DivergedError: it runs away from a record, which the sentence names.
+        """
+        found = []
+        for log, record, start in zip(self.experiments, self.records, self._begun(model), strict=True):
+            try:
+                [(_, states, _)] = self._runs(model, model.theta, tracker, NOTHING, [(record, start)])
+            except CoreError as error:
+                raise DivergedError(f"{log.name}: {error}") from None
+            found.append(states)
+        return found
 
     def outputs(self, model: Model, channels: Sequence[str]) -> list[Array]:
         """Outputs (N,) of a model along all records, as the slowest tracker has them; none where it runs away."""
