@@ -5,7 +5,7 @@ import pytest
 
 import vpm
 from vpm import Experiment, Model
-from vpm.discrepancy.screening.candidates import candidates
+from vpm.discrepancy.screening.candidates import candidates, shares_at
 from vpm.errors import ModelError, SimulationError
 from vpm.identify import InverseDynamicsProblem
 
@@ -122,3 +122,14 @@ def test_a_ranking_names_the_drive_that_rubs() -> None:
 def test_nothing_is_named_where_nothing_rubs() -> None:
     records = [stroked(bar, 30 + place, 0.0) for place, bar in enumerate((1.5, 3.0, 6.0))]
     assert not vpm.diagnose(rod(), records[:1] + records[2:], records[1:2]).effects
+
+
+def test_friction_of_a_drive_turns_round_at_a_speed_of_what_it_drives() -> None:
+    """A shaft, which turns many times as fast as the joints behind it, or the length of a line."""
+    wrist = Model.load("examples/wrist/wrist.toml")
+    model = wrist.with_effect("drive_friction", at="left_motor", driving=0.1)
+    assert model.parameters["left_motor.friction.transition_velocity"].unit == "rad/s"
+    joints = ["pitch", "roll"]
+    assert shares_at(wrist, "left_motor", joints).tolist() == shares_at(wrist, "left", joints).tolist() == [50.0, 40.0]
+    leg = Model.load("examples/hyl/hydraulic.toml").with_effect("drive_friction", at="hip_drive", driving=0.1)
+    assert leg.parameters["hip_drive.friction.transition_velocity"].unit == "m/s"

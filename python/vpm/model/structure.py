@@ -134,6 +134,8 @@ class Structure:
         """Kind of the joint in the structure that a site belongs to, or None."""
         if kind == "joint" and site in self.document.transmissions:
             return TURNING
+        if kind in {"actuator", "cylinder"}:
+            return self.driven_kind(site) or "prismatic"  # the length of a line
         joint = self.joint_at(kind, site)
         return None if joint is None else self.joint_kind(joint)
 

@@ -277,10 +277,11 @@ def acts_on(model: Model, problem: InverseDynamicsProblem, site: str) -> Array:
 def shares_at(model: Model, site: str, joints: Sequence[str]) -> Array:
     """Share of each joint in the coordinate at a candidate's site, shape (n,).
 
-    At a transmission these are its ratios, elsewhere 1 of the joint there, or of the first one.
+    At a transmission, or a drive of one, these are its ratios, elsewhere 1 of the joint there, or of the first one.
     """
-    if site in model.transmissions:
-        ratios = model.ratios(site)
+    shaft = model.transmission_of_actuator(site) if site in model.actuators else site
+    if shaft in model.transmissions:
+        ratios = model.ratios(shaft)
         return np.array([model.parameters[ratios[name]].value if name in ratios else 0.0 for name in joints])
     joint = joint_at(model, site) or model.joints[0]
     shares = np.zeros(len(joints))
