@@ -397,7 +397,10 @@ def _told(known: _Known, found: Findings) -> Diagnosis | list[Drift]:
         pairs = ((data.training, found.final.fit.residual), (data.validation, found.final.validation))
         if drifts := sensor_drifts(found.final.model, pairs, gap, FLOOR_FACTOR):
             return drifts
-    job.records[2].extend([*moved_far(job.model, found.final), *moved_by_observer(job.model, found.final)])
+    job.records[2].extend(moved_far(job.model, found.final))
+    if (ranking := known.ranking) is not None:
+        observed = ranking.model if found.accepted else ranking.recalibrated
+        job.records[2].extend(moved_by_observer(job.model, observed, found.final))
     if stopped:
         job.records[2].append(STOPPED_LATE)
     told, found, final = _concluded(known, found, said, gap, floor, rest)

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+import sledge
 import vpm
+from model_texts import effect_text, on_rail
 from vpm.simulate import Setup
 
 GRAVITY, RATE, SECONDS = 9.81, 100.0, 5.0
@@ -158,3 +160,28 @@ def test_a_fit_of_efforts_that_cannot_see_a_spring_says_which_mode_does() -> Non
     other = vpm.identify(model, record, mode="restarts", setup=SMOOTH)
     assert other["coil.spring.stiffness"] == pytest.approx(STIFFNESS, rel=0.01)
     assert not any("was compared" in sentence for sentence in other.warnings)
+
+
+def test_what_a_residual_shows_only_together_stays_where_an_observer_finds_it_as_stated() -> None:
+    """Noise of a deflection, twice differentiated, draws mass from the link to the motor; an observer does not move."""
+    link = "{ value = 2.3, uncertainty = 0.2 }"
+    gain = "{ value = 4.0, uncertainty = 0.2 }"
+    text = on_rail("sledge", link, joint="way", drive="motor", gain=gain)
+    text += effect_text("viscous_friction", "way", viscous="{ value = 8.4, uncertainty = 0.8 }")
+    spring = {
+        "stiffness": "{ value = 2.1e5, uncertainty = 2e4 }",
+        "damping": "{ value = 30.0, uncertainty = 20.0 }",
+        "inertia": "{ value = 0.75, uncertainty = 0.1 }",
+    }
+    file = vpm.Model.from_toml(text + effect_text("joint_compliance", "way", **spring))
+    first, second = (sledge.wound(seed, logged=True) for seed in (1, 2))
+    why = vpm.diagnose(file, first, second, effects=["bias_force"], check=False, workers=1)
+    true = {
+        "sledge.mass": sledge.LINK,
+        "way.compliance.inertia": sledge.MASS - sledge.LINK,
+        "way.compliance.stiffness": sledge.STIFFNESS,
+    }
+    assert why.verdict == "parameters_only"
+    for name, value in true.items():
+        assert abs(why.model.parameters[name].value - value) < 1.5 * (file.parameters[name].uncertainty or 0.0), name
+        assert not any(name in note for note in why.notes)

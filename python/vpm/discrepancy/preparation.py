@@ -147,7 +147,7 @@ def recalibrated_of(
         start = with_ranked(recalibrated.model, ranked, unseen)
         recalibrated, stopped = judged_anyhow(start, (*free, *transitions), alone, bounds)
     rest = free
-    while ranked is not None and (held := _as_stated(model, ranked, ruled_out(model, recalibrated))):
+    while ranked is not None and (held := _as_stated(model, ranked, _far(model, recalibrated))):
         # Once these are held, others may go as far in their place.
         start, rest = with_ranked(recalibrated.model, ranked, held), tuple(name for name in rest if name not in held)
         recalibrated, stopped = judged_anyhow(start, (*rest, *transitions), alone, bounds)
@@ -166,11 +166,11 @@ def _untouched(model: Model, ranked: Model) -> set[str]:
     return set(model.bodies) - moved
 
 
-def moved_by_observer(model: Model, final: Judged) -> list[str]:
+def moved_by_observer(model: Model, ranked: Model, final: Judged) -> list[str]:
     """Notes on parameters that the prepared residual does not show, and an observer finds far from the model file."""
     notes, unseen = [], {name for one in final.fit.unseen for name in one.names}
     for name in sorted(unseen.intersection(model.adjustable)):
-        file, found = model.parameters[name], final.model.parameters[name].value
+        file, found = model.parameters[name], ranked.parameters[name].value
         if (times := abs(found - file.value) / stated(file)) > FAR:
             notes.append(
                 f"an observer moved {name} from {short(file.value)} to {short(found)} {file.unit}, {times:.1f} times "
@@ -327,6 +327,11 @@ def moved_far(model: Model, final: Judged) -> list[str]:
     known = [names for names, _ in on_the_border(model, final.free)]
     found = on_the_border(final.model, final.free)
     return notes + [f"calibration stopped at {sentence}" for names, sentence in found if names not in known]
+
+
+def _far(model: Model, recalibrated: Judged) -> set[str]:
+    """Parameters that a recalibration moved far from their prior, alone or together."""
+    return {*ruled_out(model, recalibrated), *ruled_out_together(model, recalibrated)}
 
 
 def ruled_out(model: Model, recalibrated: Judged) -> dict[str, float]:
