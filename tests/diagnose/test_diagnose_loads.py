@@ -1,8 +1,14 @@
 """How sure a load is that a diagnosis names at a body of which the model file states the mass."""
 
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+
 from model_texts import effect_text, on_rail
 from sledge import MASS, pushed
 from vpm import Model, diagnose
+from vpm.discrepancy.ranked_effects import _shows
 
 UNCERTAIN = 0.05  #: Stated uncertainty of the sledge's mass, kg.
 
@@ -18,3 +24,20 @@ def test_a_load_is_no_surer_than_the_mass_of_its_body() -> None:
     assert (load.name, load.site) == ("payload", "sledge")
     assert UNCERTAIN < weight.std < 1.2 * UNCERTAIN
     assert abs(weight.value - (MASS - 2.0)) < 3.0 * weight.std
+
+
+def test_a_height_of_which_records_say_less_than_how_far_bodies_reach_is_not_fitted() -> None:
+    """A load on a table: places 0.1 m out would show as 1000, 50 and 1e-5 times the noise."""
+    table = Model.from_toml("""
+        name = "table"
+        gravity = [0.0, 0.0, -9.81]
+        bodies.plate = { mass = 2.0, inertia = [0.02, 0.02, 0.02, 0.0, 0.0, 0.0] }
+        joints.turn = { type = "revolute", parent = "world", child = "plate", axis = [0.0, 0.0, 1.0] }
+        actuators.motor = { joint = "turn", gain = 1.0, command_unit = "N m" }
+    """)
+    loaded = table.with_effect("payload", at="plate", mass=1.0, x=0.05)
+    names = [f"plate.payload.{name}" for name in ("mass", "x", "y", "z")]
+    one: Any = SimpleNamespace(key=("payload", "plate"), site="plate", side="motor")
+    noise = np.resize([1.0, -1.0], 100)
+    columns = np.outer(np.ones(100) / 10.0, [1e-9, 1e4, 5e2, 1e-4])
+    assert _shows(loaded, one, names, columns, noise).tolist() == [True, True, True, False]
