@@ -7,6 +7,7 @@ import vpm
 from vpm import Experiment, Model
 from vpm.discrepancy.screening.candidates import candidates, shares_at
 from vpm.errors import ModelError, SimulationError
+from vpm.experiment import joints_from_shafts
 from vpm.identify import InverseDynamicsProblem
 
 LOSS = {"driving": 0.08, "driven": 0.08, "transition_velocity": 0.002}
@@ -133,3 +134,19 @@ def test_friction_of_a_drive_turns_round_at_a_speed_of_what_it_drives() -> None:
     assert shares_at(wrist, "left_motor", joints).tolist() == shares_at(wrist, "left", joints).tolist() == [50.0, 40.0]
     leg = Model.load("examples/hyl/hydraulic.toml").with_effect("drive_friction", at="hip_drive", driving=0.1)
     assert leg.parameters["hip_drive.friction.transition_velocity"].unit == "m/s"
+
+
+def test_friction_of_a_shaft_starts_at_a_speed_that_its_records_show() -> None:
+    """Half a turn of a wrist is 60 of its motors: what bends within 0.01 rad/s there is a jump to any record."""
+    model, time = Model.load("examples/wrist/wrist.toml"), np.arange(1000) / 200.0
+    shafts = {"left.position": 60.0 * np.sin(3.0 * time), "right.position": 60.0 * np.sin(4.0 * time)}
+    currents = {"left_motor.command": np.cos(3.0 * time), "right_motor.command": np.cos(4.0 * time)}
+    log = joints_from_shafts(Experiment.from_arrays(time, shafts | currents, model=model), model)
+    problem = InverseDynamicsProblem(model, [log])
+    residual, _ = problem.evaluate(model, model.theta)
+    for one in candidates(model, problem, residual, ["drive_friction"]):
+        (start,) = one.starts
+        assert start["transition_velocity"] == pytest.approx(0.01 * 180.0, rel=0.4)
+    assert all(one.starts == ({},) for one in candidates(model, problem, residual, ["load_dependent_friction"]))
+    started = model.with_effect("drive_friction", at="left_motor", driving=0.1)
+    assert started.parameters["left_motor.friction.transition_velocity"].value == 0.01

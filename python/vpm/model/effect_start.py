@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-from vpm.catalogue import EffectType
+from vpm.catalogue import EffectType, JointKind
 from vpm.errors import ModelError
 from vpm.model.joint import TURNING
 from vpm.numbers import number_of
@@ -30,7 +30,7 @@ def starting_values(
     for short in values:
         effect.parameter(short)
     entry: dict[str, Any] = {}
-    kind = model.joint_kind(at) if at in model.joints else TURNING if at in model.transmissions else None
+    kind = kind_at(model, at)
     for parameter in effect.parameters:
         if parameter.optional and parameter.name not in values:
             continue
@@ -46,6 +46,13 @@ def starting_values(
         number = number_of(given, f"{parameter.name} of {effect.name}", ModelError)
         entry[parameter.name] = number if known else {"value": number, "uncertainty": math.inf}
     return entry
+
+
+def kind_at(model: Model, at: str) -> JointKind | None:
+    """Kind of the joint at which an effect starts, through its drive too; None for a line, a body or a sensor."""
+    if at in model.actuators and model.line_of_actuator(at) is None:
+        at = model.transmission_of_actuator(at) or model.joint_of_actuator(at)
+    return model.joint_kind(at) if at in model.joints else TURNING if at in model.transmissions else None
 
 
 def _motor_side(model: Model, effect: EffectType, joint: str) -> float:

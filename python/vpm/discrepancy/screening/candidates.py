@@ -30,6 +30,7 @@ from vpm.experiment import instrument_noise
 from vpm.experiment.signal import differentiate
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
+from vpm.model.effect_start import kind_at
 from vpm.numbers import Array
 
 #: Name of an effect and where it sits.
@@ -191,8 +192,18 @@ def _tried(
         bends = sorted(velocities, reverse=True)
         starts = tuple({**start, TRANSITION: velocity} for start in starts for velocity in bends)
         bounds[TRANSITION] = seen.slow
+    elif _bends_unseen(effect, site, model, seen):
+        starts = tuple({**start, TRANSITION: 0.01 * seen.speed} for start in starts)
+        bounds[TRANSITION] = seen.slow
     neutral = all(effect.parameter(name).shape for start in starts for name in start)
     return Candidate(effect, site, starts, bounds, effect.fixed, neutral)
+
+
+def _bends_unseen(effect: EffectType, site: str, model: Model, seen: Excitation) -> bool:
+    """Whether the catalogue's transition velocity is none that the records could show, as at a shaft before a gear."""
+    low, high = seen.slow
+    usual = [one.default(kind_at(model, site)) or 0.0 for one in effect.parameters if one.name == TRANSITION]
+    return any(not low <= velocity <= high for velocity in usual)
 
 
 def _periodic(effect: EffectType, site: str, data: InverseDynamicsProblem, model: Model, residual: Array) -> Candidate:
