@@ -166,6 +166,7 @@ def test_a_reading_that_effects_elsewhere_leave_open_is_told() -> None:
         "lift.effort": ChannelGap(0.06, 0.034, 0.02, NOISE, "N", SIGNAL, "inverse_dynamics"),
         "root.strain": ChannelGap(0.22, 0.08, 0.31, NOISE, "1", SIGNAL, "inverse_dynamics"),
         "tip.ax (observed)": ChannelGap(0.2, 0.2, 0.01, NOISE, "m/s^2", SIGNAL, "observed"),
+        "root.strain (observed)": ChannelGap(0.21, 0.08, 0.3, NOISE, "1", SIGNAL, "observed"),
         "root.strain (restarts)": ChannelGap(0.2, 0.2, 0.3, NOISE, "1", SIGNAL, "restarts"),
     }
     assert open_readings(gap) == ("root.strain",)

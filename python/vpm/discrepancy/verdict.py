@@ -175,7 +175,7 @@ def _of_named(
 
 def open_readings(gap: Mapping[str, ChannelGap]) -> tuple[str, ...]:
     """Readings beside efforts that a verdict leaves open: clear of noise, and about as far off as before effects."""
-    return tuple(
+    left = (
         channel.partition(" ")[0]
         for channel, g in gap.items()
         if g.mode in ("inverse_dynamics", OBSERVED)
@@ -183,6 +183,7 @@ def open_readings(gap: Mapping[str, ChannelGap]) -> tuple[str, ...]:
         and _is_clear(g.after, g)
         and g.after**2 > MOSTLY_OPEN * g.recalibrated**2
     )
+    return tuple(dict.fromkeys(left))
 
 
 def _spoiled(found: Findings, gap: Mapping[str, ChannelGap], tracked: float) -> str:
