@@ -173,7 +173,7 @@ def moved_by_observer(model: Model, ranked: Model, final: Judged) -> list[str]:
         file, found = model.parameters[name], ranked.parameters[name].value
         if (times := abs(found - file.value) / stated(file)) > FAR:
             notes.append(
-                f"an observer moved {name} from {short(file.value)} to {short(found)} {file.unit}, {times:.1f} times "
+                f"an observer moved {name} from {short(file.value)} to {_with_unit(found, file)}, {times:.1f} times "
                 "its stated uncertainty: question the file, or look for what it lacks there"
             )
     return notes
@@ -314,7 +314,7 @@ def moved_far(model: Model, final: Judged) -> list[str]:
     """Notes on parameters that calibration moved far from their prior, alone or together, or to a border."""
     notes = [
         f"calibration moved {name} from {short(model.parameters[name].value)} to "
-        f"{short(final.model.parameters[name].value)} {model.parameters[name].unit}, "
+        f"{_with_unit(final.model.parameters[name].value, model.parameters[name])}, "
         f"{times:.1f} times its stated uncertainty"
         for name, times in ruled_out(model, final).items()
     ]
@@ -327,6 +327,11 @@ def moved_far(model: Model, final: Judged) -> list[str]:
     known = [names for names, _ in on_the_border(model, final.free)]
     found = on_the_border(final.model, final.free)
     return notes + [f"calibration stopped at {sentence}" for names, sentence in found if names not in known]
+
+
+def _with_unit(value: float, parameter: Parameter) -> str:
+    """Value in words of a note, with the unit of a prepared parameter; a ratio has none."""
+    return short(value) if parameter.unit == "1" else f"{short(value)} {parameter.unit}"
 
 
 def _far(model: Model, recalibrated: Judged) -> set[str]:
