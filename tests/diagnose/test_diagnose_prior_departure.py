@@ -10,7 +10,7 @@ import vpm
 from model_texts import changed
 from shared_cases import shared_case
 from sledge import OIL, SLEDGE, pushed
-from vpm.discrepancy.preparation import _as_stated, ruled_out_together
+from vpm.discrepancy.preparation import _as_stated, _with_unit, ruled_out_together
 from vpm.discrepancy.verdict import _doubt
 
 AXIS = """
@@ -131,3 +131,9 @@ def test_no_note_tells_where_a_parameter_went_before_the_effect_was_named() -> N
     assert [effect.name for effect in why.effects] == ["coulomb_friction"]
     assert abs(why.model.parameters["way.friction.viscous"].value - OIL) < 0.1
     assert not any("way.friction.viscous" in note for note in why.notes)
+
+
+def test_a_ratio_in_a_note_has_no_unit() -> None:
+    beam: Any = SimpleNamespace(unit="1")
+    mass: Any = SimpleNamespace(unit="kg")
+    assert (_with_unit(0.02, beam), _with_unit(2.0, mass)) == ("0.02", "2 kg")
