@@ -6,12 +6,23 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import chain
+from math import inf, isfinite
 from typing import Any, TypedDict
 from warnings import warn
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis
-from vpm.discrepancy.diagnosis_fields import examined, gaps_of, of_findings, pictures, so_far, traces, unmeasured, where
+from vpm.discrepancy.diagnosis_fields import (
+    deviations,
+    examined,
+    gaps_of,
+    of_findings,
+    pictures,
+    so_far,
+    traces,
+    unmeasured,
+    where,
+)
 from vpm.discrepancy.evidence import gather
 from vpm.discrepancy.findings import Findings
 from vpm.discrepancy.judged_model import Data, Judged
@@ -410,10 +421,11 @@ def _told(known: _Known, found: Findings) -> Diagnosis | list[Drift]:
 
 def _by_tracker(known: _Known, found: Findings) -> dict[str, float]:
     """Deviations after naming of parameters that the residual does not show, and the ranking alone estimated."""
-    names = [name for entry in found.accepted for name in entry.measured.invisible]
+    job, final, told = known.job, found.final.model, deviations(found, known.data.training)
+    own = (final.effect(*entry.key, entry.side).parameter_names.values() for entry in found.accepted)
+    names = [name for several in own for name in several if not isfinite(told.get(name, inf))]
     if not names or known.ranking is None:
         return {}
-    job = known.job
     told = deviations_by_tracker(known.ranking, job.model, job.records, job.setup, names)
     return {name: told[name] for name in names if name in told}
 

@@ -223,7 +223,7 @@ def test_samples_that_do_not_count_are_gaps_and_no_zeros(diagnosis: vpm.Diagnosi
 def test_a_value_within_its_deviation_is_called_undetermined() -> None:
     assert estimate(0.5, 0.1, "N") == "0.5 ± 0.1 N"
     assert "undetermined: within its deviation of zero" in estimate(-0.05, 0.1, "N")
-    assert "undetermined: within its deviation of zero" in estimate(5.0, np.inf, "N")
+    assert estimate(5.0, np.inf, "N") == "5 N, undetermined: the records do not show it"
     assert "change undetermined: within its deviation of the model file's 0.45" in estimate(0.5, 0.1, "N", 0.45)
     assert "undetermined" not in estimate(0.5, 0.1, "N", 0.2)
     assert estimate(0.5, 0.0, "1") == "0.5 (held)"

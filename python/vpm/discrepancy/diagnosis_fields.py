@@ -58,7 +58,7 @@ def of_findings(
     """
     training, validation, notes = records
     names = ", ".join(entry.label for entry in found.accepted) or "no effect"
-    std = {**_deviations(found, problems[0]), **told}
+    std = {**deviations(found, problems[0]), **told}
     return Diagnosis(
         "effect_found" if found.accepted else "interrupted" if found.interrupted else "unexplained",
         so_far(found, f"The ranking names {names} in {model.name}; what is left on validation records is not judged."),
@@ -134,7 +134,7 @@ def _signal(problem: InverseDynamicsProblem | OutputErrorProblem, channel: str) 
     return float(np.sqrt(np.average([b.scale**2 for b in mine], weights=[b.moving.sum() for b in mine])))
 
 
-def _deviations(found: Findings, training: Problem) -> dict[str, float]:
+def deviations(found: Findings, training: Problem) -> dict[str, float]:
     """Field of a diagnosis: deviations of what the final model has, by dotted names.
 
     Values of the model file that were held, as masses beside a load, are no surer than the file says.

@@ -19,7 +19,7 @@ from vpm.discrepancy.verdict import only_if_open, verdict, without_effects
 from vpm.errors import VpmError
 from vpm.experiment import Experiment
 from vpm.identify import Estimate, InverseDynamicsProblem, estimate, gain, segments
-from vpm.identify.estimation import beside_stated, standing
+from vpm.identify.estimation import beside_held, beside_stated, standing
 from vpm.model import Model
 from vpm.ranking.result import Ranked, Ranking
 from vpm.ranking.settings import Settings
@@ -103,13 +103,14 @@ def deviations_by_tracker(
 ) -> dict[str, float]:
     """Standard deviations by tracker of parameters of ranked effects; none where no tracker keeps the model.
 
-    ``names``: those that an inverse-dynamics residual does not show, as the gain of a tachometer.
+    ``names``: those that an inverse-dynamics residual does not show, as the gain of a tachometer. All others are as
+    sure as the records and the model file make them together.
     """
     found = ranking.model
-    free = tuple(name for name in (*model.adjustable, *names) if name in found.parameters)
+    own, others = ([name for name in several if name in found.parameters] for several in (names, model.adjustable))
     with contextlib.suppress(VpmError, ArithmeticError):
         data, _ = _followed(ranking, model, records[:2], Settings(), setup)
-        return dict(zip(free, map(float, _standing(found, free, data.training).std), strict=True))
+        return beside_held(_standing(found, tuple(own), data.training), found, data.training, others)
     return {}
 
 

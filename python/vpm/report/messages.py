@@ -27,14 +27,16 @@ def estimate(value: float, std: float, unit: str, stated: float | None = None) -
     shown = f" {unit}" if unit != "1" else ""
     if not std > 0.0:
         return f"{short(value)}{shown} (held)" if std == 0.0 else f"{short(value)}{shown} (deviation unknown)"
-    spread = f"± {std:.2g}" if isfinite(std) else "± ∞"
-    return f"{short(value)} {spread}{shown}{undetermined(value, std, stated)}"
+    spread = f" ± {std:.2g}" if isfinite(std) else ""
+    return f"{short(value)}{spread}{shown}{undetermined(value, std, stated)}"
 
 
 def undetermined(value: float, std: float, stated: float | None = None) -> str:
     """Message ``, undetermined: ...`` for a value within its deviation of zero or the file's, or ""."""
     if not std > 0.0:
         return ""
+    if not isfinite(std):
+        return ", undetermined: the records do not show it"
     if abs(value) <= std:
         return ", undetermined: within its deviation of zero"
     if stated is not None and abs(value - stated) <= std:
