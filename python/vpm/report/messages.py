@@ -3,6 +3,7 @@
 from math import isfinite, isnan
 
 from vpm.discrepancy import AcceptedEffect, Diagnosis, Step
+from vpm.discrepancy.settings import NORMAL_95_ONE_SIDED
 from vpm.numbers import percent, short
 
 VERDICT_WORDS = {
@@ -50,7 +51,8 @@ def took(effect: AcceptedEffect) -> str:
         return "was not measured on validation records"
     did = "took" if effect.gain >= 0.0 else "added"
     ending = "of the validation mean square" if effect.gain >= 0.0 else "to the validation mean square"
-    return f"{did} {percent(abs(effect.gain))} {ending} ({effect.score:.1f} standard deviations)"
+    chance = ", no more than chance" if effect.score < NORMAL_95_ONE_SIDED else ""
+    return f"{did} {percent(abs(effect.gain))} {ending} ({effect.score:.1f} standard deviations{chance})"
 
 
 def probability(effect: AcceptedEffect) -> str:
