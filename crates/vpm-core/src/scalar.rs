@@ -1,4 +1,4 @@
-//! The number type of all physics: `f64` for values, [`Dual`] for values with exact derivatives.
+//! The number type of all physics: `f64` for values, [`Dual`] for values with exact derivatives, [`Twins`] for two runs at once.
 //!
 //! Every law is written once, over `S: Scalar`. With `S = f64` it compiles to plain floating point; with
 //! `S = Dual<f64, N>` the same source gives the value and `N` directional derivatives, exact to rounding; with

@@ -209,9 +209,7 @@ impl Simulation<'_> {
         let stepper = self.stepper(&seed::<f64, LANES>(theta, &by[..by.len().min(LANES)]));
         (!stepper.is_ok_and(|mut stepper| stepper.compile_if_it_pays())).then_some(moves)
     }
-}
 
-impl Simulation<'_> {
     /// Two runs of a simulation in lanes of numbers; none where one could lead to other steps than the other, or where
     /// one fails.
     fn run_in_lanes(&self, theta: &[Twins]) -> Option<[Pair<f64>; 2]> {
