@@ -102,13 +102,21 @@ pub struct Observed<'a> {
     pub initial: &'a [f64],
     /// What drives the machine.
     pub inputs: Inputs<'a>,
-    /// What corrects it; the same channels in all records.
+    /// What corrects it.
     pub gains: Gains<'a>,
 }
 
 impl<'a> Observed<'a> {
     fn rows(&self) -> usize {
         self.inputs.table.rows()
+    }
+
+    /// Whether an observer treats another record in the same way.
+    fn is_like(&self, other: &Self) -> bool {
+        let (own, others) = (&self.gains, &other.gains);
+        self.inputs.hold == other.inputs.hold
+            && own.readings.channels == others.readings.channels
+            && (own.innovations, own.alone) == (others.innovations, others.alone)
     }
 
     fn check(&self, setting: &Setting<'_>) -> Result<()> {
@@ -240,7 +248,7 @@ fn observe_two(setting: Setting<'_>, [first, second]: [&Observed<'_>; 2]) -> Res
     let beside = Some(Beside { initial: second.initial, inputs: second.inputs.table, readings, gains });
     let horizon = first.rows().max(second.rows());
     let theta: Vec<Twins> = setting.theta.iter().map(|&value| Twins::from(value)).collect();
-    let alike = first.inputs.hold == second.inputs.hold && first.rows() > 0 && second.rows() > 0;
+    let alike = first.is_like(second) && first.rows() > 0 && second.rows() > 0;
     let job = Simulation { setting, plan: Plan { horizon, beside, ..first.plan() } };
     let Some(runs) = alike.then(|| job.run_in_lanes(&theta)).flatten() else {
         return [first, second].iter().map(|record| execute(setting, record.plan())).collect();

@@ -321,22 +321,29 @@ fn innovations_give_their_record_again() {
     }
 }
 
-/// What observers leave of two records of different lengths, together and one by one, and how often they asked whether to stop.
-fn side_by_side(machine: &Machine, method: Method, hold: Hold) -> ([Vec<Run>; 2], [usize; 2]) {
+/// Channels and lengths of two records.
+const LOGS: [(&[usize], usize); 2] = [(&[0, 4], 900), (&[0, 4], 700)];
+
+/// What observers leave of two records, together and one by one, and how often they asked whether to stop.
+fn side_by_side(
+    machine: &Machine,
+    method: Method,
+    hold: Hold,
+    logs: [(&[usize], usize); 2],
+) -> ([Vec<Run>; 2], [usize; 2]) {
     let asked = AtomicUsize::new(0);
     let interrupt = || asked.fetch_add(1, Ordering::Relaxed) == usize::MAX;
     let bench = Bench::new(machine, STEP, 2, method);
     let setting = Setting { interrupt: &interrupt, ..bench.setting() };
-    let logs = [record(&bench, 900), record(&bench, 700)];
+    let records = logs.map(|(_, rows)| record(&bench, rows));
     let gains = [0.3, 0.1, 0.0, 0.2, 2.0, 0.0, 0.1, 1.5, 0.0, 0.0].repeat(900);
     let firsts = [FIRST, FIRST.map(|value| 0.9 * value)];
-    let observed: Vec<_> = logs
+    let observed: Vec<_> = records
         .iter()
-        .zip(&firsts)
-        .map(|((inputs, readings), initial)| {
-            let rows = readings.len() / 2;
+        .zip(firsts.iter().zip(logs))
+        .map(|((inputs, readings), (initial, (channels, rows)))| {
             let table = |name, numbers, width| Table::new(name, numbers, rows, width).unwrap();
-            let readings = Readings { channels: &[0, 4], table: table("readings", readings, 2) };
+            let readings = Readings { channels, table: table("readings", readings, 2) };
             let gains = table("gains", &gains[..10 * rows], 10);
             let gains = Gains { readings, gains, innovations: false, alone: true, moves: None };
             Observed { initial, inputs: Inputs { table: table("inputs", inputs, 2), hold }, gains }
@@ -352,7 +359,7 @@ fn side_by_side(machine: &Machine, method: Method, hold: Hold) -> ([Vec<Run>; 2]
 fn two_records_side_by_side_leave_bitwise_what_each_leaves_alone() {
     for method in Method::FIXED {
         for hold in [Hold::ZeroOrder, Hold::FirstOrder] {
-            let ([together, alone], [often, one_by_one]) = side_by_side(&arm(), method, hold);
+            let ([together, alone], [often, one_by_one]) = side_by_side(&arm(), method, hold, LOGS);
             assert!(together == alone, "{method}");
             assert!(one_by_one > 0 && 10 * often < 7 * one_by_one, "{method} asked {often} times, {one_by_one} alone");
         }
@@ -362,9 +369,17 @@ fn two_records_side_by_side_leave_bitwise_what_each_leaves_alone() {
 #[test]
 fn steps_of_controlled_errors_are_those_of_each_record() {
     let method = Method::Adaptive { tolerance: 1e-7 };
-    let ([together, alone], [often, one_by_one]) = side_by_side(&arm(), method, Hold::ZeroOrder);
+    let ([together, alone], [often, one_by_one]) = side_by_side(&arm(), method, Hold::ZeroOrder, LOGS);
     assert!(together == alone);
     assert_eq!(often, one_by_one);
+}
+
+#[test]
+fn records_of_other_channels_go_one_by_one() {
+    // Readings of the wrong joint soon drive the second machine away.
+    let logs: [(&[usize], usize); 2] = [(&[0, 4], 60), (&[4, 0], 50)];
+    let ([together, alone], _) = side_by_side(&arm(), Method::Rk4, Hold::ZeroOrder, logs);
+    assert!(together == alone);
 }
 
 /// A closed loop: a point of one body on a point of another.
