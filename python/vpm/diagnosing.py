@@ -419,15 +419,15 @@ def _told(known: _Known, found: Findings) -> Diagnosis | list[Drift]:
     return _with_pictures(known, found, replace(told, gap=told.gap | beyond, interrupted=interrupted), final, floor)
 
 
-def _by_tracker(known: _Known, found: Findings) -> dict[str, float]:
-    """Deviations after naming of parameters that the residual does not show, and the ranking alone estimated."""
+def _deviations(known: _Known, found: Findings) -> dict[str, float]:
+    """Deviations after naming by the residual, and by tracker of what the ranking alone estimated."""
     job, final, told = known.job, found.final.model, deviations(found, known.data.training)
     own = (final.effect(*entry.key, entry.side).parameter_names.values() for entry in found.accepted)
     names = [name for several in own for name in several if not isfinite(told.get(name, inf))]
     if not names or known.ranking is None:
-        return {}
-    told = deviations_by_tracker(known.ranking, job.model, job.records, job.setup, names)
-    return {name: told[name] for name in names if name in told}
+        return told
+    tracked = deviations_by_tracker(known.ranking, job.model, job.records, job.setup, names)
+    return told | {name: tracked[name] for name in names if name in tracked}
 
 
 def _concluded(
@@ -451,8 +451,8 @@ def _concluded(
         gap = gaps_of(data, nominal, known.recalibrated, final, floor)
         summary = f"{summary} {empirical.sentence}" + (f" {rest.seals.sentence}" if rest.seals is not None else "")
     records, ambiguous = known.job.records, known.ambiguous if found.accepted else ()
-    problems, unseen = (data.training, data.validation), _by_tracker(known, found)
-    told = of_findings(known.job.model, records, nominal, found, problems, ambiguous, unseen)
+    problems, std = (data.training, data.validation), _deviations(known, found)
+    told = of_findings(known.job.model, records, nominal, found, problems, ambiguous, std)
     fit = fit_of(final.model, data.training, final.fit, nominal.fit.residual, list(told.training))
     summary = so_far(found, summary)
     told = replace(told, verdict=word, summary=summary, gap=gap, model=final.model, fit=fit, empirical=empirical)

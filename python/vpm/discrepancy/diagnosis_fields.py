@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -48,17 +47,17 @@ def of_findings(
     found: Findings,
     problems: tuple[Problem, Problem],
     ambiguous: Sequence[Rivals] = (),
-    told: Mapping[str, float] = MappingProxyType({}),
+    std: Mapping[str, float] | None = None,
 ) -> Diagnosis:
     """Diagnosis with the fields of the findings alone: all there is where what follows it failed or was stopped.
 
     - ``start``: what the last fit is compared with
     - ``problems``: residuals of training and validation records
-    - ``told``: deviations of parameters that the residual does not show, by dotted names
+    - ``std``: deviations of what the final model has, by dotted names; by default those that the residual tells
     """
     training, validation, notes = records
     names = ", ".join(entry.label for entry in found.accepted) or "no effect"
-    std = {**deviations(found, problems[0]), **told}
+    std = deviations(found, problems[0]) if std is None else std
     return Diagnosis(
         "effect_found" if found.accepted else "interrupted" if found.interrupted else "unexplained",
         so_far(found, f"The ranking names {names} in {model.name}; what is left on validation records is not judged."),

@@ -485,7 +485,7 @@ class TrackedRecords:
                         start,
                         record.inputs,
                         record.readings[:, known],
-                        self._gains_along(model, theta, tracker, record, start),
+                        self._gains_along(model, theta, tracker, channels, record, start),
                     )
                     for record, start in several
                 ],
@@ -507,9 +507,10 @@ class TrackedRecords:
                     _among(known, len(names), slopes) if fewer else slopes,
                 )
 
-    def _gains_along(self, model: Model, theta: Array, tracker: Tracker, record: Record, start: Array) -> Array:
-        """Gains of a tracker along a record (N, nx * m) on those of its channels that the model shows."""
-        channels = [name for name in record.channels if name in model.output_channels]
+    def _gains_along(
+        self, model: Model, theta: Array, tracker: Tracker, channels: Sequence[str], record: Record, start: Array
+    ) -> Array:
+        """Gains of a tracker on these channels along a record (N, nx * m)."""
         bands = tracker.band, max(tracker.band, *self.settings.bands)
         gains = tracker_gains(model, channels, bands, (len(record.time), record.dt), theta, self.of_pressures)
         gains[:, :, [name not in self.drawn_to for name in channels]] = 0.0
