@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
@@ -25,11 +25,8 @@ from vpm.command import (
     writable,
 )
 from vpm.command_output import give, wrote
-
-if TYPE_CHECKING:
-    from vpm.model import Model
 from vpm.numbers import rough_percent
-from vpm.ranking import Ranked, Ranking
+from vpm.ranking import Ranking
 
 EXAMPLES = (
     "Example:  vpm rank model.toml train.csv --validate test.csv --out better.toml\n\n"
@@ -100,7 +97,7 @@ def lines_of(ranking: Ranking) -> Iterator[str]:
         yield f"{ranking.model.name}: no effect removes enough of the error to be added"
     for number, one in enumerate(ranking.effects, 1):
         yield f"{number}. {one.effect} at {one.place} removes {rough_percent(one.judgement.removed)} of the error power"
-        yield f"     {_sentence(one, ranking.model)}"
+        yield f"     {ranking.model.effect(one.effect, one.site, one.side).sentence(ranking.model.parameters)}"
         if one.rivals:
             yield f"     these records do not tell it from {', '.join(one.rivals)}"
     taken = {one.key for one in ranking.effects}
@@ -118,11 +115,3 @@ def lines_of(ranking: Ranking) -> Iterator[str]:
         yield f"{channel}, validation, root mean square beside a slow observer: {levels}"
     for note in ranking.notes:
         yield f"note: {note}"
-
-
-def _sentence(one: Ranked, model: Model) -> str:
-    """What an effect of a model is, with its values."""
-    effect = model.effect(one.effect, one.site, one.side)
-    values = {short: model.parameters[name] for short, name in effect.parameter_names.items()}
-    texts = {short: f"{parameter.value:.4g} {parameter.unit}" for short, parameter in values.items()}
-    return effect.type.sentence.format(at=one.place, **texts)

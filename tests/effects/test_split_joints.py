@@ -166,6 +166,12 @@ def test_the_wind_up_of_a_hanging_arm_starts_as_gravity_leaves_it() -> None:
     assert 50.0 * wind_up == pytest.approx(-1.0 * 9.81 * 0.2 * np.sin(0.5 + wind_up), rel=1e-6)
 
 
+def test_a_joint_that_winds_up_and_a_link_that_bends_cannot_be_one_behind_the_other() -> None:
+    wound = Model.from_toml(ARM).with_effect("joint_compliance", at="elbow", stiffness=50.0, inertia=0.01)
+    with pytest.raises(ModelError, match='splits joint "elbow" again, after joint_compliance'):
+        wound.with_effect("link_flexibility", at="lower", stiffness=80.0, time=1e-3, inertia=0.01)
+
+
 def test_play_at_a_joint_without_an_actuator_is_the_joint_itself() -> None:
     content = slide().to_dict()
     del content["actuators"]
@@ -188,7 +194,10 @@ def test_a_body_that_bends_turns_about_its_root() -> None:
     ("effects", "words"),
     [
         ([("joint_compliance", "axis", {"stiffness": K})], "effects.0..inertia is missing"),
-        ([("joint_compliance", "axis", SPLITS["joint_compliance"]), ("backlash", "axis", SPLITS["backlash"])], "again"),
+        (
+            [("joint_compliance", "axis", SPLITS["joint_compliance"]), ("backlash", "axis", SPLITS["backlash"])],
+            "effects.1..stiffness is that of joint_compliance at axis, which backlash is in series with; leave it out",
+        ),
     ],
 )
 def test_what_cannot_be_split_is_refused_in_one_sentence(

@@ -78,6 +78,8 @@ class Traits:
     """The start values that are tried, and bounds, where a fit would not end well from anywhere."""
     fixed: tuple[str, ...] = ()
     """Short names of the shapes that are left at their start."""
+    of_spring: tuple[tuple[str, str], ...] = ()
+    """What a play in series with a spring of its joint has from that: short names, with those that they have there."""
 
     @property
     def shifts(self) -> bool:

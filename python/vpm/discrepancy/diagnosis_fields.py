@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from vpm.catalogue import EFFECTS
-from vpm.catalogue.kinds import Side, in_words
+from vpm.catalogue.kinds import Side
 from vpm.compare import compare
 from vpm.discrepancy.diagnosis import (
     OBSERVED,
@@ -154,7 +153,7 @@ def accepted_effect(entry: Accepted, final: Model, deviations: Mapping[str, floa
         notes.append("that is a share of the inverse-dynamics residual, which does not show it; see the observed gaps")
     return AcceptedEffect(
         *entry.key,
-        _sentence(entry.key, entry.side, estimates),
+        final.effect(*entry.key, entry.side).sentence(final.parameters),
         estimates,
         measured.validation.relative,
         measured.validation.score,
@@ -172,11 +171,6 @@ def _estimates(model: Model, key: Key, side: Side, std: Callable[[str], float]) 
         EffectParameterEstimate(short, dotted, known[dotted].value, known[dotted].unit, std(dotted))
         for short, dotted in names.items()
     )
-
-
-def _sentence(key: Key, side: Side, estimates: Sequence[EffectParameterEstimate]) -> str:
-    texts = {one.name: f"{one.value:.4g} {one.unit}" for one in estimates}
-    return EFFECTS[key[0]].sentence.format(at=in_words(key[1], side), **texts)
 
 
 def classes(accepted: Sequence[Accepted], ambiguous: Sequence[Rivals]) -> tuple[tuple[str, ...], ...]:
@@ -248,7 +242,7 @@ def _effect(one: Ranked, model: Model) -> AcceptedEffect:
     return AcceptedEffect(
         one.effect,
         one.site,
-        _sentence(one.key, one.side, estimates),
+        model.effect(*one.key, one.side).sentence(model.parameters),
         estimates,
         np.nan,
         np.nan,

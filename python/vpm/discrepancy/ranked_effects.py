@@ -382,11 +382,11 @@ def _split_already(model: Model, effects: Sequence[str] | None) -> tuple[Refused
         RefusedEffect(
             effect.name,
             joint,
-            f"{beyond(effect, joint, model)}; take that out of the model file to try this one",
+            f"{why}; take that out of the model file to try this one",
         )
         for effect in splitting
         for joint in joints
-        if (effect.name, joint) not in there
+        if (effect.name, joint) not in there and (why := beyond(effect, joint, model))
     )
 
 

@@ -117,6 +117,8 @@ FREQUENCIES, LOOSE = (3.0, 8.0, 20.0, 50.0), 0.05
 SOFTEST, LEAST_DRIVEN = 0.5, 1e-4
 #: Frequency of the contacts of backlash, Hz, damping ratio, and widths as shares of the half travel.
 CONTACT_FREQUENCY, CONTACT, GAP_SHARES = 50.0, 0.1, (5e-4, 3e-3, 1.5e-2)
+#: Gaps as shares of half the way of a deflection that is read: it is the gap and what the spring gives way beside it.
+SHARES_OF_DEFLECTION = (0.05, 0.3, 1.0)
 
 # ---- discriminating experiments --------------------------------------------------------------------------------------
 

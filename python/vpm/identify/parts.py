@@ -88,6 +88,8 @@ def drives_of(model: Model, joints: tuple[str, ...]) -> Drives | None:
     """
     bare = model
     for effect in (one for one in model.effects if one.type.motion and tuple(model.joints) != joints):
+        if effect not in bare.effects:
+            continue  # it went with its spring
         candidate = bare.without_effect(*effect.key)
         bare = candidate if len(candidate.joints) < len(bare.joints) else bare
     if tuple(bare.joints) != joints:

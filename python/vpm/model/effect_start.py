@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from vpm.catalogue import EffectType, JointKind
 from vpm.errors import ModelError
+from vpm.model.effects import own_parameters
 from vpm.model.joint import TURNING
 from vpm.numbers import number_of
 
@@ -31,8 +32,9 @@ def starting_values(
         effect.parameter(short)
     entry: dict[str, Any] = {}
     kind = kind_at(model, at)
+    own = own_parameters(effect, at, model.effects)
     for parameter in effect.parameters:
-        if parameter.optional and parameter.name not in values:
+        if parameter.name not in values and (parameter.optional or parameter not in own):
             continue
         given = values.get(parameter.name, parameter.neutral)
         if given is None:

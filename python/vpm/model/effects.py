@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -17,10 +17,11 @@ from vpm.model.entry import ParameterValue, Quantity, Text
 from vpm.model.joint import COORDINATE_UNIT, EFFORT_UNIT
 from vpm.model.messages import Problem, place
 from vpm.model.parameters import Slot
-from vpm.model.splitting import bendings, deflections, splitting_problems
+from vpm.model.splitting import Seated, bendings, deflections, splitting_problems, spring_in_series
 from vpm.units import si_unit
 
 if TYPE_CHECKING:
+    from vpm.model.parameters import Parameter
     from vpm.model.schema import Document
     from vpm.model.structure import Structure
 
@@ -55,8 +56,8 @@ class EffectEntry(BaseModel):
 
     @property
     def parameters(self) -> tuple[EffectParameter, ...]:
-        """Parameters of a complete effect: all but optional ones that are not given."""
-        return tuple(p for p in EFFECTS[self.type].parameters if not p.optional or p.name in self.values)
+        """Parameters of a complete effect: all but optional ones that are not given, and those of a spring."""
+        return tuple(p for p in EFFECTS[self.type].parameters if p.name in self.values)
 
     def slots(self, position: int, structure: Structure) -> Iterator[Slot]:
         """Parameters of an effect, when it is complete and stands at a position of the file."""
@@ -81,6 +82,8 @@ class Effect:
     at: str  #: Component that it sits at.
     side: Side  #: Where at a joint with a compliance or backlash.
     parameter_names: Mapping[str, str]  #: Short name to dotted name of each parameter.
+    #: Short name to dotted name of each parameter that a play has from a spring that it is in series with.
+    of_spring: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def key(self) -> tuple[str, str] | tuple[str, str, Side]:
@@ -96,6 +99,17 @@ class Effect:
     def type(self) -> EffectType:
         """Entry of the catalogue for an effect of a model."""
         return EFFECTS[self.name]
+
+    @property
+    def traits(self) -> Traits:
+        """Traits of an effect of a model."""
+        return self.type
+
+    def sentence(self, parameters: Mapping[str, Parameter]) -> str:
+        """Sentence on an effect of a model for a report, with its values."""
+        known = {short: parameters[name] for short, name in {**self.parameter_names, **self.of_spring}.items()}
+        texts = {short: f"{one.value:.4g} {one.unit}" for short, one in known.items()}
+        return self.type.sentence.format(at=self.place, **texts)
 
 
 def effect_problems(document: Document, structure: Structure) -> Iterator[Problem]:
@@ -134,7 +148,7 @@ def effect_problems(document: Document, structure: Structure) -> Iterator[Proble
         if earlier != position:
             rest = f'is a second {entry.type} at "{entry.at}", after effects[{earlier}]; remove one'
             yield Problem(place(*keys), rest)
-        yield from _value_problems(effect, entry, keys)
+        yield from _value_problems(effect, entry, keys, document)
     yield from splitting_problems(document, structure.turned)
 
 
@@ -151,17 +165,30 @@ def _shaft_repair(effect: EffectType) -> str:
     return f"put it at {_a(effect.site)}, or leave it out"
 
 
-def _value_problems(effect: EffectType, entry: EffectEntry, keys: tuple[str, int]) -> Iterator[Problem]:
-    names = [parameter.name for parameter in effect.parameters]
+def own_parameters(effect: EffectType, at: str, effects: Iterable[Seated]) -> tuple[EffectParameter, ...]:
+    """Parameters of an effect at a site: a play in series with a spring there has some from that."""
+    shared = dict(effect.of_spring) if spring_in_series(effect, at, effects) is not None else {}
+    return tuple(parameter for parameter in effect.parameters if parameter.name not in shared)
+
+
+def _value_problems(
+    effect: EffectType, entry: EffectEntry, keys: tuple[str, int], document: Document
+) -> Iterator[Problem]:
+    own, known = own_parameters(effect, entry.at, document.effects), [one.name for one in effect.parameters]
+    names = [parameter.name for parameter in own]
+    spring = spring_in_series(effect, entry.at, document.effects)
     for key in entry.values:
-        if key not in names:
+        if spring is not None and key in known and key not in names:
+            rest = f"is that of {spring.type} at {entry.at}, which {effect.name} is in series with"
+            yield Problem(place(*keys, key), f"{rest}; leave it out, or remove {spring.type}")
+        elif key not in names:
             repair = near_match(key, ["type", "at", *(["side"] if effect.has_sides else []), *names])
             yield Problem(place(*keys, key), f"is not a known key of {effect.name}; {repair}")
-    for parameter in effect.parameters:
+    for parameter in own:
         if parameter.start is None and not parameter.optional and parameter.name not in entry.values:
             yield Problem(place(*keys, parameter.name), f"is missing; add it: {parameter.meaning}")
-    sizes = [parameter.name for parameter in effect.parameters if not parameter.shape]
-    if not any(name in entry.values for name in sizes):
+    sizes = [parameter.name for parameter in own if not parameter.shape]
+    if spring is None and not any(name in entry.values for name in sizes):
         yield Problem(place(*keys, sizes[0]), f"is missing; a {effect.title} needs {' or '.join(sizes)}")
 
 
@@ -175,7 +202,7 @@ def complete_effects(document: Document, structure: Structure) -> Document:
         effect, given = EFFECTS[entry.type], entry.values
         kind = structure.kind_at(effect.site, entry.at)
         values = {}
-        for parameter in effect.parameters:
+        for parameter in own_parameters(effect, entry.at, document.effects):
             if parameter.optional and parameter.name not in given:
                 continue
             start = parameter.default(kind)
@@ -210,14 +237,24 @@ class _Parenthesised(dict[str, str]):
 def effects_of(document: Document) -> tuple[Effect, ...]:
     """The effects of a checked document, in the order of the file."""
     return tuple(
-        Effect(entry.type, entry.at, entry.side, {p.name: f"{entry.owner}.{p.suffix}" for p in entry.parameters})
+        Effect(entry.type, entry.at, entry.side, _names(entry), _names_of_spring(entry, document))
         for entry in document.effects
     )
 
 
+def _names(entry: EffectEntry) -> dict[str, str]:
+    return {one.name: f"{entry.owner}.{one.suffix}" for one in entry.parameters}
+
+
+def _names_of_spring(entry: EffectEntry, document: Document) -> dict[str, str]:
+    spring = spring_in_series(entry.traits, entry.at, document.effects)
+    names = {} if spring is None else _names(spring)
+    return {own: names[its] for own, its in entry.traits.of_spring if its in names}
+
+
 def effect_described(effect: Effect, structure: Structure, index: Index) -> list[dict[str, Any]]:
     """Entries of one effect; one that splits a joint has two, its law behind and the inertia before."""
-    numbers = {short: index[dotted] for short, dotted in effect.parameter_names.items()}
+    numbers = {short: index[dotted] for short, dotted in {**effect.parameter_names, **effect.of_spring}.items()}
     match effect.type.site:
         case "world":
             return [{"type": effect.name, "axes": [list(axis) for axis in structure.horizontal], **numbers}]
@@ -260,7 +297,11 @@ def _on_joint(effect: Effect, structure: Structure, numbers: dict[str, int], ind
         return [_law(effect, seat, numbers)]
     rotor = next(name for name, one in EFFECTS.items() if one.rotor)
     inertia = {"type": rotor, "joint": places.index(before), "inertia": numbers.pop("inertia")}
-    return [{"type": effect.name, "joint": places.index(behind or before), **numbers}, inertia]
+    law = {"type": effect.name, "joint": places.index(behind or before), **numbers}
+    if effect.of_spring:
+        return [law]
+    others = (one for one in structure.document.effects if one.at == effect.at and one.traits.has_play)
+    return [inertia] if effect.type.winds_up and any(others) else [law, inertia]
 
 
 def _carrier(site: str, structure: Structure) -> dict[str, int]:

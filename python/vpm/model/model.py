@@ -23,7 +23,7 @@ from vpm.model.effects import Effect, effects_of
 from vpm.model.evaluation import Evaluations
 from vpm.model.parameters import Parameter
 from vpm.model.reading import parse_toml, read_toml
-from vpm.model.splitting import name_behind, name_of_bending
+from vpm.model.splitting import name_behind, name_of_bending, spring_in_series
 from vpm.model.writer import content_of, toml_of
 from vpm.numbers import number_of
 from vpm.results import Storable, html_table
@@ -271,19 +271,23 @@ class Model(Evaluations, Storable):
     def without_effect(self, name: str, at: str, side: Side = "motor") -> Self:
         """Model with one effect less, and without what sits in the spring that goes with it or reads its deflection.
 
+        A play that is in series with that spring goes with it, too.
+
         Raises
         ------
         ModelError
             The model has no such effect at this site.
         """
         gone, content = self.effect(name, at, side), self.to_dict()
-        springs = {name_of_bending(at), name_behind(at)} if gone.type.motion else set()
+        left = [one for one in self.effects if one != gone and spring_in_series(one.type, one.at, (gone,)) is None]
+        whole = gone.type.motion and not any(one.type.motion and one.at == at for one in left)
+        springs = {name_of_bending(at), name_behind(at)} if whole else set()
         inside = springs & set(self.added_joints)
         sensors = content.get("sensors", {})
         inside |= {name for name, one in sensors.items() if one["measures"].partition(".")[0] in inside}
         content["sensors"] = {name: one for name, one in sensors.items() if name not in inside}
         kept = zip(self.effects, content["effects"], strict=True)
-        content["effects"] = [entry for effect, entry in kept if effect != gone and effect.at not in inside]
+        content["effects"] = [entry for effect, entry in kept if effect in left and effect.at not in inside]
         return type(self)(content)
 
     def sites(self, kind: str) -> tuple[str, ...]:

@@ -8,10 +8,11 @@ beam that bends is not split; it gets a level of detail that bends.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Iterator, Mapping
+from typing import TYPE_CHECKING, Protocol, TypeVar
 
 from vpm.catalogue import effect_type
+from vpm.catalogue.traits import Traits
 from vpm.model.drives.motor import DcMotor
 from vpm.model.messages import Problem, place
 
@@ -19,6 +20,21 @@ if TYPE_CHECKING:
     from vpm.model.effects import EffectEntry
     from vpm.model.parameters import Parameter
     from vpm.model.schema import Document
+
+
+class Seated(Protocol):
+    """What splits a joint or sits elsewhere: an effect of a model or of its file."""
+
+    @property
+    def at(self) -> str:
+        """Component that it sits at."""
+
+    @property
+    def traits(self) -> Traits:
+        """What it does."""
+
+
+AnyEffect = TypeVar("AnyEffect", bound=Seated)
 
 #: Level of a rigid beam that bends: two strain polynomials carry its first mode within 0.48 % (docs/beams.md).
 FLEXED = "strain(2)"
@@ -34,11 +50,21 @@ def name_of_bending(body: str) -> str:
     return f"{body}_bending"
 
 
+def spring_in_series(traits: Traits, at: str, effects: Iterable[AnyEffect]) -> AnyEffect | None:
+    """Spring with which a play at a joint is in series, so that they split the joint once; None if there is none.
+
+    The play has a gap of its own. Contacts are as stiff as the spring, and its inertia is before both.
+    """
+    return next((one for one in effects if traits.has_play and one.traits.winds_up and one.at == at), None)
+
+
 def splits_joint(entry: EffectEntry, document: Document) -> bool:
     """Whether an effect splits a joint into motor and link: wind-up always, play where an actuator drives directly.
 
-    A joint without an actuator may be the play itself.
+    A joint without an actuator may be the play itself. What is in series with a spring leaves the split to that.
     """
+    if spring_in_series(entry.traits, entry.at, document.effects) is not None:
+        return False
     if entry.traits.has_play:
         return any(entry.at in actuator.joints_turned(document) for actuator in document.actuators.values())
     return entry.traits.splits

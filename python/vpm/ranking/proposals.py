@@ -16,6 +16,7 @@ from vpm.discrepancy.parallel_candidates import Failure, ParallelCandidates
 from vpm.discrepancy.screening.candidates import Candidate, Key, candidates
 from vpm.discrepancy.unknown_zeros import zeros_of
 from vpm.identify import InverseDynamicsProblem
+from vpm.model.splitting import spring_in_series
 from vpm.numbers import Array
 from vpm.ranking.fit import ASTRAY, Fitter, Followed, View
 from vpm.ranking.look import Look
@@ -116,6 +117,8 @@ def _extended(structure: Structure, listed: Sequence[Candidate], extensions: Ext
     """Possible proposals: structures with one more effect each, if these can be built."""
     found = []
     for candidate in listed:
+        if spring_in_series(candidate.effect, candidate.site, structure.added) is not None:
+            continue  # it is tried in the place of that spring
         for start, side in product(candidate.starts, sides_of(candidate, structure.model)):
             with contextlib.suppress(*ASTRAY):
                 one = extensions.extended(structure, candidate, start, side)

@@ -14,6 +14,7 @@ import numpy as np
 
 from vpm.catalogue import EFFECTS
 from vpm.discrepancy.screening.candidates import Candidate, candidates
+from vpm.model.splitting import spring_in_series
 from vpm.ranking.choice_by_evidence import as_good, weighed
 from vpm.ranking.fit import ASTRAY, View
 from vpm.ranking.look import Look
@@ -245,7 +246,9 @@ def _on_both_sides(trials: Trials, structure: Structure) -> Structure:
     A model of a whole joint says how much rubs there, and not before or behind what gives way. All of it came to one
     side with what split the joint.
     """
-    model, split = structure.model, {site for name, site in structure.effects if EFFECTS[name].splits}
+    model = structure.model
+    splitting = [one for one in structure.added if one.type.splits]
+    split = {one.at for one in splitting if spring_in_series(one.type, one.at, model.effects) is None}
     taken = {(one.name, one.at, one.side) for one in model.effects}
     for effect in model.effects:
         usual = effect.type.usual == "friction" and effect.name in trials.names

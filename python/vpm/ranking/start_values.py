@@ -61,7 +61,8 @@ def _placed(candidate: Candidate, sizes: Sizes) -> Candidate:
 
 def _backlash(start: Mapping[str, float]) -> Mapping[str, float]:
     """Start values of a backlash: friction acts within the gap, its contact is closed."""
-    return {**start, "contact_damping": start["damping"], "damping": 0.0}
+    closed = {"contact_damping": start["damping"]} if "damping" in start else {}  # else a spring in series tells
+    return {**start, **closed, "damping": 0.0}
 
 
 def _stop(start: Mapping[str, float], site: str, model: Model, sizes: Sizes) -> Mapping[str, float]:

@@ -10,6 +10,7 @@ from vpm.catalogue.kinds import Side
 from vpm.discrepancy.screening.candidates import Candidate, Key
 from vpm.discrepancy.unknown_zeros import with_unknown_zeros
 from vpm.model import Model
+from vpm.model.splitting import spring_in_series
 from vpm.ranking.model_structure import Structure, sides_taken
 from vpm.ranking.parameter_priors import Sizes, stated
 
@@ -46,7 +47,7 @@ class Extensions:
         """
         made = self._made.setdefault(structure.model, {})
         kind = (candidate.key, side, frozenset(start))
-        splits = candidate.effect.splits
+        splits = splits_more(candidate, structure.model)
         if splits and side == "link":
             structure = structure.beside(candidate.site, side)
         own: Side = "motor" if splits else side
@@ -75,9 +76,14 @@ class Extensions:
         )
 
 
+def splits_more(candidate: Candidate, model: Model) -> bool:
+    """Whether an extension splits a joint: a play in series with a spring leaves it as it is."""
+    return candidate.effect.splits and spring_in_series(candidate.effect, candidate.site, model.effects) is None
+
+
 def sides_of(candidate: Candidate, model: Model) -> tuple[Side, ...]:
     """Sides of a joint for an extension: where the effect sits, or where other effects stay after a split."""
     site = candidate.site
-    if candidate.effect.splits:
+    if splits_more(candidate, model):
         return SIDES if sides_taken(model, site) else SIDES[:1]
     return SIDES if candidate.effect.has_sides and model.joint_behind(site) else SIDES[:1]

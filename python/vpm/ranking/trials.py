@@ -196,7 +196,7 @@ class Trials:
         def one_finished(trial: Trial) -> Trial:
             view = View(trial.look.noise)
             fitted = self.fitter.finished(trial.fitted, view)
-            ends = [fitted, *self._detours(fitted, view)] if trial.splits else [fitted]
+            ends = [fitted, *self._detours(fitted, view)] if trial.moves_apart else [fitted]
             return Trial.of(min(ends, key=lambda one: one.cost), trial.look)
 
         ends = self.each("finishing", one_finished, _foremost(hopeful), lambda trial: trial.label)
@@ -304,4 +304,4 @@ def _foremost(trials: Sequence[Trial]) -> list[Trial]:
     best: dict[tuple[Key, Side], Trial] = {}
     for trial in sorted(trials, key=lambda one: one.fitted.cost):
         best.setdefault((trial.key, trial.fitted.structure.side(trial.key)), trial)
-    return [trial for trial in trials if trial.splits or trial in best.values()]
+    return [trial for trial in trials if trial.moves_apart or trial in best.values()]

@@ -41,10 +41,10 @@ class Trial:
         return replace(self, judgement=self.look.explained_by(self.fitted, self.judgement))
 
     @property
-    def splits(self) -> bool:
-        """Whether a tried effect splits a joint."""
+    def moves_apart(self) -> bool:
+        """Whether a tried effect splits a joint, or gives what is split a play."""
         now, before = (one.structure.model.added_joints for one in (self.fitted, self.look.fitted))
-        return len(now) > len(before)
+        return len(now) > len(before) or EFFECTS[self.key[0]].has_play
 
     @property
     def left(self) -> float:

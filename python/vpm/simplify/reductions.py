@@ -8,6 +8,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+from vpm.catalogue import EFFECTS
 from vpm.catalogue.kinds import Side, in_words
 from vpm.errors import VpmError
 from vpm.model import Model
@@ -123,9 +124,14 @@ def reduced(model: Model, changes: Sequence[Reduction]) -> Model:
     Raises `ModelError`: they contradict each other.
     """
     # A rigid link has no components, and a spool that follows at once no effect that slows it: those come last.
-    for change in sorted(changes, key=lambda each: each.kind in ("level", "drive")):
+    # A play goes before the spring that it may be in series with.
+    for change in sorted(changes, key=lambda each: (each.kind in ("level", "drive"), not _is_play(each))):
         model = change.applied(model)
     return model
+
+
+def _is_play(change: Reduction) -> bool:
+    return change.kind == "effect" and EFFECTS[change.name].has_play
 
 
 def _imaginable(model: Model) -> Iterator[Reduction]:

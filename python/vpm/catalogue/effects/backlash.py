@@ -3,6 +3,7 @@
 At a driven joint it splits the joint, as a compliance does: the joint's own coordinate stays that of the motor side,
 which is measured and on which the actuator and all other effects of the joint act. The link hangs behind a joint
 without actuator, named like the joint with ``_deflection`` after it, whose coordinate is link side minus motor side.
+Beside a compliance it is in series with that: a joint gives way by the gap and then as that spring does.
 
 Source: Nordin and Gutman 2002, section 2.
 """
@@ -35,6 +36,7 @@ EFFECT = EffectType(
     impossible="a negative stiffness would pull the contacts into each other, a negative damping would feed energy in",
     contains=("rotor_inertia", "joint_compliance"),
     motion="deflection",
+    of_spring=(("stiffness", "stiffness"), ("contact_damping", "damping"), ("inertia", "inertia")),
     impacts=True,
     fixed=("damping", "width"),
     motor_side_alone=True,

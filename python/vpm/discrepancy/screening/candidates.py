@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -18,6 +19,7 @@ from vpm.discrepancy.screening.compliance_and_stop_start import (
     logged_swing,
     sites_worth_trying,
     softest,
+    starts_in_series,
     stop_starts,
     strongest,
     structural_starts,
@@ -31,6 +33,7 @@ from vpm.experiment.signal import differentiate
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
 from vpm.model.effect_start import kind_at
+from vpm.model.splitting import spring_in_series
 from vpm.numbers import Array
 
 #: Name of an effect and where it sits.
@@ -152,6 +155,9 @@ def _absent(model: Model, effects: Sequence[str] | None) -> list[tuple[EffectTyp
 
 def _candidate(effect: EffectType, site: str, model: Model, data: InverseDynamicsProblem, residual: Array) -> Candidate:
     seen = _excitation(data, model, site, site if effect.site in {"actuator", "cylinder"} else None)
+    if spring_in_series(effect, site, model.effects) is not None:
+        found = starts_in_series(seen.travel, way_of_deflection(data, model, site))
+        return Candidate(effect, site, *found, effect.fixed, neutral=False)
     if effect.motion:
         found = structural_starts(effect, site, model, seen.travel, logged_swing(data, model, site))
         return Candidate(effect, site, *found, effect.fixed, neutral=False)
@@ -333,6 +339,14 @@ def way_of_spring(data: InverseDynamicsProblem, joint: str) -> tuple[Array, Arra
     ways = [log[f"{joint}.position"] for log in data.experiments]
     rates = [differentiate(way, m.dt) for way, m in zip(ways, data.motions, strict=True)]
     return np.concatenate(ways), np.concatenate(rates)
+
+
+def way_of_deflection(data: InverseDynamicsProblem, model: Model, joint: str) -> float:
+    """Half the way that the deflection of a candidate takes in all logs; infinite where one does not hold it."""
+    behind = model.joint_behind(joint)
+    if behind is None or behind not in springs_shown(model, data):
+        return math.inf
+    return 0.5 * max(float(np.ptp(log[f"{behind}.position"])) for log in data.experiments)
 
 
 def _over_way(data: InverseDynamicsProblem, model: Model, site: str, residual: Array) -> tuple[Array, Array, Array]:

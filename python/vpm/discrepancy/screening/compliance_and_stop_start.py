@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from vpm.catalogue import EFFECTS, EffectType
+from vpm.catalogue.kinds import POSITIVE
 from vpm.discrepancy.settings import (
     BEYOND_LEAST,
     BEYOND_MOST,
@@ -21,13 +22,14 @@ from vpm.discrepancy.settings import (
     GAP_SHARES,
     LEAST_DRIVEN,
     LOOSE,
+    SHARES_OF_DEFLECTION,
     SOFTEST,
     STOP_SHARES,
 )
 from vpm.experiment.signal import differentiate
 from vpm.identify import InverseDynamicsProblem
 from vpm.model import Model
-from vpm.model.splitting import name_behind, name_of_bending
+from vpm.model.splitting import name_behind, name_of_bending, spring_in_series
 from vpm.numbers import Array
 
 Starts = tuple[Mapping[str, float], ...]
@@ -61,15 +63,22 @@ def sites_worth_trying(effect: EffectType, model: Model) -> tuple[str, ...]:
     if effect.damps:
         return tuple(site for site in sites if model.levels[site] != "rigid")
     if effect.splits:
-        return tuple(site for site in sites if site in model.driven_joints and not model.joint_behind(site))
+        whole = (site for site in sites if site in model.driven_joints)
+        return tuple(site for site in whole if not model.joint_behind(site) or _in_series(effect, site, model))
     return sites
+
+
+def _in_series(effect: EffectType, site: str, model: Model) -> bool:
+    """Whether what splits a joint can be in series with a spring that is there."""
+    return spring_in_series(effect, site, model.effects) is not None
 
 
 def beyond(effect: EffectType, site: str, model: Model) -> str:
     """Why a model with one more compliance cannot be built."""
-    if not effect.motion:
+    if not effect.motion or _in_series(effect, site, model):
         return ""
-    split = [(entry.name, entry.at) for entry in model.effects if entry.type.motion]
+    splitting = [entry for entry in model.effects if entry.type.motion]
+    split = [(one.name, one.at) for one in splitting if spring_in_series(one.type, one.at, splitting) is None]
     whole = model
     for key in split:
         whole = whole.without_effect(*key)
@@ -142,6 +151,18 @@ def structural_starts(
         }
     starts = tuple({"stiffness": k, "damping": 2.0 * LOOSE * math.sqrt(k * inertia)} for k in stiffnesses)
     return (*({"stiffness": k, "damping": c} for k, c in known), *starts), {"stiffness": held, "inertia": share}
+
+
+def starts_in_series(travel: float, deflection: float) -> tuple[Starts, Bounds]:
+    """Start values and bounds of a play in series with a spring, which says how stiff its contacts are.
+
+    - ``travel``: half range of the joint's travel in the data
+    - ``deflection``: half the way of the deflection, which holds the gap; infinite if nobody reads it
+    """
+    most = max(min(travel, deflection), 100.0 * POSITIVE)  # one that stays where it is may be read, too
+    shares = GAP_SHARES if travel < deflection else SHARES_OF_DEFLECTION
+    starts = tuple({"gap": share * most, "width": 0.05 * share * most} for share in shares)
+    return starts, {"gap": (0.0, 2.0 * most), "width": (max(1e-7 * most, POSITIVE), 0.1 * most)}
 
 
 def softest(model: Model, site: str) -> float:
