@@ -34,20 +34,26 @@ viscous = {{ value = 10.0, uncertainty = 4.0 }}
 SENSOR = '[sensors.encoder]\nmeasures = "slide.position"\n'
 
 
-def driven(seed: int, model: vpm.Model) -> vpm.Experiment:
-    """Record of a mass with viscous friction, whose equation has a closed solution over each held command."""
+def driven(seed: int, model: vpm.Model, tacho: float | None = None) -> vpm.Experiment:
+    """Record of a mass with viscous friction, whose equation has a closed solution over each held command.
+
+    - ``tacho``: samples by which a speedometer beside an encoder in time is late; None without it, the encoder late
+    """
     random = np.random.default_rng(seed)
     time = STEP * np.arange(4000)
     waves = [(0.7, 1.2), (1.9, 0.9), (5.3, 0.8), (11.0, 0.6)]
     current = sum(size * np.sin(2.0 * np.pi * rate * time + random.uniform(0.0, 6.0)) for rate, size in waves)
     decay = np.exp(-DRAG / MASS * STEP)
-    place, speed = np.zeros(len(time)), 0.0
+    place, speed = np.zeros(len(time)), np.zeros(len(time))
     for k, force in enumerate(GAIN * np.asarray(current)[:-1]):
-        ended = force / DRAG + (speed - force / DRAG) * decay
-        place[k + 1] = place[k] + force / DRAG * STEP + (speed - force / DRAG) * MASS / DRAG * (1.0 - decay)
-        speed = ended
-    read = place[np.maximum(np.arange(len(time)) - LATE, 0)] + READ * random.standard_normal(len(time))
+        place[k + 1] = place[k] + force / DRAG * STEP + (speed[k] - force / DRAG) * MASS / DRAG * (1.0 - decay)
+        speed[k + 1] = force / DRAG + (speed[k] - force / DRAG) * decay
+    late = LATE if tacho is None else 0
+    read = place[np.maximum(np.arange(len(time)) - late, 0)] + READ * random.standard_normal(len(time))
     columns = {"slide.position": read, "drive.command": np.asarray(current)}
+    if tacho is not None:
+        shown = np.interp(time - tacho * STEP, time, speed)
+        columns["slide.velocity"] = shown + 20.0 * READ * random.standard_normal(len(time))
     return vpm.Experiment.from_arrays(time, columns, model=model, name=f"slide {seed}")
 
 
@@ -66,3 +72,13 @@ def test_a_late_drive_may_be_a_late_encoder_that_nobody_described(described: boo
     assert effect.name in {"input_delay", "sensor_delay"}
     assert effect.parameters[0].value == pytest.approx(LATE * STEP, rel=0.05)
     assert ("A late reading of slide.position would look alike" in why.summary) is not described
+
+
+@pytest.mark.parametrize(("samples", "names"), [(0.3, []), (3.0, ["sensor_delay"])])
+def test_a_reading_within_its_sampling_interval_is_no_effect(samples: float, names: list[str]) -> None:
+    model = vpm.Model.from_toml(SLIDE + '[sensors.tacho]\nmeasures = "slide.velocity"\n')
+    why = vpm.diagnose(model, driven(1, model, samples), driven(2, model, samples), check=False, workers=1)
+    assert [effect.name for effect in why.effects] == names
+    assert all(effect.parameters[0].value == pytest.approx(samples * STEP, rel=0.05) for effect in why.effects)
+    told = [one.reason for one in why.refused if (one.name, one.site) == ("sensor_delay", "tacho")]
+    assert all("within their sampling interval" in reason for reason in told)

@@ -42,7 +42,7 @@ class Judgement(Storable):
     reshaped : str
         An effect of the same curve that was found before and does as well by another shape of its law; "" if none does.
     timed : str
-        A shift of all commands within one sample that does as well; "" if none does.
+        A shift of all commands, or of its readings, within one sample that does as well; "" if none does.
     """
 
     removed: float

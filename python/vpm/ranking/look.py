@@ -241,10 +241,21 @@ class Look:
         alone = float(_shares(self._drawn, left)[place]) if heavier else 0.0
         ways = self._fitter.tracked.ways
         overtone = key is not None and fitted.structure.is_overtone(key, ways.get(key[1], np.inf))
-        judgement = Judgement(removed, min(shares), score, size, beside, shape, alone, overtone)
+        timed = "" if key is None else self._within_half_a_sample(fitted.structure, key)
+        judgement = Judgement(removed, min(shares), score, size, beside, shape, alone, overtone, timed=timed)
         if key is None or not ended or not judgement.is_faint(self.settings, PARTS):
             return judgement
         return replace(judgement, score=max(score, self._score_of_all(fitted, left[1])))
+
+    def _within_half_a_sample(self, structure: Structure, key: Key) -> str:
+        """Text on readings that a structure has late by less than half a sample, as a mean over a sample is; else "".
+
+        When within its sampling interval a logger reads a channel no log tells.
+        """
+        late = structure.lateness_of_readings(key)
+        if late >= 0.5 * max(record.dt for record in self._fitter.tracked.records):
+            return ""
+        return f"readings of {key[1]} {1e3 * late:.2g} ms later, within their sampling interval"
 
     def size_of(self, key: Key) -> float:
         """Amplitude of an effect of the look's structure, as a share of that of all, where it is largest."""

@@ -106,6 +106,13 @@ class Structure:
         tones = [(other / own, way / other) for other in others if own and other]
         return any(round(ratio) > 1 and abs(ratio - round(ratio)) * waves < 1.0 for ratio, waves in tones)
 
+    def lateness_of_readings(self, key: Key) -> float:
+        """Time by which an effect has its sensor late in a structure, s; infinite for any other effect."""
+        effect = self.model.effect(*key, self.side(key))
+        if effect.type.site != "sensor" or not effect.type.shifts:
+            return np.inf
+        return sum(float(self.theta[self.model.index(name)]) for name in effect.parameter_names.values())
+
     def _period(self, effect: Effect) -> float:
         """Period of an effect in a structure; zero without one."""
         name = effect.parameter_names.get("period")
