@@ -3,7 +3,7 @@
 use rayon::prelude::*;
 
 use crate::error::{Error, Result};
-use crate::scalar::{Dual, Scalar, seed};
+use crate::scalar::{Dual, Scalar, Twins, seed};
 
 /// Parameters per pass: the gradient of a number then fills one 256-bit register.
 pub const LANES: usize = 4;
@@ -28,9 +28,10 @@ pub(crate) trait Job: Sync {
     /// Runs a job of sensitivities with the parameters `theta`.
     fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>>;
 
-    /// Runs a job of sensitivities with two sets of parameters, each as if it were alone.
-    fn run_twice(&self, [first, second]: [&[f64]; 2]) -> Result<[Pair<f64>; 2]> {
-        Ok([self.run(first)?, self.run(second)?])
+    /// Runs a job of sensitivities with two sets of parameters in lanes of numbers, each as if it were alone; none where
+    /// that does not pay, or where one could lead to other steps than the other.
+    fn run_in_lanes(&self, _theta: &[Twins]) -> Option<[Pair<f64>; 2]> {
+        None
     }
 }
 
@@ -88,9 +89,13 @@ pub(crate) fn difference<J: Job>(
         moved
     });
     let all: Vec<Vec<f64>> = std::iter::once(theta.to_vec()).chain(moved).collect();
+    let alone = |runs: &[Vec<f64>]| runs.iter().map(|theta| job.run(theta)).collect();
     let some = |pair: &[Vec<f64>]| match pair {
-        [first, second] => job.run_twice([first, second]).map(Vec::from),
-        one => one.iter().map(|theta| job.run(theta)).collect(),
+        [first, second] => {
+            let lanes: Vec<Twins> = first.iter().zip(second).map(|(&a, &b)| Twins::side_by_side(a, b)).collect();
+            job.run_in_lanes(&lanes).map_or_else(|| alone(pair), |both| Ok(Vec::from(both)))
+        }
+        one => alone(one),
     };
     let runs: Vec<Vec<Pair<f64>>> = all.par_chunks(2).map(some).collect::<Result<_>>()?;
     let mut runs = runs.into_iter().flatten();

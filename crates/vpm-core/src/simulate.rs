@@ -209,9 +209,16 @@ impl Simulation<'_> {
         let stepper = self.stepper(&seed::<f64, LANES>(theta, &by[..by.len().min(LANES)]));
         (!stepper.is_ok_and(|mut stepper| stepper.compile_if_it_pays())).then_some(moves)
     }
+}
 
-    /// Two runs of a simulation in lanes of numbers; none where one could lead to other steps than the other, or where
-    /// one fails.
+impl Job for Simulation<'_> {
+    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
+        let mut stepper = self.stepper(theta)?;
+        stepper.compile_if_it_pays();
+        stepper.run(self.setting.interrupt)
+    }
+
+    /// None as well where one fails, or where steps have no machine code.
     fn run_in_lanes(&self, theta: &[Twins]) -> Option<[Pair<f64>; 2]> {
         let Setting { description, stepping, interrupt, .. } = self.setting;
         let by_values = !description.loops.is_empty()
@@ -229,23 +236,6 @@ impl Simulation<'_> {
             second: states.to_vec(),
         };
         Some([lane(0, first), lane(1, second)])
-    }
-}
-
-impl Job for Simulation<'_> {
-    fn run<S: Scalar>(&self, theta: &[S]) -> Result<Pair<S>> {
-        let mut stepper = self.stepper(theta)?;
-        stepper.compile_if_it_pays();
-        stepper.run(self.setting.interrupt)
-    }
-
-    /// Both runs in the lanes of one, where that has machine code.
-    fn run_twice(&self, [first, second]: [&[f64]; 2]) -> Result<[Pair<f64>; 2]> {
-        let theta: Vec<Twins> = first.iter().zip(second).map(|(&a, &b)| Twins::side_by_side(a, b)).collect();
-        match self.run_in_lanes(&theta) {
-            Some(both) => Ok(both),
-            None => Ok([self.run(first)?, self.run(second)?]),
-        }
     }
 }
 

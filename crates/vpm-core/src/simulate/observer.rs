@@ -16,7 +16,7 @@ use super::{
 use crate::description::Description;
 use crate::error::{Error, Result};
 use crate::scalar::{Dual, Twins};
-use crate::sensitivity::{LANES, Pair};
+use crate::sensitivity::{Job, LANES, Pair};
 use crate::sensor::Layout;
 use crate::system::Dynamics;
 use crate::table::Table;
