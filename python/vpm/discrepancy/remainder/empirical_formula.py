@@ -12,7 +12,7 @@ from vpm.catalogue.empirical import TERMS
 from vpm.discrepancy.diagnosis import Empirical, EmpiricalTerm
 from vpm.discrepancy.judged_model import Data, Judged, judged_anyhow
 from vpm.discrepancy.remainder.sparse_formula import Formula, select
-from vpm.discrepancy.remainder.state_dependence import Shares, busiest_joint, rhythm, shares
+from vpm.discrepancy.remainder.state_dependence import Shares, busiest_joint, own_vibration, rhythm, shares
 from vpm.discrepancy.settings import MOST_NAMED, PERIOD_RANGE, WORTH_A_NAME
 from vpm.identify import Gain, gain, segments
 from vpm.model import Model
@@ -40,7 +40,7 @@ def describe(base: Judged, data: Data) -> Described:
     formula = select(base, data)
     fitted = base if formula is None else _fit(formula, base, data)
     gained = gain(base.validation, fitted.validation, segments(data.validation))
-    remark, share = _in_time(states.of, beat, gained.relative)
+    remark, share = _in_time(states.of, beat, gained.relative, own_vibration(data, base, beat[0]))
     if remark or formula is None or gained.relative < WORTH_A_NAME:
         sentence = _say_without(channel, states, remark)
         left = gained.before
@@ -144,12 +144,22 @@ def _text(formula: Formula, model: Model, joint: str) -> str:
     return f"tau = -({body}) {unit}".rstrip() + f" at {joint}" + (f", with {with_what}" if with_what else "")
 
 
-def _in_time(states: dict[str, float], beat: tuple[float, float], formula_share: float) -> tuple[str, float]:
-    """Sentence on a rhythm in time of the residual and its share; empty if formula or state explain it as well."""
+def _in_time(
+    states: dict[str, float], beat: tuple[float, float], formula_share: float, own: float
+) -> tuple[str, float]:
+    """Sentence on a rhythm in time of the residual and its share; empty if formula or state explain it as well.
+
+    - ``own``: frequency of the rhythm, Hz, if links vibrate so by themselves, else 0
+    """
     period, repeats = beat
     time = max((share for name, share in states.items() if name.startswith("time")), default=0.0)
     machine = max((formula_share, *(share for name, share in states.items() if not name.startswith("time"))))
     if repeats > max(machine, time) + WORTH_A_NAME:
+        if own:
+            return (
+                f"it rings at {own:.3g} Hz, as links do while joints are held ({100 * repeats:.0f} % of it): their "
+                "damping or stiffness may be wrong, or what sets them ringing"
+            ), repeats
         return (
             f"it repeats every {period:.3g} s whatever the machine does ({100 * repeats:.0f} % of it), so that "
             "something outside of the machine, or its controller, disturbs it"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 
 from vpm.discrepancy.judged_model import Data, Judged
 from vpm.discrepancy.settings import BINS, CLEARLY, FEWEST_PERIODS, MOST_SAMPLES, PULL
+from vpm.errors import CoreError
 from vpm.identify import InverseDynamicsProblem
 from vpm.identify.statistics import robust_covariance
 from vpm.numbers import NORMAL_95, Array
@@ -106,6 +108,25 @@ def rhythm(data: Data, final: Judged, joint: int) -> tuple[float, float]:
     total = sum(float(values @ values) for _, values in series[1])
     left = sum(_other_half(time, values, best) for time, values in series[1])
     return 1.0 / best, max(0.0, 1.0 - left / total) if total > 0.0 else 0.0
+
+
+def own_vibration(data: Data, final: Judged, period: float) -> float:
+    """Dependence on time as links ring with their joints held: the frequency of a rhythm, Hz; 0 if none has it.
+
+    A line is as wide as one period in the shortest record, and frequencies of links depend on the pose.
+    """
+    problem, model = data.training, final.model
+    if not period or model.loops or not model.core.n_elastic:
+        return 0.0
+    width = 1.0 / min(float(np.ptp(motion.time)) for motion in problem.motions)
+    for record in range(len(problem.motions)):
+        ways = dict(zip(problem.joints, problem.state(record)[0].T, strict=True))
+        poses = np.column_stack([ways.get(joint, np.zeros(len(problem.state(record)[0]))) for joint in model.joints])
+        with suppress(CoreError):
+            told = np.array([model.natural_frequencies(pose) for pose in poses[:: max(1, len(poses) // BINS)]])
+            if np.any((told.min(axis=0) - width <= 1.0 / period) & (1.0 / period <= told.max(axis=0) + width)):
+                return 1.0 / period
+    return 0.0
 
 
 def _series(problem: InverseDynamicsProblem, residual: Array, joint: int) -> list[tuple[Array, Array]]:
