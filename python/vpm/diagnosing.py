@@ -15,6 +15,7 @@ from vpm.discrepancy.diagnosis import ChannelGap, Diagnosis
 from vpm.discrepancy.diagnosis_fields import (
     deviations,
     examined,
+    fit_beside,
     gaps_of,
     of_findings,
     pictures,
@@ -59,7 +60,6 @@ from vpm.discrepancy.verdict import (
 from vpm.experiment import Experiment, as_records
 from vpm.experiment.lengths import lines_that_tell
 from vpm.experiment.signal import check_cutoff
-from vpm.identify.fit_result import fit_of
 from vpm.identify.parallel import worker_count
 from vpm.log_check import refuse_mistakes
 from vpm.log_check.checking import UNCHECKED
@@ -453,7 +453,7 @@ def _concluded(
     records, ambiguous = known.job.records, known.ambiguous if found.accepted else ()
     problems, std = (data.training, data.validation), _deviations(known, found)
     told = of_findings(known.job.model, records, nominal, found, problems, ambiguous, std)
-    fit = fit_of(final.model, data.training, final.fit, nominal.fit.residual, list(told.training))
+    fit = fit_beside(known.job.model, final, data.training, nominal, found, told.training)
     summary = so_far(found, summary)
     told = replace(told, verdict=word, summary=summary, gap=gap, model=final.model, fit=fit, empirical=empirical)
     return told, found, final

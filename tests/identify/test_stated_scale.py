@@ -1,9 +1,13 @@
 """Deviations of what records show only together, where the model file states one of it."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 import vpm
+from vpm.discrepancy.diagnosis_fields import fit_beside
 from vpm.identify.comparison import comparison
 from vpm.identify.estimation import beside_held, beside_stated, standing
 
@@ -52,5 +56,19 @@ def test_what_was_fitted_beside_a_held_gain_is_no_surer_than_the_stated_mass_mak
     mass, gain, viscous = NAMES
     found = standing(model, data, (mass, viscous))
     assert np.all(found.std < 1e-3 * found.values)
-    std = beside_held(found, model, data, [gain])
+    std = beside_held(found, model, data, [gain]).deviations
     np.testing.assert_allclose([std[name] / model.parameters[name].value for name in NAMES], expected, rtol=0.02)
+
+
+def test_a_diagnosis_tells_what_was_held_where_it_had_moved_and_how_sure_all_is_with_that() -> None:
+    """The file has another gain; an observer moved that, and the residual fitted the others to it."""
+    found = vpm.Model.from_toml(SLIDE.format(mass=0.1))
+    model, data = found.with_parameters({"drive.gain": 2.9}), comparison(found, [swung(found)], "free_run")
+    mass, gain, viscous = NAMES
+    final: Any = SimpleNamespace(model=found, free=(mass, viscous), fit=standing(found, data, (mass, viscous)))
+    nothing: Any = SimpleNamespace(accepted=())
+    fit = fit_beside(model, final, data, final, nothing, ["swing"])
+    assert fit.names == (mass, viscous, gain)
+    np.testing.assert_allclose(fit.std / fit.values, 0.05, rtol=0.02)
+    np.testing.assert_allclose(fit.correlation, 1.0, atol=1e-3)  # only their ratios show
+    assert fit_beside(found, final, data, final, nothing, ["swing"]).names == (mass, viscous)

@@ -281,7 +281,7 @@ class Step(Storable):
     effect, site : str
         What was added or removed.
     values, std, units : dict
-        All fitted parameters by dotted name.
+        All fitted parameters by dotted name; deviations as if what was held were known.
     training_error, unseen_error : float
         Largest gap of any channel relative to what was measured.
     """

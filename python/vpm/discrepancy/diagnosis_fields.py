@@ -27,7 +27,7 @@ from vpm.discrepancy.ranked_effects import candidates_of, refused_by, tracker_ga
 from vpm.discrepancy.rivals.ambiguity import Rivals, listed
 from vpm.discrepancy.screening.candidates import Key
 from vpm.discrepancy.shifted_commands import in_time
-from vpm.identify import Fit, InverseDynamicsProblem, OutputErrorProblem, Problem, gaps
+from vpm.identify import Estimate, Fit, InverseDynamicsProblem, OutputErrorProblem, Problem, gaps
 from vpm.identify.estimation import beside_held
 from vpm.identify.fit_result import fit_of
 from vpm.model import Model
@@ -71,7 +71,7 @@ def of_findings(
         tuple(e.name for e in validation),
         tuple(notes),
         found.final.model,
-        fit_of(found.final.model, problems[0], found.final.fit, start.fit.residual, [e.name for e in training]),
+        fit_beside(model, found.final, problems[0], start, found, [e.name for e in training]),
         (),
         0.0,
         found.interrupted,
@@ -133,15 +133,31 @@ def _signal(problem: InverseDynamicsProblem | OutputErrorProblem, channel: str) 
 
 
 def deviations(found: Findings, training: Problem) -> dict[str, float]:
-    """Field of a diagnosis: deviations of what the final model has, by dotted names.
+    """Field of a diagnosis: deviations of what the final model has, by dotted names."""
+    return _beside_held(found.final, training, found.accepted).deviations
+
+
+def fit_beside(
+    model: Model, final: Judged, training: Problem, before: Judged, found: Findings, records: Sequence[str]
+) -> Fit:
+    """Field of a diagnosis: the final fit, with what was held where an observer had moved it from the model file.
+
+    - ``model``: as the user wrote it
+    - ``before``: what it is compared with
+    """
+    told, stated, now = _beside_held(final, training, found.accepted), model.parameters, final.model.parameters
+    moved = {name for name in told.names if name in stated and now[name].value != stated[name].value}
+    return fit_of(final.model, training, told.of({*final.free, *moved}), before.fit.residual, records)
+
+
+def _beside_held(final: Judged, training: Problem, accepted: Sequence[Accepted]) -> Estimate:
+    """Estimate of the final model of a diagnosis, with all that was held beside it.
 
     Values of the model file that were held, as masses beside a load, are no surer than the file says.
     """
-    final, aliases = found.final, (alias.parameter for entry in found.accepted for alias in entry.measured.held)
+    aliases = (alias.parameter for entry in accepted for alias in entry.measured.held)
     held = [name for name in dict.fromkeys((*aliases, *final.model.adjustable)) if name not in final.free]
-    if held:
-        return beside_held(final.fit, final.model, training, held)
-    return dict(zip(final.free, map(float, final.fit.std), strict=True))
+    return beside_held(final.fit, final.model, training, held) if held else final.fit
 
 
 def accepted_effect(entry: Accepted, final: Model, deviations: Mapping[str, float]) -> AcceptedEffect:

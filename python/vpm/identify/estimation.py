@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -56,6 +56,22 @@ class Estimate:
     def std(self) -> Array:
         """Standard deviation of each estimate; infinite where the data cannot see it."""
         return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def deviations(self) -> dict[str, float]:
+        """Standard deviations of an estimate by dotted names."""
+        return dict(zip(self.names, map(float, self.std), strict=True))
+
+    def of(self, names: Collection[str]) -> Estimate:
+        """Estimate of some of its parameters alone."""
+        places = [place for place, name in enumerate(self.names) if name in names]
+        return replace(
+            self,
+            names=tuple(self.names[place] for place in places),
+            values=self.values[places],
+            jacobian=self.jacobian[:, places],
+            covariance=self.covariance[np.ix_(places, places)],
+        )
 
     def on(self, model: Model, ties: Mapping[str, str] | None = None) -> Model:
         """Model at estimated values, and at those of what follows them by ``ties``."""
@@ -182,8 +198,8 @@ def beside_stated(found: Estimate, model: Model, data: Problem) -> Estimate:
     return replace(found, covariance=covariance + moved @ moved.T)
 
 
-def beside_held(found: Estimate, model: Model, data: Problem, held: Sequence[str]) -> dict[str, float]:
-    """Standard deviations of an estimation and of parameters ``held`` beside it, from what the model file states.
+def beside_held(found: Estimate, model: Model, data: Problem, held: Sequence[str]) -> Estimate:
+    """Estimate with parameters ``held`` beside it, and deviations from what the model file states.
 
     What was held is as sure as the records and the stated uncertainties of all parameters make it together. Its error
     moves the estimates along, which were fitted as if it were known.
@@ -198,13 +214,15 @@ def beside_held(found: Estimate, model: Model, data: Problem, held: Sequence[str
     scales = column_lengths(rows)
     spread = np.linalg.pinv(rows / scales) / scales[:, None]
     covariance = blinded(spread @ spread.T, unseen_combinations(rows, names), names)
+    blind = np.flatnonzero(~np.isfinite(np.diag(covariance)))
     own, others = np.split(jacobian / lengths, [first], axis=1)
-    along = np.linalg.lstsq(own, others, rcond=None)[0] * lengths[first:] / lengths[:first, None]
+    along = -np.linalg.lstsq(own, others, rcond=None)[0] * lengths[first:] / lengths[:first, None]
     known = np.where(np.isfinite(covariance), covariance, 0.0)[first:, first:]
-    variance = np.diag(covariance).copy()
-    moved = np.diag(found.covariance + along @ known @ along.T)
-    variance[:first] = np.where(np.isfinite(variance[:first]), moved, np.inf)
-    return dict(zip(names, map(float, np.sqrt(variance)), strict=True))
+    covariance = np.block(
+        [[found.covariance + along @ known @ along.T, along @ known], [known @ along.T, covariance[first:, first:]]]
+    )
+    covariance[blind, blind] = np.inf
+    return replace(found, names=tuple(names), values=model.theta[columns], jacobian=jacobian, covariance=covariance)
 
 
 class _Counter:

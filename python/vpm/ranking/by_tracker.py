@@ -110,7 +110,7 @@ def deviations_by_tracker(
     own, others = ([name for name in several if name in found.parameters] for several in (names, model.adjustable))
     with contextlib.suppress(VpmError, ArithmeticError):
         data, _ = _followed(ranking, model, records[:2], Settings(), setup)
-        return beside_held(_standing(found, tuple(own), data.training), found, data.training, others)
+        return beside_held(_standing(found, tuple(own), data.training), found, data.training, others).deviations
     return {}
 
 

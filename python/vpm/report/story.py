@@ -6,15 +6,15 @@ from typing import TYPE_CHECKING
 
 from vpm.discrepancy import ChannelGap, Diagnosis
 from vpm.numbers import percent, short
-from vpm.report.messages import VERDICT_WORDS, estimate, probability, step_name, took
+from vpm.report.messages import VERDICT_WORDS, estimate, last_stage, probability, refitted, step_name, took
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 
 def print_story(diagnosis: Diagnosis, console: Console) -> None:
-    """Print verdict, effects with their evidence, the gap at each stage, and what was refused and why."""
-    for paragraph in (_verdict, _effects, _steps, _gaps, _refused, _ambiguous, _where, _notes):
+    """Print verdict, effects with their evidence, known parameters, the gap at each stage, and what was refused."""
+    for paragraph in (_verdict, _effects, _known, _steps, _gaps, _refused, _ambiguous, _where, _notes):
         lines = paragraph(diagnosis)
         if lines:
             console.print("\n".join(lines), markup=False)
@@ -37,6 +37,11 @@ def _effects(d: Diagnosis) -> list[str]:
         lines += [f"       {p.dotted} = {estimate(p.value, p.std, p.unit)}" for p in effect.parameters]
         lines += [f"       {note}" for note in effect.notes]
     return lines
+
+
+def _known(d: Diagnosis) -> list[str]:
+    rows = [f"  {name:44s} {stated:>16s}   {said}" for name, stated, said in refitted(d)]
+    return [f"known parameters, fitted anew {last_stage(d)}".strip() + " (model file, fit):", *rows] if rows else []
 
 
 def _steps(d: Diagnosis) -> list[str]:
