@@ -1,10 +1,18 @@
 """Backlash between motor and load, found along the motion of the motor alone; the machine is written out here."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import numpy as np
 import pytest
 
 from vpm import Experiment, Model, diagnose, simulate
 from vpm.catalogue import EFFECTS
+from vpm.discrepancy.parallel_candidates import ParallelCandidates
+from vpm.discrepancy.screening.candidates import Candidate
+from vpm.ranking.judgement import Judgement
+from vpm.ranking.ranking_search import Search
+from vpm.ranking.settings import Settings
 
 GAP, MASS, ROTOR, VISCOUS = 4e-4, 12.0, 3.0, 30.0
 STIFFNESS, DAMPING = 1.5e6, 900.0
@@ -94,3 +102,19 @@ def test_a_backlash_without_a_gap_is_the_compliance_that_it_contains() -> None:
     assert np.max(np.abs(ways[0])) > 1e-4
     assert ways[1] == pytest.approx(ways[0], abs=1e-12)
     assert "joint_compliance" in EFFECTS["backlash"].contains
+
+
+@pytest.mark.parametrize(("gap", "apart"), [(GAP, False), (0.02, True)])
+def test_a_gap_whose_contacts_never_meet_is_no_backlash(loose: tuple[Experiment, ...], gap: float, apart: bool) -> None:
+    """In the middle of the gap roundings pass on ``stiffness width^2 / (1/2 gap^2)``: as much as the contacts here."""
+    width = 0.05 * gap
+    stiffness = STIFFNESS * (0.5 * gap**2 / width**2 if apart else 1.0)
+    start = {"gap": gap, "width": width, "stiffness": stiffness, "damping": 1.0, "contact_damping": DAMPING}
+    model = Model.from_toml(TEXT)
+    search = Search(model, loose[:1], ["backlash"], Settings(), None, ParallelCandidates(1, None), lambda _: None)
+    candidate = Candidate(EFFECTS["backlash"], "axis", (start,))
+    structure = search.extensions.extended(search.start, candidate, start, "motor")
+    trial: Any = SimpleNamespace(key=("backlash", "axis"), fitted=SimpleNamespace(structure=structure))
+    assert search._stays_apart(trial) == apart
+    judged = Judgement(1.0, 1.0, np.inf, 1.0, 1.0, 1.0, apart=apart)
+    assert judged.counts(Settings()) != apart

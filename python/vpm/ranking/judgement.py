@@ -43,6 +43,8 @@ class Judgement(Storable):
         An effect of the same curve that was found before and does as well by another shape of its law; "" if none does.
     timed : str
         A shift of all commands, or of its readings, within one sample that does as well; "" if none does.
+    apart : bool
+        Whether it has a gap whose contacts never meet in the records, so that only their roundings act.
     """
 
     removed: float
@@ -56,6 +58,7 @@ class Judgement(Storable):
     explained: float = 1.0
     reshaped: str = ""
     timed: str = ""
+    apart: bool = False
 
     @property
     def words(self) -> str:
@@ -119,4 +122,6 @@ class Judgement(Storable):
             return f"{self.reshaped} does as well by another shape of its law"
         if self.timed:
             return f"{self.timed}, do as well"
+        if self.apart:
+            return f"it {self.words}, but its contacts never meet: their roundings act as a spring"
         return ""

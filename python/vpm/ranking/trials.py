@@ -8,6 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from vpm.catalogue import EFFECTS
 from vpm.catalogue.kinds import Side
 from vpm.discrepancy.parallel_candidates import ParallelCandidates
 from vpm.discrepancy.screening.candidates import Key
@@ -204,7 +205,22 @@ class Trials:
 
     def examined(self, trial: Trial) -> Trial:
         """Trial of the search that counts, asked what it explains of noise, and what other shapes would do."""
-        return against_free_shapes(trial.beside_mirror_image, self.fitter)
+        judged = replace(trial.judgement, apart=self._stays_apart(trial))
+        return against_free_shapes(replace(trial, judgement=judged).beside_mirror_image, self.fitter)
+
+    def _stays_apart(self, trial: Trial) -> bool:
+        """Whether contacts of a tried effect of the search never meet, as the slowest tracker moves them.
+
+        Far from its contacts a backlash passes on a little by their roundings, in proportion to its way. It may be as
+        stiff there as the spring that is missing.
+        """
+        structure, (name, site) = trial.fitted.structure, trial.key
+        if not EFFECTS[name].has_play or (behind := structure.model.joint_behind(site)) is None:
+            return False
+        model = structure.repaired
+        gap = model.parameters[model.effect(name, site, structure.side(trial.key)).parameter_names["gap"]].value
+        ways = self.fitter.tracked.outputs(model, [f"{behind}.position"])
+        return any(float(np.max(np.abs(way))) < 0.5 * gap for way in ways)
 
     def by_its_own_size(self, trial: Trial) -> Trial:
         """Trial of the search whose effect is as large as it is in its own structure, if its look is none to go by.
