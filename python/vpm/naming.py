@@ -84,7 +84,7 @@ def named(
         return Findings((Stage("recalibrated", "", "", recalibrated),), (), (), ()), ()
     request.tell("measuring what was named on validation records")
     found, ambiguous = found_by(ranking, recalibrated, data, Settings(effects=request.limit), request.effects)
-    notes.extend([*notes_of(found.accepted), *ranked_notes(ranking, found.refused, found.interrupted)])
+    notes.extend([*notes_of(found.accepted, data.training), *ranked_notes(ranking, found.refused, found.interrupted)])
     return found, ambiguous
 
 

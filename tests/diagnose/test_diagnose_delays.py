@@ -1,9 +1,13 @@
 """Late drives and instruments beside dry friction, which is late by itself where a joint turns round."""
 
+from types import SimpleNamespace
+from typing import Any
+
 import pytest
 
 import vpm
 from shared_cases import shared_case
+from vpm.discrepancy.ranked_effects import notes
 
 #: A lag, and the delays that it may be taken for.
 LATE = ("actuator_lag", "input_delay", "sensor_delay")
@@ -54,3 +58,18 @@ def test_a_delay_of_a_machine_that_sticks_is_named() -> None:
     assert [effect.name for effect in why.effects] == ["input_delay"]
     truth = case.truth.hidden[0].parameters["time"]
     assert why.effects[0].parameters[0].value == pytest.approx(truth, rel=0.1)
+
+
+@pytest.mark.parametrize(("hold", "said"), [("zero_order", "held "), ("first_order", "not held ")])
+def test_a_delay_says_how_commands_were_held_beside_it(hold: str, said: str) -> None:
+    """Commands of a faster loop that a log holds at every fourth cycle come early by what half a sample makes late."""
+    nominal = SimpleNamespace(actuators=("motor",))
+    training: Any = SimpleNamespace(hold=hold, motions=(SimpleNamespace(dt=2e-3),), nominal=nominal)
+    measured = SimpleNamespace(invisible=())
+    late: Any = [
+        SimpleNamespace(key=key, label=" at ".join(key), measured=measured)
+        for key in (("input_delay", "motor"), ("sensor_delay", "encoder"), ("spring", "axis"))
+    ]
+    (note,) = notes(late, training)
+    assert note.startswith(f"input_delay at motor: commands were {said}from sample to sample")
+    assert f"1 ms {'longer if they were not' if hold == 'zero_order' else 'shorter if they were'}" in note

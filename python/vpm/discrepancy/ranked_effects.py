@@ -23,11 +23,12 @@ from vpm.discrepancy.screening.candidates import Candidate, Key, asked_for, cand
 from vpm.discrepancy.screening.compliance_and_stop_start import beyond
 from vpm.discrepancy.settings import LEAST_GAIN, NORMAL_95_ONE_SIDED, ROUNDED
 from vpm.errors import VpmError
-from vpm.identify import gain, segments
+from vpm.identify import InverseDynamicsProblem, gain, segments
 from vpm.identify.identifiability import Span, closest_column, is_alias
 from vpm.identify.response_along_motion import joints_with_play
 from vpm.model import Effect, Model
 from vpm.numbers import Array, power
+from vpm.simulate.setup import HOLDS
 
 if TYPE_CHECKING:
     from vpm.ranking import Ranked, Ranking
@@ -443,7 +444,17 @@ def candidates_of(
     return tuple(found)
 
 
-def notes(accepted: Sequence[Accepted]) -> list[str]:
-    """Notes on parameters that only the ranking could estimate."""
+def notes(accepted: Sequence[Accepted], training: InverseDynamicsProblem) -> list[str]:
+    """Notes on parameters that only the ranking could estimate, and on delays of commands that were held."""
+    half = 0.5e3 * max(m.dt for m in training.motions)
+    held = "" if training.hold == HOLDS[0] else "not "
+    late = [
+        f"{entry.label}: commands were {held}held from sample to sample beside it; its time is {half:.3g} ms "
+        f"{'shorter' if held else 'longer'} if they {'were' if held else 'were not'}"
+        for entry in accepted
+        if EFFECTS[entry.key[0]].late == "delay" and entry.key[1] in training.nominal.actuators
+    ]
     blind = [", ".join(entry.measured.invisible) for entry in accepted if entry.measured.invisible]
-    return [f"{names}: as the ranking fitted it, for the inverse-dynamics residual does not show it" for names in blind]
+    return [
+        f"{names}: as the ranking fitted it, for the inverse-dynamics residual does not show it" for names in blind
+    ] + late
