@@ -3,9 +3,12 @@
 Source: D'Imperio 2016, section 4.1.
 """
 
+import math
+
 from vpm.catalogue.kinds import NOT_NEGATIVE, EffectType
 from vpm.catalogue.shared import over_described
 from vpm.catalogue.signature import Signature
+from vpm.catalogue.traits import Tried
 
 EFFECT = EffectType(
     name="valve_dynamics",
@@ -24,6 +27,7 @@ EFFECT = EffectType(
         "input_delay": "they agree for slow commands; steps and fast commands discriminate",
     },
     late="spool",
+    tried=(Tried("time", "interval", (1.0, 4.0, 16.0), (0.02, math.inf)),),
     signature=Signature(
         ("frequency", "command_rate"),
         "An error that grows with frequency up to the bandwidth of the valve",
